@@ -1,0 +1,37 @@
+"""All that a plugin may import from the engine, beside ``sketchmatch.model``.
+
+A distribution offers its algorithms through one entry point in the group ``sketchmatch``, naming
+a module with any of the four hooks, each marked with :data:`hookimpl` and returning classes::
+
+    from sketchmatch.api import hookimpl
+
+    @hookimpl
+    def sketchmatch_register_searchers():
+        return [MySearcher]
+"""
+
+from sketchmatch.api._algorithm import API_VERSION, Algorithm, Params
+from sketchmatch.api._hooks import hookimpl
+from sketchmatch.api.histogram import Histogram, HistogramParams
+from sketchmatch.api.searcher import MatchProblem, Outcome, Searcher, SearchProgress
+from sketchmatch.api.segmenter import Segmentation, Segmenter
+from sketchmatch.api.similarity import Similarity
+from sketchmatch.errors import InvalidInputError, Reason
+
+__all__ = [
+    "API_VERSION",
+    "Algorithm",
+    "Histogram",
+    "HistogramParams",
+    "InvalidInputError",
+    "MatchProblem",
+    "Outcome",
+    "Params",
+    "Reason",
+    "SearchProgress",
+    "Searcher",
+    "Segmentation",
+    "Segmenter",
+    "Similarity",
+    "hookimpl",
+]

@@ -1,0 +1,55 @@
+"""What every algorithm of every kind has: a name, a summary, typed parameters."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict
+
+__all__ = ["API_VERSION", "Algorithm", "Params"]
+
+API_VERSION = 1
+"""Version of the plugin API. It rises when a plugin written before would no longer work."""
+
+
+class Params(BaseModel):
+    """Parameters of one algorithm: frozen, nothing extra, bounds and text on every field.
+
+    One definition serves validation, configuration, command line, catalogue and documentation.
+
+    Examples
+    --------
+    >>> from pydantic import Field
+    >>> class Tracing(Params):
+    ...     tolerance: float = Field(0.1, gt=0, description="Simplification, in metres.")
+    >>> Tracing(tolerance=0.5)
+    Tracing(tolerance=0.5)
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Algorithm:
+    """Base of the four kinds of plugin.
+
+    Parameters
+    ----------
+    params
+        An instance of the class's own ``Params``; its defaults when left out.
+
+    Attributes
+    ----------
+    name
+        What a request, a config file or a command line selects the algorithm by.
+    summary
+        One line for lists.
+    """
+
+    name: ClassVar[str]
+    summary: ClassVar[str]
+
+    class Params(Params):
+        """No parameters, unless the algorithm defines its own."""
+
+    def __init__(self, params: Any = None) -> None:
+        self.params = self.Params() if params is None else params

@@ -1,0 +1,98 @@
+"""The interface of searchers: from relations to the best histogram map."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Generator
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from sketchmatch.api._algorithm import Algorithm
+from sketchmatch.model import Fmap, RelationTable, Weights
+
+__all__ = ["MatchProblem", "Outcome", "SearchProgress", "Searcher"]
+
+
+class Outcome(StrEnum):
+    """Why a search ended; the same names as ``sketchmatch.v1.Outcome``."""
+
+    CONVERGED = "CONVERGED"
+    OPTIMAL = "OPTIMAL"
+    TIME_BUDGET = "TIME_BUDGET"
+    ITERATION_LIMIT = "ITERATION_LIMIT"
+
+
+@dataclass(frozen=True)
+class MatchProblem:
+    """What a searcher is given.
+
+    Attributes
+    ----------
+    table
+        Similarity, rotation and dilation of every histogram correspondence. The template has at
+        most as many objects as the argument.
+    weights
+        Weights of the three parts of ζ.
+    """
+
+    table: RelationTable
+    weights: Weights = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class SearchProgress:
+    """The state of a search.
+
+    Attributes
+    ----------
+    fmap
+        The best legal FMAP so far.
+    confidence
+        Its ζ. It never falls during a search.
+    iteration
+        Iterations done.
+    evaluations
+        FMAPs evaluated.
+    upper_bound
+        A ζ that no legal FMAP exceeds, or None where the searcher proves nothing.
+    """
+
+    fmap: Fmap
+    confidence: float
+    iteration: int
+    evaluations: int
+    upper_bound: float | None = None
+
+
+class Searcher(Algorithm, ABC):
+    """Looks for the FMAP with the highest confidence ζ."""
+
+    @abstractmethod
+    def search(
+        self, problem: MatchProblem, rng: np.random.Generator
+    ) -> Generator[SearchProgress, None, Outcome]:
+        """Search, yielding the state at least every 50 ms.
+
+        The host stops a search by closing the generator; a searcher needs to know nothing of
+        deadlines, cancellation or streams. The same generator state gives the same run, so
+        nothing that is drawn may depend on the clock.
+
+        Parameters
+        ----------
+        problem
+            The relations and the weights; they must not be changed.
+        rng
+            The only source of randomness.
+
+        Yields
+        ------
+        SearchProgress
+            The best FMAP so far; at least one before it returns.
+
+        Returns
+        -------
+        Outcome
+            CONVERGED, OPTIMAL or ITERATION_LIMIT.
+        """

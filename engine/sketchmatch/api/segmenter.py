@@ -1,0 +1,50 @@
+"""The interface of segmenters: from a source to a scene."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from sketchmatch.api._algorithm import Algorithm
+from sketchmatch.model import Scene
+
+__all__ = ["Segmentation", "Segmenter"]
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """What a segmenter found.
+
+    Attributes
+    ----------
+    scene
+        The objects.
+    warnings
+        What it left out or decided on its own, each one sentence for the person who drew it.
+    """
+
+    scene: Scene
+    warnings: tuple[str, ...] = ()
+
+
+class Segmenter(Algorithm, ABC):
+    """Finds the objects in a source.
+
+    Attributes
+    ----------
+    sources
+        The source types that it reads, from :mod:`sketchmatch.model`.
+    """
+
+    sources: ClassVar[tuple[type[Any], ...]]
+
+    @abstractmethod
+    def segment(self, source: Any) -> Segmentation:
+        """Return the objects of ``source``, which is of one of the types in ``sources``.
+
+        Raises
+        ------
+        InvalidInputError
+            With a path relative to the source, if nothing usable is in it.
+        """

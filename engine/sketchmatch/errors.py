@@ -1,0 +1,92 @@
+"""What can go wrong because of the caller, said in one sentence.
+
+Every error that a caller can cause carries a machine-readable reason, the path of the field at
+fault and a sentence with the remedy. The command line prints the sentence and exits with 2; the
+server sends the same as a gRPC status with ``ErrorInfo`` and ``BadRequest``.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Self
+
+__all__ = [
+    "AnswerUnavailableError",
+    "InvalidInputError",
+    "PluginError",
+    "Reason",
+    "SketchmatchError",
+]
+
+
+class Reason(StrEnum):
+    """Machine-readable reasons; the same names as ``sketchmatch.v1.ErrorReason``."""
+
+    MISSING_FIELD = "MISSING_FIELD"
+    INVALID_FIELD = "INVALID_FIELD"
+    INVALID_POLYGON = "INVALID_POLYGON"
+    INVALID_STROKE = "INVALID_STROKE"
+    INVALID_GRID = "INVALID_GRID"
+    INVALID_IMAGE = "INVALID_IMAGE"
+    INVALID_FILE = "INVALID_FILE"
+    TOO_FEW_OBJECTS = "TOO_FEW_OBJECTS"
+    UNKNOWN_ALGORITHM = "UNKNOWN_ALGORITHM"
+    WRONG_ALGORITHM = "WRONG_ALGORITHM"
+    INVALID_PARAMETER = "INVALID_PARAMETER"
+    MESSAGE_TOO_LARGE = "MESSAGE_TOO_LARGE"
+    LIMIT_EXCEEDED = "LIMIT_EXCEEDED"
+    TIME_BUDGET_EXHAUSTED = "TIME_BUDGET_EXHAUSTED"
+    PLUGIN_FAILED = "PLUGIN_FAILED"
+
+
+class SketchmatchError(Exception):
+    """Base of every error that sketchmatch raises on purpose."""
+
+
+class InvalidInputError(SketchmatchError, ValueError):
+    """The caller's input cannot be used as it is.
+
+    Parameters
+    ----------
+    reason
+        What kind of fault it is.
+    field
+        Path of the field at fault, e.g. ``"sketch.stroke_set.strokes[3]"``; empty for the whole.
+    problem
+        What is wrong with it and what would help, without a final full stop and without the
+        field's name: it is read after the path.
+
+    Examples
+    --------
+    >>> str(InvalidInputError(Reason.INVALID_STROKE, "strokes[3]", "has one point; draw a line"))
+    'strokes[3] has one point; draw a line'
+    """
+
+    def __init__(self, reason: Reason, field: str, problem: str) -> None:
+        super().__init__(f"{field} {problem}" if field else problem)
+        self.reason = reason
+        self.field = field
+        self.problem = problem
+
+    def within(self, parent: str) -> Self:
+        """Return the same error with its path seen from ``parent``.
+
+        Examples
+        --------
+        >>> str(InvalidInputError(Reason.INVALID_GRID, "resolution", "is 0").within("map"))
+        'map.resolution is 0'
+        """
+        joint = "." if parent and self.field and not self.field.startswith("[") else ""
+        return type(self)(self.reason, f"{parent}{joint}{self.field}", self.problem)
+
+
+class AnswerUnavailableError(SketchmatchError):
+    """The time budget ended before there was any answer to give."""
+
+    reason = Reason.TIME_BUDGET_EXHAUSTED
+
+
+class PluginError(SketchmatchError):
+    """A plugin broke its contract or raised; the sentence names plugin and distribution."""
+
+    reason = Reason.PLUGIN_FAILED

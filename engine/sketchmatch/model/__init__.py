@@ -1,0 +1,47 @@
+"""The values that flow through a match: immutable, and easy to build by hand in a test."""
+
+from sketchmatch.model.arrays import FloatArray, IntArray
+from sketchmatch.model.maps import Confidence, Fmap, ObjectMap, Occm, Weights
+from sketchmatch.model.relations import (
+    DILATION_SCALE,
+    RelationTable,
+    SceneDescriptor,
+    object_pairs,
+    pair_count,
+    pair_index,
+)
+from sketchmatch.model.scene import Scene, SceneObject
+from sketchmatch.model.sources import (
+    Image,
+    LabelledPolygon,
+    OccupancyGrid,
+    PolygonSet,
+    Source,
+    Stroke,
+    StrokeSet,
+)
+
+__all__ = [
+    "DILATION_SCALE",
+    "Confidence",
+    "FloatArray",
+    "Fmap",
+    "Image",
+    "IntArray",
+    "LabelledPolygon",
+    "ObjectMap",
+    "Occm",
+    "OccupancyGrid",
+    "PolygonSet",
+    "RelationTable",
+    "Scene",
+    "SceneDescriptor",
+    "SceneObject",
+    "Source",
+    "Stroke",
+    "StrokeSet",
+    "Weights",
+    "object_pairs",
+    "pair_count",
+    "pair_index",
+]

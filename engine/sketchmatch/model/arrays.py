@@ -1,0 +1,28 @@
+"""Array types of the model, and how an array becomes part of a frozen value."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FloatArray", "IntArray", "frozen", "frozen_floats"]
+
+_DType = TypeVar("_DType", bound=np.generic)
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def frozen(array: NDArray[_DType]) -> NDArray[_DType]:
+    """Return a contiguous array that cannot be written to, copied where it must be."""
+    if array.flags.writeable or not array.flags.c_contiguous:
+        array = array.copy(order="C")
+        array.flags.writeable = False
+    return array
+
+
+def frozen_floats(values: Any) -> FloatArray:
+    """Return values as a read-only float64 array."""
+    return frozen(np.asarray(values, dtype=np.float64))

@@ -1,0 +1,120 @@
+"""Histogram maps and object maps: what a search finds and what follows from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sketchmatch.model.arrays import FloatArray, IntArray, frozen, frozen_floats
+from sketchmatch.model.relations import object_pairs, pair_index
+
+__all__ = ["Confidence", "Fmap", "ObjectMap", "Occm", "Weights"]
+
+Weights = tuple[float, float, float]
+"""Weights of ζσ, ζR and ζL."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fmap:
+    """A histogram map: one argument correspondence for each template pair.
+
+    Attributes
+    ----------
+    entries
+        int64, shape (Q,), each within [0, Q'): j < Q'/2 is the argument pair (c, d), c < d, and
+        j + Q'/2 its dual (d, c).
+    """
+
+    entries: IntArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "entries", frozen(np.asarray(self.entries, dtype=np.int64)))
+
+    @classmethod
+    def from_object_map(cls, partners: IntArray, argument_objects: int) -> Fmap:
+        """Return the FMAP that an injective object map induces.
+
+        Parameters
+        ----------
+        partners
+            Shape (N,), the argument object of each template object, all different.
+        argument_objects
+            N'.
+
+        Examples
+        --------
+        >>> Fmap.from_object_map(np.array([2, 0, 1]), 3).entries
+        array([4, 5, 0])
+        """
+        half = argument_objects * (argument_objects - 1) // 2
+        c, d = np.asarray(partners, dtype=np.int64)[object_pairs(len(partners))].T
+        low, high = np.minimum(c, d), np.maximum(c, d)
+        column = low * argument_objects - low * (low + 1) // 2 + high - low - 1
+        return cls(np.where(c < d, column, column + half))
+
+    def object_pair(self, i: int, argument_objects: int) -> tuple[int, int]:
+        """Return the argument objects (c, d) that template pair i is mapped to, in order."""
+        half = argument_objects * (argument_objects - 1) // 2
+        column = int(self.entries[i]) % half
+        c, d = (int(k) for k in object_pairs(argument_objects)[column])
+        assert pair_index(c, d, argument_objects) == column
+        return (c, d) if self.entries[i] < half else (d, c)
+
+
+@dataclass(frozen=True)
+class Confidence:
+    """ζ of an FMAP and its three parts.
+
+    Attributes
+    ----------
+    total
+        ζ, the weighted mean of the parts.
+    similarity, rotation, dilation
+        ζσ, ζR and ζL.
+    """
+
+    total: float
+    similarity: float
+    rotation: float
+    dilation: float
+
+
+@dataclass(frozen=True, eq=False)
+class Occm:
+    """Object correspondence confidence matrix.
+
+    Attributes
+    ----------
+    evidence
+        Shape (N, N'): the σ of all histogram correspondences that speak for each pairing.
+    """
+
+    evidence: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "evidence", frozen_floats(self.evidence))
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectMap:
+    """A one-to-one map of template objects to argument objects.
+
+    Attributes
+    ----------
+    partners
+        int64, shape (N,): the argument object of each template object, all different.
+    confidences
+        Shape (N,): the evidence for each pairing divided by N−1, within [0, 1] for an
+        object-consistent FMAP.
+    confidence
+        Ω, their mean.
+    """
+
+    partners: IntArray
+    confidences: FloatArray
+    confidence: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "partners", frozen(np.asarray(self.partners, dtype=np.int64)))
+        object.__setattr__(self, "confidences", frozen_floats(self.confidences))

@@ -1,0 +1,152 @@
+"""Spatial relations: histograms of one scene, and the comparison of two scenes' histograms.
+
+Pairs (a, b), a < b, are numbered row by row: (0, 1), (0, 2) … (0, N−1), (1, 2) …; that is the
+thesis's numbering (section 3.3), counted from 0.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sketchmatch.model.arrays import FloatArray, IntArray, frozen, frozen_floats
+
+__all__ = [
+    "DILATION_SCALE",
+    "RelationTable",
+    "SceneDescriptor",
+    "object_pairs",
+    "pair_count",
+    "pair_index",
+]
+
+DILATION_SCALE = 1.5 / math.log(2.0)
+"""C in L̂ = C·ln L (thesis 3.3: 2.164)."""
+
+
+def pair_count(objects: int) -> int:
+    """Return Q = N(N−1)/2, the number of unordered pairs of N objects.
+
+    Examples
+    --------
+    >>> pair_count(8)
+    28
+    """
+    return objects * (objects - 1) // 2
+
+
+def pair_index(a: int, b: int, objects: int) -> int:
+    """Return the index of pair (a, b), a < b, among ``objects`` objects, all from 0.
+
+    Examples
+    --------
+    >>> [pair_index(a, b, 3) for a, b in [(0, 1), (0, 2), (1, 2)]]
+    [0, 1, 2]
+    """
+    return a * objects - a * (a + 1) // 2 + b - a - 1
+
+
+def object_pairs(objects: int) -> IntArray:
+    """Return all pairs (a, b), a < b, in the order of their index, shape (Q, 2)."""
+    return frozen(np.stack(np.triu_indices(objects, k=1), axis=1).astype(np.int64))
+
+
+@dataclass(frozen=True, eq=False)
+class SceneDescriptor:
+    """All histograms of one scene, F_rD in the thesis.
+
+    Attributes
+    ----------
+    histograms
+        Shape (Q, n): row (a, b), a < b, supports "a is in direction 2πk/n of b". The dual
+        (b, a) is the same row turned by half, so it is not stored.
+    objects
+        N, the number of objects.
+    exponent
+        r of the forces.
+    """
+
+    histograms: FloatArray
+    objects: int
+    exponent: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "histograms", frozen_floats(self.histograms))
+        if self.histograms.shape[0] != pair_count(self.objects):
+            raise ValueError("a descriptor needs one histogram for each pair of objects")
+
+    @property
+    def directions(self) -> int:
+        """The number n of directions."""
+        return self.histograms.shape[1]
+
+    def histogram(self, a: int, b: int) -> FloatArray:
+        """Return the histogram of object a on object b, in either order."""
+        if a < b:
+            return self.histograms[pair_index(a, b, self.objects)]
+        dual = self.histograms[pair_index(b, a, self.objects)]
+        return frozen_floats(np.roll(dual, self.directions // 2))
+
+
+@dataclass(frozen=True, eq=False)
+class RelationTable:
+    """How every template pair compares with every argument pair.
+
+    Columns are the Q'/2 argument pairs (c, d), c < d. The dual of column j is histogram
+    correspondence j + Q'/2: it has the same σ, the same L, and R + π, so it is not stored.
+
+    Attributes
+    ----------
+    similarity
+        σ, shape (Q, Q'/2), within [0, 1].
+    rotation
+        R in radians within [0, 2π), the turn from template to argument, shape (Q, Q'/2).
+    dilation
+        L > 0, the size of the argument relative to the template, shape (Q, Q'/2).
+    template_objects, argument_objects
+        N ≤ N'.
+    """
+
+    similarity: FloatArray
+    rotation: FloatArray
+    dilation: FloatArray
+    template_objects: int
+    argument_objects: int
+
+    def __post_init__(self) -> None:
+        if not 2 <= self.template_objects <= self.argument_objects:
+            raise ValueError("the template must have at least 2 and at most N' objects")
+        shape = (pair_count(self.template_objects), pair_count(self.argument_objects))
+        for name in ("similarity", "rotation", "dilation"):
+            array = frozen_floats(getattr(self, name))
+            if array.shape != shape:
+                raise ValueError(f"{name} has shape {array.shape}, not {shape}")
+            object.__setattr__(self, name, array)
+
+    @property
+    def template_pairs(self) -> int:
+        """Q."""
+        return self.similarity.shape[0]
+
+    @property
+    def argument_pairs(self) -> int:
+        """Q'/2, the number of columns; correspondences run to twice this."""
+        return self.similarity.shape[1]
+
+    @cached_property
+    def normalized_dilation(self) -> FloatArray:
+        """L̂ = C·ln L, shape (Q, Q'/2)."""
+        return frozen(DILATION_SCALE * np.log(self.dilation))
+
+    @cached_property
+    def cosine(self) -> FloatArray:
+        """cos R, shape (Q, Q'/2); a dual has it negated."""
+        return frozen(np.cos(self.rotation))
+
+    @cached_property
+    def sine(self) -> FloatArray:
+        """sin R, shape (Q, Q'/2); a dual has it negated."""
+        return frozen(np.sin(self.rotation))

@@ -1,0 +1,224 @@
+"""Scenes: the polygons that stand for the objects of a sketch or of a map."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+import shapely
+from shapely.validation import explain_validity
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.model.arrays import FloatArray, frozen_floats
+
+__all__ = ["Scene", "SceneObject"]
+
+# Below this share of its squared extent an area is rounding, not a shape.
+_FLAT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class SceneObject:
+    """One object: a polygon with holes, x right, y up.
+
+    Build it with :meth:`from_rings`, which checks and orients the rings.
+
+    Attributes
+    ----------
+    rings
+        The outer ring, counter-clockwise, then the holes, clockwise; each a read-only array of
+        shape (k, 2), k ≥ 3, in metres or sketch units, without a repeated last point.
+    label
+        A name for people. It never influences a match.
+    """
+
+    rings: tuple[FloatArray, ...]
+    label: str = ""
+
+    @classmethod
+    def from_rings(cls, rings: Iterable[Any], label: str = "") -> Self:
+        """Check rings and turn them into an object.
+
+        Parameters
+        ----------
+        rings
+            Outer ring first, then holes; each (k, 2) and array-like, in either orientation,
+            closed or not.
+        label
+            A name for people.
+
+        Raises
+        ------
+        InvalidInputError
+            If a ring has fewer than three distinct points, is not finite or crosses itself, if
+            the polygon has no area, or if its holes leave it or overlap.
+        """
+        arrays = [_clean_ring(ring, f"rings[{k}]") for k, ring in enumerate(rings)]
+        if not arrays:
+            raise InvalidInputError(
+                Reason.INVALID_POLYGON, "rings", "is empty; give at least an outer ring"
+            )
+        outer = arrays[0]
+        extent = float(np.ptp(outer, axis=0).max())
+        polygon = shapely.Polygon(outer, arrays[1:])
+        if abs(_signed_area(outer)) <= _FLAT * extent * extent and not _crosses_itself(outer):
+            raise InvalidInputError(
+                Reason.INVALID_POLYGON, "", "has no area; give three corners not on one line"
+            )
+        if not polygon.is_valid:
+            raise InvalidInputError(Reason.INVALID_POLYGON, "", _explain(polygon))
+        if polygon.area <= _FLAT * extent * extent:
+            raise InvalidInputError(
+                Reason.INVALID_POLYGON, "", "has no area left between its holes; remove a hole"
+            )
+        oriented = tuple(
+            frozen_floats(ring if (_signed_area(ring) > 0) == (k == 0) else ring[::-1])
+            for k, ring in enumerate(arrays)
+        )
+        return cls(oriented, label)
+
+    @cached_property
+    def polygon(self) -> shapely.Polygon:
+        """The object as a shapely polygon."""
+        return shapely.Polygon(self.rings[0], self.rings[1:])
+
+    @property
+    def area(self) -> float:
+        """Area without the holes, in squared scene units."""
+        return float(sum(_signed_area(ring) for ring in self.rings))
+
+    @property
+    def centroid(self) -> tuple[float, float]:
+        """Centre of the area."""
+        point = self.polygon.centroid
+        return (point.x, point.y)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Two or more objects in one frame.
+
+    Attributes
+    ----------
+    objects
+        The objects; their order is their index everywhere, from 0.
+    """
+
+    objects: tuple[SceneObject, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.objects) < 2:
+            count = "no object" if not self.objects else "one object"
+            raise InvalidInputError(
+                Reason.TOO_FEW_OBJECTS,
+                "",
+                f"has {count}; a match compares relations between objects and needs at least two",
+            )
+
+    @classmethod
+    def from_polygons(cls, polygons: Sequence[Any], labels: Sequence[str] | None = None) -> Self:
+        """Build a scene from polygons.
+
+        Parameters
+        ----------
+        polygons
+            Each a (k, 2) array-like, or a list of such rings: outer ring first, then holes.
+        labels
+            One name for each polygon, or None.
+
+        Raises
+        ------
+        InvalidInputError
+            If a polygon cannot be used or there are fewer than two.
+
+        Examples
+        --------
+        >>> square = [[0, 0], [1, 0], [1, 1], [0, 1]]
+        >>> triangle = [[3, 0], [5, 0], [4, 2]]
+        >>> Scene.from_polygons([square, triangle], labels=["desk", "plant"]).objects[1].area
+        2.0
+        """
+        if labels is not None and len(labels) != len(polygons):
+            raise InvalidInputError(
+                Reason.INVALID_FIELD,
+                "labels",
+                f"has {len(labels)} names for {len(polygons)} polygons; give one for each",
+            )
+        objects = []
+        for k, polygon in enumerate(polygons):
+            rings = [polygon] if _is_ring(polygon) else list(polygon)
+            try:
+                objects.append(SceneObject.from_rings(rings, labels[k] if labels else ""))
+            except InvalidInputError as error:
+                raise error.within(f"polygons[{k}]") from None
+        return cls(tuple(objects))
+
+    def __len__(self) -> int:
+        return len(self.objects)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The objects' names, empty where there is none."""
+        return tuple(item.label for item in self.objects)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Smallest x, smallest y, largest x, largest y."""
+        points = np.concatenate([item.rings[0] for item in self.objects])
+        (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
+        return (float(x0), float(y0), float(x1), float(y1))
+
+
+def _is_ring(polygon: Any) -> bool:
+    """Whether it is one ring of points, and not a list of rings."""
+    try:
+        return bool(np.ndim(polygon[0][0]) == 0)
+    except (IndexError, KeyError, TypeError):
+        return True
+
+
+def _clean_ring(ring: Any, field: str) -> FloatArray:
+    try:
+        points = np.asarray(ring, dtype=np.float64)
+    except (TypeError, ValueError):
+        points = np.empty(0)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise InvalidInputError(
+            Reason.INVALID_POLYGON, field, "is not a list of points; give [x, y] pairs of numbers"
+        )
+    if not np.isfinite(points).all():
+        k = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        raise InvalidInputError(
+            Reason.INVALID_POLYGON, f"{field}.points[{k}]", "is not finite; give plain numbers"
+        )
+    points = points[(points != np.roll(points, 1, axis=0)).any(axis=1)]
+    if len(points) < 3:
+        raise InvalidInputError(
+            Reason.INVALID_POLYGON,
+            field,
+            f"has {len(points)} distinct points; a ring needs at least three",
+        )
+    return points
+
+
+def _crosses_itself(ring: FloatArray) -> bool:
+    """Whether a closed ring touches itself other than by lying on one line."""
+    hull = shapely.MultiPoint(ring).convex_hull
+    extent = float(np.ptp(ring, axis=0).max())
+    return bool(hull.area > _FLAT * extent * extent)
+
+
+def _explain(polygon: shapely.Polygon) -> str:
+    message = explain_validity(polygon)
+    where = message[message.find("[") :].strip("[]").replace(" ", ", ") if "[" in message else ""
+    if message.startswith(("Self-intersection", "Ring Self-intersection")):
+        return f"crosses itself at ({where}); draw its outline without crossing"
+    return f"is not a polygon ({message}); keep holes inside the outer ring and apart"
+
+
+def _signed_area(ring: FloatArray) -> float:
+    x, y = (ring - ring[0]).T
+    return float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2.0

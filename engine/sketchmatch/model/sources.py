@@ -1,0 +1,161 @@
+"""What people and robots hand in: strokes, polygons, occupancy grids and images.
+
+A source is data as it came, checked for its form alone; a segmenter turns it into a
+:class:`~sketchmatch.model.Scene`. Field names are those of the messages in
+``proto/sketchmatch/v1/source.proto``, so that an error's path reads the same everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.model.arrays import FloatArray, frozen, frozen_floats
+
+__all__ = [
+    "Image",
+    "LabelledPolygon",
+    "OccupancyGrid",
+    "PolygonSet",
+    "Source",
+    "Stroke",
+    "StrokeSet",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Stroke:
+    """One pen stroke, from pen down to pen up.
+
+    Attributes
+    ----------
+    points
+        Shape (k, 2), sketch units, x right, y up.
+    times
+        Shape (k,), seconds from any origin, or None where the pad gave none.
+    label
+        A name for people.
+    """
+
+    points: FloatArray
+    times: FloatArray | None = None
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        points = frozen_floats(self.points)
+        if points.ndim != 2 or points.shape[1] != 2:
+            raise InvalidInputError(
+                Reason.INVALID_STROKE, "points", "is not a list of [x, y] pairs of numbers"
+            )
+        object.__setattr__(self, "points", points)
+        if self.times is not None:
+            times = frozen_floats(self.times)
+            if times.shape != (len(points),):
+                raise InvalidInputError(
+                    Reason.INVALID_STROKE,
+                    "times",
+                    f"has {times.size} values for {len(points)} points; give one for each or none",
+                )
+            object.__setattr__(self, "times", times)
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeSet:
+    """The strokes of a sketch in the order they were drawn."""
+
+    strokes: tuple[Stroke, ...]
+
+    field = "stroke_set"
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledPolygon:
+    """One polygon as it came: outer ring, then holes, each of shape (k, 2), y up."""
+
+    rings: tuple[FloatArray, ...]
+    label: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class PolygonSet:
+    """Polygons drawn or exported by a tool, one for each object."""
+
+    polygons: tuple[LabelledPolygon, ...]
+
+    field = "polygon_set"
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyGrid:
+    """A robot's occupancy grid, as in ``nav_msgs/OccupancyGrid``.
+
+    Attributes
+    ----------
+    cells
+        int8, shape (rows, columns), row 0 the lowest; −1 unknown, 0 free … 100 occupied.
+    resolution
+        Metres a cell.
+    origin
+        Pose (x, y, yaw) of the lower left corner of cell (0, 0) in the map's frame, in metres
+        and radians counter-clockwise.
+    """
+
+    cells: NDArray[np.int8]
+    resolution: float
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    field = "occupancy_grid"
+
+    def __post_init__(self) -> None:
+        cells = np.asarray(self.cells)
+        if cells.ndim != 2 or cells.size == 0:
+            raise InvalidInputError(
+                Reason.INVALID_GRID, "cells", "is empty; give rows × columns of cells"
+            )
+        if cells.min() < -1 or cells.max() > 100:
+            raise InvalidInputError(
+                Reason.INVALID_GRID,
+                "cells",
+                "has a value outside −1…100; use −1 for unknown and 0…100 for occupancy",
+            )
+        if not (math.isfinite(self.resolution) and self.resolution > 0):
+            raise InvalidInputError(
+                Reason.INVALID_GRID,
+                "resolution",
+                f"is {self.resolution:g}; give the positive size of a cell in metres",
+            )
+        if len(self.origin) != 3 or not all(math.isfinite(value) for value in self.origin):
+            raise InvalidInputError(
+                Reason.INVALID_GRID, "origin", "is not finite; give x, y in metres and yaw"
+            )
+        object.__setattr__(self, "cells", frozen(cells.astype(np.int8, copy=False)))
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """A picture of a map or of a sketch.
+
+    Attributes
+    ----------
+    pixels
+        uint8, shape (rows, columns), grey, row 0 the highest; 0 is black.
+    """
+
+    pixels: NDArray[np.uint8]
+
+    field = "image"
+
+    def __post_init__(self) -> None:
+        pixels = np.asarray(self.pixels)
+        if pixels.ndim != 2 or pixels.size == 0 or pixels.dtype != np.uint8:
+            raise InvalidInputError(
+                Reason.INVALID_IMAGE, "pixels", "is not a grey 8-bit picture; decode it as grey"
+            )
+        object.__setattr__(self, "pixels", frozen(pixels))
+
+
+Source = StrokeSet | PolygonSet | OccupancyGrid | Image

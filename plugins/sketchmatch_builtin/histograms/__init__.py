@@ -1,0 +1,1 @@
+"""Built-in histograms, one algorithm a file."""

@@ -1,0 +1,1 @@
+"""Built-in searchers, one algorithm a file."""

@@ -1,0 +1,1 @@
+"""Built-in similarities, one algorithm a file."""
