@@ -1,0 +1,41 @@
+"""Ask a sketchmatch server which sketched object is which object on a robot's map.
+
+:class:`Client` and :class:`AsyncClient` offer the same calls; :mod:`sketchmatch_client.sources`
+makes sketches and maps to hand to them.
+"""
+
+from sketchmatch_client import sources
+from sketchmatch_client._aio import AsyncClient
+from sketchmatch_client._match import Match
+from sketchmatch_client._requests import MatchOptions
+from sketchmatch_client._sync import Client
+from sketchmatch_client.errors import (
+    CallCancelledError,
+    DeadlineExceededError,
+    InvalidRequestError,
+    NotAuthenticatedError,
+    NotSupportedError,
+    ServerBusyError,
+    ServerFailedError,
+    ServerUnavailableError,
+    SketchmatchError,
+)
+
+__all__ = [
+    "AsyncClient",
+    "CallCancelledError",
+    "Client",
+    "DeadlineExceededError",
+    "InvalidRequestError",
+    "Match",
+    "MatchOptions",
+    "NotAuthenticatedError",
+    "NotSupportedError",
+    "ServerBusyError",
+    "ServerFailedError",
+    "ServerUnavailableError",
+    "SketchmatchError",
+    "sources",
+]
+
+__version__ = "0.1.0"

@@ -1,0 +1,197 @@
+"""The client for asyncio."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncGenerator, Mapping
+from contextlib import aclosing
+from functools import cached_property
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self, Unpack, cast
+
+import grpc
+import grpc.aio
+
+from sketchmatch_client._channel import (
+    CHECK_HEALTH,
+    HEALTH_POLL_SECONDS,
+    OPTIONS,
+    SERVING,
+    ChannelOptions,
+    never_served,
+)
+from sketchmatch_client._match import Match, MatchCollector, ProgressCallback
+from sketchmatch_client._requests import MatchOptions, match_request, segment_request
+from sketchmatch_client.errors import (
+    DeadlineExceededError,
+    ServerUnavailableError,
+    translated_errors,
+)
+from sketchmatch_proto.v1.catalog_service_pb2 import (
+    GetServerInfoRequest,
+    GetServerInfoResponse,
+    ListAlgorithmsRequest,
+    ListAlgorithmsResponse,
+)
+from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceStub
+from sketchmatch_proto.v1.match_service_pb2 import MatchRequest, MatchResponse
+from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceStub
+from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceStub
+from sketchmatch_proto.v1.source_pb2 import Source
+
+if TYPE_CHECKING:  # these exist for type checkers alone
+    from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceAsyncStub
+    from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceAsyncStub
+    from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceAsyncStub
+
+__all__ = ["AsyncClient"]
+
+
+class AsyncClient:
+    """As :class:`Client`, for asyncio; close it, or use it in an ``async with`` statement.
+
+    It belongs to the event loop of its first call.
+
+    Parameters
+    ----------
+    address
+        Host and port of the server, e.g. ``"localhost:50051"``.
+    credentials
+        TLS credentials, e.g. ``grpc.ssl_channel_credentials()``. None: no encryption.
+    timeout
+        Seconds that a call may take where the call itself does not say. None: no limit.
+    options
+        Channel options of gRPC, beside or instead of this package's own.
+
+    Raises
+    ------
+    SketchmatchError
+        From every call: :mod:`sketchmatch_client.errors` has one class for each thing to do.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        credentials: grpc.ChannelCredentials | None = None,
+        timeout: float | None = None,
+        options: ChannelOptions = (),
+    ) -> None:
+        self._address = address
+        self._credentials = credentials
+        self._timeout = timeout
+        self._options = OPTIONS + options
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Close the connection; calls that are under way end."""
+        await self._channel.close()
+
+    async def match(
+        self,
+        sketch: Source,
+        map: Source,  # noqa: A002
+        *,
+        on_progress: ProgressCallback | None = None,
+        timeout: float | None = None,
+        **options: Unpack[MatchOptions],
+    ) -> Match:
+        """Match a sketch with a map and wait for the answer; see :meth:`Client.match`."""
+        collector = MatchCollector(on_progress)
+        async with aclosing(self.events(sketch, map, timeout=timeout, **options)) as events:
+            async for event in events:
+                collector.add(event)
+        return collector.match()
+
+    def events(
+        self,
+        sketch: Source,
+        map: Source,  # noqa: A002
+        *,
+        timeout: float | None = None,
+        **options: Unpack[MatchOptions],
+    ) -> AsyncGenerator[MatchResponse, None]:
+        """Match a sketch with a map, event by event; see :meth:`Client.events`.
+
+        Closing the generator cancels the match. Python does not close it at the moment a loop
+        over it is left; ``contextlib.aclosing`` does.
+        """
+        return self._events(match_request(sketch, map, **options), timeout)
+
+    async def segment(
+        self,
+        source: Source,
+        *,
+        segmenter: str | None = None,
+        params: Mapping[str, Any] | None = None,
+        timeout: float | None = None,
+    ) -> SegmentResponse:
+        """Find the objects of one source, without a match; see :meth:`Client.segment`."""
+        request = segment_request(source, segmenter, params)
+        stub = cast("SceneServiceAsyncStub", SceneServiceStub(self._channel))
+        with translated_errors(self._address):
+            return await stub.Segment(request, timeout=self._limit(timeout))
+
+    async def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
+        """Return the algorithms that the server offers, and its plugins."""
+        stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
+        with translated_errors(self._address):
+            return await stub.ListAlgorithms(ListAlgorithmsRequest(), timeout=self._limit(timeout))
+
+    async def server_info(self, *, timeout: float | None = None) -> GetServerInfoResponse:
+        """Return the server's versions and limits."""
+        stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
+        with translated_errors(self._address):
+            return await stub.GetServerInfo(GetServerInfoRequest(), timeout=self._limit(timeout))
+
+    async def wait_until_serving(self, timeout: float = 60.0) -> None:
+        """Wait until the server is up and warm; see :meth:`Client.wait_until_serving`."""
+        deadline = time.monotonic() + timeout
+        while not await self._is_serving(deadline - time.monotonic()):
+            if time.monotonic() >= deadline:
+                raise never_served(self._address, timeout)
+            await asyncio.sleep(HEALTH_POLL_SECONDS)
+
+    @cached_property
+    def _channel(self) -> grpc.aio.Channel:
+        """The channel, made within the loop that is to run it."""
+        if self._credentials is None:
+            return grpc.aio.insecure_channel(self._address, self._options)
+        return grpc.aio.secure_channel(self._address, self._credentials, self._options)
+
+    async def _events(
+        self, request: MatchRequest, timeout: float | None
+    ) -> AsyncGenerator[MatchResponse, None]:
+        stub = cast("MatchServiceAsyncStub", MatchServiceStub(self._channel))
+        with translated_errors(self._address):
+            call = stub.Match(request, timeout=self._limit(timeout))
+            try:
+                async for event in call:
+                    yield event
+            finally:
+                call.cancel()
+
+    async def _is_serving(self, timeout: float) -> bool:
+        check: grpc.aio.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(
+            CHECK_HEALTH
+        )
+        try:
+            with translated_errors(self._address):
+                return await check(b"", timeout=timeout) == SERVING
+        except (ServerUnavailableError, DeadlineExceededError):
+            return False
+
+    def _limit(self, timeout: float | None) -> float | None:
+        return self._timeout if timeout is None else timeout

@@ -1,0 +1,131 @@
+"""From plain Python values to requests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import timedelta
+from typing import Any, TypedDict
+
+from google.protobuf.duration_pb2 import Duration
+from google.protobuf.struct_pb2 import Struct
+
+from sketchmatch_client.errors import InvalidRequestError, refused_as
+from sketchmatch_proto.v1.match_pb2 import ConfidenceWeights
+from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
+from sketchmatch_proto.v1.pipeline_pb2 import AlgorithmSelection, Pipeline
+from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest
+from sketchmatch_proto.v1.source_pb2 import Source
+
+__all__ = ["MatchOptions", "match_request", "segment_request"]
+
+_STAGES = ("sketch_segmenter", "map_segmenter", "histogram", "similarity", "searcher")
+
+
+class MatchOptions(TypedDict, total=False):
+    """How to match; whatever is left out is the server's to decide.
+
+    Attributes
+    ----------
+    sketch_segmenter, map_segmenter, histogram, similarity, searcher
+        Names of algorithms; :meth:`Client.algorithms` lists them.
+    params
+        Parameters by stage, e.g. ``{"searcher": {"population": 200}}``. The stages are the
+        names of the five options above.
+    seed
+        Seed of everything random, from 0 to 2**64 − 1. Left out: 0.
+    time_budget
+        Seconds, or a timedelta, after which the best match so far is the result.
+    weights
+        Weights of similarity, rotation and dilation in ζ. Left out: 1, 1, 1.
+    """
+
+    sketch_segmenter: str | None
+    map_segmenter: str | None
+    histogram: str | None
+    similarity: str | None
+    searcher: str | None
+    params: Mapping[str, Mapping[str, Any]] | None
+    seed: int | None
+    time_budget: float | timedelta | None
+    weights: tuple[float, float, float] | None
+
+
+def match_request(
+    sketch: Source,
+    map: Source,  # noqa: A002
+    *,
+    params: Mapping[str, Mapping[str, Any]] | None = None,
+    seed: int | None = None,
+    time_budget: float | timedelta | None = None,
+    weights: tuple[float, float, float] | None = None,
+    **names: str | None,
+) -> MatchRequest:
+    """Return the request for a match; see :class:`MatchOptions`.
+
+    Examples
+    --------
+    >>> match_request(Source(), Source(), searcher="easm", seed=7).pipeline.searcher.name
+    'easm'
+    """
+    request = MatchRequest(sketch=sketch, map=map, pipeline=_pipeline(names, params or {}))
+    if seed is not None:
+        with refused_as("INVALID_FIELD", "seed", "is not a whole number from 0 to 2**64 − 1"):
+            request.seed = seed
+    if time_budget is not None:
+        with refused_as("INVALID_FIELD", "time_budget", "is not a number of seconds"):
+            request.time_budget.CopyFrom(_duration(time_budget))
+    if weights is not None:
+        with refused_as(
+            "INVALID_FIELD", "weights", "is not three numbers: similarity, rotation, dilation"
+        ):
+            similarity, rotation, dilation = weights
+            request.weights.CopyFrom(
+                ConfidenceWeights(similarity=similarity, rotation=rotation, dilation=dilation)
+            )
+    return request
+
+
+def segment_request(
+    source: Source, segmenter: str | None, params: Mapping[str, Any] | None
+) -> SegmentRequest:
+    """Return the request for the objects of one source."""
+    request = SegmentRequest(source=source)
+    if segmenter or params:
+        request.segmenter.CopyFrom(_selection("segmenter", segmenter or "", params or {}))
+    return request
+
+
+def _pipeline(names: Mapping[str, str | None], params: Mapping[str, Mapping[str, Any]]) -> Pipeline:
+    if unknown := sorted(names.keys() - set(_STAGES)):
+        raise TypeError(f"unknown option {unknown[0]!r}; MatchOptions lists those there are")
+    if unknown := sorted(params.keys() - set(_STAGES)):
+        raise InvalidRequestError(
+            f"params has no stage {unknown[0]!r}; the stages are {', '.join(_STAGES)}",
+            "INVALID_FIELD",
+            "pipeline",
+        )
+    return Pipeline(
+        **{
+            stage: _selection(f"pipeline.{stage}", names.get(stage) or "", params.get(stage, {}))
+            for stage in _STAGES
+            if names.get(stage) or params.get(stage)
+        }
+    )
+
+
+def _selection(field: str, name: str, params: Mapping[str, Any]) -> AlgorithmSelection:
+    selection = AlgorithmSelection(name=name)
+    if params:
+        struct = Struct()
+        with refused_as("INVALID_FIELD", f"{field}.parameters", "holds a value that is not JSON"):
+            struct.update(params)
+        selection.parameters.CopyFrom(struct)
+    return selection
+
+
+def _duration(value: float | timedelta) -> Duration:
+    duration = Duration()
+    if not isinstance(value, timedelta):
+        value = timedelta(seconds=value)
+    duration.FromTimedelta(value)
+    return duration

@@ -1,0 +1,241 @@
+"""The client for plain, blocking code."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Mapping
+from contextlib import closing
+from types import TracebackType
+from typing import Any, Self, Unpack
+
+import grpc
+
+from sketchmatch_client._channel import (
+    CHECK_HEALTH,
+    HEALTH_POLL_SECONDS,
+    OPTIONS,
+    SERVING,
+    ChannelOptions,
+    never_served,
+)
+from sketchmatch_client._match import Match, MatchCollector, ProgressCallback
+from sketchmatch_client._requests import MatchOptions, match_request, segment_request
+from sketchmatch_client.errors import (
+    DeadlineExceededError,
+    ServerUnavailableError,
+    translated_errors,
+)
+from sketchmatch_proto.v1.catalog_service_pb2 import (
+    GetServerInfoRequest,
+    GetServerInfoResponse,
+    ListAlgorithmsRequest,
+    ListAlgorithmsResponse,
+)
+from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceStub
+from sketchmatch_proto.v1.match_service_pb2 import MatchRequest, MatchResponse
+from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceStub
+from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceStub
+from sketchmatch_proto.v1.source_pb2 import Source
+
+__all__ = ["Client"]
+
+
+class Client:
+    """A connection to a sketchmatch server; close it, or use it in a ``with`` statement.
+
+    It connects with the first call, and again by itself when the link was lost. It may be
+    used from several threads.
+
+    Parameters
+    ----------
+    address
+        Host and port of the server, e.g. ``"localhost:50051"``.
+    credentials
+        TLS credentials, e.g. ``grpc.ssl_channel_credentials()``. None: no encryption.
+    timeout
+        Seconds that a call may take where the call itself does not say. None: no limit.
+    options
+        Channel options of gRPC, beside or instead of this package's own.
+
+    Raises
+    ------
+    SketchmatchError
+        From every call: :mod:`sketchmatch_client.errors` has one class for each thing to do.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        credentials: grpc.ChannelCredentials | None = None,
+        timeout: float | None = None,
+        options: ChannelOptions = (),
+    ) -> None:
+        self._address = address
+        self._timeout = timeout
+        self._channel = (
+            grpc.insecure_channel(address, OPTIONS + options)
+            if credentials is None
+            else grpc.secure_channel(address, credentials, OPTIONS + options)
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection; calls that are under way end."""
+        self._channel.close()
+
+    def match(
+        self,
+        sketch: Source,
+        map: Source,  # noqa: A002
+        *,
+        on_progress: ProgressCallback | None = None,
+        timeout: float | None = None,
+        **options: Unpack[MatchOptions],
+    ) -> Match:
+        """Match a sketch with a map and wait for the answer.
+
+        Parameters
+        ----------
+        sketch, map
+            From :mod:`sketchmatch_client.sources`.
+        on_progress
+            Called with each :class:`MatchProgress`, at most 20 a second. What it raises ends
+            the match.
+        timeout
+            Seconds after which the call fails. To have the best match until then, give a
+            ``time_budget`` instead.
+        **options
+            Algorithms, parameters, seed, time budget and weights: :class:`MatchOptions`.
+
+        Returns
+        -------
+        Match
+            How it ran, the objects found and the result.
+        """
+        collector = MatchCollector(on_progress)
+        with closing(self.events(sketch, map, timeout=timeout, **options)) as events:
+            for event in events:
+                collector.add(event)
+        return collector.match()
+
+    def events(
+        self,
+        sketch: Source,
+        map: Source,  # noqa: A002
+        *,
+        timeout: float | None = None,
+        **options: Unpack[MatchOptions],
+    ) -> Generator[MatchResponse, None, None]:
+        """Match a sketch with a map, event by event.
+
+        The match starts when the first event is asked for. Closing the generator, or leaving
+        the loop over it and dropping it, cancels the match.
+
+        Parameters
+        ----------
+        sketch, map, timeout, **options
+            As for :meth:`match`.
+
+        Yields
+        ------
+        MatchResponse
+            ``accepted``, ``scenes``, any number of ``progress``, ``result``; a newer server
+            may send others, to be skipped.
+        """
+        return self._events(match_request(sketch, map, **options), timeout)
+
+    def segment(
+        self,
+        source: Source,
+        *,
+        segmenter: str | None = None,
+        params: Mapping[str, Any] | None = None,
+        timeout: float | None = None,
+    ) -> SegmentResponse:
+        """Find the objects of one source, without a match.
+
+        Parameters
+        ----------
+        source
+            From :mod:`sketchmatch_client.sources`.
+        segmenter
+            Name of the algorithm; the server's choice when left out.
+        params
+            Its parameters.
+        timeout
+            Seconds after which the call fails.
+
+        Returns
+        -------
+        SegmentResponse
+            The scene, warnings, and the segmenter as it ran.
+        """
+        request = segment_request(source, segmenter, params)
+        with translated_errors(self._address):
+            return SceneServiceStub(self._channel).Segment(request, timeout=self._limit(timeout))
+
+    def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
+        """Return the algorithms that the server offers, and its plugins."""
+        with translated_errors(self._address):
+            return CatalogServiceStub(self._channel).ListAlgorithms(
+                ListAlgorithmsRequest(), timeout=self._limit(timeout)
+            )
+
+    def server_info(self, *, timeout: float | None = None) -> GetServerInfoResponse:
+        """Return the server's versions and limits."""
+        with translated_errors(self._address):
+            return CatalogServiceStub(self._channel).GetServerInfo(
+                GetServerInfoRequest(), timeout=self._limit(timeout)
+            )
+
+    def wait_until_serving(self, timeout: float = 60.0) -> None:
+        """Wait until the server is up and warm.
+
+        Parameters
+        ----------
+        timeout
+            Seconds to wait at most. A server's first ever start compiles its kernels.
+
+        Raises
+        ------
+        ServerUnavailableError
+            If it does not serve by then.
+        """
+        deadline = time.monotonic() + timeout
+        while not self._is_serving(deadline - time.monotonic()):
+            if time.monotonic() >= deadline:
+                raise never_served(self._address, timeout)
+            time.sleep(HEALTH_POLL_SECONDS)
+
+    def _events(
+        self, request: MatchRequest, timeout: float | None
+    ) -> Generator[MatchResponse, None, None]:
+        with translated_errors(self._address):
+            call = MatchServiceStub(self._channel).Match(request, timeout=self._limit(timeout))
+            try:
+                yield from call
+            finally:
+                call.cancel()
+
+    def _is_serving(self, timeout: float) -> bool:
+        check: grpc.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(CHECK_HEALTH)
+        try:
+            with translated_errors(self._address):
+                return check(b"", timeout=timeout) == SERVING
+        except (ServerUnavailableError, DeadlineExceededError):
+            return False
+
+    def _limit(self, timeout: float | None) -> float | None:
+        return self._timeout if timeout is None else timeout

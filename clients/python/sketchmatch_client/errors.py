@@ -1,0 +1,188 @@
+"""What can go wrong in a call, each with one sentence for people and a reason for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+import grpc
+from google.protobuf.message import DecodeError, Message
+from google.rpc import error_details_pb2, status_pb2  # type: ignore[import-untyped]
+
+__all__ = [
+    "CallCancelledError",
+    "DeadlineExceededError",
+    "InvalidRequestError",
+    "NotAuthenticatedError",
+    "NotSupportedError",
+    "ServerBusyError",
+    "ServerFailedError",
+    "ServerUnavailableError",
+    "SketchmatchError",
+    "refused_as",
+    "translated_errors",
+]
+
+_Detail = TypeVar("_Detail", bound=Message)
+
+
+class SketchmatchError(Exception):
+    """Base of every error of this package.
+
+    Parameters
+    ----------
+    message
+        One sentence for people.
+    reason
+        A name of ``sketchmatch.v1.ErrorReason`` without its prefix; empty where none was given.
+    """
+
+    def __init__(self, message: str, reason: str = "") -> None:
+        super().__init__(message)
+        self.reason = reason
+
+
+class InvalidRequestError(SketchmatchError, ValueError):
+    """The request cannot be used as it is; correct it, the same one fails again.
+
+    Parameters
+    ----------
+    message
+        One sentence with the remedy.
+    reason
+        What kind of fault it is, e.g. ``"INVALID_STROKE"``.
+    field
+        Path of the field at fault, e.g. ``"sketch.stroke_set.strokes[3]"``; empty for the whole.
+    """
+
+    def __init__(self, message: str, reason: str = "", field: str = "") -> None:
+        super().__init__(message, reason)
+        self.field = field
+
+
+class ServerUnavailableError(SketchmatchError):
+    """No server answers, or it is starting or stopping; wait until it serves and send again."""
+
+
+class ServerBusyError(SketchmatchError):
+    """The server has no room for the request now.
+
+    Parameters
+    ----------
+    message
+        One sentence.
+    reason
+        What it has no room for.
+    retry_after
+        Seconds after which to send the same request again, or None where the server did not say.
+    """
+
+    def __init__(self, message: str, reason: str = "", retry_after: float | None = None) -> None:
+        super().__init__(message, reason)
+        self.retry_after = retry_after
+
+
+class DeadlineExceededError(SketchmatchError):
+    """The time ended before there was an answer; allow more of it."""
+
+
+class NotAuthenticatedError(SketchmatchError):
+    """The server wants credentials, or others than the client has."""
+
+
+class NotSupportedError(SketchmatchError):
+    """The server does not know the method; it is older than this client, or another server."""
+
+
+class CallCancelledError(SketchmatchError):
+    """The call was cancelled from elsewhere."""
+
+
+class ServerFailedError(SketchmatchError):
+    """The server could not do what it should; the message says which part of it failed."""
+
+
+@contextmanager
+def translated_errors(address: str) -> Iterator[None]:
+    """Turn gRPC's errors of a server at ``address`` into this package's."""
+    try:
+        yield
+    except grpc.RpcError as error:
+        raise _translated(error, address) from error
+
+
+@contextmanager
+def refused_as(reason: str, field: str, problem: str) -> Iterator[None]:
+    """Turn what Python or protobuf say to a value of the wrong form into one clear sentence."""
+    try:
+        yield
+    except (TypeError, ValueError, OverflowError, IndexError) as error:
+        raise InvalidRequestError(f"{field} {problem}", reason, field) from error
+
+
+_OTHERS: dict[grpc.StatusCode, type[SketchmatchError]] = {
+    grpc.StatusCode.CANCELLED: CallCancelledError,
+    grpc.StatusCode.UNIMPLEMENTED: NotSupportedError,
+    grpc.StatusCode.UNAUTHENTICATED: NotAuthenticatedError,
+    grpc.StatusCode.PERMISSION_DENIED: NotAuthenticatedError,
+}
+
+
+def _translated(error: grpc.RpcError, address: str) -> SketchmatchError:
+    code = error.code()
+    details = _details(error)
+    message = error.details() or f"the server at {address} reports {code.name}"
+    reason = _reason(details)
+    match code:
+        case grpc.StatusCode.INVALID_ARGUMENT:
+            return InvalidRequestError(message, reason, _field(details))
+        case grpc.StatusCode.RESOURCE_EXHAUSTED if not reason and "larger than max" in message:
+            problem = f"the request is larger than the server at {address} accepts; make it smaller"
+            return InvalidRequestError(problem, "MESSAGE_TOO_LARGE")
+        case grpc.StatusCode.RESOURCE_EXHAUSTED:
+            return ServerBusyError(message, reason, _retry_after(details))
+        case grpc.StatusCode.UNAVAILABLE:
+            problem = f"the sketchmatch server at {address} is not available"
+            remedy = "start it, or check the address"
+            return ServerUnavailableError(f"{problem}; {remedy} ({message})", reason)
+        case grpc.StatusCode.DEADLINE_EXCEEDED:
+            late = f"the server at {address} did not answer within the timeout; allow more time"
+            return DeadlineExceededError(message if reason else late, reason)
+    return _OTHERS.get(code, ServerFailedError)(message, reason)
+
+
+def _details(error: grpc.RpcError) -> status_pb2.Status:
+    """Return the status in the trailer, empty if there is none or it cannot be read."""
+    trailer: Any = error.trailing_metadata() or ()
+    # Pairs; dict alone would ask for keys, which grpc.aio of grpcio 1.62 gets wrong.
+    packed = dict(iter(trailer)).get("grpc-status-details-bin", b"")
+    try:
+        return status_pb2.Status.FromString(packed)
+    except DecodeError:
+        return status_pb2.Status()
+
+
+def _detail(details: status_pb2.Status, kind: type[_Detail]) -> _Detail:
+    """Return the detail of a kind, or an empty one."""
+    detail = kind()
+    for packed in details.details:
+        if packed.Unpack(detail):
+            break
+    return detail
+
+
+def _reason(details: status_pb2.Status) -> str:
+    return str(_detail(details, error_details_pb2.ErrorInfo).reason)
+
+
+def _field(details: status_pb2.Status) -> str:
+    violations = _detail(details, error_details_pb2.BadRequest).field_violations
+    return str(violations[0].field) if violations else ""
+
+
+def _retry_after(details: status_pb2.Status) -> float | None:
+    retry = _detail(details, error_details_pb2.RetryInfo)
+    if not retry.HasField("retry_delay"):
+        return None
+    return float(retry.retry_delay.ToTimedelta().total_seconds())

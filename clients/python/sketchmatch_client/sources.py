@@ -1,0 +1,277 @@
+"""Sketches and maps to hand to a client, from what people and robots have at hand.
+
+These functions check the form of what they are given. Whether a stroke makes an object, or a map
+shows anything, is the server's to say.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from array import array
+from collections.abc import Iterable, Sequence
+from itertools import chain
+from numbers import Real
+from pathlib import Path
+from typing import Any, Literal
+
+from sketchmatch_client.errors import InvalidRequestError, refused_as
+from sketchmatch_proto.v1 import source_pb2
+
+__all__ = ["YAxis", "image", "map_server_map", "occupancy_grid", "polygons", "strokes"]
+
+YAxis = Literal["up", "down"]
+"""Which way y grows: screens, tablets and pictures deliver ``"down"``."""
+
+_Y_AXES = {"up": source_pb2.Y_AXIS_UP, "down": source_pb2.Y_AXIS_DOWN}
+
+# `image: room.pgm`, its path plain or in quotes, a comment after it or none.
+_IMAGE_LINE = re.compile(
+    r"""^image[ \t]*:[ \t]+(?:"([^"\n]+)"|'([^'\n]+)'|([^\s"'#].*?))[ \t]*(?:[ \t]\#.*)?$""",
+    re.MULTILINE,
+)
+
+
+def strokes(
+    strokes: Iterable[Iterable[Sequence[float]]],
+    labels: Sequence[str] | None = None,
+    *,
+    y_axis: YAxis = "up",
+) -> source_pb2.Source:
+    """Return a sketch of pen strokes.
+
+    Parameters
+    ----------
+    strokes
+        For each stroke its points, (x, y) or (x, y, seconds); lists or arrays.
+    labels
+        A name for each stroke.
+    y_axis
+        ``"down"`` for points from a screen, tablet or browser. A sketch that is read with the
+        wrong axis is its own mirror image, and cannot match.
+
+    Raises
+    ------
+    InvalidRequestError
+        If the points are not of this form.
+
+    Examples
+    --------
+    >>> table = [(10, 10), (60, 10), (60, 40), (10, 40), (10, 11)]
+    >>> sketch = strokes([table, [(100, 80, 0.0), (120, 80, 0.1), (110, 95, 0.2)]], y_axis="down")
+    >>> sketch.stroke_set.strokes[1].points[2].time_seconds
+    0.2
+    """
+    drawn = [
+        source_pb2.Stroke(points=_stroke_points(points, f"stroke_set.strokes[{k}].points"))
+        for k, points in enumerate(strokes)
+    ]
+    for stroke, label in zip(drawn, _labels(labels, len(drawn), "strokes"), strict=True):
+        stroke.label = label
+    return source_pb2.Source(stroke_set=source_pb2.StrokeSet(strokes=drawn, y_axis=_y_axis(y_axis)))
+
+
+def polygons(
+    polygons: Iterable[Sequence[Any]],
+    labels: Sequence[str] | None = None,
+    *,
+    y_axis: YAxis = "up",
+) -> source_pb2.Source:
+    """Return a sketch or map of polygons.
+
+    Parameters
+    ----------
+    polygons
+        For each object the (x, y) corners of its outline, or a list of such rings: the outline,
+        then its holes.
+    labels
+        A name for each polygon.
+    y_axis
+        Which way y grows; see :func:`strokes`.
+
+    Raises
+    ------
+    InvalidRequestError
+        If the corners are not of this form.
+
+    Examples
+    --------
+    >>> room = polygons([[(0, 0), (2, 0), (2, 1)], [(4, 0), (5, 0), (5, 3)]], ["bed", "desk"])
+    >>> [polygon.label for polygon in room.polygon_set.polygons]
+    ['bed', 'desk']
+    """
+    drawn = [
+        source_pb2.LabelledPolygon(rings=_rings(polygon, f"polygon_set.polygons[{k}]"))
+        for k, polygon in enumerate(polygons)
+    ]
+    for polygon, label in zip(drawn, _labels(labels, len(drawn), "polygons"), strict=True):
+        polygon.label = label
+    return source_pb2.Source(
+        polygon_set=source_pb2.PolygonSet(polygons=drawn, y_axis=_y_axis(y_axis))
+    )
+
+
+def occupancy_grid(
+    cells: Any,
+    resolution: float,
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    *,
+    columns: int | None = None,
+) -> source_pb2.Source:
+    r"""Return a robot's occupancy grid as a map.
+
+    Parameters
+    ----------
+    cells
+        −1 unknown, 0 free … 100 occupied, row 0 the lowest: a two-dimensional array, a list of
+        rows, or one flat row such as bytes or the ``data`` of a ROS ``nav_msgs/OccupancyGrid``.
+    resolution
+        Metres a cell.
+    origin
+        Pose (x, y, yaw) of the grid's lower left corner, in metres and radians.
+    columns
+        Cells in a row, for flat cells (``info.width`` in ROS).
+
+    Raises
+    ------
+    InvalidRequestError
+        If the cells are no rectangle of signed bytes.
+
+    Examples
+    --------
+    >>> grid = occupancy_grid([[0, 0, 100], [0, -1, 100]], resolution=0.05).occupancy_grid
+    >>> grid.rows, grid.columns, grid.cells
+    (2, 3, b'\x00\x00d\x00\xffd')
+    """
+    with refused_as("INVALID_GRID", "occupancy_grid", "needs numbers for resolution and origin"):
+        x, y, yaw = origin
+        grid = source_pb2.OccupancyGrid(
+            resolution_meters=resolution,
+            origin=source_pb2.Pose(x_meters=x, y_meters=y, yaw_radians=yaw),
+        )
+    problem = "is not a rectangle of whole numbers from −1 to 100"
+    with refused_as("INVALID_GRID", "occupancy_grid.cells", problem):
+        grid.cells, width = _flat_cells(cells)
+    width = columns or width
+    if not width or len(grid.cells) % width:
+        raise InvalidRequestError(
+            f"occupancy_grid.columns is {width or 'not given'} for {len(grid.cells)} cells; "
+            "give the number of cells in a row",
+            "INVALID_GRID",
+            "occupancy_grid.columns",
+        )
+    grid.rows, grid.columns = len(grid.cells) // width, width
+    return source_pb2.Source(occupancy_grid=grid)
+
+
+def map_server_map(path: str | os.PathLike[str]) -> source_pb2.Source:
+    """Return a map as ROS map_server saved it.
+
+    Parameters
+    ----------
+    path
+        The .yaml file. The picture that its ``image`` names is read as well.
+
+    Raises
+    ------
+    InvalidRequestError
+        If the file names no picture, or one that cannot be read.
+    OSError
+        If the file itself cannot be read.
+    """
+    path = Path(path)
+    with refused_as("INVALID_FILE", "map_server_map.yaml", f"({path}) is not text in UTF-8"):
+        text = path.read_text(encoding="utf-8")
+    line = _IMAGE_LINE.search(text)
+    if line is None:
+        raise InvalidRequestError(
+            f"map_server_map.yaml ({path}) names no picture; add a line `image: FILE`",
+            "INVALID_FILE",
+            "map_server_map.yaml",
+        )
+    picture = path.parent / line[line.lastindex or 0]
+    try:
+        data = picture.read_bytes()
+    except OSError as error:
+        raise InvalidRequestError(
+            f"map_server_map.image ({picture}, as {path} names it) cannot be read: "
+            f"{error.strerror}",
+            "INVALID_FILE",
+            "map_server_map.image",
+        ) from error
+    return source_pb2.Source(map_server_map=source_pb2.MapServerMap(yaml=text, image=data))
+
+
+def image(file: str | os.PathLike[str] | bytes) -> source_pb2.Source:
+    """Return a picture of a map or of a sketch: dark shapes or outlines on light paper.
+
+    Parameters
+    ----------
+    file
+        A PNG, JPEG, BMP or PGM file, or its bytes.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    """
+    data = file if isinstance(file, bytes) else Path(file).read_bytes()
+    return source_pb2.Source(image=source_pb2.EncodedImage(data=data))
+
+
+def _stroke_points(points: Iterable[Sequence[float]], field: str) -> list[source_pb2.StrokePoint]:
+    made = []
+    with refused_as("INVALID_STROKE", field, "is not a list of points"):
+        points = list(points)
+    for k, point in enumerate(points):
+        with refused_as("INVALID_STROKE", f"{field}[{k}]", "is not (x, y) or (x, y, seconds)"):
+            x, y, *time = point
+            (seconds,) = time or (None,)
+            made.append(source_pb2.StrokePoint(x=x, y=y, time_seconds=seconds))
+    return made
+
+
+def _rings(polygon: Sequence[Any], field: str) -> list[source_pb2.Ring]:
+    with refused_as("INVALID_POLYGON", field, "is not a list of (x, y) corners, or of rings"):
+        rings = [polygon] if isinstance(polygon[0][0], Real) else polygon
+        return [
+            source_pb2.Ring(points=[source_pb2.Point(x=x, y=y) for x, y in ring]) for ring in rings
+        ]
+
+
+def _flat_cells(cells: Any) -> tuple[bytes, int]:
+    """Return cells as signed bytes, and the cells in a row, 0 if they are flat already."""
+    try:
+        view = memoryview(cells)
+    except TypeError:
+        view = None
+    if view is not None and view.shape and view.itemsize == 1:
+        return view.tobytes(), view.shape[1] if view.ndim == 2 else 0
+    rows = list(cells)
+    if not rows or isinstance(rows[0], Real):
+        return array("b", rows).tobytes(), 0
+    widths = {len(row) for row in rows}
+    if len(widths) > 1:
+        raise ValueError("rows of different lengths")
+    return array("b", chain.from_iterable(rows)).tobytes(), widths.pop()
+
+
+def _labels(labels: Sequence[str] | None, count: int, what: str) -> Sequence[str]:
+    if labels is None:
+        return [""] * count
+    if len(labels) != count:
+        raise InvalidRequestError(
+            f"labels has {len(labels)} names for {count} {what}; give one for each, or none",
+            "INVALID_FIELD",
+        )
+    return labels
+
+
+def _y_axis(name: str) -> source_pb2.YAxis.ValueType:
+    if name not in _Y_AXES:
+        raise InvalidRequestError(
+            f"y_axis is {name!r}; give 'up', or 'down' for points from a screen",
+            "INVALID_FIELD",
+            "y_axis",
+        )
+    return _Y_AXES[name]

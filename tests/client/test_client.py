@@ -1,0 +1,316 @@
+import asyncio
+import gc
+import time
+from contextlib import aclosing, closing
+from datetime import timedelta
+from threading import Timer
+
+import grpc
+import pytest
+
+from sketchmatch_client import AsyncClient, Client, ServerUnavailableError, sources
+from sketchmatch_client.errors import (
+    CallCancelledError,
+    DeadlineExceededError,
+    InvalidRequestError,
+    NotAuthenticatedError,
+    NotSupportedError,
+    ServerBusyError,
+    ServerFailedError,
+    SketchmatchError,
+)
+from tests.client.fake_server import EVENTS, reason, retry_after, running, violation
+
+TRIANGLE = [(0, 0), (2, 0), (2, 1)]
+SKETCH = sources.strokes([TRIANGLE, TRIANGLE], y_axis="down")
+MAP = sources.polygons([TRIANGLE, TRIANGLE])
+
+
+class TestMatch:
+    def test_returns_the_answer_and_what_it_is_about(self, call, server):
+        match = call(server.address, "match", SKETCH, MAP)
+        assert match.accepted == EVENTS[0].accepted
+        assert match.scenes == EVENTS[1].scenes
+        assert match.result == EVENTS[-1].result
+        assert match.object_map == {0: 2, 1: 0}
+
+    def test_reports_progress_and_skips_unknown_events(self, call, server):
+        seen = []
+        call(server.address, "match", SKETCH, MAP, on_progress=seen.append)
+        assert [progress.confidence for progress in seen] == [0.5, 0.75]
+
+    def test_a_callback_that_raises_ends_the_match(self, call, server):
+        def give_up(_progress):
+            raise RuntimeError("seen enough")
+
+        server.endless = True
+        with pytest.raises(RuntimeError, match="seen enough"):
+            call(server.address, "match", SKETCH, MAP, on_progress=give_up)
+        assert server.cancelled.wait(5)
+
+    def test_a_stream_without_a_result_is_an_error(self, call, server):
+        server.events = EVENTS[:2]
+        with pytest.raises(ServerFailedError, match="without a result"):
+            call(server.address, "match", SKETCH, MAP)
+
+
+class TestRequest:
+    def test_leaves_everything_to_the_server(self, call, server):
+        call(server.address, "match", SKETCH, MAP)
+        (request,) = server.requests
+        assert (request.sketch, request.map) == (SKETCH, MAP)
+        assert not request.HasField("seed")
+        assert not request.HasField("time_budget")
+        assert not request.HasField("weights")
+        assert not request.pipeline.ListFields()
+
+    def test_carries_every_option(self, call, server):
+        call(
+            server.address,
+            "match",
+            SKETCH,
+            MAP,
+            searcher="easm",
+            map_segmenter="polygons",
+            params={"searcher": {"population": 200}, "histogram": {"directions": 90}},
+            seed=2**64 - 1,
+            time_budget=2.5,
+            weights=(1, 0, 0.5),
+        )
+        (request,) = server.requests
+        pipeline = request.pipeline
+        assert pipeline.searcher.name == "easm"
+        assert pipeline.searcher.parameters["population"] == 200
+        assert pipeline.map_segmenter.name == "polygons"
+        assert pipeline.histogram.name == ""
+        assert pipeline.histogram.parameters["directions"] == 90
+        assert not pipeline.HasField("similarity")
+        assert request.seed == 2**64 - 1
+        assert request.time_budget.ToTimedelta() == timedelta(seconds=2.5)
+        weights = request.weights
+        assert (weights.similarity, weights.rotation, weights.dilation) == (1, 0, 0.5)
+        assert weights.HasField("rotation")
+
+    @pytest.mark.parametrize(
+        ("options", "sentence"),
+        [
+            ({"seed": -1}, "seed is not a whole number from 0"),
+            ({"seed": 2**64}, "seed is not a whole number from 0"),
+            ({"seed": "one"}, "seed is not a whole number from 0"),
+            ({"time_budget": "1 s"}, "time_budget is not a number of seconds"),
+            ({"time_budget": float("nan")}, "time_budget is not a number of seconds"),
+            ({"time_budget": float("inf")}, "time_budget is not a number of seconds"),
+            ({"weights": (1, 1)}, "weights is not three numbers"),
+            ({"weights": "abc"}, "weights is not three numbers"),
+            ({"params": {"serch": {}}}, "params has no stage 'serch'; the stages are sketch_seg"),
+            (
+                {"params": {"searcher": {"population": object()}}},
+                "pipeline.searcher.parameters holds a value that is not JSON",
+            ),
+        ],
+    )
+    def test_refuses_what_cannot_be_sent(self, call, server, options, sentence):
+        with pytest.raises(InvalidRequestError) as caught:
+            call(server.address, "events", SKETCH, MAP, **options)
+        assert str(caught.value).startswith(sentence)
+        assert caught.value.reason == "INVALID_FIELD"
+        assert not server.requests
+
+    def test_an_unknown_option_is_a_mistake_in_the_program(self, call, server):
+        with pytest.raises(TypeError, match="unknown option 'serch'"):
+            call(server.address, "match", SKETCH, MAP, serch="easm")
+
+
+class TestEvents:
+    def test_come_as_they_were_sent(self, call, server):
+        assert call(server.address, "events", SKETCH, MAP) == list(EVENTS)
+
+    def test_closing_cancels(self, server):
+        server.endless = True
+        with Client(server.address) as client, closing(client.events(SKETCH, MAP)) as events:
+            assert next(events) == EVENTS[0]
+            assert not server.cancelled.is_set()
+            events.close()
+            assert server.cancelled.wait(5)
+
+    def test_leaving_the_loop_cancels(self, server):
+        server.endless = True
+        with Client(server.address) as client:
+            for _event in client.events(SKETCH, MAP):
+                break
+            gc.collect()
+            assert server.cancelled.wait(5)
+
+    def test_closing_cancels_with_asyncio(self, server):
+        async def first():
+            async with AsyncClient(server.address) as client:
+                async with aclosing(client.events(SKETCH, MAP)) as events:
+                    event = await anext(events)
+                return event, await asyncio.to_thread(server.cancelled.wait, 5)
+
+        server.endless = True
+        assert asyncio.run(first()) == (EVENTS[0], True)
+
+    def test_cancelling_the_task_cancels(self, server):
+        async def cancel_soon():
+            async with AsyncClient(server.address) as client:
+                task = asyncio.create_task(client.match(SKETCH, MAP))
+                await asyncio.sleep(0.2)
+                task.cancel()
+                with pytest.raises(asyncio.CancelledError):
+                    await task
+                return await asyncio.to_thread(server.cancelled.wait, 5)
+
+        server.endless = True
+        assert asyncio.run(cancel_soon())
+
+
+class TestOtherCalls:
+    def test_an_async_client_may_be_made_before_its_loop(self, server):
+        async def info(client):
+            async with client:
+                return await client.server_info()
+
+        client = AsyncClient(server.address)
+        assert asyncio.run(info(client)).api_version == "sketchmatch.v1"
+
+    def test_segment(self, call, server):
+        answer = call(
+            server.address, "segment", MAP, segmenter="polygons", params={"tolerance": 0.1}
+        )
+        (request,) = server.requests
+        assert request.source == MAP
+        assert answer.segmenter.name == "polygons"
+        assert answer.segmenter.parameters["tolerance"] == 0.1
+
+    def test_segment_leaves_the_segmenter_to_the_server(self, call, server):
+        call(server.address, "segment", MAP)
+        assert not server.requests[0].HasField("segmenter")
+
+    def test_algorithms(self, call, server):
+        assert call(server.address, "algorithms").algorithms[0].name == "easm"
+
+    def test_server_info(self, call, server):
+        assert call(server.address, "server_info").api_version == "sketchmatch.v1"
+
+
+class TestWaitUntilServing:
+    def test_returns_when_it_serves(self, call, server):
+        call(server.address, "wait_until_serving")
+
+    def test_waits_while_kernels_compile(self, call, server):
+        server.set_health("NOT_SERVING")
+        timer = Timer(0.3, server.set_health, ["SERVING"])
+        timer.start()
+        began = time.monotonic()
+        call(server.address, "wait_until_serving", timeout=10)
+        timer.join()
+        assert time.monotonic() - began > 0.2
+
+    def test_gives_up(self, call, server):
+        server.set_health("NOT_SERVING")
+        with pytest.raises(ServerUnavailableError, match=r"did not serve within 0\.2 s"):
+            call(server.address, "wait_until_serving", timeout=0.2)
+
+    def test_gives_up_where_nobody_listens(self, call, nobody):
+        with pytest.raises(ServerUnavailableError, match=nobody):
+            call(nobody, "wait_until_serving", timeout=0.3)
+
+
+class TestErrors:
+    @pytest.mark.parametrize(
+        ("code", "kind"),
+        [
+            (grpc.StatusCode.INVALID_ARGUMENT, InvalidRequestError),
+            (grpc.StatusCode.RESOURCE_EXHAUSTED, ServerBusyError),
+            (grpc.StatusCode.UNAVAILABLE, ServerUnavailableError),
+            (grpc.StatusCode.DEADLINE_EXCEEDED, DeadlineExceededError),
+            (grpc.StatusCode.UNAUTHENTICATED, NotAuthenticatedError),
+            (grpc.StatusCode.PERMISSION_DENIED, NotAuthenticatedError),
+            (grpc.StatusCode.UNIMPLEMENTED, NotSupportedError),
+            (grpc.StatusCode.CANCELLED, CallCancelledError),
+            (grpc.StatusCode.INTERNAL, ServerFailedError),
+            (grpc.StatusCode.DATA_LOSS, ServerFailedError),
+        ],
+    )
+    @pytest.mark.parametrize("method", ["match", "segment"])
+    def test_each_status_is_one_kind(self, call, server, method, code, kind):
+        server.fail(code, "the server's own sentence", reason("PLUGIN_FAILED"))
+        with pytest.raises(SketchmatchError, match="the server's own sentence") as caught:
+            call(server.address, method, *[SKETCH, MAP][: 2 if method == "match" else 1])
+        assert type(caught.value) is kind
+        assert caught.value.reason == "PLUGIN_FAILED"
+
+    def test_a_refused_request_names_its_field(self, call, server):
+        sentence = "sketch.stroke_set.strokes[3] has one point; draw a line"
+        server.fail(
+            grpc.StatusCode.INVALID_ARGUMENT,
+            sentence,
+            reason("INVALID_STROKE"),
+            violation("sketch.stroke_set.strokes[3]"),
+        )
+        with pytest.raises(InvalidRequestError) as caught:
+            call(server.address, "match", SKETCH, MAP)
+        assert str(caught.value) == sentence
+        assert caught.value.reason == "INVALID_STROKE"
+        assert caught.value.field == "sketch.stroke_set.strokes[3]"
+
+    def test_a_busy_server_says_when_to_come_back(self, call, server):
+        server.fail(
+            grpc.StatusCode.RESOURCE_EXHAUSTED, "full", reason("LIMIT_EXCEEDED"), retry_after(3)
+        )
+        with pytest.raises(ServerBusyError) as caught:
+            call(server.address, "match", SKETCH, MAP)
+        assert caught.value.retry_after == 3.0
+
+    def test_errors_without_details_are_translated_as_well(self, call, server):
+        server.fail(grpc.StatusCode.INVALID_ARGUMENT, "no")
+        with pytest.raises(InvalidRequestError) as caught:
+            call(server.address, "match", SKETCH, MAP)
+        assert (caught.value.reason, caught.value.field) == ("", "")
+
+    def test_an_absent_server_is_noticed_at_once(self, call, nobody):
+        began = time.monotonic()
+        with pytest.raises(ServerUnavailableError) as caught:
+            call(nobody, "match", SKETCH, MAP)
+        assert time.monotonic() - began < 3
+        assert str(caught.value).startswith(
+            f"the sketchmatch server at {nobody} is not available; start it, or check the address"
+        )
+
+    def test_a_server_without_tls_is_not_available_with_tls(self, server):
+        credentials = grpc.ssl_channel_credentials()
+        with (
+            Client(server.address, credentials=credentials) as client,
+            pytest.raises(ServerUnavailableError, match=server.address),
+        ):
+            client.server_info()
+
+    def test_a_server_without_tls_is_not_available_with_tls_and_asyncio(self, server):
+        async def info():
+            async with AsyncClient(
+                server.address, credentials=grpc.ssl_channel_credentials()
+            ) as client:
+                await client.server_info()
+
+        with pytest.raises(ServerUnavailableError, match=server.address):
+            asyncio.run(info())
+
+    def test_a_timeout_ends_the_call(self, call, server):
+        server.endless = True
+        with pytest.raises(DeadlineExceededError, match="within the timeout; allow more time"):
+            call(server.address, "match", SKETCH, MAP, timeout=0.2)
+
+    def test_a_request_that_the_transport_refuses_is_too_large(self, call):
+        with running(("grpc.max_receive_message_length", 100)) as server:
+            big = sources.image(bytes(1000))
+            with pytest.raises(InvalidRequestError, match="make it smaller") as caught:
+                call(server.address, "match", big, big)
+        assert caught.value.reason == "MESSAGE_TOO_LARGE"
+
+
+@pytest.fixture
+def nobody() -> str:
+    """An address where nobody listens."""
+    with running() as server:
+        return server.address

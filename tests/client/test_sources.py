@@ -1,0 +1,186 @@
+import numpy as np
+import pytest
+
+from sketchmatch_client import InvalidRequestError, sources
+from sketchmatch_proto.v1 import source_pb2
+
+TRIANGLE = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)]
+HOLE = [(1.0, 0.1), (1.5, 0.1), (1.5, 0.2)]
+
+
+def corners(ring):
+    return [(point.x, point.y) for point in ring.points]
+
+
+class TestStrokes:
+    def test_points_with_and_without_time(self):
+        timed = [(x, y, k / 10) for k, (x, y) in enumerate(TRIANGLE)]
+        drawn = sources.strokes([TRIANGLE, timed], ["sofa", "bed"], y_axis="down").stroke_set
+        assert drawn.y_axis == source_pb2.Y_AXIS_DOWN
+        assert [stroke.label for stroke in drawn.strokes] == ["sofa", "bed"]
+        assert corners(drawn.strokes[0]) == corners(drawn.strokes[1]) == TRIANGLE
+        assert not drawn.strokes[0].points[0].HasField("time_seconds")
+        assert [point.time_seconds for point in drawn.strokes[1].points] == [0.0, 0.1, 0.2]
+        assert drawn.strokes[1].points[0].HasField("time_seconds")
+
+    def test_arrays(self):
+        assert sources.strokes([np.array(TRIANGLE)]) == sources.strokes([TRIANGLE])
+
+    @pytest.mark.parametrize(
+        ("strokes", "field"),
+        [
+            ([TRIANGLE, [(0, 0), (1,)]], "stroke_set.strokes[1].points[1]"),
+            ([[(0, 0, 0, 0)]], "stroke_set.strokes[0].points[0]"),
+            ([[("a", "b")]], "stroke_set.strokes[0].points[0]"),
+            ([[1, 2, 3]], "stroke_set.strokes[0].points[0]"),
+            ([7], "stroke_set.strokes[0].points"),
+        ],
+    )
+    def test_bad_points_are_named(self, strokes, field):
+        with pytest.raises(InvalidRequestError) as caught:
+            sources.strokes(strokes)
+        assert caught.value.field == field
+        assert caught.value.reason == "INVALID_STROKE"
+        assert str(caught.value).startswith(f"{field} is not ")
+
+    def test_labels_must_fit(self):
+        with pytest.raises(InvalidRequestError, match="labels has 1 names for 2 strokes"):
+            sources.strokes([TRIANGLE, TRIANGLE], ["sofa"])
+
+    def test_unknown_axis(self):
+        with pytest.raises(InvalidRequestError, match="y_axis is 'left'; give 'up', or 'down'"):
+            sources.strokes([TRIANGLE], y_axis="left")
+
+
+class TestPolygons:
+    def test_outlines_and_rings(self):
+        drawn = sources.polygons([TRIANGLE, [TRIANGLE, HOLE]], ["a", "b"]).polygon_set
+        assert drawn.y_axis == source_pb2.Y_AXIS_UP
+        plain, holed = drawn.polygons
+        assert (plain.label, holed.label) == ("a", "b")
+        assert [corners(ring) for ring in plain.rings] == [TRIANGLE]
+        assert [corners(ring) for ring in holed.rings] == [TRIANGLE, HOLE]
+
+    @pytest.mark.parametrize("dtype", [np.float64, np.float32, np.int64])
+    def test_arrays(self, dtype):
+        outline = np.array([[0, 0], [2, 0], [2, 1]], dtype=dtype)
+        assert sources.polygons([outline]) == sources.polygons([outline.tolist()])
+        assert sources.polygons([[outline]]) == sources.polygons([outline.tolist()])
+
+    @pytest.mark.parametrize("polygon", [[], [[]], [(0, 0, 0)], [("a", "b")], 5])
+    def test_bad_polygons_are_named(self, polygon):
+        with pytest.raises(InvalidRequestError) as caught:
+            sources.polygons([TRIANGLE, polygon])
+        assert caught.value.field == "polygon_set.polygons[1]"
+        assert caught.value.reason == "INVALID_POLYGON"
+
+
+class TestOccupancyGrid:
+    ROWS = ([0, 100, -1], [0, 0, 100])
+    BYTES = bytes([0, 100, 255, 0, 0, 100])
+
+    @pytest.mark.parametrize(
+        "cells",
+        [
+            [[0, 100, -1], [0, 0, 100]],
+            np.array(ROWS, dtype=np.int8),
+            np.array(ROWS, dtype=np.int64),
+            np.asfortranarray(np.array(ROWS, dtype=np.int8)),
+        ],
+        ids=["lists", "int8", "int64", "columns first"],
+    )
+    def test_rows(self, cells):
+        grid = sources.occupancy_grid(cells, 0.05, (1.0, 2.0, 0.5)).occupancy_grid
+        assert (grid.rows, grid.columns, grid.cells) == (2, 3, self.BYTES)
+        assert grid.resolution_meters == 0.05
+        assert (grid.origin.x_meters, grid.origin.y_meters, grid.origin.yaw_radians) == (1, 2, 0.5)
+
+    @pytest.mark.parametrize("cells", [BYTES, bytearray(BYTES), [0, 100, -1, 0, 0, 100]])
+    def test_flat(self, cells):
+        grid = sources.occupancy_grid(cells, 0.05, columns=3).occupancy_grid
+        assert (grid.rows, grid.columns, grid.cells) == (2, 3, self.BYTES)
+
+    @pytest.mark.parametrize("columns", [None, 4])
+    def test_flat_cells_need_their_width(self, columns):
+        with pytest.raises(InvalidRequestError, match="for 6 cells; give the number of cells"):
+            sources.occupancy_grid(self.BYTES, 0.05, columns=columns)
+
+    @pytest.mark.parametrize(
+        "cells", [[[0, 1], [0]], [[0, 300]], [["a"]], [[0.5]], 7, None, np.zeros((2, 2, 2))]
+    )
+    def test_bad_cells(self, cells):
+        with pytest.raises(InvalidRequestError) as caught:
+            sources.occupancy_grid(cells, 0.05)
+        assert caught.value.field == "occupancy_grid.cells"
+        assert caught.value.reason == "INVALID_GRID"
+
+    def test_bad_origin(self):
+        with pytest.raises(InvalidRequestError, match="needs numbers for resolution and origin"):
+            sources.occupancy_grid([[0]], 0.05, (0, 0))
+
+
+class TestMapServerMap:
+    @pytest.mark.parametrize(
+        "line",
+        [
+            "image: room.pgm",
+            "image:   room.pgm   ",
+            'image: "room.pgm"',
+            "image: 'room.pgm'  # the picture",
+            "image: room.pgm # the picture",
+            "image : ./room.pgm",
+        ],
+    )
+    def test_finds_the_picture(self, tmp_path, line):
+        (tmp_path / "room.pgm").write_bytes(b"P5")
+        yaml = f"# image: other.pgm\nresolution: 0.05\n{line}\nnegate: 0\n"
+        (tmp_path / "room.yaml").write_text(yaml, encoding="utf-8")
+        made = sources.map_server_map(tmp_path / "room.yaml").map_server_map
+        assert (made.yaml, made.image) == (yaml, b"P5")
+
+    @pytest.mark.parametrize("name", ["my room.pgm", "room#2.pgm", "raum-ü.pgm"])
+    def test_unusual_names(self, tmp_path, name):
+        (tmp_path / name).write_bytes(b"P5")
+        (tmp_path / "room.yaml").write_text(f"image: {name}\n", encoding="utf-8")
+        assert sources.map_server_map(str(tmp_path / "room.yaml")).map_server_map.image == b"P5"
+
+    def test_windows_line_ends(self, tmp_path):
+        (tmp_path / "room.pgm").write_bytes(b"P5")
+        (tmp_path / "room.yaml").write_bytes(b"image: room.pgm\r\nnegate: 0\r\n")
+        assert sources.map_server_map(tmp_path / "room.yaml").map_server_map.image == b"P5"
+
+    def test_absolute_path(self, tmp_path):
+        picture = tmp_path / "elsewhere.pgm"
+        picture.write_bytes(b"P5")
+        folder = tmp_path / "maps"
+        folder.mkdir()
+        (folder / "room.yaml").write_text(f"image: {picture}\n", encoding="utf-8")
+        assert sources.map_server_map(folder / "room.yaml").map_server_map.image == b"P5"
+
+    @pytest.mark.parametrize("text", ["", "resolution: 0.05\n", "image:\n", "images: a.pgm\n"])
+    def test_no_picture_named(self, tmp_path, text):
+        (tmp_path / "room.yaml").write_text(text, encoding="utf-8")
+        with pytest.raises(InvalidRequestError, match="names no picture; add a line"):
+            sources.map_server_map(tmp_path / "room.yaml")
+
+    def test_missing_picture(self, tmp_path):
+        (tmp_path / "room.yaml").write_text("image: gone.pgm\n", encoding="utf-8")
+        with pytest.raises(InvalidRequestError, match=r"gone\.pgm.* cannot be read") as caught:
+            sources.map_server_map(tmp_path / "room.yaml")
+        assert caught.value.field == "map_server_map.image"
+
+    def test_not_text(self, tmp_path):
+        (tmp_path / "room.yaml").write_bytes(b"\xff\xfe\x00")
+        with pytest.raises(InvalidRequestError, match="is not text in UTF-8"):
+            sources.map_server_map(tmp_path / "room.yaml")
+
+    def test_missing_file(self, tmp_path):
+        with pytest.raises(FileNotFoundError):
+            sources.map_server_map(tmp_path / "gone.yaml")
+
+
+class TestImage:
+    def test_file_or_bytes(self, tmp_path):
+        (tmp_path / "sketch.png").write_bytes(b"PNG")
+        assert sources.image(tmp_path / "sketch.png") == sources.image(b"PNG")
+        assert sources.image(str(tmp_path / "sketch.png")).image.data == b"PNG"
