@@ -51,5 +51,9 @@ class Algorithm:
     class Params(Params):
         """No parameters, unless the algorithm defines its own."""
 
+    @classmethod
+    def warm_up(cls) -> None:
+        """Compile what the first use would otherwise wait for; nothing, unless overridden."""
+
     def __init__(self, params: Any = None) -> None:
         self.params = self.Params() if params is None else params

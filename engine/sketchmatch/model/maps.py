@@ -87,13 +87,17 @@ class Occm:
     Attributes
     ----------
     evidence
-        Shape (N, N'): the σ of all histogram correspondences that speak for each pairing.
+        Shape (N, N'): the sum of σ over all histogram correspondences that speak for a pairing.
+    implied
+        Shape (N, N'): the part of it from those whose order implies the pairing.
     """
 
     evidence: FloatArray
+    implied: FloatArray
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "evidence", frozen_floats(self.evidence))
+        object.__setattr__(self, "implied", frozen_floats(self.implied))
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from os import PathLike, fspath
 from typing import Any, Self
 
 import numpy as np
@@ -80,6 +81,17 @@ class SceneObject:
         )
         return cls(oriented, label)
 
+    @classmethod
+    def from_polygon(cls, polygon: Any, label: str = "") -> Self:
+        """Turn one (k, 2) array-like, or a list of such rings, into an object.
+
+        Raises
+        ------
+        InvalidInputError
+            As :meth:`from_rings`.
+        """
+        return cls.from_rings([polygon] if _is_ring(polygon) else list(polygon), label)
+
     @cached_property
     def polygon(self) -> shapely.Polygon:
         """The object as a shapely polygon."""
@@ -149,12 +161,24 @@ class Scene:
             )
         objects = []
         for k, polygon in enumerate(polygons):
-            rings = [polygon] if _is_ring(polygon) else list(polygon)
             try:
-                objects.append(SceneObject.from_rings(rings, labels[k] if labels else ""))
+                objects.append(SceneObject.from_polygon(polygon, labels[k] if labels else ""))
             except InvalidInputError as error:
                 raise error.within(f"polygons[{k}]") from None
         return cls(tuple(objects))
+
+    @classmethod
+    def from_file(cls, path: str | PathLike[str]) -> Self:
+        """Read a scene from a file: SVG, stroke JSON, GeoJSON, ROS map YAML or an image.
+
+        Raises
+        ------
+        InvalidInputError
+            If the file cannot be read or holds fewer than two objects.
+        """
+        from sketchmatch.public import read_scene  # the one way up: the model stays light
+
+        return cls(read_scene(fspath(path)).objects)
 
     def __len__(self) -> int:
         return len(self.objects)

@@ -1,0 +1,93 @@
+"""ζ, the confidence of a histogram map (thesis 3.6.1)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sketchmatch.kernels._jit import kernel
+from sketchmatch.model.arrays import FloatArray, IntArray
+
+__all__ = ["fmap_confidence", "mean_absolute_difference"]
+
+_INSERTION_LIMIT = 64
+
+
+@kernel
+def fmap_confidence(
+    entries: IntArray,
+    scratch: FloatArray,
+    similarity: FloatArray,
+    cosine: FloatArray,
+    sine: FloatArray,
+    normalized_dilation: FloatArray,
+    weights: FloatArray,
+) -> tuple[float, float, float, float]:
+    """Return ζ, ζσ, ζR and ζL of a histogram map.
+
+    Parameters
+    ----------
+    entries
+        int64, shape (Q,), each within [0, Q').
+    scratch
+        Shape (Q,), overwritten.
+    similarity, cosine, sine, normalized_dilation
+        Shape (Q, Q'/2): σ, cos R, sin R and L̂ of the relation table; a dual, entry j ≥ Q'/2, has
+        the cosine and the sine of column j − Q'/2 negated.
+    weights
+        Shape (3,), of ζσ, ζR and ζL.
+
+    Returns
+    -------
+    tuple of float
+        ζ = (w1 ζσ + w2 ζR + w3 ζL) / (w1 + w2 + w3) and its three parts.
+    """
+    count, half = entries.size, similarity.shape[1]
+    similar = x = y = 0.0
+    for i in range(count):
+        column = entries[i]
+        turned = 1.0
+        if column >= half:
+            column -= half
+            turned = -1.0
+        similar += similarity[i, column]
+        x += turned * cosine[i, column]
+        y += turned * sine[i, column]
+        scratch[i] = normalized_dilation[i, column]
+    zeta_s = similar / count
+    zeta_r = np.sqrt(x * x + y * y) / count
+    zeta_l = np.exp2(-mean_absolute_difference(scratch))
+    total = weights[0] * zeta_s + weights[1] * zeta_r + weights[2] * zeta_l
+    return total / (weights[0] + weights[1] + weights[2]), zeta_s, zeta_r, zeta_l
+
+
+@kernel
+def mean_absolute_difference(values: FloatArray) -> float:
+    """Return the mean of |x − y| over all pairs of values, which it sorts in place.
+
+    Parameters
+    ----------
+    values
+        Shape (k,), reordered.
+
+    Returns
+    -------
+    float
+        0 if there is only one value.
+    """
+    count = values.size
+    if count < 2:
+        return 0.0
+    if count <= _INSERTION_LIMIT:
+        for k in range(1, count):
+            value = values[k]
+            place = k
+            while place > 0 and values[place - 1] > value:
+                values[place] = values[place - 1]
+                place -= 1
+            values[place] = value
+    else:
+        values.sort()
+    total = 0.0
+    for k in range(count):
+        total += (2 * k - count + 1) * values[k]
+    return 2.0 * total / (count * (count - 1.0))

@@ -1,0 +1,43 @@
+"""The algorithms that come with sketchmatch, registered as any plugin's are.
+
+Each hook imports its kind alone: listing one kind does not load the others.
+"""
+
+from __future__ import annotations
+
+from sketchmatch.api import Histogram, Searcher, Segmenter, Similarity, hookimpl
+
+
+@hookimpl
+def sketchmatch_register_segmenters() -> list[type[Segmenter]]:
+    """Offer the built-in segmenters."""
+    from sketchmatch_builtin.segmenters.image import ImageSegmenter
+    from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
+    from sketchmatch_builtin.segmenters.polygons import PolygonSegmenter
+    from sketchmatch_builtin.segmenters.strokes import StrokeSegmenter
+
+    return [PolygonSegmenter, StrokeSegmenter, OccupancyGridSegmenter, ImageSegmenter]
+
+
+@hookimpl
+def sketchmatch_register_histograms() -> list[type[Histogram]]:
+    """Offer the built-in histograms."""
+    from sketchmatch_builtin.histograms.constant import ConstantForce
+
+    return [ConstantForce]
+
+
+@hookimpl
+def sketchmatch_register_similarities() -> list[type[Similarity]]:
+    """Offer the built-in similarity measures."""
+    from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+
+    return [CrossCorrelation]
+
+
+@hookimpl
+def sketchmatch_register_searchers() -> list[type[Searcher]]:
+    """Offer the built-in searchers."""
+    from sketchmatch_builtin.searchers.easm import Easm
+
+    return [Easm]
