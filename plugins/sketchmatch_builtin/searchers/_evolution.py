@@ -1,0 +1,289 @@
+"""Compiled generations of the evolutionary search, for both meanings of a legal FMAP.
+
+A population is kept sorted, the fittest first. An individual is either an object map (all legal
+FMAPs under object consistency are induced by one) or the entries of an FMAP (pairwise).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sketchmatch.api.kernels import fmap_confidence, kernel
+
+__all__ = ["evolve_object_maps", "evolve_pair_maps", "found_object_maps", "found_pair_maps"]
+
+
+@kernel
+def found_object_maps(population, fitness, offspring, pairs, columns, relations, rng):  # type: ignore[no-untyped-def]
+    """Fill a population with random injective object maps, shape (p, N), the fittest first.
+
+    ``offspring`` is room for (2p, N) individuals, ``pairs`` the template pairs (Q, 2), ``columns``
+    the histogram correspondence of each ordered argument pair (N', N'), and ``relations`` the
+    relation table and the weights, as :func:`sketchmatch.api.kernels.fmap_confidence` takes them.
+    """
+    size, template_objects = population.shape
+    free = np.arange(columns.shape[0])
+    for k in range(size):
+        for a in range(template_objects):
+            _draw(free, a, rng)
+            offspring[k, a] = free[a]
+    population[:] = offspring[:size]
+    fitness[:] = -1.0
+    _judge_object_maps(population, fitness, offspring[:size], pairs, columns, relations)
+    return size
+
+
+@kernel
+def evolve_object_maps(  # type: ignore[no-untyped-def]
+    population, fitness, offspring, pairs, columns, relations, rates, rng
+):
+    """Run one generation over object maps in place and return the number of evaluations.
+
+    ``rates`` are Pc, Px and Pm; the rest is as for :func:`found_object_maps`.
+    """
+    crossover_rate, exchange_rate, mutation_rate = rates
+    size = population.shape[0]
+    order = np.arange(pairs.shape[0])
+    mask = np.empty(pairs.shape[0], dtype=np.bool_)
+    holder = np.empty(columns.shape[0], dtype=np.int64)
+    free = np.empty(columns.shape[0], dtype=np.int64)
+    bred = 0
+    for _ in range(size // 2):
+        first, second = _two(size, rng)
+        if rng.random() < crossover_rate:
+            one, other = population[first], population[second]
+            for i in range(mask.size):
+                mask[i] = rng.random() < exchange_rate
+            _mix(one, other, mask, offspring[bred], pairs, order, holder, free, rng)
+            _mix(other, one, mask, offspring[bred + 1], pairs, order, holder, free, rng)
+            bred += 2
+    for _ in range(size):
+        parent = int(rng.random() * size)
+        if rng.random() < mutation_rate:
+            offspring[bred] = population[parent]
+            changing = True
+            while changing:
+                _reassign(offspring[bred], pairs, holder, free, rng)
+                changing = rng.random() < 0.5
+            bred += 1
+    _judge_object_maps(population, fitness, offspring[:bred], pairs, columns, relations)
+    return bred
+
+
+@kernel
+def found_pair_maps(population, fitness, offspring, relations, rng):  # type: ignore[no-untyped-def]
+    """Fill a population with random FMAPs, shape (p, Q), the fittest first.
+
+    They are one-to-one and hold no dual of an entry, whether or not they lead to an object map.
+    """
+    size, template_pairs = population.shape
+    argument_pairs = relations[0].shape[1]
+    free = np.arange(argument_pairs)
+    for k in range(size):
+        for i in range(template_pairs):
+            _draw(free, i, rng)
+            offspring[k, i] = free[i] + argument_pairs * (rng.random() < 0.5)
+    population[:] = offspring[:size]
+    fitness[:] = -1.0
+    _judge_pair_maps(population, fitness, offspring[:size], relations)
+    return size
+
+
+@kernel
+def evolve_pair_maps(population, fitness, offspring, relations, rates, rng):  # type: ignore[no-untyped-def]
+    """Run one generation over FMAPs in place and return the number of evaluations."""
+    crossover_rate, exchange_rate, mutation_rate = rates
+    size, template_pairs = population.shape
+    argument_pairs = relations[0].shape[1]
+    holder = np.empty(argument_pairs, dtype=np.int64)
+    free = np.empty(argument_pairs, dtype=np.int64)
+    order = np.arange(template_pairs)
+    bred = 0
+    for _ in range(size // 2):
+        first, second = _two(size, rng)
+        if rng.random() < crossover_rate:
+            one, other = offspring[bred], offspring[bred + 1]
+            one[:] = population[first]
+            other[:] = population[second]
+            for i in range(template_pairs):
+                if rng.random() < exchange_rate:
+                    one[i], other[i] = other[i], one[i]
+            _legalize(one, order, holder, free, rng)
+            _legalize(other, order, holder, free, rng)
+            bred += 2
+    for _ in range(size):
+        parent = int(rng.random() * size)
+        if rng.random() < mutation_rate:
+            offspring[bred] = population[parent]
+            changing = True
+            while changing:
+                _replace(offspring[bred], argument_pairs, rng)
+                changing = rng.random() < 0.5
+            bred += 1
+    _judge_pair_maps(population, fitness, offspring[:bred], relations)
+    return bred
+
+
+@kernel
+def _judge_object_maps(population, fitness, offspring, pairs, columns, relations):  # type: ignore[no-untyped-def]
+    """Let offspring compete with the population."""
+    entries = np.empty(pairs.shape[0], dtype=np.int64)
+    scratch = np.empty(pairs.shape[0])
+    for k in range(offspring.shape[0]):
+        child = offspring[k]
+        for i in range(entries.size):
+            entries[i] = columns[child[pairs[i, 0]], child[pairs[i, 1]]]
+        _survive(population, fitness, child, fmap_confidence(entries, scratch, *relations)[0])
+
+
+@kernel
+def _judge_pair_maps(population, fitness, offspring, relations):  # type: ignore[no-untyped-def]
+    """Let offspring compete with the population."""
+    scratch = np.empty(offspring.shape[1])
+    for k in range(offspring.shape[0]):
+        child = offspring[k]
+        _survive(population, fitness, child, fmap_confidence(child, scratch, *relations)[0])
+
+
+@kernel
+def _draw(items, place, rng):  # type: ignore[no-untyped-def]
+    """Swap a random one of items[place:] to ``place``."""
+    other = place + int(rng.random() * (items.size - place))
+    items[place], items[other] = items[other], items[place]
+
+
+@kernel
+def _two(size, rng):  # type: ignore[no-untyped-def]
+    """Return two different random indices."""
+    first = int(rng.random() * size)
+    second = int(rng.random() * (size - 1))
+    return first, second + (second >= first)
+
+
+@kernel
+def _mix(one, other, mask, child, pairs, order, holder, free, rng):  # type: ignore[no-untyped-def]
+    """Cross two FMAPs, entry by entry, into one object-consistent child.
+
+    The entries of the crossed FMAP are visited in random order. An entry (a, b) → (c, d) stays if
+    it agrees with those that stayed before; all others change to what these imply. Template
+    objects that no entry decides get random partners.
+    """
+    child[:] = -1
+    holder[:] = -1
+    missing = child.size
+    for k in range(order.size):
+        _draw(order, k, rng)
+        i = order[k]
+        source = other if mask[i] else one
+        a, b = pairs[i, 0], pairs[i, 1]
+        c, d = source[a], source[b]
+        fits_a = child[a] == c or (child[a] < 0 and holder[c] < 0)
+        fits_b = child[b] == d or (child[b] < 0 and holder[d] < 0)
+        if fits_a and fits_b:
+            missing -= (child[a] < 0) + (child[b] < 0)
+            child[a], child[b] = c, d
+            holder[c], holder[d] = a, b
+            if missing == 0:
+                return
+    _complete(child, holder, free, rng)
+
+
+@kernel
+def _complete(child, holder, free, rng):  # type: ignore[no-untyped-def]
+    """Give random unused partners to the objects that have none."""
+    count = 0
+    for c in range(holder.size):
+        if holder[c] < 0:
+            free[count] = c
+            count += 1
+    place = 0
+    for a in range(child.size):
+        if child[a] < 0:
+            _draw(free[:count], place, rng)
+            child[a] = free[place]
+            holder[free[place]] = a
+            place += 1
+
+
+@kernel
+def _reassign(child, pairs, holder, free, rng):  # type: ignore[no-untyped-def]
+    """Change one entry of the FMAP at random and make all others agree with it.
+
+    In half of the cases the new correspondence shares an object with the old one.
+    """
+    i = int(rng.random() * pairs.shape[0])
+    a, b = pairs[i, 0], pairs[i, 1]
+    holder[:] = -1
+    for k in range(child.size):
+        holder[child[k]] = k
+    c = int(rng.random() * holder.size)
+    d = child[b]
+    if c == d or rng.random() < 0.5:
+        d = int(rng.random() * (holder.size - 1))
+        d += d >= c
+    for k in (a, b):
+        holder[child[k]] = -1
+    for k in (holder[c], holder[d]):
+        if k >= 0:
+            child[k] = -1
+    child[a], child[b] = c, d
+    holder[c], holder[d] = a, b
+    _complete(child, holder, free, rng)
+
+
+@kernel
+def _legalize(child, order, holder, free, rng):  # type: ignore[no-untyped-def]
+    """Change conflicting entries at random until no argument pair is used twice."""
+    pairs = holder.size
+    holder[:] = -1
+    conflicts = 0
+    for k in range(order.size):
+        _draw(order, k, rng)
+        column = child[order[k]] % pairs
+        if holder[column] < 0:
+            holder[column] = order[k]
+        else:
+            order[conflicts], order[k] = order[k], order[conflicts]
+            conflicts += 1
+    if conflicts == 0:
+        return
+    count = 0
+    for column in range(pairs):
+        if holder[column] < 0:
+            free[count] = column
+            count += 1
+    for k in range(conflicts):
+        _draw(free[:count], k, rng)
+        child[order[k]] = free[k] + pairs * (rng.random() < 0.5)
+
+
+@kernel
+def _replace(child, argument_pairs, rng):  # type: ignore[no-untyped-def]
+    """Change one entry at random, and the entry that it conflicts with to what it frees."""
+    place = int(rng.random() * child.size)
+    value = int(rng.random() * 2 * argument_pairs)
+    for i in range(child.size):
+        if i != place and child[i] % argument_pairs == value % argument_pairs:
+            child[i] = child[place] % argument_pairs + argument_pairs * (rng.random() < 0.5)
+    child[place] = value
+
+
+@kernel
+def _survive(population, fitness, child, value):  # type: ignore[no-untyped-def]
+    """Put a child in its place in the sorted population, unless it is worse than all or known."""
+    size = fitness.size
+    if value <= fitness[size - 1]:
+        return
+    place = size - 1
+    while place > 0 and fitness[place - 1] < value:
+        place -= 1
+    same = place - 1
+    while same >= 0 and fitness[same] == value:
+        if np.all(population[same] == child):
+            return
+        same -= 1
+    for k in range(size - 1, place, -1):
+        fitness[k] = fitness[k - 1]
+        population[k] = population[k - 1]
+    fitness[place] = value
+    population[place] = child
