@@ -1,5 +1,28 @@
-"""What contributors test with: scenes and sketches with known truth."""
+"""What contributors test with: scenes, sketches and maps with known truth."""
 
+from sketchmatch.testing.drawing import draw_strokes, strokes_to_svg
+from sketchmatch.testing.driving import Odometry, estimate_poses, plan_tour
+from sketchmatch.testing.lidar import Lidar, World, cast_rays, scan
+from sketchmatch.testing.mapping import LogOddsGrid, SensorModel, map_scans
+from sketchmatch.testing.robot import Survey, survey
 from sketchmatch.testing.sketches import SimulatedSketch, simulate_sketch, spacing
 
-__all__ = ["SimulatedSketch", "simulate_sketch", "spacing"]
+__all__ = [
+    "Lidar",
+    "LogOddsGrid",
+    "Odometry",
+    "SensorModel",
+    "SimulatedSketch",
+    "Survey",
+    "World",
+    "cast_rays",
+    "draw_strokes",
+    "estimate_poses",
+    "map_scans",
+    "plan_tour",
+    "scan",
+    "simulate_sketch",
+    "spacing",
+    "strokes_to_svg",
+    "survey",
+]
