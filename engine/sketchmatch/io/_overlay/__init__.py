@@ -1,0 +1,1 @@
+"""How the pictures of results are drawn, from colours up to the page."""

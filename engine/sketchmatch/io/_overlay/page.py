@@ -1,0 +1,149 @@
+"""The whole page: header, panels of one size, legend."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from PIL import Image
+
+from sketchmatch.io._overlay.canvas import Box, Canvas, printable
+from sketchmatch.io._overlay.palette import Colour, mixed, pair_colour
+from sketchmatch.io._overlay.panel import (
+    BORDER,
+    INK,
+    PADDING,
+    WHITE,
+    Panel,
+    draw_badge,
+    draw_object,
+    draw_panel,
+)
+from sketchmatch.io._overlay.places import Place
+
+__all__ = ["Entry", "Page"]
+
+_MARGIN, _GUTTER, _HEADER, _ROW = 36.0, 24.0, 108.0, 38.0
+_PAGE: Colour = (246, 247, 249)
+_SOFT: Colour = (98, 112, 134)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One pair in the legend: its number, what it is called, how sure it is."""
+
+    number: int
+    name: str
+    confidence: float | None = None
+
+
+@dataclass(frozen=True)
+class Page:
+    """Header, panels of one size, legend; from top to bottom."""
+
+    across: float
+    panels: Sequence[Panel]
+    entries: Sequence[Entry]
+    note: str
+
+    def drawn(
+        self, title: str, caption: str, facts: Sequence[tuple[str, str]], width: int
+    ) -> Image.Image:
+        """Return the finished picture."""
+        boxes = self._boxes()
+        legend = self._legend_box(boxes[0][3])
+        canvas = Canvas((self.across, legend[3] + _MARGIN), width, _PAGE)
+        _draw_header(canvas, self.across, title, caption, facts)
+        for panel, box in zip(self.panels, boxes, strict=True):
+            draw_panel(canvas, panel, box)
+        if legend[3] > legend[1]:
+            self._draw_legend(canvas, legend)
+        return canvas.finished()
+
+    def _boxes(self) -> list[Box]:
+        """Return the panels' boxes, as high as the scenes need within reason."""
+        count = len(self.panels)
+        width = (self.across - 2.0 * _MARGIN - (count - 1) * _GUTTER) / count
+        left, top, right, bottom = PADDING
+        areas = [panel.area() for panel in self.panels]
+        slope = max((area[3] - area[1]) / (area[2] - area[0]) for area in areas)
+        height = (width - left - right) * slope + top + bottom
+        height = min(max(height, 0.62 * width), 0.96 * width)
+        lefts = [_MARGIN + k * (width + _GUTTER) for k in range(count)]
+        return [(x, _HEADER, x + width, _HEADER + height) for x in lefts]
+
+    def _legend_box(self, top: float) -> Box:
+        rows = math.ceil(len(self.entries) / self._columns()) + (1 if self.note else 0)
+        if not rows:
+            return (_MARGIN, top, self.across - _MARGIN, top)
+        top += _GUTTER
+        return (_MARGIN, top, self.across - _MARGIN, top + rows * _ROW + 20.0)
+
+    def _columns(self) -> int:
+        """Return how many entries share a row, the rows evenly filled."""
+        if not self.entries:
+            return 1
+        named = any(entry.name for entry in self.entries)
+        most = int((self.across - 2.0 * _MARGIN) / (340.0 if named else 186.0))
+        rows = math.ceil(len(self.entries) / most)
+        return max(math.ceil(len(self.entries) / rows), min(4, most))
+
+    def _draw_legend(self, canvas: Canvas, box: Box) -> None:
+        canvas.rounded(box, 12.0, WHITE, BORDER)
+        columns = self._columns()
+        pitch = (box[2] - box[0] - 24.0) / columns
+        for k, entry in enumerate(self.entries):
+            row, column = divmod(k, columns)
+            x, y = box[0] + 20.0 + column * pitch, box[1] + 10.0 + (row + 0.5) * _ROW
+            _draw_entry(canvas, entry, x, y, pitch - (44.0 if entry.name else 34.0))
+        if self.note:
+            _draw_note(canvas, self.note, box[0] + 20.0, box[3] - 10.0 - 0.5 * _ROW)
+
+
+def _draw_header(
+    canvas: Canvas, across: float, title: str, caption: str, facts: Sequence[tuple[str, str]]
+) -> None:
+    right = across - _MARGIN
+    for name, value in [(printable(name), printable(value)) for name, value in reversed(facts)]:
+        left = right - max(canvas.text_width(name, 15.0), canvas.text_width(value, 25.0))
+        canvas.text((left, 44.0), name, 15.0, _SOFT)
+        canvas.text((left, 72.0), value, 25.0, INK, weight=0.012)
+        canvas.line(np.array([[left - 22.0, 36.0], [left - 22.0, 84.0]]), BORDER, 1.5)
+        right = left - 44.0
+    room = right - _MARGIN
+    title, caption = printable(title), printable(caption)
+    middle = 47.0 if caption else 60.0
+    title = canvas.truncated(title, 34.0, room)
+    canvas.text((_MARGIN, middle), title, 34.0, INK, weight=0.018)
+    if caption:
+        canvas.text((_MARGIN, 83.0), canvas.truncated(caption, 17.0, room), 17.0, _SOFT)
+
+
+def _draw_entry(canvas: Canvas, entry: Entry, x: float, y: float, width: float) -> None:
+    draw_badge(canvas, Place(x + 16.0, y), entry.number, 25.0)
+    left, right = x + 40.0, x + width
+    if entry.confidence is not None:
+        share = min(max(entry.confidence, 0.0), 1.0)
+        start = right - 130.0 if entry.name else left
+        end = min(start + 80.0, right - 50.0)
+        _draw_bar(canvas, (start, y - 3.5, end, y + 3.5), share, entry.number)
+        canvas.text((end + 10.0, y), f"{share:.0%}", 16.0, INK)
+        right = start - 12.0
+    if entry.name:
+        canvas.text((left, y), canvas.truncated(entry.name, 16.0, right - left), 16.0, INK)
+
+
+def _draw_bar(canvas: Canvas, box: Box, share: float, number: int) -> None:
+    radius = (box[3] - box[1]) / 2.0
+    canvas.rounded(box, radius, mixed(BORDER, WHITE, 0.35))
+    if share > 0.0:
+        filled = max(share * (box[2] - box[0]), 2.0 * radius)
+        canvas.rounded((box[0], box[1], box[0] + filled, box[3]), radius, pair_colour(number))
+
+
+def _draw_note(canvas: Canvas, note: str, x: float, y: float) -> None:
+    swatch = np.array([[x + 3, y - 10], [x + 29, y - 10], [x + 29, y + 10], [x + 3, y + 10]])
+    draw_object(canvas, [swatch], None)
+    canvas.text((x + 40.0, y), note, 16.0, _SOFT)

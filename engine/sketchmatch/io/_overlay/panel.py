@@ -1,0 +1,243 @@
+"""One panel: a scene on its ground, its objects in their colours, their numbers and labels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from sketchmatch.io._overlay.canvas import Box, Canvas, printable
+from sketchmatch.io._overlay.palette import Colour, mixed, pair_colour, readable_on
+from sketchmatch.io._overlay.places import Place, badge_places, label_places
+from sketchmatch.io._overlay.underlay import known_area, painted_cells
+from sketchmatch.model import FloatArray, OccupancyGrid, Scene
+
+__all__ = [
+    "BORDER",
+    "INK",
+    "PADDING",
+    "WHITE",
+    "Panel",
+    "badge_size",
+    "draw_badge",
+    "draw_object",
+    "draw_panel",
+]
+
+PADDING = (44.0, 60.0, 44.0, 52.0)
+WHITE: Colour = (255, 255, 255)
+INK: Colour = (23, 32, 51)
+BORDER: Colour = (221, 226, 233)
+_GREY: Colour = (140, 148, 160)
+_PAPER: Colour = (255, 254, 250)
+_DOTS: Colour = (229, 226, 215)
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One scene with all that its drawing needs.
+
+    Attributes
+    ----------
+    name
+        Written in its upper left corner.
+    scene
+        The objects.
+    numbers
+        By object; one without a number is drawn grey.
+    underlay
+        The grid under the objects.
+    pen
+        Whether it is paper and pen.
+    metres
+        Whether it gets a scale bar.
+    badge
+        Height of the numbers' badges.
+    """
+
+    name: str
+    scene: Scene
+    numbers: Mapping[int, int]
+    underlay: OccupancyGrid | None = None
+    pen: bool = False
+    metres: bool = False
+    badge: float = 28.0
+
+    def colour(self, index: int) -> Colour:
+        """Return an object's colour."""
+        return pair_colour(self.numbers[index]) if index in self.numbers else _GREY
+
+    def area(self) -> Box:
+        """Return what is worth showing, in scene units: the objects and the room around them."""
+        x0, y0, x1, y1 = self.scene.bounds
+        if self.underlay is None:
+            return (x0, y0, x1, y1)
+        around = 0.75 * max(x1 - x0, y1 - y0)
+        u0, v0, u1, v1 = known_area(self.underlay) or (x0, y0, x1, y1)
+        return (
+            min(x0, max(u0, x0 - around)),
+            min(y0, max(v0, y0 - around)),
+            max(x1, min(u1, x1 + around)),
+            max(y1, min(v1, y1 + around)),
+        )
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Scene coordinates to design units: ``scale`` about the middles of both."""
+
+    scale: float
+    centre: tuple[float, float]
+    middle: tuple[float, float]
+
+    @classmethod
+    def fitted(cls, area: Box, box: Box) -> _Frame:
+        left, top, right, bottom = PADDING
+        inner = (box[0] + left, box[1] + top, box[2] - right, box[3] - bottom)
+        width, height = area[2] - area[0], area[3] - area[1]
+        scale = min((inner[2] - inner[0]) / width, (inner[3] - inner[1]) / height)
+        return cls(scale, _middle(area), _middle(inner))
+
+    def rings(self, rings: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return rings in design units."""
+        flip = self.scale * np.array([1.0, -1.0])
+        return [(ring - self.centre) * flip + self.middle for ring in rings]
+
+
+def draw_panel(canvas: Canvas, panel: Panel, box: Box) -> None:
+    """Draw a panel into its box; smaller objects lie over larger ones."""
+    frame = _Frame.fitted(panel.area(), box)
+    _draw_ground(canvas, panel, frame, box)
+    over_cells = panel.underlay is not None
+    rings = [frame.rings(item.rings) for item in panel.scene.objects]
+    for k in sorted(range(len(rings)), key=lambda k: -panel.scene.objects[k].area):
+        draw_object(canvas, rings[k], panel.numbers.get(k), pen=panel.pen, over_cells=over_cells)
+    if panel.metres:
+        _draw_scale_bar(canvas, frame.scale, box)
+    _draw_names(canvas, panel, [shapely.Polygon(ring[0], ring[1:]) for ring in rings], box)
+    if panel.name:
+        canvas.text((box[0] + 20.0, box[1] + 27.0), panel.name, 20.0, INK, weight=0.012, halo=WHITE)
+    canvas.rounded(box, 14.0, None, BORDER, 1.5)
+
+
+def _draw_ground(canvas: Canvas, panel: Panel, frame: _Frame, box: Box) -> None:
+    if panel.underlay is None:
+        canvas.rounded(box, 14.0, _PAPER if panel.pen else WHITE)
+        if panel.pen:
+            canvas.dots((box[0], box[1] + 24.0, box[2], box[3]), 24.0, 1.1, _DOTS)
+        return
+    size = (round((box[2] - box[0]) * canvas.scale), round((box[3] - box[1]) * canvas.scale))
+    corner = (
+        frame.centre[0] + (box[0] - frame.middle[0]) / frame.scale,
+        frame.centre[1] - (box[1] - frame.middle[1]) / frame.scale,
+    )
+    step = 1.0 / (frame.scale * canvas.scale)
+    canvas.picture(painted_cells(panel.underlay, size, corner, step), box, 14.0)
+
+
+def draw_object(
+    canvas: Canvas,
+    rings: Sequence[FloatArray],
+    number: int | None,
+    *,
+    pen: bool = False,
+    over_cells: bool = False,
+) -> None:
+    """Draw one object, given in design units: in its number's colour, or grey without one."""
+    if over_cells:
+        canvas.fill(rings, WHITE, 0.8)
+    if number is None:
+        canvas.fill(rings, _GREY, 0.12)
+        canvas.hatch(rings, mixed(_GREY, WHITE, 0.35), 9.0, 1.2)
+        for ring in rings:
+            canvas.dashed(ring, _GREY, 2.0, 7.0, 4.5)
+        return
+    colour = pair_colour(number)
+    canvas.fill(rings, colour, 0.42)
+    edge = _edge(colour)
+    for k, ring in enumerate(rings):
+        if pen:
+            canvas.pen(ring, mixed(edge, WHITE, 0.45), 1.2, number + 2.0 + k)
+            canvas.pen(ring, edge, 2.8, float(number + k))
+        else:
+            canvas.outline(ring, edge, 2.8)
+
+
+def _draw_names(canvas: Canvas, panel: Panel, shapes: Sequence[shapely.Polygon], box: Box) -> None:
+    """Write the numbers, then the labels that have room."""
+    half = _badge_half(panel.badge, max(panel.numbers.values(), default=1))
+    bounds = (box[0] + 8.0, box[1] + 46.0, box[2] - 8.0, box[3] - 8.0)
+    places = badge_places(shapes, list(panel.numbers), half, bounds)
+    texts = {
+        k: canvas.truncated(printable(label), 15.0, 150.0)
+        for k, label in enumerate(panel.scene.labels)
+        if label.strip()
+    }
+    sizes = {k: (canvas.text_width(text, 15.0), 17.0) for k, text in texts.items()}
+    for k, point in label_places(shapes, sizes, places, half, bounds).items():
+        ink = mixed(panel.colour(k), INK, 0.72)
+        halo = None if shapes[k].contains(shapely.Point(point)) else WHITE
+        canvas.text(point, texts[k], 15.0, ink, anchor="mm", halo=halo)
+    for k, place in places.items():
+        if place.leads_to is not None:
+            ends = np.array([[place.x, place.y], place.leads_to])
+            canvas.line(ends, _edge(panel.colour(k)), 1.6)
+    for k, place in places.items():
+        draw_badge(canvas, place, panel.numbers[k], panel.badge)
+
+
+def badge_size(count: int) -> float:
+    """Return the height of the numbers' badges: smaller where there are many objects."""
+    return 28.0 if count <= 16 else 23.0 if count <= 48 else 18.0
+
+
+def _badge_half(size: float, number: int) -> tuple[float, float]:
+    """Return half the width and height of a badge: round, wider for more digits."""
+    return (size / 2.0 * (1.0 + 0.22 * max(0, len(str(number)) - 1)), size / 2.0)
+
+
+def draw_badge(canvas: Canvas, place: Place, number: int, size: float) -> None:
+    """Draw a number in white or dark on its colour."""
+    colour = pair_colour(number)
+    a, b = _badge_half(size, number)
+    box = (place.x - a, place.y - b, place.x + a, place.y + b)
+    canvas.rounded(box, b, colour, WHITE, 0.075 * size)
+    ink = readable_on(colour)
+    canvas.text((place.x, place.y), str(number), 0.58 * size, ink, anchor="mm", weight=0.02)
+
+
+def _draw_scale_bar(canvas: Canvas, scale: float, box: Box) -> None:
+    """Draw a round length of 60 … 150 design units in the lower right corner."""
+    metres = _round_below(150.0 / scale)
+    text = _length_text(metres)
+    right, y = box[2] - 22.0, box[3] - 20.0
+    left = right - metres * scale
+    backing = (left - 22.0 - canvas.text_width(text, 15.0), y - 13.0, right + 10.0, y + 13.0)
+    canvas.rounded(backing, 8.0, WHITE, BORDER)
+    ends = np.array([[left, y - 5], [left, y + 5], [left, y], [right, y], [right, y + 5]])
+    canvas.line(np.vstack([ends, [right, y - 5]]), INK, 1.6)
+    canvas.text((left - 10.0, y), text, 15.0, INK, anchor="rm")
+
+
+def _round_below(length: float) -> float:
+    """Return the largest of 1, 2, 5 times a power of ten that is not above ``length``."""
+    power = 10.0 ** math.floor(math.log10(length))
+    return next(digit * power for digit in (5.0, 2.0, 1.0) if digit * power <= length * 1.0000001)
+
+
+def _length_text(metres: float) -> str:
+    if metres >= 1000.0:
+        return f"{metres / 1000.0:g} km"
+    return f"{metres:g} m" if metres >= 1.0 else f"{metres * 100.0:g} cm"
+
+
+def _edge(colour: Colour) -> Colour:
+    """Return the outline that goes with a fill."""
+    return mixed(colour, INK, 0.12)
+
+
+def _middle(box: Box) -> tuple[float, float]:
+    return ((box[0] + box[2]) / 2.0, (box[1] + box[3]) / 2.0)

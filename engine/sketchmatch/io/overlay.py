@@ -1,0 +1,232 @@
+"""Pictures of results: a sketch and a map side by side, partners in one colour and number.
+
+Everything is laid out in design units, 1600 across an overlay and 1000 across a single scene,
+and drawn at any width; a picture twice as wide shows the same, finer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from PIL import Image
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io._overlay.canvas import printable
+from sketchmatch.io._overlay.page import Entry, Page
+from sketchmatch.io._overlay.panel import Panel, badge_size
+from sketchmatch.model import OccupancyGrid, Scene
+
+__all__ = ["OverlayMatch", "check_picture_path", "draw_overlay", "draw_scene", "save_overlay"]
+
+_FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
+
+_OVERLAY, _SINGLE = 1600.0, 1000.0
+
+
+@dataclass(frozen=True)
+class OverlayMatch:
+    """One pair of an object map.
+
+    Attributes
+    ----------
+    sketch_object, map_object
+        Indices of the objects, from 0.
+    confidence
+        How sure the pair is, 0 … 1.
+    """
+
+    sketch_object: int
+    map_object: int
+    confidence: float
+
+
+def draw_overlay(
+    sketch: Scene,
+    map: Scene,  # noqa: A002
+    matches: Sequence[OverlayMatch],
+    *,
+    title: str | None = None,
+    caption: str = "",
+    facts: Sequence[tuple[str, str]] = (),
+    underlay: OccupancyGrid | None = None,
+    metres: bool | None = None,
+    width: int = 1600,
+) -> Image.Image:
+    """Draw both scenes side by side, matched objects in the same colour and number.
+
+    Parameters
+    ----------
+    sketch, map
+        The scenes.
+    matches
+        The pairs of the object map, in any order. A pair has the number of its sketched object,
+        counted from 1; objects without a partner are grey, hatched and without a number.
+    title, caption
+        The headline, which counts the matches when left out, and a line below it.
+    facts
+        Names and values for the header, e.g. ``[("OMAP confidence", "0.93")]``.
+    underlay
+        The grid that the map was made from, drawn softly under its objects.
+    metres
+        Whether the map is in metres and gets a scale bar; with an underlay when left out.
+    width
+        Of the picture, in pixels, 400 … 6400. The height follows from the content.
+
+    Returns
+    -------
+    PIL.Image.Image
+        RGB.
+
+    Raises
+    ------
+    InvalidInputError
+        If a pair names an object that is not there or twice, or the width is out of range.
+    """
+    _check_width(width)
+    _check_matches(sketch, map, matches)
+    matches = sorted(matches, key=lambda match: match.sketch_object)
+    numbers = {match.sketch_object: match.sketch_object + 1 for match in matches}
+    partners = {match.map_object: match.sketch_object + 1 for match in matches}
+    metres = underlay is not None if metres is None else metres
+    badge = badge_size(max(len(sketch), len(map)))
+    panels = [
+        Panel("Sketch", sketch, numbers, pen=True, badge=badge),
+        Panel("Map", map, partners, underlay, metres=metres, badge=badge),
+    ]
+    entries = [_entry(match, sketch, map) for match in matches]
+    if title is None:
+        title = f"{len(matches)} of {len(sketch)} objects matched"
+    page = Page(_OVERLAY, panels, entries, _note(panels))
+    return page.drawn(title, caption, facts, width)
+
+
+def draw_scene(
+    scene: Scene,
+    *,
+    title: str | None = None,
+    caption: str = "",
+    underlay: OccupancyGrid | None = None,
+    metres: bool | None = None,
+    pen: bool = False,
+    width: int = 1000,
+) -> Image.Image:
+    """Draw one scene, its objects numbered from 1.
+
+    Parameters
+    ----------
+    scene
+        The objects.
+    title, caption
+        The headline, which counts the objects when left out, and a line below it.
+    underlay
+        The grid that the scene was made from, drawn softly under the objects.
+    metres
+        Whether the scene is in metres and gets a scale bar; with an underlay when left out.
+    pen
+        Draw outlines as a pen does.
+    width
+        Of the picture, in pixels, 400 … 6400.
+
+    Returns
+    -------
+    PIL.Image.Image
+        RGB.
+
+    Raises
+    ------
+    InvalidInputError
+        If the width is out of range.
+    """
+    _check_width(width)
+    metres = underlay is not None if metres is None else metres
+    numbers = {k: k + 1 for k in range(len(scene))}
+    panel = Panel("", scene, numbers, underlay, pen, metres, badge_size(len(scene)))
+    labelled = [Entry(k + 1, printable(name)) for k, name in enumerate(scene.labels) if name]
+    title = f"{len(scene)} objects" if title is None else title
+    return Page(_SINGLE, [panel], labelled, "").drawn(title, caption, (), width)
+
+
+def check_picture_path(path: str | Path) -> None:
+    """Refuse a path that no picture can be saved under, before any work is done.
+
+    Raises
+    ------
+    InvalidInputError
+        If the name's ending is no picture's, or its folder does not exist.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in _FORMATS:
+        raise InvalidInputError(
+            Reason.INVALID_FILE,
+            "overlay",
+            f"is {str(path)!r}; let its name end in .png, .jpg or .webp",
+        )
+    if not path.parent.is_dir():
+        raise InvalidInputError(
+            Reason.INVALID_FILE,
+            "overlay",
+            f"is {str(path)!r}, but there is no folder {str(path.parent)!r}; create it first",
+        )
+
+
+def save_overlay(path: str | Path, image: Image.Image) -> None:
+    """Save a picture, in the format that its name's ending says.
+
+    Raises
+    ------
+    InvalidInputError
+        If the name's ending is no picture's, or the file cannot be written.
+    """
+    check_picture_path(path)
+    try:
+        image.save(path, _FORMATS[Path(path).suffix.lower()], quality=92)
+    except OSError as error:
+        why = error.strerror or "the disk refused it"
+        raise InvalidInputError(
+            Reason.INVALID_FILE,
+            "overlay",
+            f"cannot be written to {str(path)!r} ({why}); name a file in a folder of yours",
+        ) from None
+
+
+def _check_width(width: int) -> None:
+    if not 400 <= width <= 6400:
+        raise InvalidInputError(
+            Reason.INVALID_PARAMETER, "width", f"is {width}; give 400 … 6400 pixels"
+        )
+
+
+def _check_matches(sketch: Scene, map: Scene, matches: Sequence[OverlayMatch]) -> None:  # noqa: A002
+    seen: set[tuple[str, int]] = set()
+    for k, match in enumerate(matches):
+        sides = (("sketch", match.sketch_object, sketch), ("map", match.map_object, map))
+        for side, index, scene in sides:
+            field = f"matches[{k}].{side}_object"
+            if not 0 <= index < len(scene):
+                problem = f"is {index}; the {side} has objects 0 … {len(scene) - 1}"
+                raise InvalidInputError(Reason.INVALID_FIELD, field, problem)
+            if (side, index) in seen:
+                problem = f"is {index} again; give each object one partner at most"
+                raise InvalidInputError(Reason.INVALID_FIELD, field, problem)
+            seen.add((side, index))
+        if not math.isfinite(match.confidence):
+            field = f"matches[{k}].confidence"
+            raise InvalidInputError(
+                Reason.INVALID_FIELD, field, "is not finite; give a number from 0 to 1"
+            )
+
+
+def _entry(match: OverlayMatch, sketch: Scene, map: Scene) -> Entry:  # noqa: A002
+    names = (sketch.labels[match.sketch_object], map.labels[match.map_object])
+    name = " · ".join(dict.fromkeys(printable(name) for name in names if name.strip()))
+    return Entry(match.sketch_object + 1, name, match.confidence)
+
+
+def _note(panels: Sequence[Panel]) -> str:
+    """Return what the legend says about objects without a partner; nothing if there is none."""
+    sketched, mapped = (len(panel.scene) - len(panel.numbers) for panel in panels)
+    parts = [f"{sketched} sketched"] * (sketched > 0) + [f"{mapped} mapped"] * (mapped > 0)
+    return f"no partner: {' and '.join(parts)}" if parts else ""
