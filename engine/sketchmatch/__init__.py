@@ -1,3 +1,43 @@
-"""Match a hand-drawn sketch of a place with a robot's map of it, object by object."""
+"""Match a hand-drawn sketch of a place with a robot's map of it, object by object.
 
+The names below load what they need when they are first used, so that programs that only talk to
+a server start without numba and OpenCV.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sketchmatch.errors import InvalidInputError, SketchmatchError
+    from sketchmatch.model import Scene
+    from sketchmatch.pipeline.result import MatchResult
+    from sketchmatch.public import force_histogram, match, read_scene
+
+__all__ = [
+    "InvalidInputError",
+    "MatchResult",
+    "Scene",
+    "SketchmatchError",
+    "force_histogram",
+    "match",
+    "read_scene",
+]
 __version__ = "0.1.0"
+
+_HOMES = {
+    "InvalidInputError": "sketchmatch.errors",
+    "MatchResult": "sketchmatch.pipeline.result",
+    "Scene": "sketchmatch.model",
+    "SketchmatchError": "sketchmatch.errors",
+    "force_histogram": "sketchmatch.public",
+    "match": "sketchmatch.public",
+    "read_scene": "sketchmatch.public",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'sketchmatch' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)

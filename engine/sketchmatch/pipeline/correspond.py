@@ -1,0 +1,108 @@
+"""From a histogram map to the object map, and how sure it is (thesis 3.6.1, 3.9, 3.10)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sketchmatch.kernels import confidence as kernels
+from sketchmatch.model import (
+    Confidence,
+    FloatArray,
+    Fmap,
+    ObjectMap,
+    Occm,
+    RelationTable,
+    Weights,
+    object_pairs,
+)
+
+__all__ = ["fmap_confidence", "global_dilation", "global_rotation", "object_map", "occm"]
+
+# Sums of the same similarities in another order differ by less than this.
+_TIE = 1e-12
+
+
+def fmap_confidence(
+    fmap: Fmap, table: RelationTable, weights: Weights = (1.0, 1.0, 1.0)
+) -> Confidence:
+    """Return ζ of a histogram map and its parts ζσ, ζR and ζL.
+
+    Examples
+    --------
+    A perfect map of two objects onto two objects turned by a quarter:
+
+    >>> table = RelationTable([[1.0]], [[math.pi / 2]], [[2.0]], 2, 2)
+    >>> fmap_confidence(Fmap([0]), table)
+    Confidence(total=1.0, similarity=1.0, rotation=1.0, dilation=1.0)
+    """
+    scratch = np.empty(table.template_pairs)
+    values = kernels.fmap_confidence(
+        fmap.entries,
+        scratch,
+        table.similarity,
+        table.cosine,
+        table.sine,
+        table.normalized_dilation,
+        np.array(weights, dtype=np.float64),
+    )
+    return Confidence(*(float(value) for value in values))
+
+
+def occm(fmap: Fmap, table: RelationTable) -> Occm:
+    """Collect what every entry of a histogram map says about every pairing of objects.
+
+    An entry (a, b) → (c, d) adds its σ to the pairings a→c and b→d, which its order implies, and
+    to a→d and b→c.
+    """
+    rows, columns = np.arange(table.template_pairs), fmap.entries % table.argument_pairs
+    sigma = table.similarity[rows, columns]
+    a, b = object_pairs(table.template_objects).T
+    low, high = object_pairs(table.argument_objects)[columns].T
+    dual = fmap.entries >= table.argument_pairs
+    c, d = np.where(dual, high, low), np.where(dual, low, high)
+    implied = np.zeros((table.template_objects, table.argument_objects))
+    crossed = np.zeros_like(implied)
+    np.add.at(implied, (a, c), sigma)
+    np.add.at(implied, (b, d), sigma)
+    np.add.at(crossed, (a, d), sigma)
+    np.add.at(crossed, (b, c), sigma)
+    return Occm(implied + crossed, implied)
+
+
+def object_map(matrix: Occm) -> ObjectMap:
+    """Take the pairing with the most evidence among the objects left, again and again.
+
+    Ties go to the pairing that the order of the entries implies, then to the lower indices.
+    """
+    evidence, implied = matrix.evidence.copy(), matrix.implied.copy()
+    objects = len(evidence)
+    partners = np.full(objects, -1, dtype=np.int64)
+    confidences = np.zeros(objects)
+    for _ in range(objects):
+        best = evidence >= evidence.max() - _TIE
+        best &= implied >= implied[best].max() - _TIE
+        g, h = (int(k) for k in np.unravel_index(int(best.argmax()), best.shape))
+        partners[g], confidences[g] = h, matrix.evidence[g, h] / (objects - 1)
+        evidence[g, :], evidence[:, h] = -np.inf, -np.inf
+    return ObjectMap(partners, confidences, float(confidences.mean()))
+
+
+def global_rotation(fmap: Fmap, table: RelationTable) -> float:
+    """Return the turn from template to argument, arg Σ e^{iR}, in radians within [−π, π]."""
+    cosine, sine = _turned(fmap, table, table.cosine), _turned(fmap, table, table.sine)
+    return math.atan2(sine.sum(), cosine.sum())
+
+
+def global_dilation(fmap: Fmap, table: RelationTable) -> float:
+    """Return the median size of the argument relative to the template."""
+    columns = fmap.entries % table.argument_pairs
+    return float(np.median(table.dilation[np.arange(len(columns)), columns]))
+
+
+def _turned(fmap: Fmap, table: RelationTable, values: FloatArray) -> FloatArray:
+    """Return one value for each entry, negated where the entry is a dual."""
+    rows, half = np.arange(table.template_pairs), table.argument_pairs
+    picked = values[rows, fmap.entries % half]
+    return np.where(fmap.entries < half, picked, -picked)

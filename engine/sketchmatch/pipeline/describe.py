@@ -1,0 +1,59 @@
+"""From a scene to the histograms of all its pairs of objects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+
+import numpy as np
+
+from sketchmatch.api import Histogram
+from sketchmatch.model import FloatArray, Scene, SceneDescriptor, object_pairs
+from sketchmatch.pipeline.slices import slices
+
+__all__ = ["describe"]
+
+
+def describe(scene: Scene, histogram: Histogram) -> Generator[float, None, SceneDescriptor]:
+    """Describe every pair of a scene.
+
+    A pair that none of the directions meets, because the objects are small for their distance,
+    gets the limit of its histogram: the whole force A_a·A_b/D between their centroids, shared by
+    the two directions next to it.
+
+    Yields
+    ------
+    float
+        The share that is done.
+
+    Returns
+    -------
+    SceneDescriptor
+        One histogram for each pair (a, b), a < b.
+    """
+    pairs = object_pairs(len(scene))
+    histograms = np.empty((len(pairs), histogram.params.directions))
+    for first, last in slices(len(pairs)):
+        histograms[first:last] = histogram.describe(scene, pairs[first:last])
+        yield last / len(pairs)
+    for index in np.flatnonzero(~histograms.any(axis=1)):
+        a, b = (scene.objects[k] for k in pairs[index])
+        offset = np.subtract(a.centroid, b.centroid)
+        distance = float(np.hypot(*offset))
+        if distance > 0.0:
+            force = a.area * b.area * distance ** (-1.0 - histogram.exponent)
+            angle = float(np.arctan2(offset[1], offset[0]))
+            histograms[index] = _point_histogram(angle, force, histograms.shape[1])
+    return SceneDescriptor(histograms, len(scene), histogram.exponent)
+
+
+def _point_histogram(angle: float, force: float, directions: int) -> FloatArray:
+    """Return a histogram whose integral over all directions is ``force``, all at one angle."""
+    histogram = np.zeros(directions)
+    step = 2.0 * math.pi / directions
+    place = (angle / step) % directions
+    low = int(place)
+    share = place - low
+    histogram[low % directions] = (1.0 - share) * force / step
+    histogram[(low + 1) % directions] += share * force / step
+    return histogram

@@ -1,0 +1,394 @@
+"""One match from two sources to a result, as a stream of events."""
+
+from __future__ import annotations
+
+import math
+import time
+import uuid
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+from typing import TypeVar
+
+import numpy as np
+
+from sketchmatch.api import MatchProblem, Outcome, SearchProgress, Segmentation, Segmenter
+from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError, Reason
+from sketchmatch.model import (
+    Fmap,
+    ObjectMap,
+    RelationTable,
+    Scene,
+    Source,
+    Weights,
+    object_pairs,
+)
+from sketchmatch.pipeline.correspond import (
+    fmap_confidence,
+    global_dilation,
+    global_rotation,
+    object_map,
+    occm,
+)
+from sketchmatch.pipeline.describe import describe
+from sketchmatch.pipeline.relate import relate
+from sketchmatch.pipeline.result import Correspondence, MatchResult, ObjectMatch, Statistics
+from sketchmatch.pipeline.selection import Pipeline, Selection, resolve
+from sketchmatch.registry import Registry
+
+__all__ = [
+    "Accepted",
+    "Finished",
+    "MatchEvent",
+    "MatchRequest",
+    "Phase",
+    "Progress",
+    "Segmented",
+    "run_match",
+]
+
+_PROGRESS_EVERY = 0.05
+_MAX_SEED = 2**64 - 1
+_Value = TypeVar("_Value")
+
+
+class Phase(StrEnum):
+    """What a match is doing; the same names as ``sketchmatch.v1.Phase``."""
+
+    SEGMENT = "SEGMENT"
+    DESCRIBE = "DESCRIBE"
+    RELATE = "RELATE"
+    SEARCH = "SEARCH"
+
+
+@dataclass(frozen=True)
+class MatchRequest:
+    """What to match, and how.
+
+    Attributes
+    ----------
+    sketch, map
+        Sources, or scenes that need no segmentation.
+    selection
+        Algorithms and parameters, by stage.
+    seed
+        0 … 2⁶⁴−1; the same request with the same seed gives the same result.
+    time_budget
+        Seconds after which the best answer so far is given, or None for no limit.
+    weights
+        Of ζσ, ζR and ζL in ζ.
+    """
+
+    sketch: Source | Scene
+    map: Source | Scene
+    selection: Selection = field(default_factory=lambda: MappingProxyType({}))
+    seed: int = 0
+    time_budget: float | None = None
+    weights: Weights = (1.0, 1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.seed <= _MAX_SEED:
+            raise InvalidInputError(
+                Reason.INVALID_FIELD, "seed", f"is {self.seed}; give an integer 0 … 2**64 − 1"
+            )
+        if self.time_budget is not None and not 0 < self.time_budget < math.inf:
+            raise InvalidInputError(
+                Reason.INVALID_FIELD,
+                "time_budget",
+                f"is {self.time_budget:g} s; give a positive time or none at all",
+            )
+        names = ("similarity", "rotation", "dilation")
+        for name, weight in zip(names, self.weights, strict=True):
+            if not (math.isfinite(weight) and weight >= 0):
+                raise InvalidInputError(
+                    Reason.INVALID_FIELD, f"weights.{name}", f"is {weight:g}; give 0 or more"
+                )
+        if sum(self.weights) == 0:
+            raise InvalidInputError(
+                Reason.INVALID_FIELD, "weights", "are all zero; give at least one above zero"
+            )
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """The request is sound and work begins."""
+
+    match_id: str
+    seed: int
+    pipeline: Pipeline
+
+
+@dataclass(frozen=True)
+class Segmented:
+    """Both scenes are known."""
+
+    sketch: Segmentation
+    map: Segmentation
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a match stands.
+
+    Attributes
+    ----------
+    phase
+        What it is doing.
+    elapsed
+        Seconds since it was accepted.
+    fraction
+        Share of the phase that is done, where known.
+    iteration, evaluations, confidence, upper_bound
+        The search so far, as in :class:`~sketchmatch.api.SearchProgress`.
+    matches
+        The object map that follows from its best FMAP, as in the result.
+    """
+
+    phase: Phase
+    elapsed: float
+    fraction: float | None = None
+    iteration: int = 0
+    evaluations: int = 0
+    confidence: float | None = None
+    upper_bound: float | None = None
+    matches: tuple[ObjectMatch, ...] = ()
+
+    @property
+    def object_map(self) -> dict[int, int]:
+        """Sketch index → map index of the best map so far; empty before the search."""
+        return {match.sketch_object: match.map_object for match in self.matches}
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The end of a match."""
+
+    result: MatchResult
+
+
+MatchEvent = Accepted | Segmented | Progress | Finished
+
+
+def run_match(request: MatchRequest, registry: Registry) -> Iterator[MatchEvent]:
+    """Match, yielding Accepted, Segmented, some Progress (at most 20 a second) and Finished.
+
+    Closing the iterator stops the work; between two events it works 50 ms or less, but for a
+    plugin that is slower in one step.
+
+    Raises
+    ------
+    InvalidInputError
+        If the request cannot be used.
+    AnswerUnavailableError
+        If the time budget ends before there is any answer.
+    PluginError
+        If a plugin breaks its contract.
+    """
+    return _Match(request, registry).run()
+
+
+class _Match:
+    """The state of one running match."""
+
+    def __init__(self, request: MatchRequest, registry: Registry) -> None:
+        self.request = request
+        self.registry = registry
+        self.match_id = uuid.uuid4().hex
+        self.started = time.monotonic()
+        self.reported = -math.inf
+        self.seconds: dict[str, float] = {}
+        self.pipeline = resolve(
+            registry,
+            request.selection,
+            None if isinstance(request.sketch, Scene) else request.sketch,
+            None if isinstance(request.map, Scene) else request.map,
+        )
+
+    def run(self) -> Iterator[MatchEvent]:
+        yield Accepted(self.match_id, self.request.seed, self.pipeline)
+        yield Progress(Phase.SEGMENT, self.elapsed())
+        with self.timed("segment"):
+            sketch = _segment("sketch", self.request.sketch, self.pipeline.sketch_segmenter)
+            self.check_budget(Phase.SEGMENT)
+            map_ = _segment("map", self.request.map, self.pipeline.map_segmenter)
+        yield Segmented(sketch, map_)
+        exchanged = len(sketch.scene) > len(map_.scene)
+        scenes = (sketch.scene, map_.scene)
+        template, argument = reversed(scenes) if exchanged else scenes
+        with self.timed("describe"):
+            first = yield from self.watched(
+                Phase.DESCRIBE, describe(template, self.pipeline.histogram)
+            )
+            second = yield from self.watched(
+                Phase.DESCRIBE, describe(argument, self.pipeline.histogram)
+            )
+        with self.timed("relate"):
+            table = yield from self.watched(
+                Phase.RELATE, relate(first, second, self.pipeline.similarity)
+            )
+        with self.timed("search"):
+            found, outcome = yield from self.search(table, exchanged)
+        yield Finished(self.result(sketch, map_, table, exchanged, found, outcome))
+
+    def watched(
+        self, phase: Phase, work: Generator[float, None, _Value]
+    ) -> Generator[MatchEvent, None, _Value]:
+        """Run a stage to its end, passing its progress on."""
+        while True:
+            self.check_budget(phase)
+            try:
+                fraction = next(work)
+            except StopIteration as stop:
+                return stop.value  # type: ignore[no-any-return]
+            if self.may_report():
+                yield Progress(phase, self.elapsed(), fraction)
+
+    def search(
+        self, table: RelationTable, exchanged: bool
+    ) -> Generator[MatchEvent, None, tuple[SearchProgress, Outcome]]:
+        """Run the searcher until it ends or the time budget does."""
+        searcher = self.pipeline.searcher
+        problem = MatchProblem(table, self.request.weights)
+        work = searcher.search(problem, np.random.default_rng(self.request.seed))
+        best: SearchProgress | None = None
+        try:
+            while True:
+                try:
+                    best = next(work)
+                except StopIteration as stop:
+                    if best is None:
+                        raise PluginError(
+                            f"searcher {searcher.name} ended without any answer; "
+                            "report this to its author or choose another"
+                        ) from None
+                    return best, Outcome(stop.value or Outcome.CONVERGED)
+                if self.out_of_time():
+                    return best, Outcome.TIME_BUDGET
+                if self.may_report():
+                    mapped = object_map(occm(best.fmap, table))
+                    yield Progress(
+                        Phase.SEARCH,
+                        self.elapsed(),
+                        iteration=best.iteration,
+                        evaluations=best.evaluations,
+                        confidence=best.confidence,
+                        upper_bound=best.upper_bound,
+                        matches=_matches(mapped, exchanged),
+                    )
+        finally:
+            work.close()
+
+    def result(
+        self,
+        sketch: Segmentation,
+        map_: Segmentation,
+        table: RelationTable,
+        exchanged: bool,
+        found: SearchProgress,
+        outcome: Outcome,
+    ) -> MatchResult:
+        """Read what was found from sketch to map."""
+        mapped = object_map(occm(found.fmap, table))
+        rotation = global_rotation(found.fmap, table)
+        dilation = global_dilation(found.fmap, table)
+        self.seconds["total"] = self.elapsed()
+        return MatchResult(
+            matches=_matches(mapped, exchanged),
+            omap_confidence=mapped.confidence,
+            confidence=fmap_confidence(found.fmap, table, self.request.weights),
+            fmap=_correspondences(found.fmap, table, exchanged),
+            rotation=_half_turned(-rotation if exchanged else rotation),
+            scale=1.0 / dilation if exchanged else dilation,
+            outcome=outcome,
+            upper_bound=found.upper_bound,
+            seed=self.request.seed,
+            match_id=self.match_id,
+            statistics=Statistics(
+                found.iteration, found.evaluations, MappingProxyType(self.seconds)
+            ),
+            sketch=sketch.scene,
+            map=map_.scene,
+            warnings=(
+                *(f"sketch: {warning}" for warning in sketch.warnings),
+                *(f"map: {warning}" for warning in map_.warnings),
+            ),
+        )
+
+    def elapsed(self) -> float:
+        return time.monotonic() - self.started
+
+    def out_of_time(self) -> bool:
+        budget = self.request.time_budget
+        return budget is not None and self.elapsed() > budget
+
+    def check_budget(self, phase: Phase) -> None:
+        if self.out_of_time():
+            raise AnswerUnavailableError(
+                f"the time budget of {self.request.time_budget:g} s ended in phase {phase.lower()}, "
+                "before there was any answer; allow more time or match fewer objects"
+            )
+
+    def may_report(self) -> bool:
+        """Whether enough time has passed since the last progress was reported."""
+        now = time.monotonic()
+        if now - self.reported < _PROGRESS_EVERY:
+            return False
+        self.reported = now
+        return True
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        started = time.monotonic()
+        yield
+        self.seconds[stage] = time.monotonic() - started
+
+
+def _segment(side: str, source: Source | Scene, segmenter: Segmenter | None) -> Segmentation:
+    if isinstance(source, Scene):
+        return Segmentation(source)
+    assert segmenter is not None
+    try:
+        return segmenter.segment(source)
+    except InvalidInputError as error:
+        raise error.within(f"{side}.{source.field}") from None
+
+
+def _matches(mapped: ObjectMap, exchanged: bool) -> tuple[ObjectMatch, ...]:
+    pairs = zip(mapped.partners.tolist(), mapped.confidences.tolist(), strict=True)
+    read = (
+        ObjectMatch(h, g, confidence) if exchanged else ObjectMatch(g, h, confidence)
+        for g, (h, confidence) in enumerate(pairs)
+    )
+    return tuple(sorted(read, key=lambda match: match.sketch_object))
+
+
+def _correspondences(
+    fmap: Fmap, table: RelationTable, exchanged: bool
+) -> tuple[Correspondence, ...]:
+    half = table.argument_pairs
+    argument_pairs = object_pairs(table.argument_objects)
+    entries = []
+    for i, (a, b) in enumerate(object_pairs(table.template_objects).tolist()):
+        column = int(fmap.entries[i]) % half
+        dual = bool(fmap.entries[i] >= half)
+        c, d = argument_pairs[column].tolist()[:: -1 if dual else 1]
+        rotation = float(table.rotation[i, column]) + (math.pi if dual else 0.0)
+        dilation = float(table.dilation[i, column])
+        entries.append(
+            Correspondence(
+                sketch_pair=(c, d) if exchanged else (a, b),
+                map_pair=(a, b) if exchanged else (c, d),
+                similarity=float(table.similarity[i, column]),
+                rotation=_half_turned(-rotation if exchanged else rotation),
+                dilation=1.0 / dilation if exchanged else dilation,
+            )
+        )
+    return tuple(entries)
+
+
+def _half_turned(angle: float) -> float:
+    """Return the same angle within (−π, π]."""
+    turned = math.remainder(angle, 2.0 * math.pi)
+    return math.pi if turned == -math.pi else turned

@@ -1,0 +1,132 @@
+"""The answer to a match: which sketched object is which mapped object, and how sure it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from sketchmatch.api import Outcome
+from sketchmatch.model import Confidence, Scene
+
+__all__ = ["Correspondence", "MatchResult", "ObjectMatch", "Statistics"]
+
+
+@dataclass(frozen=True)
+class ObjectMatch:
+    """One sketched object, the mapped object that it is, and how sure that is, 0 … 1."""
+
+    sketch_object: int
+    map_object: int
+    confidence: float
+
+
+@dataclass(frozen=True)
+class Correspondence:
+    """One entry of the FMAP, read from sketch to map.
+
+    Attributes
+    ----------
+    sketch_pair, map_pair
+        Objects (a, b) of the sketch whose relation corresponds to that of (c, d) on the map.
+    similarity
+        σ of the two histograms.
+    rotation
+        Turn from the sketch's to the map's, radians counter-clockwise within (−π, π].
+    dilation
+        Size on the map relative to the sketch.
+    """
+
+    sketch_pair: tuple[int, int]
+    map_pair: tuple[int, int]
+    similarity: float
+    rotation: float
+    dilation: float
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a match took.
+
+    Attributes
+    ----------
+    iterations, evaluations
+        Of the searcher: its iterations, and the FMAPs that it evaluated.
+    seconds
+        Time of each stage, ``segment``, ``describe``, ``relate``, ``search``, and ``total``.
+    """
+
+    iterations: int
+    evaluations: int
+    seconds: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class MatchResult:
+    """The result of a match.
+
+    Attributes
+    ----------
+    matches
+        The matched objects, by index in the sketch.
+    omap_confidence
+        Ω, the mean of their confidences.
+    confidence
+        ζ of the FMAP and its parts.
+    fmap
+        The histogram map that was found.
+    rotation
+        Turn from sketch to map, radians counter-clockwise within (−π, π].
+    scale
+        Size of the map relative to the sketch.
+    outcome
+        Why the search ended.
+    upper_bound
+        A ζ that no legal FMAP exceeds, or None where the searcher proves nothing.
+    seed
+        With it, the same request gives the same result.
+    match_id
+        Unique to this match.
+    statistics
+        What it took.
+    sketch, map
+        The scenes that were matched.
+    warnings
+        What segmentation left out or decided, each naming its side.
+    """
+
+    matches: tuple[ObjectMatch, ...]
+    omap_confidence: float
+    confidence: Confidence
+    fmap: tuple[Correspondence, ...]
+    rotation: float
+    scale: float
+    outcome: Outcome
+    upper_bound: float | None
+    seed: int
+    match_id: str
+    statistics: Statistics
+    sketch: Scene
+    map: Scene
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def object_map(self) -> dict[int, int]:
+        """Sketch index → map index, from 0; sketched objects without a partner are left out."""
+        return {match.sketch_object: match.map_object for match in self.matches}
+
+    @property
+    def fmap_confidence(self) -> float:
+        """ζ."""
+        return self.confidence.total
+
+    @property
+    def unmatched_sketch_objects(self) -> tuple[int, ...]:
+        """Sketched objects without a partner."""
+        matched = set(self.object_map)
+        return tuple(k for k in range(len(self.sketch)) if k not in matched)
+
+    @property
+    def unmatched_map_objects(self) -> tuple[int, ...]:
+        """Mapped objects without a partner."""
+        matched = set(self.object_map.values())
+        return tuple(k for k in range(len(self.map)) if k not in matched)

@@ -1,0 +1,44 @@
+"""Compiling everything before the first request, and saying so where it takes long."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from sketchmatch.kernels._jit import on_compile
+from sketchmatch.model import Fmap, SceneDescriptor
+from sketchmatch.pipeline.correspond import fmap_confidence
+from sketchmatch.pipeline.relate import relate
+from sketchmatch.pipeline.selection import resolve
+from sketchmatch.pipeline.slices import finish
+from sketchmatch.registry import Registry
+
+__all__ = ["COMPILING", "warm_up"]
+
+COMPILING = "compiling the kernels: this happens once after an installation and takes about 20 s"
+
+
+def warm_up(registry: Registry, say: Callable[[str], None]) -> None:
+    """Load the kernels of the pipeline and of every algorithm, or compile them.
+
+    Parameters
+    ----------
+    registry
+        The algorithms.
+    say
+        Called once with :data:`COMPILING` if something is not in the cache.
+    """
+    silent = True
+
+    def listener(_: str) -> None:
+        nonlocal silent
+        if silent:
+            silent = False
+            say(COMPILING)
+
+    with on_compile(listener):
+        pipeline = resolve(registry, {})
+        one = SceneDescriptor([[1.0, 0.0, 0.0, 0.0]], 2, 0.0)
+        table = finish(relate(one, one, pipeline.similarity))
+        fmap_confidence(Fmap([0]), table)
+        for item in registry.algorithms:
+            item.algorithm.warm_up()
