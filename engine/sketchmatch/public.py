@@ -171,6 +171,5 @@ def _selection(names: Mapping[str, str], params: Mapping[str, Mapping[str, Any]]
                 f"is no stage; choose one of: {', '.join(STAGES)}",
             )
     return {
-        stage: Choice(names.get(stage, ""), params.get(stage, {}))
-        for stage in {*names, *params}
+        stage: Choice(names.get(stage, ""), params.get(stage, {})) for stage in {*names, *params}
     }

@@ -6,7 +6,7 @@ makes sketches and maps to hand to them.
 
 from sketchmatch_client import sources
 from sketchmatch_client._aio import AsyncClient
-from sketchmatch_client._match import Match
+from sketchmatch_client._match import Match, MatchCollector
 from sketchmatch_client._requests import MatchOptions
 from sketchmatch_client._sync import Client
 from sketchmatch_client.errors import (
@@ -28,6 +28,7 @@ __all__ = [
     "DeadlineExceededError",
     "InvalidRequestError",
     "Match",
+    "MatchCollector",
     "MatchOptions",
     "NotAuthenticatedError",
     "NotSupportedError",

@@ -1,1 +1,5 @@
+"""Files: what people and robots have on disk, in, and pictures of results, out."""
 
+from sketchmatch.io.files import read_source
+
+__all__ = ["read_source"]

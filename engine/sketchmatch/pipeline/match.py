@@ -171,10 +171,10 @@ class Finished:
 MatchEvent = Accepted | Segmented | Progress | Finished
 
 
-def run_match(request: MatchRequest, registry: Registry) -> Iterator[MatchEvent]:
+def run_match(request: MatchRequest, registry: Registry) -> Generator[MatchEvent, None, None]:
     """Match, yielding Accepted, Segmented, some Progress (at most 20 a second) and Finished.
 
-    Closing the iterator stops the work; between two events it works 50 ms or less, but for a
+    Closing the generator stops the work; between two events it works 50 ms or less, but for a
     plugin that is slower in one step.
 
     Raises
@@ -199,14 +199,17 @@ class _Match:
         self.started = time.monotonic()
         self.reported = -math.inf
         self.seconds: dict[str, float] = {}
-        self.pipeline = resolve(
-            registry,
-            request.selection,
-            None if isinstance(request.sketch, Scene) else request.sketch,
-            None if isinstance(request.map, Scene) else request.map,
-        )
+        try:
+            self.pipeline = resolve(
+                registry,
+                request.selection,
+                None if isinstance(request.sketch, Scene) else request.sketch,
+                None if isinstance(request.map, Scene) else request.map,
+            )
+        except InvalidInputError as error:
+            raise error.within("pipeline") from None
 
-    def run(self) -> Iterator[MatchEvent]:
+    def run(self) -> Generator[MatchEvent, None, None]:
         yield Accepted(self.match_id, self.request.seed, self.pipeline)
         yield Progress(Phase.SEGMENT, self.elapsed())
         with self.timed("segment"):

@@ -129,9 +129,7 @@ def resolve_segmenter(
         If it is unknown, cannot read the source, or a parameter is wrong.
     """
     default = _DEFAULT_SEGMENTERS[type(source)]
-    segmenter = cast(
-        Segmenter, _resolve_stage(registry, Kind.SEGMENTER, choice, default, stage)
-    )
+    segmenter = cast(Segmenter, _resolve_stage(registry, Kind.SEGMENTER, choice, default, stage))
     if not isinstance(source, segmenter.sources):
         fitting = ", ".join(
             item.name
@@ -141,7 +139,7 @@ def resolve_segmenter(
         raise InvalidInputError(
             Reason.WRONG_ALGORITHM,
             f"{stage}.name",
-            f"is {segmenter.name!r}, which cannot read a {source.field}; choose one of: {fitting}",
+            f"is {segmenter.name!r}, which cannot read source {source.field}; choose one of: {fitting}",
         )
     return segmenter
 
@@ -168,6 +166,8 @@ def _parameter_error(algorithm: type[Algorithm], error: ValidationError) -> Inva
         problem = f"is no parameter of {algorithm.name}; it has: {known}"
     else:
         given = fault["input"]
+        if isinstance(given, float) and given.is_integer():
+            given = int(given)  # numbers of a protobuf Struct are all floating
         remedy = fault["msg"].removeprefix("Input ").removeprefix("Value error, ")
         problem = f"is {given!r}; it {remedy}"
     return InvalidInputError(Reason.INVALID_PARAMETER, path, problem)

@@ -1,8 +1,9 @@
-"""Compiling everything before the first request, and saying so where it takes long."""
+"""Compiling kernels before they are needed, and saying so where it takes long."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from sketchmatch.kernels._jit import on_compile
 from sketchmatch.model import Fmap, SceneDescriptor
@@ -12,21 +13,14 @@ from sketchmatch.pipeline.selection import resolve
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Registry
 
-__all__ = ["COMPILING", "warm_up"]
+__all__ = ["COMPILING", "announcing_compilation", "warm_up"]
 
 COMPILING = "compiling the kernels: this happens once after an installation and takes about 20 s"
 
 
-def warm_up(registry: Registry, say: Callable[[str], None]) -> None:
-    """Load the kernels of the pipeline and of every algorithm, or compile them.
-
-    Parameters
-    ----------
-    registry
-        The algorithms.
-    say
-        Called once with :data:`COMPILING` if something is not in the cache.
-    """
+@contextmanager
+def announcing_compilation(say: Callable[[str], None]) -> Iterator[None]:
+    """Call ``say`` with :data:`COMPILING`, once, if a kernel is not in the cache."""
     silent = True
 
     def listener(_: str) -> None:
@@ -36,9 +30,14 @@ def warm_up(registry: Registry, say: Callable[[str], None]) -> None:
             say(COMPILING)
 
     with on_compile(listener):
-        pipeline = resolve(registry, {})
-        one = SceneDescriptor([[1.0, 0.0, 0.0, 0.0]], 2, 0.0)
-        table = finish(relate(one, one, pipeline.similarity))
-        fmap_confidence(Fmap([0]), table)
-        for item in registry.algorithms:
-            item.algorithm.warm_up()
+        yield
+
+
+def warm_up(registry: Registry) -> None:
+    """Load the kernels of the pipeline and of every algorithm, or compile them."""
+    pipeline = resolve(registry, {})
+    one = SceneDescriptor([[1.0, 0.0, 0.0, 0.0]], 2, 0.0)
+    table = finish(relate(one, one, pipeline.similarity))
+    fmap_confidence(Fmap([0]), table)
+    for item in registry.algorithms:
+        item.algorithm.warm_up()

@@ -39,9 +39,7 @@ def discover(points: Iterable[EntryPoint] | None = None) -> Registry:
             point.dist.version if point.dist else "",
         )
         try:
-            algorithms += [
-                Registered(kind, algorithm, *origin) for kind, algorithm in _load(point)
-            ]
+            algorithms += [Registered(kind, algorithm, *origin) for kind, algorithm in _load(point)]
             failure = ""
         except Exception as error:  # a plugin may raise anything
             failure = f"{type(error).__name__}: {error}"

@@ -1,1 +1,1 @@
-
+"""The gRPC server: messages in, the pipeline, messages out."""

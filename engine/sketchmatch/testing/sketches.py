@@ -128,7 +128,8 @@ def _resampled(ring: FloatArray, count: int) -> FloatArray:
     parts = np.maximum(1, np.rint(count * lengths / lengths.sum())).astype(int)
     return np.vstack(
         [
-            closed[k] + np.linspace(0.0, 1.0, n, endpoint=False)[:, None] * (closed[k + 1] - closed[k])
+            closed[k]
+            + np.linspace(0.0, 1.0, n, endpoint=False)[:, None] * (closed[k + 1] - closed[k])
             for k, n in enumerate(parts)
         ]
     )

@@ -54,7 +54,10 @@ class Easm(Searcher):
             0.7, ge=0, le=1, description="Pc, probability that two parents cross over."
         )
         exchange_rate: float = Field(
-            0.5, ge=0, le=1, description="Px, probability that an element is swapped in a cross-over."
+            0.5,
+            ge=0,
+            le=1,
+            description="Px, probability that an element is swapped in a cross-over.",
         )
         mutation_rate: float = Field(
             0.3, ge=0, le=1, description="Pm, probability that a parent mutates."

@@ -1,0 +1,5 @@
+"""``python -m sketchmatch``: the command line."""
+
+from sketchmatch.cli import main
+
+main()

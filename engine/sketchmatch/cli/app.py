@@ -1,0 +1,117 @@
+"""The commands, and what becomes of their errors."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from enum import IntEnum
+from typing import Annotated, NoReturn
+
+import typer
+
+import sketchmatch
+from sketchmatch.cli import demo, match, plugins, segment, serve
+from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError
+
+__all__ = ["ExitCode", "main"]
+
+app = typer.Typer(
+    name="sketchmatch",
+    help="Match a hand-drawn sketch of a place with a robot's map of it, object by object.",
+    invoke_without_command=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("match")(match.match)
+app.command("segment")(segment.segment)
+app.command("serve")(serve.serve)
+app.command("demo")(demo.demo)
+app.add_typer(plugins.app, name="plugins")
+
+
+class ExitCode(IntEnum):
+    """What the exit code of a command means."""
+
+    OK = 0
+    UNFORESEEN = 1
+    INVALID_INPUT = 2
+    SERVER_UNAVAILABLE = 3
+    NO_ANSWER_IN_TIME = 4
+    ALGORITHM_FAILED = 5
+    INTERRUPTED = 130
+
+
+@app.callback()
+def options(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+) -> None:
+    """Take the options that belong to no command."""
+    if version:
+        typer.echo(f"sketchmatch {sketchmatch.__version__}")
+    elif context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+def main() -> NoReturn:
+    """Run the command line and exit; an error is one line on standard error."""
+    # What gRPC's own library logs is for those who develop it.
+    os.environ.setdefault("GRPC_VERBOSITY", "NONE")
+    code, message = _run()
+    if message:
+        typer.echo(f"sketchmatch: {message}", err=True)
+    sys.exit(code)
+
+
+def _run() -> tuple[int, str]:
+    """Run the command line and return its exit code and what to say about it."""
+    try:
+        return app(standalone_mode=False) or ExitCode.OK, ""
+    except (typer.Abort, KeyboardInterrupt):
+        return ExitCode.INTERRUPTED, "interrupted"
+    except BrokenPipeError:
+        # Whoever read standard output has had enough; Python must not flush into it at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return ExitCode.OK, ""
+    except Exception as error:
+        return _exit_code(error), _sentence(error)
+
+
+def _exit_code(error: Exception) -> ExitCode:
+    if _is_usage_error(error):
+        return ExitCode.INVALID_INPUT
+    from sketchmatch_client import errors as client
+
+    codes: dict[type[Exception], ExitCode] = {
+        InvalidInputError: ExitCode.INVALID_INPUT,
+        AnswerUnavailableError: ExitCode.NO_ANSWER_IN_TIME,
+        PluginError: ExitCode.ALGORITHM_FAILED,
+        client.InvalidRequestError: ExitCode.INVALID_INPUT,
+        client.DeadlineExceededError: ExitCode.NO_ANSWER_IN_TIME,
+        client.ServerUnavailableError: ExitCode.SERVER_UNAVAILABLE,
+        client.ServerBusyError: ExitCode.SERVER_UNAVAILABLE,
+        client.SketchmatchError: ExitCode.ALGORITHM_FAILED,
+    }
+    return next(
+        (code for kind, code in codes.items() if isinstance(error, kind)), ExitCode.UNFORESEEN
+    )
+
+
+def _is_usage_error(error: Exception) -> bool:
+    """Whether the command line itself is wrong; typer keeps the class of that to itself."""
+    return hasattr(error, "format_message")
+
+
+def _sentence(error: Exception) -> str:
+    if _is_usage_error(error):
+        problem = error.format_message()  # type: ignore[attr-defined]
+        return f"{problem.rstrip('.')}; --help tells what it takes"
+    if _exit_code(error) is not ExitCode.UNFORESEEN:
+        return str(error)
+    if os.environ.get("SKETCHMATCH_DEBUG"):
+        return "".join(traceback.format_exception(error)).rstrip()
+    return (
+        f"failed in a way nobody foresaw ({type(error).__name__}: {error}); "
+        "please report it with what SKETCHMATCH_DEBUG=1 prints"
+    )

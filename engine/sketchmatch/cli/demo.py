@@ -1,0 +1,84 @@
+"""``sketchmatch demo``: the bundled living room, matched by a real server."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sketchmatch.cli.options import say
+
+__all__ = ["demo"]
+
+_START_SECONDS = 120.0
+_STOP_SECONDS = 10.0
+
+
+def demo(
+    overlay: Annotated[
+        Path, typer.Option("--overlay", metavar="FILE", help="Where to draw the answer.")
+    ] = Path("demo-overlay.png"),
+    seed: Annotated[int, typer.Option(help="Same seed, same answer.")] = 0,
+) -> None:
+    """Match a sketch of a living room with a robot's map of it.
+
+    Starts a server in a process of its own, asks it over gRPC, shows the search while it runs,
+    prints which sketched object is which mapped object, and draws both.
+    """
+    from sketchmatch.cli import display, pictures, remote
+    from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
+    from sketchmatch_client import MatchOptions
+
+    pictures.check_path(overlay)
+    with _server() as address:
+        events = remote.match_events(
+            address, LIVING_ROOM_SKETCH, LIVING_ROOM_MAP, MatchOptions(seed=seed)
+        )
+        answer = display.watch(events)
+    display.show_match(answer)
+    pictures.draw_match(answer, LIVING_ROOM_MAP, overlay)
+    say(f"the picture is in {overlay}")
+
+
+@contextmanager
+def _server() -> Iterator[str]:
+    """Run a server in a process of its own and yield its address once it serves."""
+    from sketchmatch_client import Client
+
+    command = [sys.executable, "-m", "sketchmatch", "serve", "--address", "127.0.0.1:0"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, encoding="utf-8")
+    try:
+        address = _address(process)
+        with Client(address) as client:
+            client.wait_until_serving(_START_SECONDS)
+        yield address
+    finally:
+        process.terminate()
+        try:
+            process.wait(_STOP_SECONDS)
+        except subprocess.TimeoutExpired:
+            process.kill()
+
+
+def _address(process: subprocess.Popen[str]) -> str:
+    """Read where a server listens, and pass on what it says from then on."""
+    assert process.stderr is not None
+    for line in process.stderr:
+        typer.echo(f"[server] {line.rstrip()}", err=True)
+        if found := re.search(r"listening on (\S+)", line):
+            threading.Thread(target=_pass_on, args=(process,), daemon=True).start()
+            return found[1]
+    raise RuntimeError("the server ended before it listened")
+
+
+def _pass_on(process: subprocess.Popen[str]) -> None:
+    assert process.stderr is not None
+    for line in process.stderr:
+        typer.echo(f"[server] {line.rstrip()}", err=True)

@@ -1,0 +1,92 @@
+"""``sketchmatch match``."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from google.protobuf.json_format import MessageToJson
+
+from sketchmatch.cli.options import Json, Overlay, Server, Settings, parse_settings
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch_client import MatchOptions
+from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+
+__all__ = ["match"]
+
+
+def match(
+    sketch: Annotated[Path, typer.Argument(help="Sketch: .svg, stroke .json, .geojson, image.")],
+    map_: Annotated[
+        Path, typer.Argument(metavar="MAP", help="Map: ROS map .yaml, .geojson, .svg, image.")
+    ],
+    server: Server = None,
+    searcher: Annotated[str | None, typer.Option(help="Searcher.")] = None,
+    histogram: Annotated[str | None, typer.Option(help="Histogram.")] = None,
+    similarity: Annotated[str | None, typer.Option(help="Similarity measure.")] = None,
+    segmenter_sketch: Annotated[str | None, typer.Option(help="Segmenter of the sketch.")] = None,
+    segmenter_map: Annotated[str | None, typer.Option(help="Segmenter of the map.")] = None,
+    settings: Settings = None,
+    seed: Annotated[int, typer.Option(help="Same seed, same answer.")] = 0,
+    time_budget: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Give the best answer so far after this time."),
+    ] = None,
+    weights: Annotated[
+        str, typer.Option(metavar="W1,W2,W3", help="Weights of ζσ, ζR and ζL in ζ.")
+    ] = "1,1,1",
+    json: Json = False,
+    overlay: Overlay = None,
+) -> None:
+    """Find which sketched object is which mapped object.
+
+    On a terminal it shows the search while it runs and then a table that counts objects from 1, as
+    the overlay does. In a pipe it prints tab-separated lines; these and --json count from 0, as
+    the API does.
+    """
+    from sketchmatch.cli import display, pictures
+
+    if overlay is not None:
+        pictures.check_path(overlay)
+    options = MatchOptions(
+        sketch_segmenter=segmenter_sketch,
+        map_segmenter=segmenter_map,
+        histogram=histogram,
+        similarity=similarity,
+        searcher=searcher,
+        params=parse_settings(settings),
+        seed=seed,
+        time_budget=time_budget,
+        weights=_weights(weights),
+    )
+    answer = display.watch(_events(server, sketch, map_, options))
+    if json:
+        typer.echo(MessageToJson(answer.result, **display.JSON_STYLE))
+    else:
+        display.show_match(answer)
+    if overlay is not None:
+        pictures.draw_match(answer, map_, overlay)
+
+
+def _events(
+    server: str | None, sketch: Path, map_: Path, options: MatchOptions
+) -> Generator[MatchResponse, None, None]:
+    if server:
+        from sketchmatch.cli import remote
+
+        return remote.match_events(server, sketch, map_, options)
+    from sketchmatch.cli import local
+
+    return local.match_events(sketch, map_, options)
+
+
+def _weights(text: str) -> tuple[float, float, float]:
+    try:
+        similarity, rotation, dilation = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InvalidInputError(
+            Reason.INVALID_FIELD, "--weights", f"{text!r} is not three numbers, as in 1,1,1"
+        ) from None
+    return (similarity, rotation, dilation)

@@ -1,0 +1,75 @@
+"""Options that several commands share, and how they are read."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from sketchmatch.errors import InvalidInputError, Reason
+
+__all__ = ["Json", "Overlay", "Server", "Settings", "parse_settings", "say"]
+
+Server = Annotated[
+    str | None,
+    typer.Option(
+        "--server", metavar="HOST:PORT", help="Ask this server instead of computing here."
+    ),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="STAGE.PARAMETER=VALUE",
+        help="Set a parameter, e.g. searcher.population=400; may be repeated. "
+        "`sketchmatch plugins list` shows what there is.",
+    ),
+]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print the answer as the contract's message in JSON.")
+]
+Overlay = Annotated[
+    Path | None, typer.Option("--overlay", metavar="FILE", help="Draw the answer into a picture.")
+]
+
+
+def parse_settings(settings: Iterable[str] | None) -> dict[str, dict[str, Any]]:
+    """Read ``stage.parameter=value`` settings; a value is JSON, or else a string.
+
+    Raises
+    ------
+    InvalidInputError
+        If one has another form.
+
+    Examples
+    --------
+    >>> parse_settings(["searcher.population=400", "searcher.consistency=pairwise"])
+    {'searcher': {'population': 400, 'consistency': 'pairwise'}}
+    """
+    stages: dict[str, dict[str, Any]] = {}
+    for setting in settings or ():
+        name, equals, text = setting.partition("=")
+        stage, dot, parameter = name.partition(".")
+        if not (equals and dot and stage and parameter):
+            raise InvalidInputError(
+                Reason.INVALID_PARAMETER,
+                "--set",
+                f"{setting!r} has another form than STAGE.PARAMETER=VALUE, "
+                "as in searcher.population=400",
+            )
+        try:
+            value = json.loads(text)
+        except ValueError:
+            value = text
+        stages.setdefault(stage, {})[parameter] = value
+    return stages
+
+
+def say(sentence: str) -> None:
+    """Tell the person at the terminal something that is not part of the answer."""
+    typer.echo(f"sketchmatch: {sentence}", err=True)
+    sys.stderr.flush()

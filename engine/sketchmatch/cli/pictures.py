@@ -1,0 +1,72 @@
+"""Pictures of answers, drawn from the messages of the contract."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from sketchmatch.cli.display import facts
+from sketchmatch.io import read_source
+from sketchmatch.io.overlay import (
+    OverlayMatch,
+    check_picture_path,
+    draw_overlay,
+    draw_scene,
+    save_overlay,
+)
+from sketchmatch.model import OccupancyGrid, Scene, SceneObject
+from sketchmatch.model.arrays import frozen_floats
+from sketchmatch_client import Match
+from sketchmatch_proto.v1 import scene_pb2
+from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+
+__all__ = ["check_path", "draw_match", "draw_segmentation"]
+
+check_path = check_picture_path
+
+
+def draw_match(match: Match, map_path: Path, target: Path) -> None:
+    """Draw both scenes of a match, a robot's map under its objects, and save the picture."""
+    pairs = [
+        OverlayMatch(line.sketch_object, line.map_object, line.confidence)
+        for line in match.result.object_matches
+    ]
+    picture = draw_overlay(
+        _scene(match.scenes.sketch),
+        _scene(match.scenes.map),
+        pairs,
+        facts=facts(match.result),
+        underlay=_grid(map_path),
+    )
+    save_overlay(target, picture)
+
+
+def draw_segmentation(response: SegmentResponse, source: Path, target: Path) -> None:
+    """Draw the objects of one scene, numbered, and save the picture."""
+    grid = _grid(source)
+    pen = response.segmenter.name == "strokes"
+    save_overlay(target, draw_scene(_scene(response.scene), underlay=grid, pen=pen))
+
+
+def _scene(message: scene_pb2.Scene) -> Scene:
+    return Scene(
+        tuple(
+            SceneObject(
+                tuple(
+                    frozen_floats(np.array([(point.x, point.y) for point in ring.points]))
+                    for ring in item.rings
+                ),
+                item.label,
+            )
+            for item in message.objects
+        )
+    )
+
+
+def _grid(path: Path) -> OccupancyGrid | None:
+    """Return the robot's map in a file, if it is one."""
+    if path.suffix.lower() not in {".yaml", ".yml"}:
+        return None
+    source = read_source(path)
+    return source if isinstance(source, OccupancyGrid) else None

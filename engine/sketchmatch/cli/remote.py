@@ -1,0 +1,78 @@
+"""Asking a server; what is sent are the files as they are, where the contract has room for them."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io import read_source
+from sketchmatch.model import PolygonSet, StrokeSet
+from sketchmatch_client import Client, MatchOptions, sources
+from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsResponse
+from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+from sketchmatch_proto.v1.source_pb2 import Source
+
+__all__ = ["algorithms", "match_events", "segmented"]
+
+
+def match_events(
+    server: str, sketch: Path, map_: Path, options: MatchOptions
+) -> Generator[MatchResponse, None, None]:
+    """Let a server match two files and yield the events of the match."""
+    sketch_message, map_message = _readable(sketch), _readable(map_)
+    with Client(server) as client:
+        yield from client.events(sketch_message, map_message, **options)
+
+
+def segmented(server: str, path: Path, name: str, parameters: dict[str, Any]) -> SegmentResponse:
+    """Let a server find the objects in a file."""
+    message = _readable(path)
+    with Client(server) as client:
+        return client.segment(message, segmenter=name or None, params=parameters)
+
+
+def algorithms(server: str) -> ListAlgorithmsResponse:
+    """List what a server offers."""
+    with Client(server) as client:
+        return client.algorithms()
+
+
+def _readable(path: Path) -> Source:
+    """Return a file as a message, or say why it cannot be read."""
+    try:
+        return _message(path)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InvalidInputError(
+            Reason.INVALID_FILE,
+            str(error.filename or path),
+            f"cannot be read ({reason}); check the path",
+        ) from None
+
+
+def _message(path: Path) -> Source:
+    """Return a file as a message: pictures and maps as they are, drawings as what they hold."""
+    if path.suffix.lower() in {".yaml", ".yml"}:
+        return sources.map_server_map(path)
+    if path.suffix.lower() not in {".svg", ".json", ".geojson"}:
+        return sources.image(path)
+    source = read_source(path)
+    if isinstance(source, StrokeSet):
+        return sources.strokes(
+            [_timed(stroke.points, stroke.times) for stroke in source.strokes],
+            [stroke.label for stroke in source.strokes],
+        )
+    assert isinstance(source, PolygonSet)
+    return sources.polygons(
+        [[ring.tolist() for ring in polygon.rings] for polygon in source.polygons],
+        [polygon.label for polygon in source.polygons],
+    )
+
+
+def _timed(points: Any, times: Any) -> list[Any]:
+    if times is None:
+        return list(points.tolist())
+    return [(*point, time) for point, time in zip(points.tolist(), times.tolist(), strict=True)]

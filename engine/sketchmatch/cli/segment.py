@@ -1,0 +1,59 @@
+"""``sketchmatch segment``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from google.protobuf.json_format import MessageToJson
+
+from sketchmatch.cli.options import Json, Overlay, Server, Settings, parse_settings
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+
+__all__ = ["segment"]
+
+
+def segment(
+    file: Annotated[Path, typer.Argument(help="A sketch or a map, as `match` takes them.")],
+    server: Server = None,
+    segmenter: Annotated[str, typer.Option(help="Segmenter; the file's kind decides.")] = "",
+    settings: Settings = None,
+    json: Json = False,
+    overlay: Overlay = None,
+) -> None:
+    """Show which objects are found in a file.
+
+    Parameters are set as in --set segmenter.min_size=0.3. On a terminal the table counts objects
+    from 1, as the overlay does; in a pipe the lines count from 0, as the API does.
+    """
+    from sketchmatch.cli import display, pictures
+
+    if overlay is not None:
+        pictures.check_path(overlay)
+    found = _segmented(server, file, segmenter, settings)
+    if json:
+        typer.echo(MessageToJson(found, **display.JSON_STYLE))
+    else:
+        display.show_scene(found)
+    if overlay is not None:
+        pictures.draw_segmentation(found, file, overlay)
+
+
+def _segmented(
+    server: str | None, file: Path, segmenter: str, settings: list[str] | None
+) -> SegmentResponse:
+    stages = parse_settings(settings)
+    parameters = stages.pop("segmenter", {})
+    for stage in stages:
+        raise InvalidInputError(
+            Reason.INVALID_PARAMETER, "--set", f"{stage!r} is no stage here; use segmenter.…"
+        )
+    if server:
+        from sketchmatch.cli import remote
+
+        return remote.segmented(server, file, segmenter, parameters)
+    from sketchmatch.cli import local
+
+    return local.segmented(file, segmenter, parameters)

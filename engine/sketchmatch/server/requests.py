@@ -1,0 +1,181 @@
+"""From request messages to the engine's values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from google.protobuf.json_format import MessageToDict
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io.images import decode_image
+from sketchmatch.io.ros_map import decode_map_server
+from sketchmatch.model import (
+    FloatArray,
+    LabelledPolygon,
+    OccupancyGrid,
+    PolygonSet,
+    Source,
+    Stroke,
+    StrokeSet,
+)
+from sketchmatch.pipeline.match import MatchRequest
+from sketchmatch.pipeline.selection import STAGES, Choice
+from sketchmatch_proto.v1 import match_service_pb2, pipeline_pb2, source_pb2
+
+__all__ = ["choice", "match_request", "source"]
+
+_KINDS = "stroke_set, polygon_set, occupancy_grid, map_server_map or image"
+
+
+def match_request(
+    request: match_service_pb2.MatchRequest, max_time_budget: float | None
+) -> MatchRequest:
+    """Read a request to match.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be used, with the path of the field.
+    """
+    weights = request.weights
+    return MatchRequest(
+        sketch=source(request.sketch, "sketch", request.HasField("sketch")),
+        map=source(request.map, "map", request.HasField("map")),
+        selection={
+            stage: choice(getattr(request.pipeline, stage))
+            for stage in STAGES
+            if request.pipeline.HasField(stage)
+        },
+        seed=request.seed,
+        time_budget=_time_budget(request, max_time_budget),
+        weights=(
+            weights.similarity if weights.HasField("similarity") else 1.0,
+            weights.rotation if weights.HasField("rotation") else 1.0,
+            weights.dilation if weights.HasField("dilation") else 1.0,
+        ),
+    )
+
+
+def choice(selection: pipeline_pb2.AlgorithmSelection) -> Choice:
+    """Read what is asked for in one stage."""
+    return Choice(selection.name, MessageToDict(selection.parameters))
+
+
+def source(message: source_pb2.Source, field: str, present: bool) -> Source:
+    """Read a sketch or a map.
+
+    Parameters
+    ----------
+    message
+        The source.
+    field
+        Its path in the request, for errors.
+    present
+        Whether the request has it at all.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is missing or cannot be read.
+    """
+    kind = message.WhichOneof("kind")
+    if not present or kind is None:
+        raise InvalidInputError(Reason.MISSING_FIELD, field, f"is not set; give {_KINDS}")
+    try:
+        match kind:
+            case "stroke_set":
+                return _stroke_set(message.stroke_set)
+            case "polygon_set":
+                return _polygon_set(message.polygon_set)
+            case "occupancy_grid":
+                return _occupancy_grid(message.occupancy_grid)
+            case "map_server_map":
+                packed = message.map_server_map
+                return decode_map_server(packed.yaml, packed.image)
+            case "image":
+                return decode_image(message.image.data)
+    except InvalidInputError as error:
+        raise error.within(f"{field}.{kind}") from None
+    raise AssertionError(kind)
+
+
+def _time_budget(
+    request: match_service_pb2.MatchRequest, max_time_budget: float | None
+) -> float | None:
+    if not request.HasField("time_budget"):
+        return max_time_budget
+    seconds = request.time_budget.seconds + request.time_budget.nanos / 1e9
+    if seconds <= 0:
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "time_budget",
+            f"is {seconds:g} s; give a positive time or none at all",
+        )
+    return min(seconds, max_time_budget or math.inf)
+
+
+def _stroke_set(message: source_pb2.StrokeSet) -> StrokeSet:
+    upward = _upward(message.y_axis)
+    strokes = []
+    for k, stroke in enumerate(message.strokes):
+        points = _points(stroke.points, upward)
+        times = _times(stroke, f"strokes[{k}]")
+        strokes.append(Stroke(points, times, stroke.label))
+    return StrokeSet(tuple(strokes))
+
+
+def _times(stroke: source_pb2.Stroke, field: str) -> FloatArray | None:
+    timed = [point.HasField("time_seconds") for point in stroke.points]
+    if not any(timed):
+        return None
+    if not all(timed):
+        raise InvalidInputError(
+            Reason.INVALID_STROKE,
+            f"{field}.points[{timed.index(False)}].time_seconds",
+            "is not set, though other points have it; set it on every point or on none",
+        )
+    return np.array([point.time_seconds for point in stroke.points])
+
+
+def _polygon_set(message: source_pb2.PolygonSet) -> PolygonSet:
+    upward = _upward(message.y_axis)
+    return PolygonSet(
+        tuple(
+            LabelledPolygon(
+                tuple(_points(ring.points, upward) for ring in polygon.rings), polygon.label
+            )
+            for polygon in message.polygons
+        )
+    )
+
+
+def _occupancy_grid(message: source_pb2.OccupancyGrid) -> OccupancyGrid:
+    rows, columns = message.rows, message.columns
+    if rows * columns != len(message.cells):
+        raise InvalidInputError(
+            Reason.INVALID_GRID,
+            "cells",
+            f"has {len(message.cells)} bytes for {rows} × {columns} cells; give one for each cell",
+        )
+    cells = np.frombuffer(message.cells, dtype=np.int8).reshape(rows, columns)
+    origin = message.origin
+    pose = (origin.x_meters, origin.y_meters, origin.yaw_radians)
+    try:
+        return OccupancyGrid(cells, message.resolution_meters, pose)
+    except InvalidInputError as error:
+        if error.field == "resolution":
+            raise InvalidInputError(error.reason, "resolution_meters", error.problem) from None
+        raise
+
+
+def _points(
+    points: Iterable[source_pb2.Point] | Iterable[source_pb2.StrokePoint], upward: float
+) -> FloatArray:
+    flat = [value for point in points for value in (point.x, upward * point.y)]
+    return np.array(flat, dtype=np.float64).reshape(-1, 2)
+
+
+def _upward(y_axis: source_pb2.YAxis) -> float:
+    return -1.0 if y_axis == source_pb2.Y_AXIS_DOWN else 1.0

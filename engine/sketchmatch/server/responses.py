@@ -1,0 +1,232 @@
+"""From the engine's values to response messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from google.protobuf.duration_pb2 import Duration
+
+from sketchmatch.api import Algorithm, Segmentation, Segmenter
+from sketchmatch.model import Image, OccupancyGrid, PolygonSet, Scene, StrokeSet
+from sketchmatch.pipeline.match import (
+    Accepted,
+    Finished,
+    MatchEvent,
+    MatchRequest,
+    Progress,
+    Segmented,
+)
+from sketchmatch.pipeline.result import Correspondence, MatchResult, ObjectMatch
+from sketchmatch.pipeline.selection import DEFAULTS
+from sketchmatch.registry import Kind, PluginStatus, Registered, Registry
+from sketchmatch_proto.v1 import (
+    catalog_service_pb2,
+    match_pb2,
+    match_service_pb2,
+    pipeline_pb2,
+    scene_pb2,
+    scene_service_pb2,
+    source_pb2,
+)
+
+__all__ = ["ResponseWriter", "catalogue", "result", "scene", "segmented", "selection"]
+
+_SOURCE_KINDS = {
+    StrokeSet: [catalog_service_pb2.SOURCE_KIND_STROKE_SET],
+    PolygonSet: [catalog_service_pb2.SOURCE_KIND_POLYGON_SET],
+    OccupancyGrid: [
+        catalog_service_pb2.SOURCE_KIND_OCCUPANCY_GRID,
+        catalog_service_pb2.SOURCE_KIND_MAP_SERVER_MAP,
+    ],
+    Image: [catalog_service_pb2.SOURCE_KIND_IMAGE],
+}
+
+
+class ResponseWriter:
+    """Turns the events of one match into responses.
+
+    Parameters
+    ----------
+    request
+        What is matched.
+    """
+
+    def __init__(self, request: MatchRequest) -> None:
+        self._request = request
+        self._labels: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+
+    def response(self, event: MatchEvent) -> match_service_pb2.MatchResponse:
+        """Return the response for the next event."""
+        match event:
+            case Accepted():
+                return match_service_pb2.MatchResponse(accepted=self._accepted(event))
+            case Segmented():
+                self._labels = (event.sketch.scene.labels, event.map.scene.labels)
+                return match_service_pb2.MatchResponse(scenes=_scenes(event))
+            case Progress():
+                return match_service_pb2.MatchResponse(progress=self._progress(event))
+            case Finished():
+                return match_service_pb2.MatchResponse(result=result(event.result))
+
+    def _accepted(self, event: Accepted) -> match_pb2.MatchAccepted:
+        similarity, rotation, dilation = self._request.weights
+        stages = {stage: selection(item) for stage, item in event.pipeline.stages().items()}
+        budget = self._request.time_budget
+        return match_pb2.MatchAccepted(
+            match_id=event.match_id,
+            seed=event.seed,
+            pipeline=pipeline_pb2.Pipeline(**stages),
+            weights=match_pb2.ConfidenceWeights(
+                similarity=similarity, rotation=rotation, dilation=dilation
+            ),
+            time_budget=None if budget is None else _duration(budget),
+        )
+
+    def _progress(self, event: Progress) -> match_pb2.MatchProgress:
+        return match_pb2.MatchProgress(
+            phase=match_pb2.Phase.Value(f"PHASE_{event.phase}"),
+            fraction=event.fraction,
+            iteration=event.iteration,
+            evaluations=event.evaluations,
+            confidence=event.confidence,
+            upper_bound=event.upper_bound,
+            object_matches=_object_matches(event.matches, *self._labels),
+            elapsed=_duration(event.elapsed),
+        )
+
+
+def result(value: MatchResult) -> match_pb2.MatchResult:
+    """Return a result as a message."""
+    seconds = value.statistics.seconds
+    return match_pb2.MatchResult(
+        match_id=value.match_id,
+        seed=value.seed,
+        outcome=match_pb2.Outcome.Value(f"OUTCOME_{value.outcome}"),
+        object_matches=_object_matches(value.matches, value.sketch.labels, value.map.labels),
+        unmatched_sketch_objects=value.unmatched_sketch_objects,
+        unmatched_map_objects=value.unmatched_map_objects,
+        omap_confidence=value.omap_confidence,
+        fmap_confidence=match_pb2.FmapConfidence(
+            total=value.confidence.total,
+            similarity=value.confidence.similarity,
+            rotation=value.confidence.rotation,
+            dilation=value.confidence.dilation,
+        ),
+        upper_bound=value.upper_bound,
+        fmap_entries=[_entry(entry) for entry in value.fmap],
+        rotation_radians=value.rotation,
+        scale=value.scale,
+        statistics=match_pb2.MatchStatistics(
+            iterations=value.statistics.iterations,
+            evaluations=value.statistics.evaluations,
+            **{f"{stage}_elapsed": _duration(spent) for stage, spent in seconds.items()},
+        ),
+    )
+
+
+def scene(value: Scene) -> scene_pb2.Scene:
+    """Return a scene as a message."""
+    return scene_pb2.Scene(
+        objects=[
+            scene_pb2.SceneObject(
+                rings=[
+                    source_pb2.Ring(points=[source_pb2.Point(x=x, y=y) for x, y in ring.tolist()])
+                    for ring in item.rings
+                ],
+                label=item.label,
+                area=item.area,
+                centroid=source_pb2.Point(x=item.centroid[0], y=item.centroid[1]),
+            )
+            for item in value.objects
+        ]
+    )
+
+
+def selection(value: Algorithm) -> pipeline_pb2.AlgorithmSelection:
+    """Return an algorithm with all its parameters as a message."""
+    message = pipeline_pb2.AlgorithmSelection(name=value.name)
+    message.parameters.update(value.params.model_dump(mode="json"))
+    return message
+
+
+def segmented(found: Segmentation, segmenter: Segmenter) -> scene_service_pb2.SegmentResponse:
+    """Return what a segmenter found as a message."""
+    return scene_service_pb2.SegmentResponse(
+        scene=scene(found.scene), warnings=found.warnings, segmenter=selection(segmenter)
+    )
+
+
+def catalogue(registry: Registry) -> catalog_service_pb2.ListAlgorithmsResponse:
+    """Return what a registry holds as a message."""
+    return catalog_service_pb2.ListAlgorithmsResponse(
+        algorithms=[_algorithm(item) for kind in Kind for item in registry.of_kind(kind)],
+        plugins=[_plugin(status) for status in registry.statuses],
+    )
+
+
+def _scenes(event: Segmented) -> match_pb2.MatchScenes:
+    return match_pb2.MatchScenes(
+        sketch=scene(event.sketch.scene),
+        map=scene(event.map.scene),
+        sketch_warnings=event.sketch.warnings,
+        map_warnings=event.map.warnings,
+    )
+
+
+def _object_matches(
+    matches: Iterable[ObjectMatch], sketch_labels: Sequence[str], map_labels: Sequence[str]
+) -> list[match_pb2.ObjectMatch]:
+    return [
+        match_pb2.ObjectMatch(
+            sketch_object=match.sketch_object,
+            map_object=match.map_object,
+            sketch_label=sketch_labels[match.sketch_object],
+            map_label=map_labels[match.map_object],
+            confidence=match.confidence,
+        )
+        for match in matches
+    ]
+
+
+def _entry(entry: Correspondence) -> match_pb2.FmapEntry:
+    (a, b), (c, d) = entry.sketch_pair, entry.map_pair
+    return match_pb2.FmapEntry(
+        sketch_pair=match_pb2.ObjectPair(first=a, second=b),
+        map_pair=match_pb2.ObjectPair(first=c, second=d),
+        similarity=entry.similarity,
+        rotation_radians=entry.rotation,
+        dilation=entry.dilation,
+    )
+
+
+def _duration(seconds: float) -> Duration:
+    duration = Duration()
+    duration.FromNanoseconds(round(seconds * 1e9))
+    return duration
+
+
+def _algorithm(item: Registered) -> catalog_service_pb2.Algorithm:
+    message = catalog_service_pb2.Algorithm(
+        kind=catalog_service_pb2.AlgorithmKind.Value(f"ALGORITHM_KIND_{item.kind.upper()}"),
+        name=item.name,
+        summary=item.algorithm.summary,
+        description=item.description,
+        distribution=item.distribution,
+        distribution_version=item.version,
+        is_default=item.name in DEFAULTS[item.kind],
+    )
+    message.parameters_schema.update(item.schema)
+    if issubclass(item.algorithm, Segmenter):
+        for kind in item.algorithm.sources:
+            message.source_kinds.extend(_SOURCE_KINDS[kind])
+    return message
+
+
+def _plugin(status: PluginStatus) -> catalog_service_pb2.Plugin:
+    state = "PLUGIN_STATE_FAILED" if status.failure else "PLUGIN_STATE_ACTIVE"
+    return catalog_service_pb2.Plugin(
+        distribution=status.distribution,
+        version=status.version,
+        state=catalog_service_pb2.PluginState.Value(state),
+        reason=status.failure,
+    )

@@ -1,0 +1,65 @@
+"""Errors as gRPC statuses: a code, one sentence, and details for programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import grpc
+from google.protobuf import any_pb2, duration_pb2
+from google.rpc import code_pb2, error_details_pb2, status_pb2  # type: ignore[import-untyped]
+
+from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError, Reason
+
+__all__ = ["Refusal", "refusal", "too_busy"]
+
+_DOMAIN = "sketchmatch"
+_RETRY_SECONDS = 1
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """What a call is aborted with."""
+
+    code: grpc.StatusCode
+    message: str
+    trailing_metadata: tuple[tuple[str, bytes], ...] = ()
+
+
+def refusal(error: BaseException) -> Refusal:
+    """Return the status for an error; one that nobody foresaw says no more than that."""
+    if isinstance(error, InvalidInputError):
+        violation = error_details_pb2.BadRequest.FieldViolation(
+            field=error.field, description=error.problem
+        )
+        bad_request = error_details_pb2.BadRequest(field_violations=[violation])
+        return _refusal(grpc.StatusCode.INVALID_ARGUMENT, str(error), error.reason, bad_request)
+    if isinstance(error, AnswerUnavailableError):
+        return _refusal(grpc.StatusCode.DEADLINE_EXCEEDED, str(error), error.reason)
+    if isinstance(error, PluginError):
+        return _refusal(grpc.StatusCode.INTERNAL, str(error), error.reason)
+    return Refusal(
+        grpc.StatusCode.INTERNAL,
+        "the server failed in a way nobody foresaw; its log has the details, please report them",
+    )
+
+
+def too_busy(running: int) -> Refusal:
+    """Return the status for a request that there is no room for now."""
+    retry = error_details_pb2.RetryInfo(retry_delay=duration_pb2.Duration(seconds=_RETRY_SECONDS))
+    return _refusal(
+        grpc.StatusCode.RESOURCE_EXHAUSTED,
+        f"the server runs {running} requests already, which is its limit; "
+        f"send the request again in {_RETRY_SECONDS} s",
+        Reason.LIMIT_EXCEEDED,
+        retry,
+    )
+
+
+def _refusal(code: grpc.StatusCode, message: str, reason: Reason, *details: object) -> Refusal:
+    info = error_details_pb2.ErrorInfo(reason=reason.value, domain=_DOMAIN)
+    status = status_pb2.Status(code=code_pb2.Code.Value(code.name), message=message)
+    for detail in (info, *details):
+        packed = any_pb2.Any()
+        packed.Pack(detail)
+        status.details.append(packed)
+    return Refusal(code, message, (("grpc-status-details-bin", status.SerializeToString()),))

@@ -1,0 +1,47 @@
+"""Polygons that are objects already."""
+
+from __future__ import annotations
+
+from sketchmatch.api import InvalidInputError, Reason, Segmentation, Segmenter
+from sketchmatch.model import LabelledPolygon, PolygonSet, Scene, SceneObject
+
+__all__ = ["PolygonSegmenter"]
+
+
+class PolygonSegmenter(Segmenter):
+    """Takes every polygon as one object, as it is.
+
+    Nothing is repaired: a polygon that crosses itself or has no area is refused, because which
+    shape was meant is not for a program to guess. The model is that of the OGC's simple
+    features.
+
+    References
+    ----------
+    OpenGIS Implementation Standard for Geographic information: Simple feature access, part 1,
+    OGC 06-103r4, 2011.
+    """
+
+    name = "polygons"
+    summary = "Every polygon is one object."
+    sources = (PolygonSet,)
+
+    def segment(self, source: PolygonSet) -> Segmentation:
+        """Return the polygons as objects, in their order."""
+        count = len(source.polygons)
+        if count < 2:
+            raise InvalidInputError(
+                Reason.TOO_FEW_OBJECTS,
+                "polygons",
+                f"holds {'no polygon' if not count else 'one polygon'}; "
+                "a match compares relations between objects, so give at least two",
+            )
+        return Segmentation(
+            Scene(tuple(_object(polygon, k) for k, polygon in enumerate(source.polygons)))
+        )
+
+
+def _object(polygon: LabelledPolygon, k: int) -> SceneObject:
+    try:
+        return SceneObject.from_rings(polygon.rings, polygon.label)
+    except InvalidInputError as error:
+        raise error.within(f"polygons[{k}]") from None
