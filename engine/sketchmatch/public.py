@@ -67,7 +67,8 @@ def match(
 
     Examples
     --------
-    >>> box, bar, dot = [[0, 0], [2, 0], [2, 2], [0, 2]], [[5, 0], [9, 0], [9, 1]], [[1, 6], [2, 6], [2, 7]]
+    >>> box, bar = [[0, 0], [2, 0], [2, 2], [0, 2]], [[5, 0], [9, 0], [9, 1]]
+    >>> dot = [[1, 6], [2, 6], [2, 7]]
     >>> scene = Scene.from_polygons([box, bar, dot])
     >>> turned = Scene.from_polygons([[[-y, x] for x, y in p] for p in (dot, box, bar)])
     >>> match(scene, turned).object_map
@@ -141,7 +142,8 @@ def force_histogram(a: Any, b: Any, *, r: float = 0.0, directions: int = 180) ->
     chosen = {"histogram": Choice("constant", {"directions": directions})}
     histogram = resolve(default_registry(), chosen).histogram
     scene = Scene((_object("a", a), _object("b", b)))
-    return histogram.describe(scene, np.array([[0, 1]]))[0]
+    (row,) = histogram.describe(scene, np.array([[0, 1]]))
+    return np.asarray(row)
 
 
 def _object(name: str, polygon: Any) -> SceneObject:

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from sketchmatch.cli.options import say
+from sketchmatch.cli.options import MatchSettings, say
 
 __all__ = ["demo"]
 
@@ -34,12 +34,11 @@ def demo(
     """
     from sketchmatch.cli import display, pictures, remote
     from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
-    from sketchmatch_client import MatchOptions
 
     pictures.check_path(overlay)
     with _server() as address:
         events = remote.match_events(
-            address, LIVING_ROOM_SKETCH, LIVING_ROOM_MAP, MatchOptions(seed=seed)
+            address, LIVING_ROOM_SKETCH, LIVING_ROOM_MAP, MatchSettings(seed=seed)
         )
         answer = display.watch(events)
     display.show_match(answer)

@@ -9,16 +9,15 @@ from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
-from sketchmatch.cli.options import say
+from sketchmatch.cli.options import MatchSettings, say
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.io import read_source
 from sketchmatch.model import Source
 from sketchmatch.pipeline.match import MatchRequest, run_match
-from sketchmatch.pipeline.selection import STAGES, Choice, resolve_segmenter
+from sketchmatch.pipeline.selection import Choice, resolve_segmenter
 from sketchmatch.pipeline.warmup import announcing_compilation
 from sketchmatch.registry import default_registry
 from sketchmatch.server import responses
-from sketchmatch_client import MatchOptions
 from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsResponse
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
@@ -27,21 +26,20 @@ __all__ = ["algorithms", "match_events", "segmented"]
 
 
 def match_events(
-    sketch: Path, map_: Path, options: MatchOptions
+    sketch: Path, map_: Path, settings: MatchSettings
 ) -> Generator[MatchResponse, None, None]:
     """Match two files and yield the events of the match."""
-    params = options["params"]
-    names = {stage: options.get(stage) for stage in STAGES}
+    names, params = settings.names, settings.params
     request = MatchRequest(
         sketch=read_source(sketch),
         map=read_source(map_),
         selection={
-            stage: Choice(names.get(stage) or "", params.get(stage, {}))
+            stage: Choice(names.get(stage, ""), params.get(stage, {}))
             for stage in {*names, *params}
         },
-        seed=options["seed"],
-        time_budget=options["time_budget"],
-        weights=options["weights"],
+        seed=settings.seed,
+        time_budget=settings.time_budget,
+        weights=settings.weights,
     )
     writer = responses.ResponseWriter(request)
     with announcing_compilation(say):

@@ -9,9 +9,8 @@ from typing import Annotated
 import typer
 from google.protobuf.json_format import MessageToJson
 
-from sketchmatch.cli.options import Json, Overlay, Server, Settings, parse_settings
+from sketchmatch.cli.options import Json, MatchSettings, Overlay, Server, Settings, parse_settings
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch_client import MatchOptions
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
 __all__ = ["match"]
@@ -50,18 +49,21 @@ def match(
 
     if overlay is not None:
         pictures.check_path(overlay)
-    options = MatchOptions(
-        sketch_segmenter=segmenter_sketch,
-        map_segmenter=segmenter_map,
-        histogram=histogram,
-        similarity=similarity,
-        searcher=searcher,
+    chosen = {
+        "sketch_segmenter": segmenter_sketch,
+        "map_segmenter": segmenter_map,
+        "histogram": histogram,
+        "similarity": similarity,
+        "searcher": searcher,
+    }
+    how = MatchSettings(
+        names={stage: name for stage, name in chosen.items() if name},
         params=parse_settings(settings),
         seed=seed,
         time_budget=time_budget,
         weights=_weights(weights),
     )
-    answer = display.watch(_events(server, sketch, map_, options))
+    answer = display.watch(_events(server, sketch, map_, how))
     if json:
         typer.echo(MessageToJson(answer.result, **display.JSON_STYLE))
     else:
@@ -71,15 +73,15 @@ def match(
 
 
 def _events(
-    server: str | None, sketch: Path, map_: Path, options: MatchOptions
+    server: str | None, sketch: Path, map_: Path, how: MatchSettings
 ) -> Generator[MatchResponse, None, None]:
     if server:
         from sketchmatch.cli import remote
 
-        return remote.match_events(server, sketch, map_, options)
+        return remote.match_events(server, sketch, map_, how)
     from sketchmatch.cli import local
 
-    return local.match_events(sketch, map_, options)
+    return local.match_events(sketch, map_, how)
 
 
 def _weights(text: str) -> tuple[float, float, float]:

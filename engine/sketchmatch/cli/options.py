@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +13,7 @@ import typer
 
 from sketchmatch.errors import InvalidInputError, Reason
 
-__all__ = ["Json", "Overlay", "Server", "Settings", "parse_settings", "say"]
+__all__ = ["Json", "MatchSettings", "Overlay", "Server", "Settings", "parse_settings", "say"]
 
 Server = Annotated[
     str | None,
@@ -35,6 +36,27 @@ Json = Annotated[
 Overlay = Annotated[
     Path | None, typer.Option("--overlay", metavar="FILE", help="Draw the answer into a picture.")
 ]
+
+
+@dataclass(frozen=True)
+class MatchSettings:
+    """How to match, as the command line says it.
+
+    Attributes
+    ----------
+    names
+        Algorithm by stage; empty for the default.
+    params
+        Parameters by stage, where some were set.
+    seed, time_budget, weights
+        As in :class:`sketchmatch.pipeline.match.MatchRequest`.
+    """
+
+    names: Mapping[str, str] = field(default_factory=dict)
+    params: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    seed: int = 0
+    time_budget: float | None = None
+    weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
 def parse_settings(settings: Iterable[str] | None) -> dict[str, dict[str, Any]]:

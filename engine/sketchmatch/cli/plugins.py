@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 import typer
-from google.protobuf.json_format import MessageToJson
+from google.protobuf.json_format import MessageToDict, MessageToJson
 
 from sketchmatch.cli.options import Json, Server, say
 from sketchmatch_proto.v1.catalog_service_pb2 import (
@@ -17,12 +17,12 @@ from sketchmatch_proto.v1.catalog_service_pb2 import (
 
 __all__ = ["app"]
 
-app = typer.Typer(help="What there is to choose from.")
+app = typer.Typer(help="List what there is to choose from.")
 
 
 @app.callback()
 def plugins() -> None:
-    """What there is to choose from."""
+    """List what there is to choose from."""
 
 
 @app.command("list")
@@ -76,14 +76,11 @@ def _print_lines(catalogue: ListAlgorithmsResponse) -> None:
 
 
 def _parameters(item: Algorithm) -> list[str]:
-    schema = item.parameters_schema
-    if "properties" not in schema:
-        return []
-    properties = schema["properties"]
+    properties = MessageToDict(item.parameters_schema).get("properties", {})
     return [
-        f"{name} = {_plain(properties[name]['default'])}: {properties[name]['description']}"
-        for name in sorted(properties)
-        if "default" in properties[name]
+        f"{name} = {_plain(schema['default'])}: {schema['description']}"
+        for name, schema in sorted(properties.items())
+        if "default" in schema
     ]
 
 

@@ -6,10 +6,11 @@ from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
+from sketchmatch.cli.options import MatchSettings
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import PolygonSet, StrokeSet
-from sketchmatch_client import Client, MatchOptions, sources
+from sketchmatch_client import Client, sources
 from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsResponse
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
@@ -19,12 +20,24 @@ __all__ = ["algorithms", "match_events", "segmented"]
 
 
 def match_events(
-    server: str, sketch: Path, map_: Path, options: MatchOptions
+    server: str, sketch: Path, map_: Path, settings: MatchSettings
 ) -> Generator[MatchResponse, None, None]:
     """Let a server match two files and yield the events of the match."""
     sketch_message, map_message = _readable(sketch), _readable(map_)
     with Client(server) as client:
-        yield from client.events(sketch_message, map_message, **options)
+        yield from client.events(
+            sketch_message,
+            map_message,
+            sketch_segmenter=settings.names.get("sketch_segmenter"),
+            map_segmenter=settings.names.get("map_segmenter"),
+            histogram=settings.names.get("histogram"),
+            similarity=settings.names.get("similarity"),
+            searcher=settings.names.get("searcher"),
+            params=settings.params,
+            seed=settings.seed,
+            time_budget=settings.time_budget,
+            weights=settings.weights,
+        )
 
 
 def segmented(server: str, path: Path, name: str, parameters: dict[str, Any]) -> SegmentResponse:

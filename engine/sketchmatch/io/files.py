@@ -81,7 +81,7 @@ def _text(data: bytes) -> str:
 
 
 def _map_server(path: Path, data: bytes) -> Source:
-    from sketchmatch.io.ros_map import parse_header  # noqa: PLC0415
+    from sketchmatch.io.ros_map import parse_header
 
     header = parse_header(_text(data))
     picture = path.parent / header.image
@@ -89,13 +89,13 @@ def _map_server(path: Path, data: bytes) -> Source:
 
 
 def _picture(_: Path, data: bytes) -> Source:
-    from sketchmatch.io.images import decode_image  # noqa: PLC0415
+    from sketchmatch.io.images import decode_image
 
     return decode_image(data)
 
 
 def _svg(_: Path, data: bytes) -> Source:
-    from sketchmatch.io.svg import decode_svg  # noqa: PLC0415
+    from sketchmatch.io.svg import decode_svg
 
     return decode_svg(data)
 

@@ -83,8 +83,7 @@ def decode_svg(data: bytes) -> StrokeSet:
     >>> sketch.strokes[0].points.tolist()
     [[5.0, -1.0], [7.0, -1.0], [7.0, -2.0], [5.0, -1.0]]
     """
-    _check_document(data)
-    root = ElementTree.fromstring(data)
+    root = _document(data)
     if _tag(root) != "svg":
         raise _invalid("", f"is XML but no SVG: it begins with <{_tag(root)}>; save it as SVG")
     drawn = [
@@ -105,8 +104,19 @@ def decode_svg(data: bytes) -> StrokeSet:
     )
 
 
-def _check_document(data: bytes) -> None:
-    """Refuse what must not reach a parser that builds a tree: entities and deep nesting."""
+def _document(data: bytes) -> ElementTree.Element:
+    """Parse XML, but no entities and no deep nesting."""
+    try:
+        _check(data)
+        return ElementTree.fromstring(data)
+    except InvalidInputError:
+        raise
+    except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
+        raise _invalid("", f"is not SVG ({error}); save it as SVG again") from None
+
+
+def _check(data: bytes) -> None:
+    """Refuse what must not reach a parser that builds a tree."""
     depth = 0
 
     def doctype(_name: str, _system: str | None, _public: str | None, subset: int) -> None:
@@ -131,12 +141,7 @@ def _check_document(data: bytes) -> None:
     parser.StartDoctypeDeclHandler = doctype
     parser.StartElementHandler = start
     parser.EndElementHandler = end
-    try:
-        parser.Parse(data, True)
-    except (expat.ExpatError, LookupError, ValueError) as error:
-        if isinstance(error, InvalidInputError):
-            raise
-        raise _invalid("", f"is not SVG ({error}); save it as SVG again") from None
+    parser.Parse(data, True)
 
 
 def _drawn(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, Any]]:

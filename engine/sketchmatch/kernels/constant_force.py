@@ -101,7 +101,16 @@ def constant_force_histograms(
 
 
 @kernel
-def _project(starts, ends, centre_x, centre_y, cosine, sine, edges, span):  # type: ignore[no-untyped-def]
+def _project(
+    starts: FloatArray,
+    ends: FloatArray,
+    centre_x: float,
+    centre_y: float,
+    cosine: float,
+    sine: float,
+    edges: FloatArray,
+    span: FloatArray,
+) -> int:
     """Write edges as seen along a direction, sorted by their start in v; return their number."""
     count = 0
     span[0], span[1] = np.inf, -np.inf
@@ -130,7 +139,14 @@ def _project(starts, ends, centre_x, centre_y, cosine, sine, edges, span):  # ty
 
 
 @kernel
-def _forces(edges_a, edges_b, span_a, span_b, active_a, active_b):  # type: ignore[no-untyped-def]
+def _forces(
+    edges_a: FloatArray,
+    edges_b: FloatArray,
+    span_a: FloatArray,
+    span_b: FloatArray,
+    active_a: IntArray,
+    active_b: IntArray,
+) -> tuple[float, float]:
     """Return F^AB for one direction and for its opposite."""
     order = 0
     if span_a[0] >= span_b[1]:
@@ -184,7 +200,9 @@ def _forces(edges_a, edges_b, span_a, span_b, active_a, active_b):  # type: igno
 
 
 @kernel
-def _term(edge_a, edge_b, order, centre_a, centre_b):  # type: ignore[no-untyped-def]
+def _term(
+    edge_a: FloatArray, edge_b: FloatArray, order: int, centre_a: float, centre_b: float
+) -> tuple[float, float]:
     """Return what one pair of overlapping edges adds to the force in a direction and its dual."""
     low = max(edge_a[_LOW], edge_b[_LOW])
     high = min(edge_a[_HIGH], edge_b[_HIGH])
@@ -205,13 +223,13 @@ def _term(edge_a, edge_b, order, centre_a, centre_b):  # type: ignore[no-untyped
 
 
 @kernel
-def _product_integral(p0, p1, q0, q1):  # type: ignore[no-untyped-def]
+def _product_integral(p0: float, p1: float, q0: float, q1: float) -> float:
     """Return ∫₀¹ p(t) q(t) dt for linear p and q."""
     return (2.0 * p0 * q0 + p0 * q1 + p1 * q0 + 2.0 * p1 * q1) / 6.0
 
 
 @kernel
-def _half_square_integral(d0, d1):  # type: ignore[no-untyped-def]
+def _half_square_integral(d0: float, d1: float) -> float:
     """Return ∫₀¹ max(d(t), 0)² / 2 dt for linear d."""
     if d0 >= 0.0 and d1 >= 0.0:
         return (d0 * d0 + d0 * d1 + d1 * d1) / 6.0

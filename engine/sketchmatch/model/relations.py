@@ -81,12 +81,12 @@ class SceneDescriptor:
     @property
     def directions(self) -> int:
         """The number n of directions."""
-        return self.histograms.shape[1]
+        return int(self.histograms.shape[1])
 
     def histogram(self, a: int, b: int) -> FloatArray:
         """Return the histogram of object a on object b, in either order."""
         if a < b:
-            return self.histograms[pair_index(a, b, self.objects)]
+            return frozen_floats(self.histograms[pair_index(a, b, self.objects)])
         dual = self.histograms[pair_index(b, a, self.objects)]
         return frozen_floats(np.roll(dual, self.directions // 2))
 
@@ -129,12 +129,12 @@ class RelationTable:
     @property
     def template_pairs(self) -> int:
         """Q."""
-        return self.similarity.shape[0]
+        return int(self.similarity.shape[0])
 
     @property
     def argument_pairs(self) -> int:
         """Q'/2, the number of columns; correspondences run to twice this."""
-        return self.similarity.shape[1]
+        return int(self.similarity.shape[1])
 
     @cached_property
     def normalized_dilation(self) -> FloatArray:

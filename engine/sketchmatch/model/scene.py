@@ -218,7 +218,7 @@ def _clean_ring(ring: Any, field: str) -> FloatArray:
         raise InvalidInputError(
             Reason.INVALID_POLYGON, f"{field}.points[{k}]", "is not finite; give plain numbers"
         )
-    points = points[(points != np.roll(points, 1, axis=0)).any(axis=1)]
+    points = np.compress((points != np.roll(points, 1, axis=0)).any(axis=1), points, axis=0)
     if len(points) < 3:
         raise InvalidInputError(
             Reason.INVALID_POLYGON,
@@ -239,6 +239,8 @@ def _explain(polygon: shapely.Polygon) -> str:
     message = explain_validity(polygon)
     where = message[message.find("[") :].strip("[]").replace(" ", ", ") if "[" in message else ""
     if message.startswith(("Self-intersection", "Ring Self-intersection")):
+        if polygon.interiors:
+            return f"crosses itself or a hole at ({where}); keep holes inside and apart"
         return f"crosses itself at ({where}); draw its outline without crossing"
     return f"is not a polygon ({message}); keep holes inside the outer ring and apart"
 

@@ -329,8 +329,9 @@ class _Match:
     def check_budget(self, phase: Phase) -> None:
         if self.out_of_time():
             raise AnswerUnavailableError(
-                f"the time budget of {self.request.time_budget:g} s ended in phase {phase.lower()}, "
-                "before there was any answer; allow more time or match fewer objects"
+                f"the time budget of {self.request.time_budget:g} s ended in phase "
+                f"{phase.lower()}, before there was any answer; "
+                "allow more time or match fewer objects"
             )
 
     def may_report(self) -> bool:

@@ -139,7 +139,8 @@ def resolve_segmenter(
         raise InvalidInputError(
             Reason.WRONG_ALGORITHM,
             f"{stage}.name",
-            f"is {segmenter.name!r}, which cannot read source {source.field}; choose one of: {fitting}",
+            f"is {segmenter.name!r}, which cannot read source {source.field}; "
+            f"choose one of: {fitting}",
         )
     return segmenter
 

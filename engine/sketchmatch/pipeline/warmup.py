@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import numpy as np
+
 from sketchmatch.kernels._jit import on_compile
 from sketchmatch.model import Fmap, SceneDescriptor
 from sketchmatch.pipeline.correspond import fmap_confidence
@@ -36,8 +38,8 @@ def announcing_compilation(say: Callable[[str], None]) -> Iterator[None]:
 def warm_up(registry: Registry) -> None:
     """Load the kernels of the pipeline and of every algorithm, or compile them."""
     pipeline = resolve(registry, {})
-    one = SceneDescriptor([[1.0, 0.0, 0.0, 0.0]], 2, 0.0)
+    one = SceneDescriptor(np.array([[1.0, 0.0, 0.0, 0.0]]), 2, 0.0)
     table = finish(relate(one, one, pipeline.similarity))
-    fmap_confidence(Fmap([0]), table)
+    fmap_confidence(Fmap(np.array([0])), table)
     for item in registry.algorithms:
         item.algorithm.warm_up()

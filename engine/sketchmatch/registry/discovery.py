@@ -65,7 +65,7 @@ def _checked(kind: Kind, offered: Any) -> type[Algorithm]:
     if not (isinstance(offered, type) and issubclass(offered, kind.interface)):
         raise TypeError(f"{kind.hook} offers {offered!r}, which is not a {kind.interface.__name__}")
     if inspect.isabstract(offered):
-        missing = ", ".join(sorted(offered.__abstractmethods__))
+        missing = ", ".join(sorted(getattr(offered, "__abstractmethods__", ())))
         raise TypeError(f"{offered.__name__} does not define {missing}")
     for attribute in ("name", "summary"):
         if not isinstance(getattr(offered, attribute, None), str):

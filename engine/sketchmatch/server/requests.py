@@ -43,11 +43,7 @@ def match_request(
     return MatchRequest(
         sketch=source(request.sketch, "sketch", request.HasField("sketch")),
         map=source(request.map, "map", request.HasField("map")),
-        selection={
-            stage: choice(getattr(request.pipeline, stage))
-            for stage in STAGES
-            if request.pipeline.HasField(stage)
-        },
+        selection={stage: choice(getattr(request.pipeline, stage)) for stage in STAGES},
         seed=request.seed,
         time_budget=_time_budget(request, max_time_budget),
         weights=(
@@ -177,5 +173,5 @@ def _points(
     return np.array(flat, dtype=np.float64).reshape(-1, 2)
 
 
-def _upward(y_axis: source_pb2.YAxis) -> float:
+def _upward(y_axis: int) -> float:
     return -1.0 if y_axis == source_pb2.Y_AXIS_DOWN else 1.0

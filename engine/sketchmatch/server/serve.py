@@ -7,6 +7,7 @@ import logging
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import grpc
 from grpc_health.v1 import health, health_pb2, health_pb2_grpc
@@ -160,8 +161,9 @@ def _stop_on_signals(stopping: asyncio.Event) -> None:
 
 async def _first(warming: asyncio.Future[None], stopping: asyncio.Event) -> None:
     """Wait until the kernels are warm or the server is asked to stop."""
-    waiting = asyncio.ensure_future(stopping.wait())
-    await asyncio.wait({warming, waiting}, return_when=asyncio.FIRST_COMPLETED)
-    waiting.cancel()
+    stopped = asyncio.ensure_future(stopping.wait())
+    either: set[asyncio.Future[Any]] = {warming, stopped}
+    await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
+    stopped.cancel()
     if warming.done():
         warming.result()

@@ -7,14 +7,27 @@ FMAPs under object consistency are induced by one) or the entries of an FMAP (pa
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sketchmatch.api.kernels import fmap_confidence, kernel
+from sketchmatch.model import FloatArray, IntArray
 
 __all__ = ["evolve_object_maps", "evolve_pair_maps", "found_object_maps", "found_pair_maps"]
 
+Relations = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+"""σ, cos R, sin R and L̂ of the relation table, and the weights of ζ."""
+
 
 @kernel
-def found_object_maps(population, fitness, offspring, pairs, columns, relations, rng):  # type: ignore[no-untyped-def]
+def found_object_maps(
+    population: IntArray,
+    fitness: FloatArray,
+    offspring: IntArray,
+    pairs: IntArray,
+    columns: IntArray,
+    relations: Relations,
+    rng: np.random.Generator,
+) -> int:
     """Fill a population with random injective object maps, shape (p, N), the fittest first.
 
     ``offspring`` is room for (2p, N) individuals, ``pairs`` the template pairs (Q, 2), ``columns``
@@ -30,13 +43,20 @@ def found_object_maps(population, fitness, offspring, pairs, columns, relations,
     population[:] = offspring[:size]
     fitness[:] = -1.0
     _judge_object_maps(population, fitness, offspring[:size], pairs, columns, relations)
-    return size
+    return len(population)
 
 
 @kernel
-def evolve_object_maps(  # type: ignore[no-untyped-def]
-    population, fitness, offspring, pairs, columns, relations, rates, rng
-):
+def evolve_object_maps(
+    population: IntArray,
+    fitness: FloatArray,
+    offspring: IntArray,
+    pairs: IntArray,
+    columns: IntArray,
+    relations: Relations,
+    rates: tuple[float, float, float],
+    rng: np.random.Generator,
+) -> int:
     """Run one generation over object maps in place and return the number of evaluations.
 
     ``rates`` are Pc, Px and Pm; the rest is as for :func:`found_object_maps`.
@@ -71,7 +91,13 @@ def evolve_object_maps(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def found_pair_maps(population, fitness, offspring, relations, rng):  # type: ignore[no-untyped-def]
+def found_pair_maps(
+    population: IntArray,
+    fitness: FloatArray,
+    offspring: IntArray,
+    relations: Relations,
+    rng: np.random.Generator,
+) -> int:
     """Fill a population with random FMAPs, shape (p, Q), the fittest first.
 
     They are one-to-one and hold no dual of an entry, whether or not they lead to an object map.
@@ -86,11 +112,18 @@ def found_pair_maps(population, fitness, offspring, relations, rng):  # type: ig
     population[:] = offspring[:size]
     fitness[:] = -1.0
     _judge_pair_maps(population, fitness, offspring[:size], relations)
-    return size
+    return len(population)
 
 
 @kernel
-def evolve_pair_maps(population, fitness, offspring, relations, rates, rng):  # type: ignore[no-untyped-def]
+def evolve_pair_maps(
+    population: IntArray,
+    fitness: FloatArray,
+    offspring: IntArray,
+    relations: Relations,
+    rates: tuple[float, float, float],
+    rng: np.random.Generator,
+) -> int:
     """Run one generation over FMAPs in place and return the number of evaluations."""
     crossover_rate, exchange_rate, mutation_rate = rates
     size, template_pairs = population.shape
@@ -125,7 +158,14 @@ def evolve_pair_maps(population, fitness, offspring, relations, rates, rng):  # 
 
 
 @kernel
-def _judge_object_maps(population, fitness, offspring, pairs, columns, relations):  # type: ignore[no-untyped-def]
+def _judge_object_maps(
+    population: IntArray,
+    fitness: FloatArray,
+    offspring: IntArray,
+    pairs: IntArray,
+    columns: IntArray,
+    relations: Relations,
+) -> None:
     """Let offspring compete with the population."""
     entries = np.empty(pairs.shape[0], dtype=np.int64)
     scratch = np.empty(pairs.shape[0])
@@ -137,7 +177,9 @@ def _judge_object_maps(population, fitness, offspring, pairs, columns, relations
 
 
 @kernel
-def _judge_pair_maps(population, fitness, offspring, relations):  # type: ignore[no-untyped-def]
+def _judge_pair_maps(
+    population: IntArray, fitness: FloatArray, offspring: IntArray, relations: Relations
+) -> None:
     """Let offspring compete with the population."""
     scratch = np.empty(offspring.shape[1])
     for k in range(offspring.shape[0]):
@@ -146,14 +188,14 @@ def _judge_pair_maps(population, fitness, offspring, relations):  # type: ignore
 
 
 @kernel
-def _draw(items, place, rng):  # type: ignore[no-untyped-def]
+def _draw(items: IntArray, place: int, rng: np.random.Generator) -> None:
     """Swap a random one of items[place:] to ``place``."""
     other = place + int(rng.random() * (items.size - place))
     items[place], items[other] = items[other], items[place]
 
 
 @kernel
-def _two(size, rng):  # type: ignore[no-untyped-def]
+def _two(size: int, rng: np.random.Generator) -> tuple[int, int]:
     """Return two different random indices."""
     first = int(rng.random() * size)
     second = int(rng.random() * (size - 1))
@@ -161,7 +203,17 @@ def _two(size, rng):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _mix(one, other, mask, child, pairs, order, holder, free, rng):  # type: ignore[no-untyped-def]
+def _mix(
+    one: IntArray,
+    other: IntArray,
+    mask: NDArray[np.bool_],
+    child: IntArray,
+    pairs: IntArray,
+    order: IntArray,
+    holder: IntArray,
+    free: IntArray,
+    rng: np.random.Generator,
+) -> None:
     """Cross two FMAPs, entry by entry, into one object-consistent child.
 
     The entries of the crossed FMAP are visited in random order. An entry (a, b) → (c, d) stays if
@@ -189,7 +241,7 @@ def _mix(one, other, mask, child, pairs, order, holder, free, rng):  # type: ign
 
 
 @kernel
-def _complete(child, holder, free, rng):  # type: ignore[no-untyped-def]
+def _complete(child: IntArray, holder: IntArray, free: IntArray, rng: np.random.Generator) -> None:
     """Give random unused partners to the objects that have none."""
     count = 0
     for c in range(holder.size):
@@ -206,7 +258,9 @@ def _complete(child, holder, free, rng):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _reassign(child, pairs, holder, free, rng):  # type: ignore[no-untyped-def]
+def _reassign(
+    child: IntArray, pairs: IntArray, holder: IntArray, free: IntArray, rng: np.random.Generator
+) -> None:
     """Change one entry of the FMAP at random and make all others agree with it.
 
     In half of the cases the new correspondence shares an object with the old one.
@@ -232,7 +286,9 @@ def _reassign(child, pairs, holder, free, rng):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _legalize(child, order, holder, free, rng):  # type: ignore[no-untyped-def]
+def _legalize(
+    child: IntArray, order: IntArray, holder: IntArray, free: IntArray, rng: np.random.Generator
+) -> None:
     """Change conflicting entries at random until no argument pair is used twice."""
     pairs = holder.size
     holder[:] = -1
@@ -258,7 +314,7 @@ def _legalize(child, order, holder, free, rng):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _replace(child, argument_pairs, rng):  # type: ignore[no-untyped-def]
+def _replace(child: IntArray, argument_pairs: int, rng: np.random.Generator) -> None:
     """Change one entry at random, and the entry that it conflicts with to what it frees."""
     place = int(rng.random() * child.size)
     value = int(rng.random() * 2 * argument_pairs)
@@ -269,7 +325,7 @@ def _replace(child, argument_pairs, rng):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _survive(population, fitness, child, value):  # type: ignore[no-untyped-def]
+def _survive(population: IntArray, fitness: FloatArray, child: IntArray, value: float) -> None:
     """Put a child in its place in the sorted population, unless it is worse than all or known."""
     size = fitness.size
     if value <= fitness[size - 1]:

@@ -77,7 +77,8 @@ class Easm(Searcher):
     @classmethod
     def warm_up(cls) -> None:
         """Compile the kernels for both meanings of a legal FMAP."""
-        table = RelationTable([[1.0]], [[0.0]], [[1.0]], 2, 2)
+        one = np.ones((1, 1))
+        table = RelationTable(one, one, one, 2, 2)
         for consistency in ("object", "pairwise"):
             params = cls.Params(consistency=consistency, population=2, generations=1)
             list(cls(params).search(MatchProblem(table), np.random.default_rng(0)))

@@ -21,6 +21,8 @@ _MAIN_LOOP = 0.5
 _END = 1.0 / 3.0
 # Enclosed area, as a share of the squared size, below which a stroke is a line there and back.
 _LINE = 1e-3
+# Beyond this, coordinates are a fault, and their squares would soon overflow.
+_LARGEST = 1e15
 # Share of the enclosed area in separate parts from which on a person is told that they are lost.
 _NOTABLE = 0.05
 
@@ -102,12 +104,12 @@ class StrokeSegmenter(Segmenter):
 def _checked(stroke: Stroke, field: str) -> FloatArray:
     """Return a stroke's points without repetitions, shape (k, 2)."""
     points = stroke.points
-    finite = np.isfinite(points).all(axis=1)
-    if not finite.all():
+    usable = (np.abs(points) < _LARGEST).all(axis=1)
+    if not usable.all():
+        k = int(np.argmin(usable))
+        fault = "too large" if np.isfinite(points[k]).all() else "not finite"
         raise InvalidInputError(
-            Reason.INVALID_STROKE,
-            f"{field}.points[{int(np.argmin(finite))}]",
-            "is not finite; give plain numbers",
+            Reason.INVALID_STROKE, f"{field}.points[{k}]", f"is {fault}; give plain numbers"
         )
     moved = np.ones(len(points), dtype=bool)
     moved[1:] = (points[1:] != points[:-1]).any(axis=1)
