@@ -137,7 +137,7 @@ def _match_table(match: Match) -> RenderableType:
             ProgressBar(total=1.0, completed=line.confidence, width=12),
         )
     parts = result.fmap_confidence
-    summary = "  ".join(f"{name.lower()} {value}" for name, value in facts(result))
+    summary = "  ".join(f"{name} {value}" for name, value in facts(result))
     detail = (
         f"ζ {parts.total:.3f} of relations {parts.similarity:.3f}, "
         f"rotations {parts.rotation:.3f}, dilations {parts.dilation:.3f}"
