@@ -17,8 +17,11 @@ __all__ = ["StrokeSegmenter"]
 # What a crossing closes must be this share of what the joined ends enclose: less is a flourish on
 # the way round, not the place where the outline closes.
 _MAIN_LOOP = 0.5
-# A stroke that runs past its own start without crossing it does so in this share of its length.
+# A tail beside the outline's start is at most this share of the stroke, and at most this many
+# times as long as the ends are apart: a half circle's arc is π/2 times its chord.
 _END = 1.0 / 3.0
+_BEND = 1.6
+_ROUNDING = 1e-9
 # Enclosed area, as a share of the squared size, below which a stroke is a line there and back.
 _LINE = 1e-3
 # Beyond this, coordinates are a fault, and their squares would soon overflow.
@@ -151,16 +154,18 @@ def _gap(line: shapely.LineString) -> float:
 def _closed(line: shapely.LineString, longest: float) -> shapely.LineString | None:
     """Return a line with its ends joined, or None if it is open wider than ``longest``.
 
-    Ends far apart may belong to a line that ran on past its own start: then its tail is cut
-    where it comes nearest to the other end.
+    A line may run on beside its own start without crossing it: then its tail is cut where it
+    comes nearest to the other end.
     """
-    if _gap(line) > longest:
+    gap, length = _gap(line), line.length
+    if gap > _ROUNDING * length:
+        tail = min(_BEND * gap, _END * length)
         first, last = shapely.get_point(line, 0), shapely.get_point(line, -1)
-        length, end = line.length, _END * line.length
-        early, late = _part(line, 0.0, end), _part(line, length - end, length)
+        early, late = _part(line, 0.0, tail), _part(line, length - tail, length)
         line = min(
+            line,
             _part(line, early.project(last), length),
-            _part(line, 0.0, length - end + late.project(first)),
+            _part(line, 0.0, length - tail + late.project(first)),
             key=_gap,
         )
     return _joined(line) if _gap(line) <= longest else None

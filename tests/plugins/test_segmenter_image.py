@@ -1,0 +1,171 @@
+"""The segmenter of pictures: outlines and filled shapes, noise, frames, light on dark."""
+
+import cv2
+import numpy as np
+import pytest
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.model import Image
+from sketchmatch_builtin.segmenters.image import ImageSegmenter
+
+INVERTED = "The picture is light on dark: it was read as its negative."
+
+
+def segmented(pixels, **params):
+    return ImageSegmenter(ImageSegmenter.Params(**params)).segment(Image(pixels))
+
+
+def paper(shape=(300, 400), grey=240):
+    return np.full(shape, grey, np.uint8)
+
+
+def drawing():
+    """A filled box, an outlined box and an outlined disc with a face in it."""
+    pixels = paper()
+    cv2.rectangle(pixels, (50, 40), (129, 79), 20, cv2.FILLED)  # 80 × 40 pixels
+    pixels[50:110, 200:300] = 20
+    pixels[53:107, 203:297] = 240
+    cv2.circle(pixels, (150, 220), 40, 20, 3)
+    cv2.circle(pixels, (140, 210), 5, 20, cv2.FILLED)
+    cv2.circle(pixels, (160, 210), 5, 20, cv2.FILLED)
+    return pixels
+
+
+def test_shapes_are_what_they_enclose_in_pixels_with_y_up():
+    found = segmented(drawing(), blur=0.0)
+    box, outlined, disc = found.scene.objects
+    assert box.polygon.bounds == (50, 300 - 80, 130, 300 - 40)
+    assert box.area == 3200.0
+    assert outlined.polygon.bounds == (200, 300 - 110, 300, 300 - 50)
+    assert outlined.area == 6000.0
+    assert disc.centroid == pytest.approx((150.5, 300 - 220.5), abs=0.5)
+    assert disc.area == pytest.approx(np.pi * 42**2, rel=0.04)
+    assert found.warnings == ()
+
+
+def test_noise_and_specks_change_little():
+    rng = np.random.default_rng(1)
+    noisy = np.clip(drawing() + rng.normal(0, 20, (300, 400)), 0, 255).astype(np.uint8)
+    noisy[rng.random(noisy.shape) < 0.01] = 0
+    clean, found = segmented(drawing()).scene, segmented(noisy).scene
+    assert len(found) == 3
+    for expected, item in zip(clean.objects, found.objects, strict=True):
+        assert item.centroid == pytest.approx(expected.centroid, abs=1.0)
+        assert item.area == pytest.approx(expected.area, rel=0.05)
+
+
+def test_a_turned_picture_has_turned_objects():
+    scene = segmented(drawing()).scene
+    turned = segmented(np.rot90(drawing())).scene
+    centres = {tuple(np.round(item.centroid)) for item in scene.objects}
+    back = {tuple(np.round((y, 300 - x))) for x, y in (o.centroid for o in turned.objects)}
+    assert all(min(np.hypot(a - c, b - d) for c, d in back) <= 2.0 for a, b in centres)
+
+
+def test_light_on_dark_is_read_as_its_negative_and_said():
+    found = segmented(255 - drawing())
+    assert [item.area for item in found.scene.objects] == pytest.approx(
+        [item.area for item in segmented(drawing()).scene.objects], rel=0.02
+    )
+    assert found.warnings == (INVERTED,)
+
+
+def framed():
+    pixels = drawing()
+    cv2.rectangle(pixels, (10, 10), (389, 289), 20, 4)
+    return pixels
+
+
+def test_a_line_around_everything_is_a_frame():
+    found = segmented(framed())
+    assert len(found.scene) == 3
+    assert found.warnings == (
+        "The line around everything was taken as a frame and left out: set frame to 'keep' if "
+        "it is an object.",
+    )
+
+
+def test_a_frame_can_be_kept_as_the_one_object_that_it_is():
+    with pytest.raises(InvalidInputError, match="has only one shape"):
+        segmented(framed(), frame="keep")
+
+
+def test_a_shape_around_one_other_is_no_frame():
+    pixels = paper()
+    cv2.circle(pixels, (200, 150), 90, 20, 3)
+    cv2.circle(pixels, (200, 150), 30, 20, 3)
+    with pytest.raises(InvalidInputError, match="has only one shape"):
+        segmented(pixels)
+
+
+def test_what_lies_in_an_object_is_not_looked_at():
+    pixels = drawing()
+    cv2.rectangle(pixels, (215, 60), (240, 100), 20, 2)
+    cv2.rectangle(pixels, (250, 60), (280, 100), 20, 2)
+    assert len(segmented(pixels).scene) == 3
+
+
+def test_min_size_is_relative_to_the_picture():
+    pixels = drawing()
+    cv2.rectangle(pixels, (350, 250), (369, 269), 20, cv2.FILLED)  # 20 of 400 pixels: 5 %
+    assert len(segmented(pixels, blur=0.0, min_size=0.05).scene) == 4
+    assert len(segmented(pixels, blur=0.0, min_size=0.051).scene) == 3
+
+
+def test_simplify_is_relative_to_the_shape():
+    small, large = paper((200, 400)), paper((2000, 4000))
+    for pixels, scale in ((small, 1), (large, 10)):
+        for x in (100, 300):
+            cv2.circle(pixels, (x * scale, 100 * scale), 60 * scale, 0, cv2.FILLED)
+    few, many = segmented(small).scene, segmented(large).scene
+    assert abs(len(few.objects[0].rings[0]) - len(many.objects[0].rings[0])) <= 6
+    assert len(many.objects[0].rings[0]) < 40
+    assert len(segmented(large, simplify=0.0).scene.objects[0].rings[0]) > 400
+
+
+@pytest.mark.parametrize("grey", [0, 128, 255])
+def test_a_blank_picture_is_refused(grey):
+    with pytest.raises(InvalidInputError) as caught:
+        segmented(paper(grey=grey))
+    assert (caught.value.field, caught.value.reason) == ("pixels", Reason.INVALID_IMAGE)
+    assert "is blank: lightest and darkest differ by 0 of 255 grey levels; give" in str(
+        caught.value
+    )
+
+
+def test_paper_texture_alone_is_blank():
+    rng = np.random.default_rng(2)
+    texture = np.clip(rng.normal(220, 6, (300, 400)), 0, 255).astype(np.uint8)
+    with pytest.raises(InvalidInputError, match="is blank"):
+        segmented(texture)
+
+
+def test_a_picture_of_one_pixel_is_blank():
+    with pytest.raises(InvalidInputError, match="is blank"):
+        segmented(np.zeros((1, 1), np.uint8))
+
+
+def test_too_few_shapes_say_how_large_they_would_have_to_be():
+    pixels = paper()
+    cv2.circle(pixels, (100, 100), 40, 20, cv2.FILLED)
+    with pytest.raises(InvalidInputError) as caught:
+        segmented(pixels)
+    assert (caught.value.field, caught.value.reason) == ("pixels", Reason.TOO_FEW_OBJECTS)
+    assert caught.value.problem == (
+        "has only one shape of at least 8 pixels' side, and a match needs two; draw objects "
+        "apart from each other, or lower min_size"
+    )
+
+
+def test_a_picture_of_noise_is_refused_before_it_takes_long():
+    noise = np.where(np.random.default_rng(0).random((800, 800)) < 0.1, 0, 255).astype(np.uint8)
+    with pytest.raises(InvalidInputError, match="more than the limit of 1000; raise blur or"):
+        segmented(noise, blur=0.0, min_size=0.0)
+
+
+def test_nested_rings_by_the_hundred_are_no_problem():
+    pixels = paper((2000, 2000), 255)
+    for radius in range(4, 980, 4):
+        cv2.circle(pixels, (1000, 1000), radius, 0, 1)
+    with pytest.raises(InvalidInputError, match="has only one shape"):
+        segmented(pixels, blur=0.0)

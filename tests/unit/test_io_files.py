@@ -1,0 +1,71 @@
+"""The door for every kind of file."""
+
+import subprocess
+import sys
+
+import pytest
+
+import sketchmatch.io.files
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io import read_source
+
+
+def refused(path):
+    with pytest.raises(InvalidInputError) as caught:
+        read_source(path)
+    return caught.value
+
+
+def test_a_missing_file_is_named(tmp_path):
+    error = refused(tmp_path / "none.svg")
+    assert str(error) == f"{tmp_path / 'none.svg'} does not exist; check the path"
+    assert error.reason == Reason.INVALID_FILE
+
+
+def test_a_directory_is_named(tmp_path):
+    (tmp_path / "maps.yaml").mkdir()
+    error = refused(tmp_path / "maps.yaml")
+    assert str(error) == f"{tmp_path / 'maps.yaml'} is a directory; give a file in it"
+
+
+@pytest.mark.parametrize("name", ["sketch.dwg", "sketch", ".svg"])
+def test_an_unknown_kind_lists_the_known_ones(tmp_path, name):
+    (tmp_path / name).write_text("?")
+    error = refused(tmp_path / name)
+    assert error.reason == Reason.INVALID_FILE
+    assert "is of no known kind; give a file that ends in one of .bmp .geojson" in error.problem
+
+
+def test_a_path_that_the_system_refuses_is_named():
+    assert "cannot be read (file name too long)" in refused("x" * 5000 + ".svg").problem
+
+
+def test_a_path_with_a_null_is_named():
+    assert "; " in refused("a\0b.svg").problem
+
+
+def test_a_file_above_the_limit_is_not_read(tmp_path, monkeypatch):
+    monkeypatch.setattr(sketchmatch.io.files, "MAX_BYTES", 2 * 1024**2)
+    path = tmp_path / "sketch.svg"
+    path.write_bytes(b" " * (2 * 1024**2 + 1))
+    error = refused(path)
+    assert str(error) == f"{path} is larger than the limit of 2 MiB; reduce it"
+    assert error.reason == Reason.LIMIT_EXCEEDED
+
+
+def test_contents_at_fault_are_named_after_the_path(tmp_path):
+    path = tmp_path / "sketch.json"
+    path.write_text('{"strokes": [{"points": [[0, 0], [1, null]]}]}')
+    expected = f"{path}: strokes[0].points[1][1] is missing; give a finite number"
+    assert str(refused(path)) == expected
+
+
+def test_slow_libraries_wait_until_a_file_needs_them():
+    script = (
+        "import sys, sketchmatch.io; print([name for name in"
+        " ('cv2', 'PIL', 'svgelements', 'yaml') if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,278 @@
+"""Robots' maps: every key, mode and kind of picture, and every way to get them wrong."""
+
+import struct
+import zlib
+
+import numpy as np
+import PIL.Image
+import pytest
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io import read_source
+from sketchmatch.io.ros_map import decode_map_server
+from sketchmatch.model import OccupancyGrid
+from tests.tools import ROOT, require
+
+GREYS = [0, 60, 100, 205, 254, 255]
+HEADER = {
+    "image": "map.pgm",
+    "resolution": 0.05,
+    "origin": [-1.0, 2.0, 0.0],
+    "negate": 0,
+    "occupied_thresh": 0.65,
+    "free_thresh": 0.196,
+}
+
+
+def yaml_text(**changes):
+    header = {**HEADER, **changes}
+    return "".join(f"{key}: {value}\n" for key, value in header.items() if value != "left out")
+
+
+def pgm(rows, maxval=255):
+    rows = np.asarray(rows, np.uint8)
+    return b"P5\n# by hand\n%d %d\n%d\n" % (*rows.shape[::-1], maxval) + rows.tobytes()
+
+
+def encoded(picture, kind, tmp_path):
+    path = tmp_path / f"picture.{kind}"
+    picture.save(path)
+    return path.read_bytes()
+
+
+def cells(greys, **changes):
+    return decode_map_server(yaml_text(**changes), pgm([greys])).cells[0].tolist()
+
+
+def test_trinary_is_the_default_and_the_comparisons_are_strict():
+    assert cells(GREYS) == [100, 100, -1, -1, 0, 0]
+    # p(205) = 50/255 = 0.196…: free only where the threshold is above it, as in nav2's depot map.
+    assert cells([205], free_thresh=0.25) == [0]
+    # p(204) = 0.2 is not below 0.2, p(51) = 0.8 not above 0.8.
+    assert cells([204, 51], free_thresh=0.2, occupied_thresh=0.8) == [-1, -1]
+
+
+def test_negate_turns_white_into_occupied():
+    assert cells(GREYS, negate=1) == [0, -1, -1, 100, 100, 100]
+    assert cells([0, 255], negate="true") == [0, 100]
+
+
+def test_scale_spreads_what_lies_between_the_thresholds():
+    values = cells([0, 89, 128, 204, 255], mode="scale", free_thresh=0.2, occupied_thresh=0.65)
+    # p = 1, 0.651, 0.498, 0.2, 0.
+    assert values == [100, 100, round((127 / 255 - 0.2) / 0.45 * 100), 0, 0]
+
+
+def test_raw_takes_values_as_they_are():
+    assert cells([0, 42, 100, 101, 255], mode="raw") == [0, 42, 100, -1, -1]
+    assert cells([0, 42], mode="raw", negate=1) == [0, 42]
+
+
+def test_rows_are_turned_so_that_the_lowest_is_first():
+    grid = decode_map_server(yaml_text(), pgm([[0, 254], [205, 205], [254, 0]]))
+    assert grid.cells.tolist() == [[0, 100], [-1, -1], [100, 0]]
+    assert grid.origin == (-1.0, 2.0, 0.0)
+    assert grid.resolution == 0.05
+
+
+@pytest.mark.parametrize("kind", ["png", "bmp", "tif"])
+def test_every_lossless_format_holds_the_same_map(kind, tmp_path):
+    greys = np.random.default_rng(0).choice(GREYS, (7, 5)).astype(np.uint8)
+    expected = decode_map_server(yaml_text(), pgm(greys)).cells
+    picture = PIL.Image.fromarray(greys)
+    assert (
+        decode_map_server(yaml_text(), encoded(picture, kind, tmp_path)).cells == expected
+    ).all()
+    colour = encoded(picture.convert("RGB"), kind, tmp_path)
+    assert (decode_map_server(yaml_text(), colour).cells == expected).all()
+
+
+def test_plain_and_16_bit_pgm_hold_the_same_map():
+    plain = b"P2\n# by hand\n3 2\n255\n0 100 254\n205 0 255\n"
+    expected = [[-1, 100, 0], [100, -1, 0]]
+    assert decode_map_server(yaml_text(), plain).cells.tolist() == expected
+    deep = b"P5\n3 2\n65535\n" + np.array([0, 25700, 65278, 52685, 0, 65535], ">u2").tobytes()
+    assert decode_map_server(yaml_text(), deep).cells.tolist() == expected
+
+
+def test_a_palette_is_looked_up(tmp_path):
+    picture = PIL.Image.new("P", (3, 1))
+    picture.putdata([0, 1, 2])
+    picture.putpalette([255, 255, 255, 0, 0, 0, 205, 205, 205])
+    data = encoded(picture, "png", tmp_path)
+    assert decode_map_server(yaml_text(), data).cells.tolist() == [[0, 100, -1]]
+
+
+def test_a_colour_counts_as_its_mean(tmp_path):
+    colour = PIL.Image.fromarray(np.array([[[255, 0, 0], [255, 255, 0]]], np.uint8))
+    # Means 85 and 170: p = 0.667 and 0.333.
+    data = encoded(colour, "png", tmp_path)
+    assert decode_map_server(yaml_text(), data).cells.tolist() == [[100, -1]]
+
+
+@pytest.mark.parametrize(
+    ("mode", "expected"), [("trinary", [100, -1, -1]), ("scale", [100, -1, -1]), ("raw", [0, 0, 9])]
+)
+def test_what_is_transparent_is_unknown(mode, expected, tmp_path):
+    pixels = np.array([[[0, 0, 0, 255], [0, 0, 0, 0], [9, 9, 9, 254]]], np.uint8)
+    data = encoded(PIL.Image.fromarray(pixels), "png", tmp_path)
+    assert decode_map_server(yaml_text(mode=mode), data).cells.tolist() == [expected]
+
+
+def test_numbers_that_yaml_takes_for_strings_are_numbers():
+    grid = decode_map_server(yaml_text(resolution="5e-2"), pgm([[0]]))
+    assert grid.resolution == 0.05
+
+
+def test_keys_of_other_tools_are_ignored():
+    assert decode_map_server(yaml_text(author="me"), pgm([[0]])).cells.shape == (1, 1)
+
+
+BAD_YAML = {
+    "image is missing": ({"image": "left out"}, "image", "add it"),
+    "resolution is missing": ({"resolution": "left out"}, "resolution", "'resolution: 0.05'"),
+    "resolution is null": ({"resolution": "null"}, "resolution", "is missing"),
+    "resolution is 0": ({"resolution": 0}, "resolution", "is 0; give the metres per cell"),
+    "resolution is negative": ({"resolution": -0.1}, "resolution", "is -0.1; give the metres"),
+    "resolution is nan": ({"resolution": ".nan"}, "resolution", "is nan; give a finite number"),
+    "resolution is a word": ({"resolution": "fine"}, "resolution", "is 'fine'; give a finite"),
+    "resolution is true": ({"resolution": "true"}, "resolution", "is True; give a finite number"),
+    "resolution is huge": ({"resolution": "1" * 400}, "resolution", "give a finite number"),
+    "origin is short": ({"origin": [0, 0]}, "origin", "give [x, y, yaw]"),
+    "origin is no list": ({"origin": 3}, "origin", "give [x, y, yaw]"),
+    "yaw is nan": ({"origin": "[0, 0, .nan]"}, "origin[2]", "is nan; give a finite number"),
+    "negate is 2": ({"negate": 2}, "negate", "is 2; give 0"),
+    "threshold out of range": ({"occupied_thresh": 65}, "occupied_thresh", "a share from 0 to 1"),
+    "thresholds swapped": ({"free_thresh": 0.7}, "free_thresh", "not below occupied_thresh 0.65"),
+    "thresholds missing": ({"free_thresh": "left out"}, "free_thresh", "add it"),
+    "mode unknown": ({"mode": "binary"}, "mode", "is 'binary'; give trinary, scale or raw"),
+    "image is a number": ({"image": 7}, "image", "give the picture's path"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_YAML)
+def test_a_wrong_key_is_named_with_the_remedy(case):
+    changes, field, words = BAD_YAML[case]
+    with pytest.raises(InvalidInputError) as caught:
+        decode_map_server(yaml_text(**changes), pgm([[0]]))
+    assert caught.value.field == f"yaml.{field}"
+    assert caught.value.reason == Reason.INVALID_GRID
+    assert words in caught.value.problem
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is not a list of keys and values"),
+        ("- 1\n- 2", "is not a list of keys and values"),
+        ("a: [1, 2", "is not YAML (line 1)"),
+        ("a: b: c", "is not YAML (line 1)"),
+        ("a: !!python/object:os.system x", "is not YAML"),
+        ("x: \0", "is not YAML"),
+        ("[" * 5000, "is not YAML"),
+        ("a: 2001-99-99", "is not YAML"),
+    ],
+)
+def test_text_that_is_no_header_is_refused(text, words):
+    with pytest.raises(InvalidInputError, match="file that map_server saved") as caught:
+        decode_map_server(text, pgm([[0]]))
+    assert caught.value.field == "yaml"
+    assert words in caught.value.problem
+
+
+def png(width, height, data):
+    header = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    chunks = [header, b"IDAT" + zlib.compress(data), b"IEND"]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+        for chunk in chunks
+    )
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (pgm(np.zeros((9, 9)))[:-1], "is damaged or cut short"),
+        (b"P2\n3 2\n255\n0 1 2 3 4\n", "is damaged or cut short"),
+        (b"P2\n3 1\n255\n0 x 2\n", "is damaged or cut short"),
+        (b"P5\n3", "is damaged or cut short"),
+        (b"P5\n0 3\n255\n", "is not a picture"),
+        (b"", "is not a picture; give a PNG, JPEG, BMP, TIFF or PGM file"),
+        (b"image: map.pgm", "is not a picture"),
+    ],
+)
+def test_a_broken_picture_is_refused(data, words):
+    with pytest.raises(InvalidInputError) as caught:
+        decode_map_server(yaml_text(), data)
+    assert (caught.value.field, caught.value.reason) == ("image", Reason.INVALID_IMAGE)
+    assert words in caught.value.problem
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"P5\n9000 9000\n255\n",
+        b"P5\n10000 10000\n255\n",
+        b"P5\n2000000 2000000\n255\n",
+        png(100_000, 100_000, b""),
+    ],
+)
+def test_a_small_file_cannot_announce_a_huge_picture(data):
+    with pytest.raises(InvalidInputError, match="the limit of 64 million pixels") as caught:
+        decode_map_server(yaml_text(), data)
+    assert (caught.value.field, caught.value.reason) == ("image", Reason.LIMIT_EXCEEDED)
+
+
+def write_map(folder, text, picture=None):
+    (folder / "map.yaml").write_text(text)
+    if picture is not None:
+        (folder / "map.pgm").write_bytes(picture)
+    return folder / "map.yaml"
+
+
+def test_the_picture_lies_beside_the_yaml_file(tmp_path, monkeypatch):
+    path = write_map(tmp_path, yaml_text(), pgm([[0, 254]]))
+    monkeypatch.chdir("/")
+    grid = read_source(path)
+    assert isinstance(grid, OccupancyGrid)
+    assert grid.cells.tolist() == [[100, 0]]
+
+
+def test_a_fault_in_a_file_names_file_and_key(tmp_path):
+    path = write_map(tmp_path, yaml_text(resolution=0), pgm([[0]]))
+    with pytest.raises(InvalidInputError) as caught:
+        read_source(path)
+    remedy = "resolution is 0; give the metres per cell as a positive number"
+    assert str(caught.value) == f"{path}: {remedy}"
+
+
+def test_a_missing_picture_names_both_files(tmp_path):
+    path = write_map(tmp_path, yaml_text())
+    with pytest.raises(InvalidInputError) as caught:
+        read_source(path)
+    picture = tmp_path / "map.pgm"
+    assert str(caught.value) == f"{path}: image {picture} does not exist; check the path"
+
+
+def test_a_truncated_picture_names_the_yaml_and_the_key(tmp_path):
+    path = write_map(tmp_path, yaml_text(), pgm(np.zeros((4, 4)))[:-3])
+    with pytest.raises(InvalidInputError, match="is damaged or cut short") as caught:
+        read_source(path)
+    assert caught.value.field == f"{path}: image"
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "counts"),
+    [
+        ("turtlebot3/map.yaml", (384, 384), (138722, 7939, 795)),
+        ("nav2-depot/depot.yaml", (307, 604), (0, 8894 + 170587, 5947)),
+        ("husky-playpen/playpen_map.yaml", (1984, 1984), (3784308, 149150, 2798)),
+        ("pmb2-small-office/map.yaml", (297, 204), (3286, 43575 + 11114, 2613)),
+    ],
+)
+def test_real_maps_have_the_cells_that_their_greys_say(name, shape, counts):
+    path = ROOT.parent / "shared" / "data" / "ogm" / name
+    require(path.exists(), f"the real map {name}")
+    grid = read_source(path)
+    assert grid.cells.shape == shape
+    assert tuple(int((grid.cells == value).sum()) for value in (-1, 0, 100)) == counts
