@@ -12,6 +12,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import FloatArray, Scene, SceneObject, Source, Weights
 from sketchmatch.pipeline.match import Finished, MatchRequest, Progress, run_match
+from sketchmatch.pipeline.plugins import segmented
 from sketchmatch.pipeline.result import MatchResult
 from sketchmatch.pipeline.selection import STAGES, Choice, Selection, resolve, resolve_segmenter
 from sketchmatch.registry import default_registry
@@ -100,7 +101,9 @@ def read_scene(path: str | Path) -> Scene:
         If the file cannot be read or holds fewer than two objects.
     """
     source = read_source(Path(path))
-    return resolve_segmenter(default_registry(), Choice(), source).segment(source).scene
+    registry = default_registry()
+    segmenter = resolve_segmenter(registry, Choice(), source)
+    return segmented(source, segmenter, registry, f"{path}: {source.field}").scene
 
 
 def force_histogram(a: Any, b: Any, *, r: float = 0.0, directions: int = 180) -> FloatArray:

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from sketchmatch.cli.options import MatchSettings, say
-from sketchmatch.errors import InvalidInputError
 from sketchmatch.io import read_source
 from sketchmatch.model import Source
+from sketchmatch.pipeline import plugins
 from sketchmatch.pipeline.match import MatchRequest, run_match
 from sketchmatch.pipeline.selection import Choice, resolve_segmenter
 from sketchmatch.pipeline.warmup import announcing_compilation
@@ -50,11 +50,9 @@ def match_events(
 def segmented(path: Path, name: str, parameters: dict[str, Any]) -> SegmentResponse:
     """Find the objects in a file."""
     source: Source = read_source(path)
-    segmenter = resolve_segmenter(default_registry(), Choice(name, parameters), source)
-    try:
-        found = segmenter.segment(source)
-    except InvalidInputError as error:
-        raise error.within(f"{path}: {source.field}") from None
+    registry = default_registry()
+    segmenter = resolve_segmenter(registry, Choice(name, parameters), source)
+    found = plugins.segmented(source, segmenter, registry, f"{path}: {source.field}")
     return responses.segmented(found, segmenter)
 
 

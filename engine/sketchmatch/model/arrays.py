@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FloatArray", "IntArray", "frozen", "frozen_floats"]
+__all__ = ["FloatArray", "IntArray", "frozen", "frozen_floats", "sealed"]
 
 _DType = TypeVar("_DType", bound=np.generic)
 
@@ -20,6 +20,12 @@ def frozen(array: NDArray[_DType]) -> NDArray[_DType]:
     if array.flags.writeable or not array.flags.c_contiguous:
         array = array.copy(order="C")
         array.flags.writeable = False
+    return array
+
+
+def sealed(array: NDArray[_DType]) -> NDArray[_DType]:
+    """Make an array read-only in place and return it; for its only owner, who saves a copy."""
+    array.flags.writeable = False
     return array
 
 

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sketchmatch.model.arrays import FloatArray, IntArray, frozen, frozen_floats
+from sketchmatch.model.arrays import FloatArray, IntArray, frozen, frozen_floats, sealed
 
 __all__ = [
     "DILATION_SCALE",
@@ -139,14 +139,14 @@ class RelationTable:
     @cached_property
     def normalized_dilation(self) -> FloatArray:
         """L̂ = C·ln L, shape (Q, Q'/2)."""
-        return frozen(DILATION_SCALE * np.log(self.dilation))
+        return sealed(DILATION_SCALE * np.log(self.dilation))
 
     @cached_property
     def cosine(self) -> FloatArray:
         """cos R, shape (Q, Q'/2); a dual has it negated."""
-        return frozen(np.cos(self.rotation))
+        return sealed(np.cos(self.rotation))
 
     @cached_property
     def sine(self) -> FloatArray:
         """sin R, shape (Q, Q'/2); a dual has it negated."""
-        return frozen(np.sin(self.rotation))
+        return sealed(np.sin(self.rotation))

@@ -19,6 +19,8 @@ __all__ = ["Scene", "SceneObject"]
 
 # Below this share of its squared extent an area is rounding, not a shape.
 _FLAT = 1e-9
+# Beyond this, forces and areas would leave the range of floating-point numbers.
+_FAR = 1e15
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,6 +219,10 @@ def _clean_ring(ring: Any, field: str) -> FloatArray:
         k = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
         raise InvalidInputError(
             Reason.INVALID_POLYGON, f"{field}.points[{k}]", "is not finite; give plain numbers"
+        )
+    if np.abs(points).max(initial=0.0) > _FAR:
+        raise InvalidInputError(
+            Reason.INVALID_POLYGON, field, f"reaches beyond ±{_FAR:g}; use a larger unit"
         )
     points = np.compress((points != np.roll(points, 1, axis=0)).any(axis=1), points, axis=0)
     if len(points) < 3:

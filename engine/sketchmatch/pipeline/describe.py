@@ -9,6 +9,8 @@ import numpy as np
 
 from sketchmatch.api import Histogram
 from sketchmatch.model import FloatArray, Scene, SceneDescriptor, object_pairs
+from sketchmatch.model.arrays import sealed
+from sketchmatch.pipeline.plugins import checked_array
 from sketchmatch.pipeline.slices import slices
 
 __all__ = ["describe"]
@@ -34,7 +36,8 @@ def describe(scene: Scene, histogram: Histogram) -> Generator[float, None, Scene
     pairs = object_pairs(len(scene))
     histograms = np.empty((len(pairs), histogram.params.directions))
     for first, last in slices(len(pairs)):
-        histograms[first:last] = histogram.describe(scene, pairs[first:last])
+        found = histogram.describe(scene, pairs[first:last])
+        histograms[first:last] = checked_array(found, (last - first, histograms.shape[1]))
         yield last / len(pairs)
     for index in np.flatnonzero(~histograms.any(axis=1)):
         a, b = (scene.objects[k] for k in pairs[index])
@@ -44,7 +47,7 @@ def describe(scene: Scene, histogram: Histogram) -> Generator[float, None, Scene
             force = a.area * b.area * distance ** (-1.0 - histogram.exponent)
             angle = float(np.arctan2(offset[1], offset[0]))
             histograms[index] = _point_histogram(angle, force, histograms.shape[1])
-    return SceneDescriptor(histograms, len(scene), histogram.exponent)
+    return SceneDescriptor(sealed(histograms), len(scene), histogram.exponent)
 
 
 def _point_histogram(angle: float, force: float, directions: int) -> FloatArray:

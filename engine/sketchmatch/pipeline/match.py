@@ -14,8 +14,16 @@ from typing import TypeVar
 
 import numpy as np
 
-from sketchmatch.api import MatchProblem, Outcome, SearchProgress, Segmentation, Segmenter
-from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError, Reason
+from sketchmatch.api import (
+    Algorithm,
+    MatchProblem,
+    Outcome,
+    Searcher,
+    SearchProgress,
+    Segmentation,
+    Segmenter,
+)
+from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, Reason
 from sketchmatch.model import (
     Fmap,
     ObjectMap,
@@ -24,6 +32,7 @@ from sketchmatch.model import (
     Source,
     Weights,
     object_pairs,
+    pair_count,
 )
 from sketchmatch.pipeline.correspond import (
     fmap_confidence,
@@ -33,6 +42,7 @@ from sketchmatch.pipeline.correspond import (
     occm,
 )
 from sketchmatch.pipeline.describe import describe
+from sketchmatch.pipeline.plugins import blaming, checked_progress, segmented
 from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.result import Correspondence, MatchResult, ObjectMatch, Statistics
 from sketchmatch.pipeline.selection import Pipeline, Selection, resolve
@@ -51,6 +61,9 @@ __all__ = [
 
 _PROGRESS_EVERY = 0.05
 _MAX_SEED = 2**64 - 1
+# What 2 GB hold: 100 × 100 objects, and the histograms of 700 objects in 180 directions.
+_MAX_COMPARISONS = 30_000_000
+_MAX_HISTOGRAM_VALUES = 50_000_000
 _Value = TypeVar("_Value")
 
 
@@ -211,40 +224,50 @@ class _Match:
 
     def run(self) -> Generator[MatchEvent, None, None]:
         yield Accepted(self.match_id, self.request.seed, self.pipeline)
-        yield Progress(Phase.SEGMENT, self.elapsed())
+        if self.may_report():
+            yield Progress(Phase.SEGMENT, self.elapsed())
         with self.timed("segment"):
-            sketch = _segment("sketch", self.request.sketch, self.pipeline.sketch_segmenter)
+            sketch = self.segmented("sketch", self.request.sketch, self.pipeline.sketch_segmenter)
             self.check_budget(Phase.SEGMENT)
-            map_ = _segment("map", self.request.map, self.pipeline.map_segmenter)
+            map_ = self.segmented("map", self.request.map, self.pipeline.map_segmenter)
+        _check_size(sketch.scene, map_.scene, self.pipeline)
         yield Segmented(sketch, map_)
         exchanged = len(sketch.scene) > len(map_.scene)
         scenes = (sketch.scene, map_.scene)
         template, argument = reversed(scenes) if exchanged else scenes
+        histogram, similarity = self.pipeline.histogram, self.pipeline.similarity
         with self.timed("describe"):
-            first = yield from self.watched(
-                Phase.DESCRIBE, describe(template, self.pipeline.histogram)
-            )
-            second = yield from self.watched(
-                Phase.DESCRIBE, describe(argument, self.pipeline.histogram)
-            )
+            work = describe(template, histogram)
+            first = yield from self.watched(Phase.DESCRIBE, histogram, work)
+            work = describe(argument, histogram)
+            second = yield from self.watched(Phase.DESCRIBE, histogram, work)
         with self.timed("relate"):
-            table = yield from self.watched(
-                Phase.RELATE, relate(first, second, self.pipeline.similarity)
-            )
+            comparing = relate(first, second, similarity)
+            table = yield from self.watched(Phase.RELATE, similarity, comparing)
         with self.timed("search"):
             found, outcome = yield from self.search(table, exchanged)
         yield Finished(self.result(sketch, map_, table, exchanged, found, outcome))
 
+    def segmented(
+        self, side: str, source: Source | Scene, segmenter: Segmenter | None
+    ) -> Segmentation:
+        """Return the objects of one side."""
+        if isinstance(source, Scene):
+            return Segmentation(source)
+        assert segmenter is not None
+        return segmented(source, segmenter, self.registry, f"{side}.{source.field}")
+
     def watched(
-        self, phase: Phase, work: Generator[float, None, _Value]
+        self, phase: Phase, algorithm: Algorithm, work: Generator[float, None, _Value]
     ) -> Generator[MatchEvent, None, _Value]:
-        """Run a stage to its end, passing its progress on."""
+        """Run an algorithm's stage to its end, passing its progress on."""
         while True:
             self.check_budget(phase)
-            try:
-                fraction = next(work)
-            except StopIteration as stop:
-                return stop.value  # type: ignore[no-any-return]
+            with blaming(algorithm, self.registry):
+                try:
+                    fraction = next(work)
+                except StopIteration as stop:
+                    return stop.value  # type: ignore[no-any-return]
             if self.may_report():
                 yield Progress(phase, self.elapsed(), fraction)
 
@@ -254,19 +277,16 @@ class _Match:
         """Run the searcher until it ends or the time budget does."""
         searcher = self.pipeline.searcher
         problem = MatchProblem(table, self.request.weights)
-        work = searcher.search(problem, np.random.default_rng(self.request.seed))
         best: SearchProgress | None = None
-        try:
+        with self.searching(searcher, problem) as work:
             while True:
-                try:
-                    best = next(work)
-                except StopIteration as stop:
-                    if best is None:
-                        raise PluginError(
-                            f"searcher {searcher.name} ended without any answer; "
-                            "report this to its author or choose another"
-                        ) from None
-                    return best, Outcome(stop.value or Outcome.CONVERGED)
+                with blaming(searcher, self.registry):
+                    try:
+                        best = checked_progress(next(work), table)
+                    except StopIteration as stop:
+                        if best is None:
+                            raise ValueError("it ended without any answer") from None
+                        return best, Outcome(stop.value or Outcome.CONVERGED)
                 if self.out_of_time():
                     return best, Outcome.TIME_BUDGET
                 if self.may_report():
@@ -280,8 +300,21 @@ class _Match:
                         upper_bound=best.upper_bound,
                         matches=_matches(mapped, exchanged),
                     )
+
+    @contextmanager
+    def searching(
+        self, searcher: Searcher, problem: MatchProblem
+    ) -> Iterator[Generator[SearchProgress, None, Outcome]]:
+        """Start a search, and stop it in the end."""
+        with blaming(searcher, self.registry):
+            work = searcher.search(problem, np.random.default_rng(self.request.seed))
+            if not isinstance(work, Generator):
+                raise TypeError(f"its search is a {type(work).__name__}, not a generator")
+        try:
+            yield work
         finally:
-            work.close()
+            with blaming(searcher, self.registry):
+                work.close()
 
     def result(
         self,
@@ -349,14 +382,26 @@ class _Match:
         self.seconds[stage] = time.monotonic() - started
 
 
-def _segment(side: str, source: Source | Scene, segmenter: Segmenter | None) -> Segmentation:
-    if isinstance(source, Scene):
-        return Segmentation(source)
-    assert segmenter is not None
-    try:
-        return segmenter.segment(source)
-    except InvalidInputError as error:
-        raise error.within(f"{side}.{source.field}") from None
+def _check_size(sketch: Scene, map_: Scene, pipeline: Pipeline) -> None:
+    """Refuse scenes whose relations would not fit into memory."""
+    for side, scene in (("sketch", sketch), ("map", map_)):
+        values = pair_count(len(scene)) * pipeline.histogram.params.directions
+        if values > _MAX_HISTOGRAM_VALUES:
+            raise InvalidInputError(
+                Reason.LIMIT_EXCEEDED,
+                side,
+                f"has {len(scene)} objects, whose relations take {values} numbers, more than the "
+                f"limit of {_MAX_HISTOGRAM_VALUES}; leave out small objects",
+            )
+    comparisons = pair_count(len(sketch)) * pair_count(len(map_))
+    if comparisons > _MAX_COMPARISONS:
+        raise InvalidInputError(
+            Reason.LIMIT_EXCEEDED,
+            "sketch",
+            f"has {len(sketch)} objects and the map {len(map_)}, which makes {comparisons} "
+            f"comparisons of relations, more than the limit of {_MAX_COMPARISONS}; "
+            "leave out small objects",
+        )
 
 
 def _matches(mapped: ObjectMap, exchanged: bool) -> tuple[ObjectMatch, ...]:

@@ -9,6 +9,8 @@ import numpy as np
 from sketchmatch.api import Similarity
 from sketchmatch.kernels.alignment import main_directions, rotated_rows
 from sketchmatch.model import RelationTable, SceneDescriptor
+from sketchmatch.model.arrays import sealed
+from sketchmatch.pipeline.plugins import checked_array
 from sketchmatch.pipeline.slices import slices
 
 __all__ = ["relate"]
@@ -48,8 +50,11 @@ def relate(
                 ratios = argument_means[present] / template_means[i]
                 angles = np.mod(argument_angles[present] - template_angles[i], 2.0 * np.pi)
                 aligned = rotated_rows(template.histograms[i], angles, ratios)
-                sigma[i, present] = similarity.compare(aligned, columns)
+                alike = similarity.compare(aligned, columns)
+                sigma[i, present] = checked_array(alike, angles.shape)
                 rotation[i, present] = np.where(angles < 2.0 * np.pi, angles, 0.0)
                 dilation[i, present] = ratios ** (1.0 / power)
         yield last / shape[0]
-    return RelationTable(sigma, rotation, dilation, template.objects, argument.objects)
+    return RelationTable(
+        sealed(sigma), sealed(rotation), sealed(dilation), template.objects, argument.objects
+    )

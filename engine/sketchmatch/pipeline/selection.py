@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from sketchmatch.api import Algorithm, Histogram, Searcher, Segmenter, Similarity
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import Image, OccupancyGrid, PolygonSet, Source, StrokeSet
+from sketchmatch.pipeline.plugins import blaming
 from sketchmatch.registry import Kind, Registry
 
 __all__ = ["DEFAULTS", "STAGES", "Choice", "Pipeline", "Selection", "resolve", "resolve_segmenter"]
@@ -152,10 +153,12 @@ def _resolve_stage(
         algorithm = registry.find(kind, choice.name or default).algorithm
     except InvalidInputError as error:
         raise error.within(stage) from None
-    try:
-        return algorithm(algorithm.Params(**dict(choice.parameters)))
-    except ValidationError as error:
-        raise _parameter_error(algorithm, error).within(f"{stage}.parameters") from None
+    with blaming(algorithm, registry):
+        try:
+            params = algorithm.Params(**dict(choice.parameters))
+        except ValidationError as error:
+            raise _parameter_error(algorithm, error).within(f"{stage}.parameters") from None
+        return algorithm(params)
 
 
 def _parameter_error(algorithm: type[Algorithm], error: ValidationError) -> InvalidInputError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -16,6 +17,8 @@ from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Registry
 
 __all__ = ["COMPILING", "announcing_compilation", "warm_up"]
+
+_log = logging.getLogger(__name__)
 
 COMPILING = "compiling the kernels: this happens once after an installation and takes about 20 s"
 
@@ -35,11 +38,24 @@ def announcing_compilation(say: Callable[[str], None]) -> Iterator[None]:
         yield
 
 
-def warm_up(registry: Registry) -> None:
-    """Load the kernels of the pipeline and of every algorithm, or compile them."""
+def warm_up(registry: Registry, unwanted: Callable[[], bool] = lambda: False) -> None:
+    """Load the kernels of the pipeline and of every algorithm, or compile them.
+
+    Parameters
+    ----------
+    registry
+        The algorithms.
+    unwanted
+        Asked before each algorithm; once it says so, the rest is left out.
+    """
     pipeline = resolve(registry, {})
     one = SceneDescriptor(np.array([[1.0, 0.0, 0.0, 0.0]]), 2, 0.0)
     table = finish(relate(one, one, pipeline.similarity))
     fmap_confidence(Fmap(np.array([0])), table)
     for item in registry.algorithms:
-        item.algorithm.warm_up()
+        if unwanted():
+            return
+        try:
+            item.algorithm.warm_up()
+        except Exception:  # a plugin may raise anything; it will fail again when it is asked for
+            _log.exception("%s failed to warm up", registry.whose(item.algorithm))

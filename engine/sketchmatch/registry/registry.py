@@ -115,6 +115,13 @@ class Registry:
             sorted((item for item in self.algorithms if item.kind is kind), key=lambda i: i.name)
         )
 
+    def whose(self, algorithm: Algorithm | type[Algorithm]) -> str:
+        """Return an algorithm's kind, name and distribution, to begin a sentence with."""
+        for item in self.algorithms:
+            if item.algorithm in (algorithm, type(algorithm)):
+                return f"{item.kind} {item.name} of {item.distribution} {item.version}".rstrip()
+        return f"algorithm {algorithm.name}"
+
     def find(self, kind: Kind, name: str) -> Registered:
         """Return the algorithm that a name selects.
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from google.protobuf.json_format import MessageToDict
@@ -22,9 +23,14 @@ from sketchmatch.model import (
 )
 from sketchmatch.pipeline.match import MatchRequest
 from sketchmatch.pipeline.selection import STAGES, Choice
-from sketchmatch_proto.v1 import match_service_pb2, pipeline_pb2, source_pb2
+from sketchmatch_proto.v1 import (
+    match_service_pb2,
+    pipeline_pb2,
+    scene_service_pb2,
+    source_pb2,
+)
 
-__all__ = ["choice", "match_request", "source"]
+__all__ = ["choice", "match_request", "paths_of", "source"]
 
 _KINDS = "stroke_set, polygon_set, occupancy_grid, map_server_map or image"
 
@@ -95,6 +101,25 @@ def source(message: source_pb2.Source, field: str, present: bool) -> Source:
     except InvalidInputError as error:
         raise error.within(f"{field}.{kind}") from None
     raise AssertionError(kind)
+
+
+@contextmanager
+def paths_of(
+    request: match_service_pb2.MatchRequest | scene_service_pb2.SegmentRequest,
+) -> Iterator[None]:
+    """Give errors of the engine, which knows decoded sources alone, the paths of a request."""
+    try:
+        yield
+    except InvalidInputError as error:
+        side, _, path = error.field.partition(".")
+        if side not in ("sketch", "map", "source"):
+            raise
+        match getattr(request, side).WhichOneof("kind"):
+            case "map_server_map" if path.startswith("occupancy_grid"):
+                path = "map_server_map.image"
+            case "image" if path.startswith("image."):
+                path = "image.data"
+        raise InvalidInputError(error.reason, f"{side}.{path}", error.problem) from None
 
 
 def _time_budget(

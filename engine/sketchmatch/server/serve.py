@@ -101,7 +101,8 @@ async def serve(
     say(f"listening on {host}:{port}")
     try:
         with announcing_compilation(say):
-            await _first(workers.run(lambda: warm_up(registry)), stopping)
+            warming = asyncio.to_thread(warm_up, registry, stopping.is_set)
+            await _first(asyncio.ensure_future(warming), stopping)
         if not stopping.is_set():
             for name in ("", *_SERVICES):
                 await checks.set(name, health_pb2.HealthCheckResponse.SERVING)

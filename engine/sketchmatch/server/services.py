@@ -17,8 +17,9 @@ from google.protobuf.message import Message
 
 import sketchmatch
 from sketchmatch.api import API_VERSION
-from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
+from sketchmatch.errors import InvalidInputError, PluginError, Reason, SketchmatchError
 from sketchmatch.pipeline.match import run_match
+from sketchmatch.pipeline.plugins import segmented
 from sketchmatch.pipeline.selection import resolve_segmenter
 from sketchmatch.registry import Registry
 from sketchmatch.server import requests, responses
@@ -78,24 +79,29 @@ class Workers:
         if self._running >= self.limits.max_concurrent_matches:
             raise TooBusyError(self._running)
         stop = threading.Event()
-        self._running += 1
         self._stops.add(stop)
         try:
             yield stop
         finally:
-            self._running -= 1
             self._stops.discard(stop)
             stop.set()
 
     def run(self, work: Callable[[], _Answer]) -> asyncio.Future[_Answer]:
-        """Run something in a thread."""
-        return asyncio.get_running_loop().run_in_executor(self._threads, work)
+        """Run something in a thread; its place is free again when the thread is."""
+        loop = asyncio.get_running_loop()
+        self._running += 1
+        job = self._threads.submit(work)
+        job.add_done_callback(lambda _: loop.call_soon_threadsafe(self._free))
+        return asyncio.wrap_future(job)
 
     def close(self) -> None:
         """Stop all work that is under way and wait for its threads."""
         for stop in tuple(self._stops):
             stop.set()
         self._threads.shutdown()
+
+    def _free(self) -> None:
+        self._running -= 1
 
 
 class TooBusyError(SketchmatchError):
@@ -136,7 +142,7 @@ class MatchService(match_service_pb2_grpc.MatchServiceServicer):
         try:
             value = requests.match_request(request, self._workers.limits.max_time_budget)
             writer = responses.ResponseWriter(value)
-            with closing(run_match(value, self._registry)) as events:
+            with requests.paths_of(request), closing(run_match(value, self._registry)) as events:
                 for event in events:
                     if stop.is_set():
                         return
@@ -168,10 +174,8 @@ class SceneService(scene_service_pb2_grpc.SceneServiceServicer):
         source = requests.source(request.source, "source", request.HasField("source"))
         chosen = requests.choice(request.segmenter)
         segmenter = resolve_segmenter(self._registry, chosen, source)
-        try:
-            found = segmenter.segment(source)
-        except InvalidInputError as error:
-            raise error.within(f"source.{source.field}") from None
+        with requests.paths_of(request):
+            found = segmented(source, segmenter, self._registry, f"source.{source.field}")
         return responses.segmented(found, segmenter)
 
 
@@ -222,6 +226,8 @@ async def _abort(context: _Context, error: Exception) -> NoReturn:
 def _status(error: Exception) -> Refusal:
     if isinstance(error, TooBusyError):
         return too_busy(error.running)
-    if not isinstance(error, SketchmatchError):
+    if isinstance(error, PluginError):
+        _log.error("%s", error, exc_info=error.__cause__)
+    elif not isinstance(error, SketchmatchError):
         _log.error("a request failed in a way nobody foresaw", exc_info=error)
     return refusal(error)
