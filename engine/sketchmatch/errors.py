@@ -16,7 +16,22 @@ __all__ = [
     "PluginError",
     "Reason",
     "SketchmatchError",
+    "quoted",
 ]
+
+_LONGEST_QUOTE = 60
+
+
+def quoted(value: object) -> str:
+    """Return a caller's value as a sentence may quote it: cut short where it is long.
+
+    Examples
+    --------
+    >>> quoted("office"), quoted("x" * 1000) == "'" + 59 * "x" + "…"
+    ("'office'", True)
+    """
+    text = repr(value)
+    return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
 
 
 class Reason(StrEnum):

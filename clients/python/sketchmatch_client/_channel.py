@@ -21,6 +21,10 @@ OPTIONS: ChannelOptions = (
     # What is too large is the server's to say: only it knows its memory.
     ("grpc.max_send_message_length", -1),
     ("grpc.max_receive_message_length", -1),
+    # Buffer as little as there may be: what waits here for a slow reader is progress that the
+    # server can no longer replace by the latest. A whole message passes at once all the same.
+    ("grpc.http2.lookahead_bytes", 1),
+    ("grpc.http2.bdp_probe", 0),
     # A robot's link may vanish without a word: find out within 40 s, and reconnect soon.
     ("grpc.keepalive_time_ms", 30_000),
     ("grpc.keepalive_timeout_ms", 10_000),

@@ -67,10 +67,15 @@ def main() -> NoReturn:
 def _run() -> tuple[int, str]:
     """Run the command line and return its exit code and what to say about it."""
     try:
-        return app(standalone_mode=False) or ExitCode.OK, ""
+        code = app(standalone_mode=False) or ExitCode.OK
+        sys.stdout.flush()
+        return code, "interrupted" if code == ExitCode.INTERRUPTED else ""
     except (typer.Abort, KeyboardInterrupt):
         return ExitCode.INTERRUPTED, "interrupted"
-    except BrokenPipeError:
+    except (BrokenPipeError, SystemExit) as end:
+        # Typer makes an exit of a broken pipe.
+        if BrokenPipeError not in (type(end), type(end.__context__)):
+            raise
         # Whoever read standard output has had enough; Python must not flush into it at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ExitCode.OK, ""

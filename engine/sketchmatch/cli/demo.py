@@ -32,13 +32,14 @@ def demo(
     Starts a server in a process of its own, asks it over gRPC, shows the search while it runs,
     prints which sketched object is which mapped object, and draws both.
     """
-    from sketchmatch.cli import display, pictures, remote
-    from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
+    with _server() as server:
+        # The server starts while this process loads what it needs.
+        from sketchmatch.cli import display, pictures, remote
+        from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 
-    pictures.check_path(overlay)
-    with _server() as address:
+        pictures.check_path(overlay)
         events = remote.match_events(
-            address, LIVING_ROOM_SKETCH, LIVING_ROOM_MAP, MatchSettings(seed=seed)
+            _address(server), LIVING_ROOM_SKETCH, LIVING_ROOM_MAP, MatchSettings(seed=seed)
         )
         answer = display.watch(events)
     display.show_match(answer)
@@ -47,17 +48,12 @@ def demo(
 
 
 @contextmanager
-def _server() -> Iterator[str]:
-    """Run a server in a process of its own and yield its address once it serves."""
-    from sketchmatch_client import Client
-
+def _server() -> Iterator[subprocess.Popen[str]]:
+    """Run a server in a process of its own."""
     command = [sys.executable, "-m", "sketchmatch", "serve", "--address", "127.0.0.1:0"]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, encoding="utf-8")
     try:
-        address = _address(process)
-        with Client(address) as client:
-            client.wait_until_serving(_START_SECONDS)
-        yield address
+        yield process
     finally:
         process.terminate()
         try:
@@ -67,12 +63,16 @@ def _server() -> Iterator[str]:
 
 
 def _address(process: subprocess.Popen[str]) -> str:
-    """Read where a server listens, and pass on what it says from then on."""
+    """Return where a server listens once it serves, and pass on what it says from then on."""
+    from sketchmatch_client import Client
+
     assert process.stderr is not None
     for line in process.stderr:
         typer.echo(f"[server] {line.rstrip()}", err=True)
         if found := re.search(r"listening on (\S+)", line):
             threading.Thread(target=_pass_on, args=(process,), daemon=True).start()
+            with Client(found[1]) as client:
+                client.wait_until_serving(_START_SECONDS)
             return found[1]
     raise RuntimeError("the server ended before it listened")
 

@@ -52,7 +52,7 @@ def segmented(path: Path, name: str, parameters: dict[str, Any]) -> SegmentRespo
     source: Source = read_source(path)
     registry = default_registry()
     segmenter = resolve_segmenter(registry, Choice(name, parameters), source)
-    found = plugins.segmented(source, segmenter, registry, f"{path}: {source.field}")
+    found = plugins.segmented(source, segmenter, registry, f"source.{source.field}")
     return responses.segmented(found, segmenter)
 
 

@@ -17,7 +17,10 @@ __all__ = ["match"]
 
 
 def match(
-    sketch: Annotated[Path, typer.Argument(help="Sketch: .svg, stroke .json, .geojson, image.")],
+    sketch: Annotated[
+        Path,
+        typer.Argument(metavar="SKETCH", help="Sketch: .svg, stroke .json, .geojson, image."),
+    ],
     map_: Annotated[
         Path, typer.Argument(metavar="MAP", help="Map: ROS map .yaml, .geojson, .svg, image.")
     ],
@@ -45,7 +48,7 @@ def match(
     the overlay does. In a pipe it prints tab-separated lines; these and --json count from 0, as
     the API does.
     """
-    from sketchmatch.cli import display, pictures
+    from sketchmatch.cli import display, pictures, places
 
     if overlay is not None:
         pictures.check_path(overlay)
@@ -63,7 +66,8 @@ def match(
         time_budget=time_budget,
         weights=_weights(weights),
     )
-    answer = display.watch(_events(server, sketch, map_, how))
+    with places.places_in(sketch=sketch, map=map_):
+        answer = display.watch(_events(server, sketch, map_, how))
     if json:
         typer.echo(MessageToJson(answer.result, **display.JSON_STYLE))
     else:

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from sketchmatch.cli.options import MatchSettings
-from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
-from sketchmatch.model import PolygonSet, StrokeSet
+from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
 from sketchmatch_client import Client, sources
 from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsResponse
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
@@ -23,7 +22,7 @@ def match_events(
     server: str, sketch: Path, map_: Path, settings: MatchSettings
 ) -> Generator[MatchResponse, None, None]:
     """Let a server match two files and yield the events of the match."""
-    sketch_message, map_message = _readable(sketch), _readable(map_)
+    sketch_message, map_message = _message(sketch), _message(map_)
     with Client(server) as client:
         yield from client.events(
             sketch_message,
@@ -42,7 +41,7 @@ def match_events(
 
 def segmented(server: str, path: Path, name: str, parameters: dict[str, Any]) -> SegmentResponse:
     """Let a server find the objects in a file."""
-    message = _readable(path)
+    message = _message(path)
     with Client(server) as client:
         return client.segment(message, segmenter=name or None, params=parameters)
 
@@ -53,36 +52,27 @@ def algorithms(server: str) -> ListAlgorithmsResponse:
         return client.algorithms()
 
 
-def _readable(path: Path) -> Source:
-    """Return a file as a message, or say why it cannot be read."""
-    try:
-        return _message(path)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise InvalidInputError(
-            Reason.INVALID_FILE,
-            str(error.filename or path),
-            f"cannot be read ({reason}); check the path",
-        ) from None
-
-
 def _message(path: Path) -> Source:
-    """Return a file as a message: pictures and maps as they are, drawings as what they hold."""
-    if path.suffix.lower() in {".yaml", ".yml"}:
-        return sources.map_server_map(path)
-    if path.suffix.lower() not in {".svg", ".json", ".geojson"}:
-        return sources.image(path)
-    source = read_source(path)
-    if isinstance(source, StrokeSet):
-        return sources.strokes(
-            [_timed(stroke.points, stroke.times) for stroke in source.strokes],
-            [stroke.label for stroke in source.strokes],
-        )
-    assert isinstance(source, PolygonSet)
-    return sources.polygons(
-        [[ring.tolist() for ring in polygon.rings] for polygon in source.polygons],
-        [polygon.label for polygon in source.polygons],
-    )
+    """Return a file as a message: pictures and maps as they are, drawings as what they hold.
+
+    It is read in any case, so that a file of no use is refused here, in the same words as without
+    a server.
+    """
+    match read_source(path):
+        case OccupancyGrid():
+            return sources.map_server_map(path)
+        case Image():
+            return sources.image(path)
+        case StrokeSet(strokes):
+            return sources.strokes(
+                [_timed(stroke.points, stroke.times) for stroke in strokes],
+                [stroke.label for stroke in strokes],
+            )
+        case PolygonSet(polygons):
+            return sources.polygons(
+                [[ring.tolist() for ring in polygon.rings] for polygon in polygons],
+                [polygon.label for polygon in polygons],
+            )
 
 
 def _timed(points: Any, times: Any) -> list[Any]:

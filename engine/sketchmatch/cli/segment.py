@@ -16,7 +16,9 @@ __all__ = ["segment"]
 
 
 def segment(
-    file: Annotated[Path, typer.Argument(help="A sketch or a map, as `match` takes them.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A sketch or a map, as `match` takes them.")
+    ],
     server: Server = None,
     segmenter: Annotated[str, typer.Option(help="Segmenter; the file's kind decides.")] = "",
     settings: Settings = None,
@@ -28,11 +30,12 @@ def segment(
     Parameters are set as in --set segmenter.min_size=0.3. On a terminal the table counts objects
     from 1, as the overlay does; in a pipe the lines count from 0, as the API does.
     """
-    from sketchmatch.cli import display, pictures
+    from sketchmatch.cli import display, pictures, places
 
     if overlay is not None:
         pictures.check_path(overlay)
-    found = _segmented(server, file, segmenter, settings)
+    with places.places_in(source=file):
+        found = _segmented(server, file, segmenter, settings)
     if json:
         typer.echo(MessageToJson(found, **display.JSON_STYLE))
     else:

@@ -46,7 +46,8 @@ def read_source(path: str | Path) -> Source:
     except InvalidInputError as error:
         if error.field.startswith(str(path)):
             raise
-        place = f"{path}: {error.field}" if error.field else str(path)
+        # A picture is all data: there is no place in it to name.
+        place = f"{path}: {error.field}" if error.field not in ("", "data") else str(path)
         raise InvalidInputError(error.reason, place, error.problem) from None
 
 

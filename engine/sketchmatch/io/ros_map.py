@@ -34,9 +34,10 @@ import PIL.Image
 import yaml
 from numpy.typing import NDArray
 
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io.images import load_picture, scaled_to_8_bits
 from sketchmatch.model import OccupancyGrid
+from sketchmatch.model.sources import check_placement
 
 __all__ = ["MapServerHeader", "decode_map_server", "parse_header"]
 
@@ -174,6 +175,7 @@ def _check_ranges(header: MapServerHeader) -> None:
             "resolution",
             f"is {header.resolution:g}; give the metres per cell as a positive number",
         )
+    check_placement(header.resolution, header.origin)
     for key in ("occupied_thresh", "free_thresh"):
         value = getattr(header, key)
         if not 0.0 <= value <= 1.0:
@@ -201,13 +203,13 @@ def _origin(value: object) -> tuple[float, float, float]:
 
 def _negate(value: object) -> bool:
     if value not in (0, 1):
-        raise _invalid("negate", f"is {value!r}; give 0, or 1 where white is occupied")
+        raise _invalid("negate", f"is {quoted(value)}; give 0, or 1 where white is occupied")
     return bool(value)
 
 
 def _mode(value: object) -> str:
     if value not in _MODES:
-        raise _invalid("mode", f"is {value!r}; give trinary, scale or raw")
+        raise _invalid("mode", f"is {quoted(value)}; give trinary, scale or raw")
     return str(value)
 
 
@@ -218,13 +220,8 @@ def _number(value: object, key: str) -> float:
     except (ValueError, OverflowError):
         number = math.nan
     if isinstance(value, bool) or not math.isfinite(number):
-        raise _invalid(key, f"is {_shown(value)}; give a finite number")
+        raise _invalid(key, f"is {quoted(value)}; give a finite number")
     return number
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else f"{text[:40]}…"
 
 
 def _values(picture: PIL.Image.Image) -> tuple[NDArray[np.uint8], NDArray[np.bool_] | None]:

@@ -18,6 +18,7 @@ __all__ = [
     "DILATION_SCALE",
     "RelationTable",
     "SceneDescriptor",
+    "correspondences",
     "object_pairs",
     "pair_count",
     "pair_index",
@@ -52,6 +53,27 @@ def pair_index(a: int, b: int, objects: int) -> int:
 def object_pairs(objects: int) -> IntArray:
     """Return all pairs (a, b), a < b, in the order of their index, shape (Q, 2)."""
     return frozen(np.stack(np.triu_indices(objects, k=1), axis=1).astype(np.int64))
+
+
+def correspondences(objects: int) -> IntArray:
+    """Return the index of the histogram of every ordered pair of objects.
+
+    Returns
+    -------
+    ndarray
+        Shape (N, N): pair (c, d) has its index if c < d and that of its dual, Q more, if c > d;
+        the diagonal means nothing.
+
+    Examples
+    --------
+    >>> int(correspondences(3)[2, 0])
+    4
+    """
+    columns = np.zeros((objects, objects), dtype=np.int64)
+    c, d = object_pairs(objects).T
+    columns[c, d] = np.arange(len(c))
+    columns[d, c] = columns[c, d] + len(c)
+    return sealed(columns)
 
 
 @dataclass(frozen=True, eq=False)

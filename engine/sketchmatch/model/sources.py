@@ -7,7 +7,6 @@ A source is data as it came, checked for its form alone; a segmenter turns it in
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +24,9 @@ __all__ = [
     "Stroke",
     "StrokeSet",
 ]
+
+# Metres. Beyond these a map is a mistake, and its squares would soon overflow.
+_FINEST, _COARSEST, _FARTHEST = 1e-6, 1e6, 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,16 +124,7 @@ class OccupancyGrid:
                 "cells",
                 "has a value outside −1…100; use −1 for unknown and 0…100 for occupancy",
             )
-        if not (math.isfinite(self.resolution) and self.resolution > 0):
-            raise InvalidInputError(
-                Reason.INVALID_GRID,
-                "resolution",
-                f"is {self.resolution:g}; give the positive size of a cell in metres",
-            )
-        if len(self.origin) != 3 or not all(math.isfinite(value) for value in self.origin):
-            raise InvalidInputError(
-                Reason.INVALID_GRID, "origin", "is not finite; give x, y in metres and yaw"
-            )
+        check_placement(self.resolution, self.origin)
         object.__setattr__(self, "cells", frozen(cells.astype(np.int8, copy=False)))
 
 
@@ -156,6 +149,28 @@ class Image:
                 Reason.INVALID_IMAGE, "pixels", "is not a grey 8-bit picture; decode it as grey"
             )
         object.__setattr__(self, "pixels", frozen(pixels))
+
+
+def check_placement(resolution: float, origin: tuple[float, ...]) -> None:
+    """Check where the cells of a grid lie.
+
+    Raises
+    ------
+    InvalidInputError
+        With the path ``resolution`` or ``origin``.
+    """
+    if not _FINEST <= resolution <= _COARSEST:
+        raise InvalidInputError(
+            Reason.INVALID_GRID,
+            "resolution",
+            f"is {resolution:g}; give the positive size of a cell in metres, as in 0.05",
+        )
+    if len(origin) != 3 or not all(abs(value) <= _FARTHEST for value in origin):
+        raise InvalidInputError(
+            Reason.INVALID_GRID,
+            "origin",
+            "is not finite or too far away; give x, y, yaw in metres and radians",
+        )
 
 
 Source = StrokeSet | PolygonSet | OccupancyGrid | Image

@@ -11,7 +11,7 @@ import numpy as np
 
 from sketchmatch.api import Algorithm, SearchProgress, Segmentation, Segmenter
 from sketchmatch.errors import InvalidInputError, PluginError, SketchmatchError
-from sketchmatch.model import FloatArray, RelationTable, Source
+from sketchmatch.model import FloatArray, RelationTable, Scene, Source
 from sketchmatch.registry import Registry
 
 __all__ = ["blaming", "checked_array", "checked_progress", "segmented"]
@@ -78,4 +78,6 @@ def segmented(source: Source, segmenter: Segmenter, registry: Registry, field: s
             raise error.within(field) from None
         if not isinstance(found, Segmentation):
             raise TypeError(f"it returned a {type(found).__name__}, not a Segmentation")
+        if not isinstance(found.scene, Scene):
+            raise TypeError(f"it found a {type(found.scene).__name__}, not a Scene")
     return found

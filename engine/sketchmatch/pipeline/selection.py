@@ -10,7 +10,7 @@ from typing import Any, cast
 from pydantic import ValidationError
 
 from sketchmatch.api import Algorithm, Histogram, Searcher, Segmenter, Similarity
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model import Image, OccupancyGrid, PolygonSet, Source, StrokeSet
 from sketchmatch.pipeline.plugins import blaming
 from sketchmatch.registry import Kind, Registry
@@ -20,6 +20,7 @@ __all__ = ["DEFAULTS", "STAGES", "Choice", "Pipeline", "Selection", "resolve", "
 STAGES = ("sketch_segmenter", "map_segmenter", "histogram", "similarity", "searcher")
 """The stages of a match, by the names that requests, options and errors use."""
 
+_LONGEST_NAME = 60
 _DEFAULT_SEGMENTERS: dict[type[Any], str] = {
     StrokeSet: "strokes",
     PolygonSet: "polygons",
@@ -164,7 +165,7 @@ def _resolve_stage(
 def _parameter_error(algorithm: type[Algorithm], error: ValidationError) -> InvalidInputError:
     """Say the first fault of a validation in one sentence."""
     fault = error.errors(include_url=False)[0]
-    path = ".".join(str(part) for part in fault["loc"])
+    path = ".".join(str(part)[:_LONGEST_NAME] for part in fault["loc"])
     if fault["type"] == "extra_forbidden":
         known = ", ".join(algorithm.Params.model_fields) or "none"
         problem = f"is no parameter of {algorithm.name}; it has: {known}"
@@ -173,5 +174,5 @@ def _parameter_error(algorithm: type[Algorithm], error: ValidationError) -> Inva
         if isinstance(given, float) and given.is_integer():
             given = int(given)  # numbers of a protobuf Struct are all floating
         remedy = fault["msg"].removeprefix("Input ").removeprefix("Value error, ")
-        problem = f"is {given!r}; it {remedy}"
+        problem = f"is {quoted(given)}; it {remedy}"
     return InvalidInputError(Reason.INVALID_PARAMETER, path, problem)

@@ -9,7 +9,7 @@ from enum import StrEnum
 from typing import Any
 
 from sketchmatch.api import Algorithm, Histogram, Searcher, Segmenter, Similarity
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 
 __all__ = ["Kind", "PluginStatus", "Registered", "Registry"]
 
@@ -143,7 +143,7 @@ class Registry:
             raise InvalidInputError(
                 Reason.UNKNOWN_ALGORITHM,
                 "name",
-                f"is {name!r}, which is no {kind}; choose one of: {known or 'none'}{failed}",
+                f"is {quoted(name)}, which is no {kind}; choose one of: {known or 'none'}{failed}",
             )
         owners = " and ".join(f"{item.distribution} {item.version}" for item in found)
         raise InvalidInputError(

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
-from google.protobuf.json_format import MessageToDict
+from google.protobuf import struct_pb2
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io.images import decode_image
@@ -62,7 +63,8 @@ def match_request(
 
 def choice(selection: pipeline_pb2.AlgorithmSelection) -> Choice:
     """Read what is asked for in one stage."""
-    return Choice(selection.name, MessageToDict(selection.parameters))
+    fields = selection.parameters.fields
+    return Choice(selection.name, {name: _plain(value) for name, value in fields.items()})
 
 
 def source(message: source_pb2.Source, field: str, present: bool) -> Source:
@@ -112,14 +114,25 @@ def paths_of(
         yield
     except InvalidInputError as error:
         side, _, path = error.field.partition(".")
-        if side not in ("sketch", "map", "source"):
-            raise
-        match getattr(request, side).WhichOneof("kind"):
-            case "map_server_map" if path.startswith("occupancy_grid"):
-                path = "map_server_map.image"
-            case "image" if path.startswith("image."):
-                path = "image.data"
-        raise InvalidInputError(error.reason, f"{side}.{path}", error.problem) from None
+        if path == "image.pixels":
+            path = "image.data"
+        elif path == "occupancy_grid.cells":
+            kind = getattr(request, side).WhichOneof("kind")
+            path = "map_server_map.image" if kind == "map_server_map" else path
+        field = f"{side}.{path}" if path else side
+        raise InvalidInputError(error.reason, field, error.problem) from None
+
+
+def _plain(value: struct_pb2.Value) -> Any:
+    """Return a value as Python has it; protobuf's own way stumbles over NaN."""
+    match value.WhichOneof("kind"):
+        case "struct_value":
+            return {name: _plain(item) for name, item in value.struct_value.fields.items()}
+        case "list_value":
+            return [_plain(item) for item in value.list_value.values]
+        case "number_value" | "string_value" | "bool_value" as kind:
+            return getattr(value, kind)
+    return None
 
 
 def _time_budget(

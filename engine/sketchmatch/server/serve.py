@@ -112,7 +112,7 @@ async def serve(
     finally:
         await checks.enter_graceful_shutdown()
         await server.stop(settings.grace)
-        workers.close()
+        await workers.close()
     say("stopped")
 
 

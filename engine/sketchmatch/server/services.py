@@ -6,7 +6,7 @@ import asyncio
 import logging
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from typing import Any, NoReturn, TypeVar
@@ -94,11 +94,11 @@ class Workers:
         job.add_done_callback(lambda _: loop.call_soon_threadsafe(self._free))
         return asyncio.wrap_future(job)
 
-    def close(self) -> None:
+    async def close(self) -> None:
         """Stop all work that is under way and wait for its threads."""
         for stop in tuple(self._stops):
             stop.set()
-        self._threads.shutdown()
+        await asyncio.to_thread(self._threads.shutdown)
 
     def _free(self) -> None:
         self._running -= 1
@@ -119,17 +119,19 @@ class MatchService(match_service_pb2_grpc.MatchServiceServicer):
         self._registry = registry
         self._workers = workers
 
-    async def Match(  # noqa: N802
+    async def Match(  # type: ignore[override]  # noqa: N802
         self, request: match_service_pb2.MatchRequest, context: _Context
-    ) -> AsyncIterator[match_service_pb2.MatchResponse]:
+    ) -> None:
         """Run a match in a thread and pass its events on."""
         try:
             with self._workers.admitted(request) as stop:
                 mailbox = Mailbox[match_service_pb2.MatchResponse](_is_progress)
                 work = self._workers.run(lambda: self._match(request, mailbox, stop))
                 async for response in mailbox:
-                    yield response
+                    await context.write(response)
                 await work
+        except grpc.aio.InternalError:
+            return  # nobody is left to write to: the caller has gone
         except Exception as error:
             await _abort(context, error)
 
@@ -207,7 +209,7 @@ class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):
             limits.max_time_budget.FromMilliseconds(round(1e3 * self._limits.max_time_budget))
         return catalog_service_pb2.GetServerInfoResponse(
             version=sketchmatch.__version__,
-            api_version="v1",
+            api_version="sketchmatch.v1",
             plugin_api_version=API_VERSION,
             limits=limits,
             uptime=Duration(seconds=int(time.monotonic() - self._started)),

@@ -14,6 +14,8 @@ __all__ = ["Refusal", "refusal", "too_busy"]
 
 _DOMAIN = "sketchmatch"
 _RETRY_SECONDS = 1
+# All of a refusal travels in trailers, for which gRPC has 8 KiB.
+_LONGEST = 500
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ def refusal(error: BaseException) -> Refusal:
     """Return the status for an error; one that nobody foresaw says no more than that."""
     if isinstance(error, InvalidInputError):
         violation = error_details_pb2.BadRequest.FieldViolation(
-            field=error.field, description=error.problem
+            field=_cut(error.field), description=_cut(error.problem)
         )
         bad_request = error_details_pb2.BadRequest(field_violations=[violation])
         return _refusal(grpc.StatusCode.INVALID_ARGUMENT, str(error), error.reason, bad_request)
@@ -55,7 +57,12 @@ def too_busy(running: int) -> Refusal:
     )
 
 
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+
+
 def _refusal(code: grpc.StatusCode, message: str, reason: Reason, *details: object) -> Refusal:
+    message = _cut(message)
     info = error_details_pb2.ErrorInfo(reason=reason.value, domain=_DOMAIN)
     status = status_pb2.Status(code=code_pb2.Code.Value(code.name), message=message)
     for detail in (info, *details):

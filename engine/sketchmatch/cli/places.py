@@ -1,0 +1,38 @@
+"""Where something is wrong, in the words of the person at the terminal: in which file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch_client import InvalidRequestError
+
+__all__ = ["places_in"]
+
+_KINDS = ("stroke_set", "polygon_set", "occupancy_grid", "map_server_map", "image")
+_WHOLE = ("", "cells", "pixels", "data", "image", "yaml")
+
+
+@contextmanager
+def places_in(**files: Path) -> Iterator[None]:
+    """Turn paths of errors into places in files.
+
+    Parameters
+    ----------
+    **files
+        The file of each source in the request, e.g. ``sketch=Path("sketch.json")``:
+        ``sketch.stroke_set.strokes[3]`` becomes ``sketch.json: strokes[3]``.
+    """
+    try:
+        yield
+    except (InvalidInputError, InvalidRequestError) as error:
+        side, _, path = error.field.partition(".")
+        kind, _, place = path.partition(".")
+        if side not in files or kind not in _KINDS:
+            raise
+        problem = str(error).removeprefix(error.field).lstrip()
+        place = place.removeprefix("yaml.")
+        field = str(files[side]) if place in _WHOLE else f"{files[side]}: {place}"
+        raise InvalidInputError(Reason(error.reason), field, problem) from None
