@@ -7,7 +7,7 @@ import numpy as np
 from sketchmatch.kernels._jit import kernel
 from sketchmatch.model.arrays import FloatArray, IntArray
 
-__all__ = ["fmap_confidence", "mean_absolute_difference"]
+__all__ = ["fmap_confidence", "fmap_confidence_above", "mean_absolute_difference"]
 
 _INSERTION_LIMIT = 64
 
@@ -41,6 +41,27 @@ def fmap_confidence(
     tuple of float
         ζ = (w1 ζσ + w2 ζR + w3 ζL) / (w1 + w2 + w3) and its three parts.
     """
+    return fmap_confidence_above(
+        -np.inf, entries, scratch, similarity, cosine, sine, normalized_dilation, weights
+    )
+
+
+@kernel
+def fmap_confidence_above(
+    floor: float,
+    entries: IntArray,
+    scratch: FloatArray,
+    similarity: FloatArray,
+    cosine: FloatArray,
+    sine: FloatArray,
+    normalized_dilation: FloatArray,
+    weights: FloatArray,
+) -> tuple[float, float, float, float]:
+    """Return ζ and its parts as :func:`fmap_confidence`, unless ζ cannot be above ``floor``.
+
+    ζL, which costs most, is at most 1. Where ζ would not be above ``floor`` even so, that upper
+    bound of ζ is returned with ζL = 1.
+    """
     count, half = entries.size, similarity.shape[1]
     similar = x = y = 0.0
     for i in range(count):
@@ -55,9 +76,12 @@ def fmap_confidence(
         scratch[i] = normalized_dilation[i, column]
     zeta_s = similar / count
     zeta_r = np.sqrt(x * x + y * y) / count
+    total_weight = weights[0] + weights[1] + weights[2]
+    most = (weights[0] * zeta_s + weights[1] * zeta_r + weights[2]) / total_weight
+    if most <= floor:
+        return most, zeta_s, zeta_r, 1.0
     zeta_l = np.exp2(-mean_absolute_difference(scratch))
-    total = weights[0] * zeta_s + weights[1] * zeta_r + weights[2] * zeta_l
-    return total / (weights[0] + weights[1] + weights[2]), zeta_s, zeta_r, zeta_l
+    return most - weights[2] * (1.0 - zeta_l) / total_weight, zeta_s, zeta_r, zeta_l
 
 
 @kernel

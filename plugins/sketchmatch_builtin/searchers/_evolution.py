@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sketchmatch.api.kernels import fmap_confidence, kernel
+from sketchmatch.api.kernels import fmap_confidence_above, kernel
 from sketchmatch.model import FloatArray, IntArray
 
 __all__ = ["evolve_object_maps", "evolve_pair_maps", "found_object_maps", "found_pair_maps"]
@@ -32,7 +32,7 @@ def found_object_maps(
 
     ``offspring`` is room for (2p, N) individuals, ``pairs`` the template pairs (Q, 2), ``columns``
     the histogram correspondence of each ordered argument pair (N', N'), and ``relations`` the
-    relation table and the weights, as :func:`sketchmatch.api.kernels.fmap_confidence` takes them.
+    relation table and the weights, as :func:`~sketchmatch.api.kernels.fmap_confidence` takes them.
     """
     size, template_objects = population.shape
     free = np.arange(columns.shape[0])
@@ -173,7 +173,8 @@ def _judge_object_maps(
         child = offspring[k]
         for i in range(entries.size):
             entries[i] = columns[child[pairs[i, 0]], child[pairs[i, 1]]]
-        _survive(population, fitness, child, fmap_confidence(entries, scratch, *relations)[0])
+        value = fmap_confidence_above(fitness[-1], entries, scratch, *relations)[0]
+        _survive(population, fitness, child, value)
 
 
 @kernel
@@ -184,7 +185,8 @@ def _judge_pair_maps(
     scratch = np.empty(offspring.shape[1])
     for k in range(offspring.shape[0]):
         child = offspring[k]
-        _survive(population, fitness, child, fmap_confidence(child, scratch, *relations)[0])
+        value = fmap_confidence_above(fitness[-1], child, scratch, *relations)[0]
+        _survive(population, fitness, child, value)
 
 
 @kernel

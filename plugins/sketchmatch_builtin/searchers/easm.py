@@ -11,7 +11,14 @@ import numpy as np
 from pydantic import Field
 
 from sketchmatch.api import MatchProblem, Outcome, Params, Searcher, SearchProgress
-from sketchmatch.model import FloatArray, Fmap, IntArray, RelationTable, object_pairs
+from sketchmatch.model import (
+    FloatArray,
+    Fmap,
+    IntArray,
+    RelationTable,
+    correspondences,
+    object_pairs,
+)
 from sketchmatch_builtin.searchers._evolution import (
     evolve_object_maps,
     evolve_pair_maps,
@@ -47,8 +54,12 @@ class Easm(Searcher):
             description="What makes an FMAP legal: 'object', it follows from one object map; "
             "'pairwise', it is one-to-one and holds no histogram beside its dual.",
         )
-        population: int = Field(
-            200, ge=2, le=100_000, description="Number of FMAPs that live at once."
+        population: int | None = Field(
+            None,
+            ge=2,
+            le=100_000,
+            description="Number of FMAPs that live at once; when left out, 25 for each object of "
+            "the larger scene, at least 100 and at most 400.",
         )
         crossover_rate: float = Field(
             0.7, ge=0, le=1, description="Pc, probability that two parents cross over."
@@ -89,7 +100,7 @@ class Easm(Searcher):
         """Evolve until nothing better was found for ``patience`` generations."""
         params = self.params
         population = self._empty_population(problem)
-        fitness = np.empty(params.population)
+        fitness = np.empty(len(population))
         found, evolve = self._operators(problem, population, fitness, rng)
         evaluations = found()
         best, stale, reported = float(fitness[0]), 0, -np.inf
@@ -110,7 +121,8 @@ class Easm(Searcher):
         table = problem.table
         by_object = self.params.consistency == "object"
         genes = table.template_objects if by_object else table.template_pairs
-        return np.empty((self.params.population, genes), dtype=np.int64)
+        size = self.params.population or min(max(100, 25 * table.argument_objects), 400)
+        return np.empty((size, genes), dtype=np.int64)
 
     def _operators(
         self,
@@ -121,7 +133,7 @@ class Easm(Searcher):
     ) -> tuple[Callable[[], int], Callable[[], int]]:
         """Return what fills the population and what runs one generation, both in place."""
         table, params = problem.table, self.params
-        offspring = np.empty((2 * params.population, population.shape[1]), dtype=np.int64)
+        offspring = np.empty((2 * len(population), population.shape[1]), dtype=np.int64)
         relations = (
             table.similarity,
             table.cosine,
@@ -137,7 +149,7 @@ class Easm(Searcher):
                 partial(evolve_pair_maps, *state, relations, rates, rng),
             )
         pairs = object_pairs(table.template_objects)
-        columns = _correspondences(table.argument_objects)
+        columns = correspondences(table.argument_objects)
         return (
             partial(found_object_maps, *state, pairs, columns, relations, rng),
             partial(evolve_object_maps, *state, pairs, columns, relations, rates, rng),
@@ -147,12 +159,3 @@ class Easm(Searcher):
         if self.params.consistency == "pairwise":
             return Fmap(individual)
         return Fmap.from_object_map(individual, problem.table.argument_objects)
-
-
-def _correspondences(objects: int) -> IntArray:
-    """Return the histogram correspondence of each ordered pair of argument objects, (N', N')."""
-    columns = np.zeros((objects, objects), dtype=np.int64)
-    c, d = object_pairs(objects).T
-    columns[c, d] = np.arange(len(c))
-    columns[d, c] = columns[c, d] + len(c)
-    return columns
