@@ -1,0 +1,76 @@
+"""The comparison of histograms (SPEC 3; thesis 3.2), pair by pair and bin by bin."""
+
+import math
+
+import numpy as np
+
+from tests.oracle.forces import force_histogram
+
+
+def correspondence(a, b, objects):
+    """Return the index of the ordered pair (a, b) of ``objects`` objects, all counted from 1."""
+    if a > b:
+        return correspondence(b, a, objects) + objects * (objects - 1) // 2
+    return (b - 1) + (a - 1) * objects - sum(k + 1 for k in range(a))
+
+
+def descriptor(scene, directions):
+    """Return the histogram of each ordered pair (a, b) of a scene, counted from 0."""
+    count = len(scene)
+    return {
+        (a, b): force_histogram(scene.objects[a].rings, scene.objects[b].rings, directions)
+        for a in range(count)
+        for b in range(count)
+        if a != b
+    }
+
+
+def main_direction(histogram):
+    n = len(histogram)
+    sine = sum(h * math.sin(2 * math.pi * k / n) for k, h in enumerate(histogram))
+    cosine = sum(h * math.cos(2 * math.pi * k / n) for k, h in enumerate(histogram))
+    return math.atan2(sine, cosine)
+
+
+def turned(histogram, rotation):
+    """Return h(θ − rotation) at every bin, read by periodic linear interpolation."""
+    n = len(histogram)
+    result = []
+    for k in range(n):
+        place = k - rotation * n / (2 * math.pi)
+        low = math.floor(place)
+        share = place - low
+        result.append((1 - share) * histogram[low % n] + share * histogram[(low + 1) % n])
+    return result
+
+
+def cross_correlation(first, second):
+    product = sum(x * y for x, y in zip(first, second, strict=True))
+    return product / math.sqrt(sum(x * x for x in first)) / math.sqrt(sum(y * y for y in second))
+
+
+def relation(template, argument, exponent=0.0):
+    """Return (σ, R, L) of two histograms."""
+    power = 3 - exponent
+    dilation = (np.mean(argument) / np.mean(template)) ** (1 / power)
+    rotation = (main_direction(argument) - main_direction(template)) % (2 * math.pi)
+    aligned = turned([h * dilation**power for h in template], rotation)
+    return cross_correlation(aligned, argument), rotation, dilation
+
+
+def relation_table(template, argument):
+    """Return (σ, R, L) by (row, histogram correspondence), duals included."""
+    rows = sorted({a for pair in template for a in pair})
+    columns = sorted({c for pair in argument for c in pair})
+    return {
+        (
+            correspondence(a + 1, b + 1, len(rows)),
+            correspondence(c + 1, d + 1, len(columns)),
+        ): relation(template[a, b], argument[c, d])
+        for a in rows
+        for b in rows
+        if a < b
+        for c in columns
+        for d in columns
+        if c != d
+    }

@@ -1,0 +1,82 @@
+"""How kernels are compiled is said in one place, and old machine code never outlives its source."""
+
+import re
+import shutil
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from sketchmatch.kernels import _jit
+from sketchmatch.kernels.confidence import fmap_confidence, mean_absolute_difference
+from sketchmatch.kernels.constant_force import constant_force_histograms
+from tests.tools import ROOT
+
+NUMBA = re.compile(r"\b(numba|n?jit)\b")
+
+
+def test_only_one_module_calls_numba():
+    callers = [
+        path.relative_to(ROOT).as_posix()
+        for folder in ("engine", "plugins")
+        for path in (ROOT / folder).rglob("*.py")
+        if NUMBA.search(without_text(path.read_text(encoding="utf-8")))
+    ]
+    assert callers == ["engine/sketchmatch/kernels/_jit.py"]
+
+
+def without_text(source):
+    return re.sub(r'""".*?"""|#[^\n]*', "", source, flags=re.S)
+
+
+@pytest.mark.parametrize(
+    "function", [fmap_confidence, mean_absolute_difference, constant_force_histograms]
+)
+def test_kernels_run_without_the_gil_and_without_fast_math(function):
+    assert function.targetoptions["nogil"] is True
+    assert not function.targetoptions.get("fastmath")
+
+
+def test_a_kernel_computes_what_its_python_does():
+    values = np.array([3.0, -1.0, 4.0, 1.5])
+    assert mean_absolute_difference(values.copy()) == mean_absolute_difference.py_func(values)
+
+
+def test_the_cache_folder_follows_the_source_of_every_kernel(tmp_path, monkeypatch):
+    copy = tmp_path / "kernels"
+    shutil.copytree(Path(_jit.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    before = _jit._source_digest()
+    monkeypatch.setattr(_jit, "__file__", str(copy / "_jit.py"))
+    assert _jit._source_digest() == before, "the same source gives the same folder"
+    for path in sorted(copy.glob("*.py")):
+        path.write_text(path.read_text(encoding="utf-8") + "# changed\n", encoding="utf-8")
+        after = _jit._source_digest()
+        assert after != before
+        before = after
+
+
+def test_the_cache_lies_where_the_environment_says(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert _jit._cache_folder().parent == tmp_path
+    before = numba.config.CACHE_DIR
+    _jit.kernel(without_text)
+    assert before == numba.config.CACHE_DIR, "kernels of other programs go where they went"
+
+
+def test_compilation_is_announced_by_name_and_loading_is_not(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+
+    def doubled(x):
+        return 2 * x
+
+    names = []
+    first = _jit.kernel(doubled)
+    with _jit.on_compile(names.append):
+        assert first(21) == 42
+        assert first(1) == 2
+    assert names == ["doubled"]
+    again = _jit.kernel(doubled)
+    with _jit.on_compile(names.append):
+        assert again(21) == 42
+    assert names == ["doubled"]

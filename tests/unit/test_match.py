@@ -1,0 +1,393 @@
+"""A whole match: its events, what comes out both ways round, its limits and its refusals."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+
+from sketchmatch import Scene
+from sketchmatch.api import Outcome, Searcher, SearchProgress
+from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError, Reason
+from sketchmatch.model import Fmap, LabelledPolygon, OccupancyGrid, PolygonSet
+from sketchmatch.pipeline.match import (
+    Accepted,
+    Finished,
+    MatchRequest,
+    Phase,
+    Progress,
+    Segmented,
+    run_match,
+)
+from sketchmatch.pipeline.selection import Choice
+from sketchmatch.pipeline.warmup import warm_up
+from sketchmatch.registry import Kind, Registered, Registry, default_registry
+from sketchmatch.testing import simulate_sketch
+from tests.oracle import maps as oracle
+from tests.strategies import random_scene
+
+ENDLESS = {"searcher": Choice("easm", {"patience": 10_000_000, "generations": 10_000_000})}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _warm():
+    # On a new machine the kernels compile here, and not while a test measures time.
+    warm_up(default_registry())
+
+
+def polygons(scene, turn=0.0, factor=1.0, order=None):
+    """Return a scene's polygons turned, scaled and in another order."""
+    c, s = math.cos(turn), math.sin(turn)
+    matrix = factor * np.array([[c, s], [-s, c]])
+    chosen = range(len(scene)) if order is None else order
+    return [[ring @ matrix for ring in scene.objects[k].rings] for k in chosen]
+
+
+def changed(scene, turn=0.0, factor=1.0, order=None):
+    return Scene.from_polygons(polygons(scene, turn, factor, order))
+
+
+def source(scene):
+    return PolygonSet(tuple(LabelledPolygon(item.rings) for item in scene.objects))
+
+
+def events(sketch, map_, registry=None, **settings):
+    return run_match(MatchRequest(sketch, map_, **settings), registry or default_registry())
+
+
+def matched(sketch, map_, registry=None, **settings):
+    *_, last = events(sketch, map_, registry, **settings)
+    assert isinstance(last, Finished)
+    return last.result
+
+
+def seven():
+    return random_scene(np.random.default_rng(42), 7)
+
+
+def test_events_come_in_order():
+    scene = seven()
+    kinds = [type(event) for event in events(source(changed(scene, 1.0)), source(scene))]
+    assert kinds[0] is Accepted
+    assert kinds[-1] is Finished
+    assert kinds.count(Accepted) == kinds.count(Segmented) == kinds.count(Finished) == 1
+    assert set(kinds) == {Accepted, Progress, Segmented, Finished}
+
+
+def test_phases_come_in_order_and_the_search_shows_its_best_map():
+    scene = seven()
+    seen = list(events(changed(scene, 1.0), scene, selection=ENDLESS, time_budget=0.5))
+    progress = [event for event in seen if isinstance(event, Progress)]
+    phases = [event.phase for event in progress]
+    assert phases == sorted(phases, key=list(Phase).index)
+    assert (phases[0], phases[-1]) == (Phase.SEGMENT, Phase.SEARCH)
+    assert [event.elapsed for event in progress] == sorted(event.elapsed for event in progress)
+    searching = [event for event in progress if event.phase is Phase.SEARCH]
+    assert [event.confidence for event in searching] == sorted(
+        event.confidence for event in searching
+    )
+    for event in searching:
+        assert sorted(event.object_map) == list(range(7))
+        assert len(set(event.object_map.values())) == 7
+        assert event.iteration > 0
+    assert all(event.object_map == {} for event in progress if event.phase is not Phase.SEARCH)
+
+
+def test_progress_comes_at_most_twenty_times_a_second():
+    result, count = None, 0
+    for event in events(seven(), seven(), selection=ENDLESS, time_budget=0.6):
+        count += isinstance(event, Progress)
+        result = event.result if isinstance(event, Finished) else None
+    assert count <= result.statistics.seconds["total"] / 0.05 + 2
+
+
+def test_what_was_accepted_is_what_runs():
+    first = next(events(seven(), seven(), seed=9))
+    assert isinstance(first, Accepted)
+    assert first.seed == 9
+    assert first.pipeline.searcher.name == "easm"
+    result = matched(seven(), seven(), seed=9)
+    assert result.seed == 9
+    assert result.match_id != first.match_id
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7, math.pi, -2.0])
+def test_a_scene_and_its_turned_copy_are_one(turn):
+    scene = seven()
+    result = matched(changed(scene, turn, 3.0), scene)
+    assert result.object_map == {k: k for k in range(7)}
+    assert result.fmap_confidence > 0.99
+    assert result.omap_confidence > 0.99
+    assert result.outcome is Outcome.CONVERGED
+    assert result.upper_bound is None
+
+
+# Which objects of the map are drawn, and which of the drawn are on the map.
+CASES = {
+    "as many": (list(range(7)), list(range(7))),
+    "the map has more": ([5, 0, 3, 6], list(range(7))),
+    "the sketch has more": (list(range(7)), [6, 1, 2, 4, 5]),
+}
+
+
+@pytest.mark.parametrize(("drawn", "mapped"), CASES.values(), ids=CASES)
+@pytest.mark.parametrize("degrees", [0, 90, 136, 180, -30])
+@pytest.mark.parametrize("scale", [0.2, 1.0, 12.0])
+def test_turn_and_scale_read_from_sketch_to_map(drawn, mapped, degrees, scale):
+    world = seven()
+    # A multiple of the 2° between directions, so that nothing is lost between bins.
+    sketch = changed(world, -math.radians(degrees), 1 / scale, drawn)
+    result = matched(sketch, changed(world, order=mapped))
+    common = {drawn.index(k): mapped.index(k) for k in drawn if k in mapped}
+    assert result.object_map == common
+    assert result.fmap_confidence == pytest.approx(1.0, abs=1e-6)
+    apart = math.remainder(result.rotation - math.radians(degrees), math.tau)
+    assert apart == pytest.approx(0.0, abs=1e-6)
+    assert -math.pi < result.rotation <= math.pi
+    assert result.scale == pytest.approx(scale, rel=1e-6)
+    assert result.unmatched_sketch_objects == tuple(
+        k for k, name in enumerate(drawn) if name not in mapped
+    )
+    assert result.unmatched_map_objects == tuple(
+        k for k, name in enumerate(mapped) if name not in drawn
+    )
+    assert (len(result.sketch), len(result.map)) == (len(drawn), len(mapped))
+    for entry in result.fmap:
+        assert tuple(common[k] for k in entry.sketch_pair) == entry.map_pair
+        assert entry.similarity == pytest.approx(1.0, abs=1e-6)
+        assert entry.dilation == pytest.approx(scale, rel=1e-6)
+        off = math.remainder(entry.rotation - math.radians(degrees), math.tau)
+        assert off == pytest.approx(0.0, abs=1e-6)
+
+
+def test_exchanging_sketch_and_map_turns_the_answer_around():
+    scene = seven()
+    drawn = simulate_sketch(scene, np.random.default_rng(3), objects=[0, 2, 3, 5, 6]).scene
+    there, back = matched(drawn, scene), matched(scene, drawn)
+    assert {b: a for a, b in back.object_map.items()} == there.object_map
+    assert back.fmap_confidence == there.fmap_confidence
+    assert back.omap_confidence == there.omap_confidence
+    assert math.remainder(back.rotation + there.rotation, math.tau) == pytest.approx(0.0, abs=1e-9)
+    assert back.scale == pytest.approx(1 / there.scale, rel=1e-12)
+    confidences = {match.map_object: match.confidence for match in back.matches}
+    for match in there.matches:
+        assert confidences[match.sketch_object] == match.confidence
+    assert [m.sketch_object for m in back.matches] == sorted(m.sketch_object for m in back.matches)
+
+
+def test_a_result_is_consistent_in_itself():
+    scene = seven()
+    result = matched(simulate_sketch(scene, np.random.default_rng(1)).scene, scene)
+    parts = result.confidence
+    assert parts.total == pytest.approx(
+        (parts.similarity + parts.rotation + parts.dilation) / 3, rel=1e-12
+    )
+    assert parts.similarity == pytest.approx(
+        np.mean([entry.similarity for entry in result.fmap]), rel=1e-12
+    )
+    turns = [complex(math.cos(e.rotation), math.sin(e.rotation)) for e in result.fmap]
+    assert parts.rotation == pytest.approx(abs(sum(turns)) / len(turns), rel=1e-9)
+    assert result.omap_confidence == pytest.approx(np.mean([m.confidence for m in result.matches]))
+    assert set(result.statistics.seconds) == {"segment", "describe", "relate", "search", "total"}
+    assert result.statistics.iterations >= 400
+    assert result.statistics.evaluations > result.statistics.iterations
+
+
+def fingerprint(result):
+    return (
+        result.object_map,
+        result.confidence,
+        result.omap_confidence,
+        result.fmap,
+        result.rotation,
+        result.scale,
+        result.outcome,
+        result.statistics.iterations,
+        result.statistics.evaluations,
+    )
+
+
+def test_the_same_seed_gives_the_same_result_and_another_another_run():
+    scene = seven()
+    sketch = simulate_sketch(scene, np.random.default_rng(2)).scene
+    one, same, other = (matched(sketch, scene, seed=seed) for seed in (5, 5, 6))
+    assert fingerprint(one) == fingerprint(same)
+    assert one.statistics.evaluations != other.statistics.evaluations
+
+
+def test_sources_and_the_scenes_in_them_match_alike():
+    scene = seven()
+    sketch = simulate_sketch(scene, np.random.default_rng(4)).scene
+    direct, segmented = matched(sketch, scene), matched(source(sketch), source(scene))
+    assert fingerprint(direct) == fingerprint(segmented)
+
+
+@pytest.mark.parametrize(("weights", "part"), [((1, 0, 0), 0), ((0, 2, 0), 1), ((0, 0, 0.5), 2)])
+def test_weights_decide_what_is_sought_and_told(weights, part):
+    scene = seven()
+    result = matched(simulate_sketch(scene, np.random.default_rng(1)).scene, scene, weights=weights)
+    parts = (result.confidence.similarity, result.confidence.rotation, result.confidence.dilation)
+    assert result.fmap_confidence == pytest.approx(parts[part], rel=1e-12)
+    even = matched(simulate_sketch(scene, np.random.default_rng(1)).scene, scene).confidence
+    assert parts[part] >= (even.similarity, even.rotation, even.dilation)[part] - 1e-9
+
+
+def test_a_time_budget_ends_the_search_with_its_best():
+    scene = seven()
+    started = time.monotonic()
+    result = matched(changed(scene, 1.0), scene, selection=ENDLESS, time_budget=0.4)
+    assert result.outcome is Outcome.TIME_BUDGET
+    assert 0.4 <= result.statistics.seconds["total"] <= time.monotonic() - started < 3.0
+    assert result.object_map == {k: k for k in range(7)}
+
+
+def test_a_time_budget_too_short_for_any_answer_says_where_it_went():
+    with pytest.raises(AnswerUnavailableError, match=r"1e-09 s ended in phase .*allow more"):
+        list(events(source(seven()), source(seven()), time_budget=1e-9))
+
+
+def test_generations_end_a_search_with_their_own_outcome():
+    result = matched(seven(), seven(), selection={"searcher": Choice("easm", {"generations": 3})})
+    assert (result.outcome, result.statistics.iterations) == (Outcome.ITERATION_LIMIT, 3)
+
+
+def test_closing_the_events_stops_the_search():
+    work = events(seven(), seven(), selection=ENDLESS)
+    for event in work:
+        if isinstance(event, Progress) and event.phase is Phase.SEARCH:
+            break
+    started = time.monotonic()
+    work.close()
+    assert time.monotonic() - started < 0.5
+    with pytest.raises(StopIteration):
+        next(work)
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        ({"seed": -1}, "seed"),
+        ({"seed": 2**64}, "seed"),
+        ({"time_budget": 0.0}, "time_budget"),
+        ({"time_budget": -3.0}, "time_budget"),
+        ({"time_budget": math.nan}, "time_budget"),
+        ({"time_budget": math.inf}, "time_budget"),
+        ({"weights": (-1.0, 1.0, 1.0)}, "weights.similarity"),
+        ({"weights": (1.0, math.nan, 1.0)}, "weights.rotation"),
+        ({"weights": (1.0, 1.0, math.inf)}, "weights.dilation"),
+        ({"weights": (0.0, 0.0, 0.0)}, "weights"),
+    ],
+)
+def test_a_request_that_cannot_be_is_refused_by_its_field(settings, field):
+    with pytest.raises(InvalidInputError, match="give") as caught:
+        MatchRequest(seven(), seven(), **settings)
+    assert (caught.value.reason, caught.value.field) == (Reason.INVALID_FIELD, field)
+
+
+def test_the_largest_seed_is_allowed():
+    assert matched(seven(), seven(), seed=2**64 - 1).fmap_confidence > 0.99
+
+
+def test_a_wrong_choice_is_refused_before_any_work():
+    with pytest.raises(InvalidInputError) as caught:
+        events(seven(), seven(), selection={"searcher": Choice("easm", {"population": 1})})
+    assert caught.value.field == "pipeline.searcher.parameters.population"
+
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+NAN = np.array([[0.0, 0.0], [np.nan, 0.0], [1.0, 1.0]])
+
+
+@pytest.mark.parametrize(
+    ("sketch", "map_", "reason", "field"),
+    [
+        ([SQUARE], [SQUARE, SQUARE + 3], Reason.TOO_FEW_OBJECTS, "sketch.polygon_set"),
+        ([SQUARE, SQUARE + 3], [], Reason.TOO_FEW_OBJECTS, "map.polygon_set"),
+        (
+            [SQUARE, SQUARE + 3],
+            [SQUARE, NAN],
+            Reason.INVALID_POLYGON,
+            "map.polygon_set.polygons[1].rings[0].points[1]",
+        ),
+    ],
+)
+def test_a_fault_in_a_source_is_told_with_its_side_and_place(sketch, map_, reason, field):
+    given = [PolygonSet(tuple(LabelledPolygon((r,)) for r in each)) for each in (sketch, map_)]
+    with pytest.raises(InvalidInputError) as caught:
+        list(events(*given))
+    assert caught.value.reason is reason
+    assert caught.value.field.startswith(field)
+
+
+def test_a_map_without_objects_is_told_with_its_side():
+    empty = OccupancyGrid(np.zeros((20, 20)), 0.1)
+    with pytest.raises(InvalidInputError) as caught:
+        list(events(seven(), empty))
+    assert caught.value.reason is Reason.TOO_FEW_OBJECTS
+    assert caught.value.field.startswith("map.occupancy_grid")
+
+
+def test_objects_that_lie_on_each_other_still_match():
+    scene = Scene.from_polygons([SQUARE, SQUARE + 0.5, 2 * SQUARE, SQUARE])
+    assert matched(scene, scene).fmap_confidence > 0.9
+
+
+def test_very_small_objects_very_far_apart_still_match():
+    dots = [0.01 * SQUARE + place for place in ([0, 0], [1000, 37], [-300, 800], [500, -900])]
+    scene = Scene.from_polygons(dots)
+    result = matched(changed(scene, math.radians(40.0), 5.0), scene)
+    assert result.object_map == {k: k for k in range(4)}
+    assert math.degrees(result.rotation) == pytest.approx(-40.0, abs=0.01)
+    assert result.scale == pytest.approx(0.2, rel=1e-6)
+
+
+class Odd(Searcher):
+    """A searcher that does what it is told to."""
+
+    name = "odd"
+    summary = "Does what it is told to."
+    behaviour = "nothing"
+
+    def search(self, problem, rng):  # noqa: ARG002
+        if self.behaviour == "raise":
+            raise ZeroDivisionError("lost")
+        if self.behaviour == "outside":
+            yield SearchProgress(Fmap(np.array([99] * problem.table.template_pairs)), 0.5, 1, 1)
+        if self.behaviour == "short":
+            yield SearchProgress(Fmap(np.array([0])), 0.5, 1, 1)
+        if self.behaviour == "bound":
+            fmap = Fmap.from_object_map(np.arange(7), 7)
+            yield SearchProgress(fmap, 1.0, 1, 1, upper_bound=1.0)
+            return Outcome.OPTIMAL
+        return None
+
+
+def with_odd(monkeypatch, behaviour):
+    monkeypatch.setattr(Odd, "behaviour", behaviour)
+    offered = Registered(Kind.SEARCHER, Odd, "acme-odd", "1.0")
+    return Registry([*default_registry().algorithms, offered])
+
+
+@pytest.mark.parametrize("behaviour", ["nothing", "raise", "outside", "short"])
+def test_a_searcher_that_breaks_its_contract_is_named(monkeypatch, behaviour):
+    registry = with_odd(monkeypatch, behaviour)
+    with pytest.raises(PluginError, match="odd"):
+        matched(seven(), seven(), registry, selection={"searcher": Choice("odd")})
+
+
+def test_a_searchers_bound_and_outcome_reach_the_result(monkeypatch):
+    registry = with_odd(monkeypatch, "bound")
+    result = matched(seven(), seven(), registry, selection={"searcher": Choice("odd")})
+    assert (result.outcome, result.upper_bound) == (Outcome.OPTIMAL, 1.0)
+    assert result.object_map == {k: k for k in range(7)}
+
+
+def test_the_reported_confidence_is_that_of_the_definition():
+    scene = seven()
+    sketch = simulate_sketch(scene, np.random.default_rng(8)).scene
+    result = matched(sketch, scene)
+    mapped = [entry.map_pair for entry in result.fmap]
+    assert oracle.is_object_legal(mapped, 7)
+    levels = [1.5 / math.log(2) * math.log(entry.dilation) for entry in result.fmap]
+    gaps = [abs(x - y) for k, x in enumerate(levels) for y in levels[:k]]
+    assert result.confidence.dilation == pytest.approx(2 ** -np.mean(gaps), rel=1e-9)

@@ -1,0 +1,108 @@
+"""Scenes: what an object may be, how it is kept, and how each fault is told."""
+
+import numpy as np
+import pytest
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.model import Scene, SceneObject
+
+SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
+HOLE = [[0.5, 0.5], [1.5, 0.5], [1.5, 1.5], [0.5, 1.5]]
+TRIANGLE = [[3, 0], [5, 0], [4, 2]]
+
+
+def test_an_object_has_the_area_and_centroid_of_its_rings():
+    item = SceneObject.from_rings([SQUARE, HOLE])
+    assert item.area == pytest.approx(3.0)
+    assert item.centroid == pytest.approx((1.0, 1.0))
+    assert item.polygon.area == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("outer", [SQUARE, SQUARE[::-1], [*SQUARE, SQUARE[0]]])
+@pytest.mark.parametrize("hole", [HOLE, HOLE[::-1]])
+def test_rings_are_kept_open_outer_counter_clockwise_holes_clockwise(outer, hole):
+    item = SceneObject.from_rings([outer, hole])
+    assert [len(ring) for ring in item.rings] == [4, 4]
+    x, y = item.rings[0].T
+    assert np.dot(x, np.roll(y, -1)) > np.dot(y, np.roll(x, -1))
+    x, y = item.rings[1].T
+    assert np.dot(x, np.roll(y, -1)) < np.dot(y, np.roll(x, -1))
+
+
+def test_repeated_points_count_once_and_collinear_ones_stay():
+    item = SceneObject.from_rings([[[0, 0], [0, 0], [1, 0], [2, 0], [2, 2], [2, 2], [0, 2]]])
+    assert len(item.rings[0]) == 5
+
+
+def test_rings_cannot_be_written_to_and_the_callers_array_stays_his():
+    given = np.array(SQUARE, dtype=float)
+    item = SceneObject.from_rings([given])
+    given[0] = 99.0
+    assert item.rings[0].max() == 2.0
+    with pytest.raises(ValueError, match="read-only"):
+        item.rings[0][0] = 1.0
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e6, 1e12])
+def test_size_does_not_decide_whether_a_polygon_is_one(scale):
+    item = SceneObject.from_rings([scale * np.array(TRIANGLE, dtype=float)])
+    assert item.area == pytest.approx(2.0 * scale**2)
+
+
+def test_a_small_object_far_from_the_origin_keeps_its_area():
+    assert SceneObject.from_rings([np.array(SQUARE) + 1e7]).area == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("rings", "field", "words"),
+    [
+        ([], "rings", "at least an outer ring"),
+        ([[[0, 0], [1, 1]]], "rings[0]", "2 distinct points"),
+        ([[[0, 0], [1, 1], [0, 0]]], "rings[0]", "2 distinct points"),
+        ([[[0, 0], [1, 1], [2, 2]]], "", "has no area"),
+        ([[[0, 0], [1, 0], [1, 1e-12]]], "", "has no area"),
+        ([[[0, 0], [2, 2], [2, 0], [0, 2]]], "", "crosses itself"),
+        ([[[0, 0], [np.nan, 1], [1, 0]]], "rings[0].points[1]", "not finite"),
+        ([[[0, 0], [1, 1], [np.inf, 0]]], "rings[0].points[2]", "not finite"),
+        ([[[0, 0, 0], [1, 1, 1], [2, 0, 0]]], "rings[0]", "[x, y] pairs"),
+        ([["a", "b"]], "rings[0]", "[x, y] pairs"),
+        ([[[0, 0], [1], [2, 0]]], "rings[0]", "[x, y] pairs"),
+        ([[]], "rings[0]", "[x, y] pairs"),
+        ([SQUARE, [[5, 5], [6, 5], [6, 6]]], "", "keep holes inside"),
+        ([SQUARE, HOLE, [[1, 1], [1.8, 1], [1.8, 1.8]]], "", "or a hole at (1.5, 1.5)"),
+        ([SQUARE, SQUARE], "", "or a hole"),
+    ],
+)
+def test_a_polygon_that_cannot_be_used_is_refused_with_its_place(rings, field, words):
+    with pytest.raises(InvalidInputError) as caught:
+        SceneObject.from_rings(rings)
+    assert caught.value.reason is Reason.INVALID_POLYGON
+    assert caught.value.field == field
+    assert words in caught.value.problem
+
+
+def test_a_scene_takes_rings_and_lists_of_rings():
+    scene = Scene.from_polygons([SQUARE, [SQUARE, HOLE], np.array(TRIANGLE)], ["a", "", "c"])
+    assert len(scene) == 3
+    assert scene.labels == ("a", "", "c")
+    assert [item.area for item in scene.objects] == pytest.approx([4.0, 3.0, 2.0])
+    assert scene.bounds == (0.0, 0.0, 5.0, 2.0)
+
+
+@pytest.mark.parametrize(("polygons", "words"), [([], "no object"), ([SQUARE], "one object")])
+def test_a_scene_has_at_least_two_objects(polygons, words):
+    with pytest.raises(InvalidInputError, match=words) as caught:
+        Scene.from_polygons(polygons)
+    assert caught.value.reason is Reason.TOO_FEW_OBJECTS
+
+
+def test_a_bad_polygon_is_named_by_its_place_in_the_scene():
+    with pytest.raises(InvalidInputError) as caught:
+        Scene.from_polygons([SQUARE, [SQUARE, [[0, 0], [1, np.nan], [1, 0]]]])
+    assert caught.value.field == "polygons[1].rings[1].points[1]"
+
+
+def test_labels_come_one_for_each_polygon():
+    with pytest.raises(InvalidInputError, match="1 names for 2 polygons") as caught:
+        Scene.from_polygons([SQUARE, TRIANGLE], labels=["a"])
+    assert caught.value.field == "labels"
