@@ -1,0 +1,370 @@
+import json
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import PIL.Image
+import pytest
+from google.protobuf.json_format import Parse
+
+import sketchmatch
+from sketchmatch.cli import local
+from sketchmatch.cli.app import ExitCode
+from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
+from sketchmatch_client import Client
+from sketchmatch_proto.v1 import match_pb2
+from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsResponse
+from sketchmatch_proto.v1.match_pb2 import MatchResult
+from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+from tests import processes
+from tests.processes import Terminal
+from tests.processes import sketchmatch as run
+
+ROOM = (LIVING_ROOM_SKETCH, LIVING_ROOM_MAP)
+LONG = ("--set", "searcher.patience=10000000", "--set", "searcher.generations=10000000")
+ESCAPE = "\x1b"
+
+
+@pytest.fixture(params=["in process", "server"])
+def where(request):
+    """Yield the options with which a command computes here, or asks a server."""
+    if request.param == "in process":
+        return []
+    return ["--server", request.getfixturevalue("address")]
+
+
+def geojson(path, *polygons):
+    shapes = [{"type": "Polygon", "coordinates": [ring]} for ring in polygons]
+    path.write_text(json.dumps({"type": "GeometryCollection", "geometries": shapes}))
+    return path
+
+
+@pytest.fixture
+def uneven(tmp_path):
+    """Return a file of four polygons and one of the first three of them."""
+    four = [
+        [[0, 0], [2, 0], [2, 2], [0, 2]],
+        [[5, 0], [9, 0], [9, 3]],
+        [[0, 6], [6, 6], [6, 7]],
+        [[8, 9], [11, 9], [9, 12]],
+    ]
+    return geojson(tmp_path / "four.geojson", *four), geojson(tmp_path / "three.geojson", *four[:3])
+
+
+def result(done) -> MatchResult:
+    assert done.returncode == 0, done.stderr
+    return Parse(done.stdout, MatchResult())
+
+
+# match ------------------------------------------------------------------------------------------
+
+
+def test_json_is_the_contracts_message_and_the_same_in_process_and_from_a_server(
+    command_line, address
+):
+    here = command_line("match", *ROOM, "--json", "--seed", "5")
+    there = command_line("match", *ROOM, "--json", "--seed", "5", "--server", address)
+    answers = [json.loads(done.stdout) for done in (here, there)]
+    assert result(here).match_id
+    for answer in answers:
+        answer.pop("matchId")
+        for name in [name for name in answer["statistics"] if name.endswith("Elapsed")]:
+            answer["statistics"].pop(name)
+    assert answers[0] == answers[1]
+    assert answers[0]["seed"] == "5"
+
+
+def test_json_writes_out_index_0_and_empty_lists(command_line):
+    answer = json.loads(command_line("match", *ROOM, "--json").stdout)
+    assert answer["objectMatches"][0]["sketchObject"] == 0
+    assert answer["unmatchedMapObjects"] == []
+
+
+def test_a_pipe_gets_tab_separated_lines_and_nothing_else(where):
+    done = run("match", *ROOM, *where)
+    assert done.returncode == 0
+    assert done.stderr == ""
+    head, *lines = [line.split("\t") for line in done.stdout.splitlines()]
+    assert head == ["sketch_object", "map_object", "confidence", "sketch_label", "map_label"]
+    assert [line[0] for line in lines] == [str(k) for k in range(8)]
+    assert sorted(line[1] for line in lines) == [str(k) for k in range(8)]
+    assert all(0 < float(line[2]) <= 1 for line in lines)
+    assert lines[0][3] == "sideboard"
+    assert ESCAPE not in done.stdout
+
+
+def test_a_terminal_shows_the_search_while_it_runs_and_then_a_table(where):
+    terminal = Terminal("match", *ROOM, *where, *LONG, "--time-budget", "1.5")
+    terminal.wait_for("searching")
+    terminal.wait_for("ζ 0.")
+    terminal.wait_for("best so far: 1→")
+    code, _ = terminal.end()
+    assert code == 0
+    assert re.search(r"iteration \d+ .* \d+ evaluations", terminal.shown)
+    assert "8 of 8 sketched objects matched" in terminal.shown
+    assert "sideboard" in terminal.shown
+    assert "stopped by the time budget after" in terminal.shown
+
+
+def test_a_pipe_stays_clean_while_the_terminal_shows_the_search():
+    terminal = Terminal("match", *ROOM, *LONG, "--time-budget", "1", "--json", stdout=False)
+    terminal.wait_for("searching")
+    code, piped = terminal.end()
+    assert code == 0
+    assert ESCAPE not in piped
+    assert Parse(piped, MatchResult()).outcome == match_pb2.OUTCOME_TIME_BUDGET
+
+
+def test_the_overlay_is_a_picture_of_the_right_size(command_line, where, tmp_path):
+    target = tmp_path / "overlay.png"
+    assert command_line("match", *ROOM, *where, "--overlay", target).returncode == 0
+    with PIL.Image.open(target) as picture:
+        assert (picture.format, picture.mode, picture.width) == ("PNG", "RGB", 1600)
+        assert 600 < picture.height < 1600
+        assert len(picture.getcolors(10**6)) > 50
+
+
+def test_an_overlay_that_cannot_be_written_is_refused_before_the_match(command_line, tmp_path):
+    done = command_line("match", *ROOM, "--overlay", tmp_path / "missing" / "overlay.png")
+    assert done.returncode == ExitCode.INVALID_INPUT
+    assert done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_the_seed_decides_the_search(command_line, where):
+    same, again, other = (
+        result(command_line("match", *ROOM, *where, "--json", "--seed", seed)) for seed in (1, 1, 2)
+    )
+    assert same.statistics.evaluations == again.statistics.evaluations
+    assert same.fmap_entries == again.fmap_entries
+    assert same.statistics.evaluations != other.statistics.evaluations
+
+
+def test_set_sets_parameters_of_any_stage(command_line, where):
+    sets = ("--set", "searcher.generations=3", "--set", "searcher.consistency=pairwise")
+    sets += ("--set", "map_segmenter.min_size=0.45")
+    answer = result(command_line("match", *ROOM, *where, "--json", *sets))
+    assert answer.outcome == match_pb2.OUTCOME_ITERATION_LIMIT
+    assert answer.statistics.iterations == 3
+    assert list(answer.unmatched_sketch_objects), "the plant is smaller than that"
+
+
+def test_a_time_budget_gives_the_best_answer_until_then(command_line, where):
+    began = time.monotonic()
+    answer = result(command_line("match", *ROOM, *where, *LONG, "--json", "--time-budget", 0.5))
+    assert time.monotonic() - began < 2.5
+    assert answer.outcome == match_pb2.OUTCOME_TIME_BUDGET
+    assert len(answer.object_matches) == 8
+
+
+def test_weights_weigh_the_parts_of_the_confidence(command_line, where):
+    answer = result(command_line("match", *ROOM, *where, "--json", "--weights", "1,0,3"))
+    parts = answer.fmap_confidence
+    assert parts.total == pytest.approx((parts.similarity + 3 * parts.dilation) / 4)
+
+
+def test_fewer_and_more_objects_in_the_sketch(command_line, where, uneven):
+    four, three = uneven
+    fewer = result(command_line("match", three, four, *where, "--json"))
+    more = result(command_line("match", four, three, *where, "--json"))
+    for answer in (fewer, more):
+        assert [m.sketch_object for m in answer.object_matches] == [0, 1, 2]
+        assert [m.map_object for m in answer.object_matches] == [0, 1, 2]
+    assert list(fewer.unmatched_map_objects) == list(more.unmatched_sketch_objects) == [3]
+
+
+def test_the_table_says_how_many_are_without_a_partner(uneven):
+    four, three = uneven
+    terminal = Terminal("match", four, three)
+    assert terminal.end()[0] == 0
+    assert "3 of 4 sketched objects matched, 1 in the sketch without partner" in terminal.shown
+
+
+# segment, plugins -------------------------------------------------------------------------------
+
+
+def test_segment_lists_the_objects_in_lines_and_in_json(command_line, where, tmp_path):
+    picture = tmp_path / "scene.png"
+    lines = command_line("segment", LIVING_ROOM_MAP, *where, "--overlay", picture)
+    message = command_line("segment", LIVING_ROOM_MAP, *where, "--json")
+    found = Parse(message.stdout, SegmentResponse())
+    head, *rows = [line.split("\t") for line in lines.stdout.splitlines()]
+    assert head == ["object", "label", "vertices", "area", "centroid_x", "centroid_y"]
+    assert [row[0] for row in rows] == [str(k) for k in range(8)]
+    assert [float(row[3]) for row in rows] == pytest.approx(
+        [item.area for item in found.scene.objects], rel=1e-5
+    )
+    assert found.segmenter.name == "occupancy-grid"
+    with PIL.Image.open(picture) as image:
+        assert (image.format, image.width) == ("PNG", 1000)
+
+
+def test_segment_sets_parameters_and_refuses_those_of_other_stages(command_line, where):
+    few = command_line("segment", LIVING_ROOM_MAP, *where, "--set", "segmenter.min_size=0.6")
+    assert 3 <= len(few.stdout.splitlines()) < 9
+    done = command_line("segment", LIVING_ROOM_MAP, *where, "--set", "searcher.population=3")
+    assert done.returncode == ExitCode.INVALID_INPUT
+    assert "use segmenter." in done.stderr
+
+
+def test_plugins_list_says_the_same_here_and_of_a_server(command_line, address):
+    everywhere = ((), ("--server", address))
+    here, there = (command_line("plugins", "list", "--json", *where) for where in everywhere)
+    catalogue = Parse(here.stdout, ListAlgorithmsResponse())
+    assert catalogue.algorithms
+    assert catalogue == Parse(there.stdout, ListAlgorithmsResponse())
+    here, there = (command_line("plugins", "list", *where) for where in everywhere)
+    assert here.stdout == there.stdout
+    lines = [line.split("\t") for line in here.stdout.splitlines()]
+    assert lines[0] == ["kind", "name", "default", "distribution", "version", "summary"]
+    assert ["searcher", "easm", "true", "sketchmatch"] in [line[:4] for line in lines]
+
+
+def test_plugins_list_shows_parameters_on_a_terminal():
+    terminal = Terminal("plugins", "list")
+    assert terminal.end()[0] == 0
+    assert "population = 200" in terminal.shown
+
+
+# serve ------------------------------------------------------------------------------------------
+
+
+def test_serve_takes_its_limits_from_options():
+    limits = ("--max-request-mib", "2", "--max-matches", "3", "--max-time-budget", "1.5")
+    with processes.server(*limits) as running, Client(running.address) as client:
+        said = client.server_info().limits
+    assert said.max_request_bytes == 2 * 1024**2
+    assert said.max_concurrent_matches == 3
+    assert said.max_time_budget.ToTimedelta().total_seconds() == 1.5
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--max-request-mib", 0), ("--max-matches", 0), ("--max-time-budget", -1), ("--grace", -1)],
+)
+def test_serve_refuses_limits_that_let_nothing_pass(command_line, option, value):
+    assert_one_line(command_line("serve", option, value), 2, option)
+
+
+@pytest.mark.parametrize("address", ["nowhere", "256.0.0.1:1"])
+def test_serve_refuses_an_address_that_is_none(address):
+    assert_one_line(run("serve", "--address", address), 2, "cannot be listened on")
+
+
+# What is typed wrong, and what goes wrong -------------------------------------------------------
+
+
+def assert_one_line(done, code, *words):
+    assert done.stdout == ""
+    assert done.returncode == code, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("sketchmatch: ")
+    assert all(word in line for word in words), line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["mach"], ["mach", "--help"]),
+        (["match"], ["SKETCH", "--help"]),
+        (["match", LIVING_ROOM_SKETCH], ["MAP", "--help"]),
+        (["match", *ROOM, "--sed", "1"], ["--sed", "--help"]),
+        (["match", *ROOM, "--seed", "one"], ["--seed", "valid integer", "--help"]),
+        (["match", *ROOM, "--seed", "-1"], ["seed is -1", "give an integer 0"]),
+        (["match", *ROOM, "--seed", str(2**64)], ["seed", "2**64"]),
+        (["match", *ROOM, "--weights", "1,2"], ["--weights '1,2'", "as in 1,1,1"]),
+        (["match", *ROOM, "--set", "population=3"], ["--set", "as in searcher.population=400"]),
+        (["match", *ROOM, "--set", "sercher.population=3"], ["sercher", "searcher"]),
+        (["match", *ROOM, "--time-budget", "nan"], ["time_budget", "give a positive time"]),
+        (["match", *ROOM, "--overlay", "x.txt"], ["x.txt", ".png"]),
+        (["match", "missing.svg", LIVING_ROOM_MAP], ["missing.svg does not exist", "check"]),
+        (["match", LIVING_ROOM_SKETCH, "."], [". is of no known kind", "give a file"]),
+        (["segment", __file__], ["is of no known kind", ".yaml"]),
+        (["plugins", "lits"], ["lits", "--help"]),
+    ],
+    ids=lambda value: " ".join(str(part) for part in value[:4])[-40:],
+)
+def test_what_is_typed_wrong_gets_exit_code_2_and_one_line_with_the_remedy(
+    command_line, arguments, words
+):
+    assert_one_line(command_line(*arguments), ExitCode.INVALID_INPUT, *words)
+
+
+@pytest.mark.parametrize(
+    "arguments", [["match", *ROOM], ["segment", LIVING_ROOM_MAP], ["plugins", "list"]]
+)
+def test_a_server_that_is_not_there_is_exit_code_3(command_line, arguments):
+    done = command_line(*arguments, "--server", "127.0.0.1:9")
+    assert_one_line(done, ExitCode.SERVER_UNAVAILABLE, "127.0.0.1:9", "start it, or check")
+
+
+def test_a_busy_server_is_exit_code_3_as_well(command_line):
+    with processes.server("--max-matches", "1") as running:
+        other = Terminal("match", *ROOM, *LONG, "--server", running.address)
+        other.wait_for("searching")
+        done = command_line("match", *ROOM, "--server", running.address)
+        other.process.send_signal(signal.SIGINT)
+        assert other.end()[0] == ExitCode.INTERRUPTED
+    assert_one_line(done, ExitCode.SERVER_UNAVAILABLE, "send the request again in 1 s")
+
+
+def test_no_answer_in_time_is_exit_code_4(command_line, where):
+    done = command_line("match", *ROOM, *where, "--time-budget", "1e-6")
+    assert_one_line(done, ExitCode.NO_ANSWER_IN_TIME, "allow more time")
+
+
+def test_what_nobody_foresaw_is_exit_code_1_and_still_one_line(command_line, monkeypatch):
+    def failing(*_):
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(local, "match_events", failing)
+    monkeypatch.delenv("SKETCHMATCH_DEBUG", raising=False)
+    done = command_line("match", *ROOM)
+    assert_one_line(done, ExitCode.UNFORESEEN, "division by zero", "SKETCHMATCH_DEBUG=1")
+    monkeypatch.setenv("SKETCHMATCH_DEBUG", "1")
+    assert "Traceback" in command_line("match", *ROOM).stderr
+
+
+def test_ctrl_c_ends_a_long_match_soon_and_quietly(where):
+    terminal = Terminal("match", *ROOM, *where, *LONG)
+    terminal.wait_for("searching")
+    asked = time.monotonic()
+    terminal.process.send_signal(signal.SIGINT)
+    code, _ = terminal.end()
+    print(f"ended after {time.monotonic() - asked:.2f} s")
+    assert time.monotonic() - asked < 3.0
+    assert code == ExitCode.INTERRUPTED == 130
+    assert "Traceback" not in terminal.shown
+    assert terminal.shown.rstrip().endswith("sketchmatch: interrupted")
+
+
+@pytest.mark.parametrize("command", [["match", *ROOM], ["plugins", "list", "--json"]])
+def test_a_reader_who_has_had_enough_is_no_error(command, where):
+    line = shlex.join([*processes.COMMAND, *map(str, command), *where])
+    done = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; ({line}; echo $? >&2) | true"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.stderr.split() == ["0"]
+
+
+def test_help_and_version(command_line):
+    assert command_line("--version").stdout == f"sketchmatch {sketchmatch.__version__}\n"
+    for arguments in ([], ["--help"], ["-h"]):
+        done = command_line(*arguments)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert all(word in done.stdout for word in ("match", "segment", "serve", "demo", "plugins"))
+    assert "--time-budget" in command_line("match", "--help").stdout
+
+
+def test_the_installed_program_is_the_same_as_the_module():
+    program = Path(sys.executable).with_name("sketchmatch")
+    done = subprocess.run([program, "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout == run("--version").stdout

@@ -1,0 +1,123 @@
+"""Real ``sketchmatch`` processes."""
+
+import os
+import pty
+import re
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+_ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+COMMAND = [sys.executable, "-m", "sketchmatch"]
+
+
+def sketchmatch(*arguments, timeout=60, **options) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, as a shell with pipes would."""
+    return subprocess.run(
+        [*COMMAND, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=timeout,
+        check=False,
+        **options,
+    )
+
+
+class Server:
+    """A ``sketchmatch serve`` process and what it says on standard error."""
+
+    def __init__(self, *arguments: str) -> None:
+        self.said: list[str] = []
+        self.process = subprocess.Popen(
+            [*COMMAND, "serve", "--address", "127.0.0.1:0", *arguments],
+            stderr=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+        )
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def address(self) -> str:
+        return self.wait_for(r"listening on (\S+)")
+
+    def wait_for(self, pattern: str, seconds: float = 60.0) -> str:
+        """Wait until the server says something, and return the pattern's last group."""
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            for line in list(self.said):
+                if found := re.search(pattern, line):
+                    return found[found.re.groups]
+            assert self.process.poll() is None, f"the server ended: {self.said}"
+            time.sleep(0.005)
+        raise AssertionError(f"the server said no {pattern!r}: {self.said}")
+
+    def end(self, seconds: float = 20.0) -> int:
+        """Wait until the process ends and return its exit code."""
+        code = self.process.wait(seconds)
+        self._reader.join()
+        return code
+
+    def _read(self) -> None:
+        assert self.process.stderr is not None
+        with self.process.stderr as lines:
+            self.said.extend(line.rstrip() for line in iter(lines.readline, ""))
+
+
+class Terminal:
+    """A command whose standard error, and standard output if asked, are a terminal."""
+
+    def __init__(self, *arguments, stdout: bool = True) -> None:
+        self._screen, terminal = pty.openpty()
+        self.process = subprocess.Popen(
+            [*COMMAND, *map(str, arguments)],
+            stdin=subprocess.DEVNULL,
+            stdout=terminal if stdout else subprocess.PIPE,
+            stderr=terminal,
+            env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "140"},
+        )
+        os.close(terminal)
+        self._shown = bytearray()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def shown(self) -> str:
+        """All that was written to the screen so far, without colours and cursor movements."""
+        return _ESCAPE.sub("", self._shown.decode("utf-8", "replace"))
+
+    def wait_for(self, text: str, seconds: float = 60.0) -> None:
+        deadline = time.monotonic() + seconds
+        while text not in self.shown:
+            assert time.monotonic() < deadline, f"no {text!r} on the screen: {self.shown}"
+            assert self.process.poll() is None, f"the command ended: {self.shown}"
+            time.sleep(0.005)
+
+    def end(self, seconds: float = 60.0) -> tuple[int, str]:
+        """Wait until the process ends and return its exit code and what it piped."""
+        piped, _ = self.process.communicate(timeout=seconds)
+        self._reader.join(10)
+        os.close(self._screen)
+        return self.process.returncode, (piped or b"").decode()
+
+    def _read(self) -> None:
+        # Reading fails where nobody holds the terminal any more.
+        with suppress(OSError):
+            while chunk := os.read(self._screen, 65_536):
+                self._shown += chunk
+
+
+@contextmanager
+def server(*arguments: str) -> Iterator[Server]:
+    """Run a server process until the end of the block; it serves when the block begins."""
+    running = Server(*arguments)
+    try:
+        running.wait_for("serving$")
+        yield running
+    finally:
+        running.process.terminate()
+        running.end()

@@ -1,0 +1,141 @@
+import signal
+import time
+
+import pytest
+from grpc import insecure_channel
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+from grpc_reflection.v1alpha.proto_reflection_descriptor_database import (
+    ProtoReflectionDescriptorDatabase,
+)
+
+import sketchmatch
+from sketchmatch_client import Client, ServerUnavailableError
+from sketchmatch_client.errors import CallCancelledError
+from sketchmatch_proto.v1 import catalog_service_pb2
+from tests.processes import server
+from tests.processes import sketchmatch as run
+from tests.server.harness import ENDLESS, scene, serving
+from tests.server.probes import Exploding, SlowToWarm
+
+SERVICES = [f"sketchmatch.v1.{name}Service" for name in ("Match", "Scene", "Catalog")]
+
+
+def health(address: str, service: str = "") -> str:
+    with insecure_channel(address) as channel:
+        request = health_pb2.HealthCheckRequest(service=service)
+        status = health_pb2_grpc.HealthStub(channel).Check(request, timeout=5).status
+    return health_pb2.HealthCheckResponse.ServingStatus.Name(status)
+
+
+def test_health_is_not_serving_until_the_kernels_are_warm():
+    SlowToWarm.may_finish.clear()
+    with serving(SlowToWarm, warm=False) as host:
+        assert health(host.address) == "NOT_SERVING"
+        with Client(host.address) as client, pytest.raises(ServerUnavailableError, match="wait"):
+            client.wait_until_serving(0.2)
+        SlowToWarm.may_finish.set()
+        with Client(host.address) as client:
+            client.wait_until_serving(5)
+        assert [health(host.address, name) for name in ("", *SERVICES)] == ["SERVING"] * 4
+
+
+def test_a_server_that_is_stopped_while_it_warms_up_stops():
+    SlowToWarm.may_finish.clear()
+    with serving(SlowToWarm, warm=False) as host:
+        host.stop()
+        time.sleep(0.1)
+        SlowToWarm.may_finish.set()
+    assert "serving" not in host.said
+    assert host.said[-1] == "stopped"
+
+
+def test_an_algorithm_that_cannot_warm_up_does_not_keep_the_others_from_serving(caplog):
+    with serving(Exploding) as host, Client(host.address) as client:
+        assert client.match(scene(3), scene(3)).object_map == {0: 0, 1: 1, 2: 2}
+    assert "searcher exploding of acme-plugins 1.2 failed to warm up" in caplog.text
+
+
+def test_reflection_lists_the_services_and_describes_them(address):
+    with insecure_channel(address) as channel:
+        database = ProtoReflectionDescriptorDatabase(channel)
+        listed = database.get_services()
+        file = database.FindFileContainingSymbol("sketchmatch.v1.MatchService")
+    assert {*SERVICES, "grpc.health.v1.Health"} <= set(listed)
+    assert [service.name for service in file.service] == ["MatchService"]
+
+
+def test_the_catalogue_tells_what_there_is_and_what_is_the_default(address):
+    with Client(address) as client:
+        catalogue = client.algorithms()
+    kind = catalog_service_pb2.AlgorithmKind.Name
+    defaults = {(kind(a.kind), a.name) for a in catalogue.algorithms if a.is_default}
+    assert defaults >= {
+        ("ALGORITHM_KIND_HISTOGRAM", "constant"),
+        ("ALGORITHM_KIND_SIMILARITY", "cross-correlation"),
+        ("ALGORITHM_KIND_SEARCHER", "easm"),
+        ("ALGORITHM_KIND_SEGMENTER", "strokes"),
+    }
+    easm = next(a for a in catalogue.algorithms if a.name == "easm")
+    patience = easm.parameters_schema["properties"]["patience"]
+    assert (patience["default"], patience["minimum"]) == (400, 1)
+    assert patience["description"]
+    assert [plugin.distribution for plugin in catalogue.plugins] == ["sketchmatch"]
+
+
+def test_the_server_tells_its_version_and_limits():
+    with (
+        serving(max_time_budget=2.5, max_concurrent_matches=3) as host,
+        Client(host.address) as client,
+    ):
+        info = client.server_info()
+    assert info.version == sketchmatch.__version__
+    assert info.api_version == "sketchmatch.v1"
+    assert info.limits.max_concurrent_matches == 3
+    assert info.limits.max_request_bytes == 64 * 1024**2
+    assert info.limits.max_time_budget.ToTimedelta().total_seconds() == 2.5
+
+
+def test_sigterm_ends_an_idle_server_at_once_with_exit_code_0():
+    with server() as running:
+        asked = time.monotonic()
+        running.process.send_signal(signal.SIGTERM)
+        assert running.end() == 0
+        assert time.monotonic() - asked < 2.0
+    assert running.said[-1] == "sketchmatch: stopped"
+
+
+def test_sigterm_lets_a_running_match_end_within_the_grace():
+    with server("--grace", "10") as running, Client(running.address) as client:
+        events = client.events(scene(20), scene(20, 1), params=ENDLESS, time_budget=1.0)
+        while not next(events).progress.HasField("confidence"):
+            pass
+        asked = time.monotonic()
+        running.process.send_signal(signal.SIGTERM)
+        assert list(events)[-1].WhichOneof("event") == "result"
+        assert running.end() == 0
+        assert time.monotonic() - asked < 3.0
+
+
+def test_sigterm_ends_matches_that_outlast_the_grace():
+    with server("--grace", "0.5") as running, Client(running.address) as client:
+        events = client.events(scene(20), scene(20, 1), params=ENDLESS)
+        while not next(events).progress.HasField("confidence"):
+            pass
+        asked = time.monotonic()
+        running.process.send_signal(signal.SIGTERM)
+        with pytest.raises((ServerUnavailableError, CallCancelledError)):
+            list(events)
+        assert running.end() == 0
+        assert 0.4 < time.monotonic() - asked < 3.0
+    assert not any("Traceback" in line for line in running.said)
+
+
+def test_a_second_server_on_the_same_port_is_refused_in_one_line(address):
+    second = run("serve", "--address", address)
+    assert second.returncode == 2
+    assert second.stdout == ""
+    (line,) = second.stderr.splitlines()
+    assert line == (
+        f"sketchmatch: address '{address}' cannot be listened on; "
+        "choose a free port, as in 127.0.0.1:50051"
+    )
