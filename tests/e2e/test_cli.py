@@ -227,7 +227,7 @@ def test_plugins_list_says_the_same_here_and_of_a_server(command_line, address):
 def test_plugins_list_shows_parameters_on_a_terminal():
     terminal = Terminal("plugins", "list")
     assert terminal.end()[0] == 0
-    assert "population = 200" in terminal.shown
+    assert "mutation_rate = 0.3: Pm, probability" in terminal.shown
 
 
 # serve ------------------------------------------------------------------------------------------

@@ -61,6 +61,7 @@ __all__ = [
 
 _PROGRESS_EVERY = 0.05
 _MAX_SEED = 2**64 - 1
+_MAX_WEIGHT = 1e6
 # What 2 GB hold: 100 × 100 objects, and the histograms of 700 objects in 180 directions.
 _MAX_COMPARISONS = 30_000_000
 _MAX_HISTOGRAM_VALUES = 50_000_000
@@ -102,7 +103,7 @@ class MatchRequest:
     weights: Weights = (1.0, 1.0, 1.0)
 
     def __post_init__(self) -> None:
-        if not 0 <= self.seed <= _MAX_SEED:
+        if not (isinstance(self.seed, int) and 0 <= self.seed <= _MAX_SEED):
             raise InvalidInputError(
                 Reason.INVALID_FIELD, "seed", f"is {self.seed}; give an integer 0 … 2**64 − 1"
             )
@@ -113,10 +114,18 @@ class MatchRequest:
                 f"is {self.time_budget:g} s; give a positive time or none at all",
             )
         names = ("similarity", "rotation", "dilation")
+        if len(self.weights) != len(names):
+            raise InvalidInputError(
+                Reason.INVALID_FIELD,
+                "weights",
+                f"are {len(self.weights)} numbers; give three: {', '.join(names)}",
+            )
         for name, weight in zip(names, self.weights, strict=True):
-            if not (math.isfinite(weight) and weight >= 0):
+            if not 0 <= weight <= _MAX_WEIGHT:
                 raise InvalidInputError(
-                    Reason.INVALID_FIELD, f"weights.{name}", f"is {weight:g}; give 0 or more"
+                    Reason.INVALID_FIELD,
+                    f"weights.{name}",
+                    f"is {weight:g}; give a number from 0 to {_MAX_WEIGHT:g}",
                 )
         if sum(self.weights) == 0:
             raise InvalidInputError(

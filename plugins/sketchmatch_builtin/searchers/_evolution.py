@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from sketchmatch.api.kernels import fmap_confidence_above, kernel
 from sketchmatch.model import FloatArray, IntArray
 
-__all__ = ["evolve_object_maps", "evolve_pair_maps", "found_object_maps", "found_pair_maps"]
+__all__ = [
+    "breed_object_maps",
+    "breed_pair_maps",
+    "found_object_maps",
+    "found_pair_maps",
+    "judge_object_maps",
+    "judge_pair_maps",
+]
 
 Relations = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 """σ, cos R, sin R and L̂ of the relation table, and the weights of ζ."""
@@ -23,50 +30,44 @@ def found_object_maps(
     population: IntArray,
     fitness: FloatArray,
     offspring: IntArray,
-    pairs: IntArray,
-    columns: IntArray,
-    relations: Relations,
+    argument_objects: int,
     rng: np.random.Generator,
 ) -> int:
-    """Fill a population with random injective object maps, shape (p, N), the fittest first.
+    """Draw random injective object maps, shape (p, N), to be judged; return their number.
 
-    ``offspring`` is room for (2p, N) individuals, ``pairs`` the template pairs (Q, 2), ``columns``
-    the histogram correspondence of each ordered argument pair (N', N'), and ``relations`` the
-    relation table and the weights, as :func:`~sketchmatch.api.kernels.fmap_confidence` takes them.
+    ``offspring`` is room for (2p, N) individuals. Until they are judged the population holds the
+    same maps, with a fitness below any other.
     """
     size, template_objects = population.shape
-    free = np.arange(columns.shape[0])
+    free = np.arange(argument_objects)
     for k in range(size):
         for a in range(template_objects):
             _draw(free, a, rng)
             offspring[k, a] = free[a]
     population[:] = offspring[:size]
     fitness[:] = -1.0
-    _judge_object_maps(population, fitness, offspring[:size], pairs, columns, relations)
     return len(population)
 
 
 @kernel
-def evolve_object_maps(
+def breed_object_maps(
     population: IntArray,
-    fitness: FloatArray,
     offspring: IntArray,
     pairs: IntArray,
-    columns: IntArray,
-    relations: Relations,
+    argument_objects: int,
     rates: tuple[float, float, float],
     rng: np.random.Generator,
 ) -> int:
-    """Run one generation over object maps in place and return the number of evaluations.
+    """Write the offspring of one generation and return their number.
 
-    ``rates`` are Pc, Px and Pm; the rest is as for :func:`found_object_maps`.
+    ``pairs`` are the template pairs (Q, 2), ``rates`` are Pc, Px and Pm.
     """
     crossover_rate, exchange_rate, mutation_rate = rates
     size = population.shape[0]
     order = np.arange(pairs.shape[0])
     mask = np.empty(pairs.shape[0], dtype=np.bool_)
-    holder = np.empty(columns.shape[0], dtype=np.int64)
-    free = np.empty(columns.shape[0], dtype=np.int64)
+    holder = np.empty(argument_objects, dtype=np.int64)
+    free = np.empty(argument_objects, dtype=np.int64)
     bred = 0
     for _ in range(size // 2):
         first, second = _two(size, rng)
@@ -86,7 +87,6 @@ def evolve_object_maps(
                 _reassign(offspring[bred], pairs, holder, free, rng)
                 changing = rng.random() < 0.5
             bred += 1
-    _judge_object_maps(population, fitness, offspring[:bred], pairs, columns, relations)
     return bred
 
 
@@ -95,15 +95,14 @@ def found_pair_maps(
     population: IntArray,
     fitness: FloatArray,
     offspring: IntArray,
-    relations: Relations,
+    argument_pairs: int,
     rng: np.random.Generator,
 ) -> int:
-    """Fill a population with random FMAPs, shape (p, Q), the fittest first.
+    """Draw random FMAPs, shape (p, Q), as :func:`found_object_maps` draws object maps.
 
     They are one-to-one and hold no dual of an entry, whether or not they lead to an object map.
     """
     size, template_pairs = population.shape
-    argument_pairs = relations[0].shape[1]
     free = np.arange(argument_pairs)
     for k in range(size):
         for i in range(template_pairs):
@@ -111,23 +110,20 @@ def found_pair_maps(
             offspring[k, i] = free[i] + argument_pairs * (rng.random() < 0.5)
     population[:] = offspring[:size]
     fitness[:] = -1.0
-    _judge_pair_maps(population, fitness, offspring[:size], relations)
     return len(population)
 
 
 @kernel
-def evolve_pair_maps(
+def breed_pair_maps(
     population: IntArray,
-    fitness: FloatArray,
     offspring: IntArray,
-    relations: Relations,
+    argument_pairs: int,
     rates: tuple[float, float, float],
     rng: np.random.Generator,
 ) -> int:
-    """Run one generation over FMAPs in place and return the number of evaluations."""
+    """Write the offspring of one generation and return their number."""
     crossover_rate, exchange_rate, mutation_rate = rates
     size, template_pairs = population.shape
-    argument_pairs = relations[0].shape[1]
     holder = np.empty(argument_pairs, dtype=np.int64)
     free = np.empty(argument_pairs, dtype=np.int64)
     order = np.arange(template_pairs)
@@ -153,12 +149,11 @@ def evolve_pair_maps(
                 _replace(offspring[bred], argument_pairs, rng)
                 changing = rng.random() < 0.5
             bred += 1
-    _judge_pair_maps(population, fitness, offspring[:bred], relations)
     return bred
 
 
 @kernel
-def _judge_object_maps(
+def judge_object_maps(
     population: IntArray,
     fitness: FloatArray,
     offspring: IntArray,
@@ -166,7 +161,12 @@ def _judge_object_maps(
     columns: IntArray,
     relations: Relations,
 ) -> None:
-    """Let offspring compete with the population."""
+    """Let offspring compete with the population, which stays sorted, the fittest first.
+
+    ``columns`` is the histogram correspondence of each ordered argument pair (N', N'), and
+    ``relations`` the relation table and the weights, as
+    :func:`~sketchmatch.api.kernels.fmap_confidence` takes them.
+    """
     entries = np.empty(pairs.shape[0], dtype=np.int64)
     scratch = np.empty(pairs.shape[0])
     for k in range(offspring.shape[0]):
@@ -178,7 +178,7 @@ def _judge_object_maps(
 
 
 @kernel
-def _judge_pair_maps(
+def judge_pair_maps(
     population: IntArray, fitness: FloatArray, offspring: IntArray, relations: Relations
 ) -> None:
     """Let offspring compete with the population."""

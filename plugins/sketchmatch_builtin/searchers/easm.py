@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator
+from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
@@ -20,15 +21,19 @@ from sketchmatch.model import (
     object_pairs,
 )
 from sketchmatch_builtin.searchers._evolution import (
-    evolve_object_maps,
-    evolve_pair_maps,
+    breed_object_maps,
+    breed_pair_maps,
     found_object_maps,
     found_pair_maps,
+    judge_object_maps,
+    judge_pair_maps,
 )
 
 __all__ = ["Easm"]
 
 _REPORT_EVERY = 0.02
+# What is judged between two looks at the clock: about 10 ms.
+_SLICE_ENTRIES = 200_000
 
 
 class Easm(Searcher):
@@ -99,41 +104,33 @@ class Easm(Searcher):
     ) -> Generator[SearchProgress, None, Outcome]:
         """Evolve until nothing better was found for ``patience`` generations."""
         params = self.params
-        population = self._empty_population(problem)
-        fitness = np.empty(len(population))
-        found, evolve = self._operators(problem, population, fitness, rng)
-        evaluations = found()
-        best, stale, reported = float(fitness[0]), 0, -np.inf
-        for generation in range(1, params.generations + 1):
-            evaluations += evolve()
-            stale = 0 if fitness[0] > best else stale + 1
-            best = float(fitness[0])
-            last = stale == params.patience or generation == params.generations
-            if last or time.monotonic() - reported > _REPORT_EVERY:
-                reported = time.monotonic()
-                fmap = self._fmap(population[0], problem)
-                yield SearchProgress(fmap, best, generation, evaluations)
+        state = self._state(problem, rng)
+        chunk = max(1, _SLICE_ENTRIES // problem.table.template_pairs)
+        best, stale, evaluations, reported = -1.0, -1, 0, -np.inf
+        for generation in range(params.generations + 1):
+            bred = state.breed() if generation else state.found()
+            for first in range(0, max(1, bred), chunk):
+                last = min(bred, first + chunk)
+                state.judge(state.offspring[first:last])
+                evaluations += last - first
+                if time.monotonic() - reported > _REPORT_EVERY:
+                    reported = time.monotonic()
+                    yield self._progress(problem, state, generation, evaluations)
+            stale = 0 if state.fitness[0] > best else stale + 1
+            best = float(state.fitness[0])
             if stale == params.patience:
-                return Outcome.CONVERGED
-        return Outcome.ITERATION_LIMIT
+                break
+        yield self._progress(problem, state, generation, evaluations)
+        return Outcome.CONVERGED if stale == params.patience else Outcome.ITERATION_LIMIT
 
-    def _empty_population(self, problem: MatchProblem) -> IntArray:
-        table = problem.table
-        by_object = self.params.consistency == "object"
-        genes = table.template_objects if by_object else table.template_pairs
-        size = self.params.population or min(max(100, 25 * table.argument_objects), 400)
-        return np.empty((size, genes), dtype=np.int64)
-
-    def _operators(
-        self,
-        problem: MatchProblem,
-        population: IntArray,
-        fitness: FloatArray,
-        rng: np.random.Generator,
-    ) -> tuple[Callable[[], int], Callable[[], int]]:
-        """Return what fills the population and what runs one generation, both in place."""
+    def _state(self, problem: MatchProblem, rng: np.random.Generator) -> _State:
+        """Return an empty population and what works on it in place."""
         table, params = problem.table, self.params
-        offspring = np.empty((2 * len(population), population.shape[1]), dtype=np.int64)
+        by_object = params.consistency == "object"
+        size = params.population or min(max(100, 25 * table.argument_objects), 400)
+        genes = table.template_objects if by_object else table.template_pairs
+        population, fitness = np.empty((size, genes), dtype=np.int64), np.empty(size)
+        offspring = np.empty((2 * size, genes), dtype=np.int64)
         relations = (
             table.similarity,
             table.cosine,
@@ -142,20 +139,45 @@ class Easm(Searcher):
             np.array(problem.weights, dtype=np.float64),
         )
         rates = (params.crossover_rate, params.exchange_rate, params.mutation_rate)
-        state = (population, fitness, offspring)
-        if params.consistency == "pairwise":
-            return (
-                partial(found_pair_maps, *state, relations, rng),
-                partial(evolve_pair_maps, *state, relations, rates, rng),
+
+        def judge(some: IntArray) -> None:
+            if by_object:
+                judge_object_maps(population, fitness, some, pairs, columns, relations)
+            else:
+                judge_pair_maps(population, fitness, some, relations)
+
+        if by_object:
+            pairs = object_pairs(table.template_objects)
+            columns = correspondences(table.argument_objects)
+            found = partial(found_object_maps, population, fitness, offspring, len(columns), rng)
+            breed = partial(
+                breed_object_maps, population, offspring, pairs, len(columns), rates, rng
             )
-        pairs = object_pairs(table.template_objects)
-        columns = correspondences(table.argument_objects)
-        return (
-            partial(found_object_maps, *state, pairs, columns, relations, rng),
-            partial(evolve_object_maps, *state, pairs, columns, relations, rates, rng),
-        )
+        else:
+            others = table.argument_pairs
+            found = partial(found_pair_maps, population, fitness, offspring, others, rng)
+            breed = partial(breed_pair_maps, population, offspring, others, rates, rng)
+        return _State(population, fitness, offspring, found, breed, judge)
+
+    def _progress(
+        self, problem: MatchProblem, state: _State, generation: int, evaluations: int
+    ) -> SearchProgress:
+        fmap = self._fmap(state.population[0].copy(), problem)
+        return SearchProgress(fmap, float(state.fitness[0]), generation, evaluations)
 
     def _fmap(self, individual: IntArray, problem: MatchProblem) -> Fmap:
         if self.params.consistency == "pairwise":
             return Fmap(individual)
         return Fmap.from_object_map(individual, problem.table.argument_objects)
+
+
+@dataclass(frozen=True)
+class _State:
+    """A population, sorted, with its offspring, and the steps of the evolution."""
+
+    population: IntArray
+    fitness: FloatArray
+    offspring: IntArray
+    found: Callable[[], int]
+    breed: Callable[[], int]
+    judge: Callable[[IntArray], None]
