@@ -467,7 +467,7 @@ CASES = [
         "INVALID_FIELD",
         "weights.dilation",
         "is -1",
-        "give 0 or more",
+        "give a number from 0",
         weights=(1, 1, -1),
     ),
     Case(
@@ -475,7 +475,7 @@ CASES = [
         "INVALID_FIELD",
         "weights.similarity",
         "is nan",
-        "give 0 or more",
+        "give a number from 0",
         weights=(math.nan, 1, 1),
     ),
     Case(

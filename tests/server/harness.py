@@ -3,7 +3,8 @@
 import asyncio
 import re
 import threading
-from collections.abc import Coroutine, Iterator
+import time
+from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from functools import cache
@@ -15,7 +16,7 @@ from sketchmatch.api import Algorithm
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from sketchmatch.server.limits import Limits
 from sketchmatch.server.serve import ServerSettings, serve
-from sketchmatch_client import sources
+from sketchmatch_client import ServerBusyError, sources
 from sketchmatch_proto.v1 import source_pb2
 
 _Answer = TypeVar("_Answer")
@@ -120,6 +121,17 @@ def turned(polygons: list[np.ndarray], degrees: float = 40.0) -> list[np.ndarray
 def scene(count: int, seed: int = 0, labels: list[str] | None = None) -> source_pb2.Source:
     """Return a source of random polygons."""
     return sources.polygons(shapes(count, seed), labels)
+
+
+def when_there_is_room(call: Callable[[], _Answer], seconds: float = 2.0) -> _Answer:
+    """Call until the server is no longer busy; a stopped search takes a moment to end."""
+    deadline = time.monotonic() + seconds
+    while True:
+        try:
+            return call()
+        except ServerBusyError:
+            assert time.monotonic() < deadline, "the place is never given back"
+            time.sleep(0.01)
 
 
 def kinds(events: list) -> list[str]:

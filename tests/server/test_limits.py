@@ -5,7 +5,7 @@ import pytest
 
 from sketchmatch_client import Client, InvalidRequestError, ServerBusyError
 from sketchmatch_proto.v1.match_pb2 import OUTCOME_TIME_BUDGET
-from tests.server.harness import ENDLESS, scene, serving
+from tests.server.harness import ENDLESS, scene, serving, when_there_is_room
 
 
 def assert_serves(client):
@@ -28,8 +28,7 @@ def test_a_request_more_than_the_server_has_room_for_is_told_when_to_come_again(
             assert raised.value.__cause__.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
         assert client.algorithms().algorithms, "what costs nothing is answered all the same"
         running[0].close()
-        time.sleep(0.1)
-        assert_serves(client)
+        when_there_is_room(lambda: assert_serves(client))
         running[1].close()
 
 

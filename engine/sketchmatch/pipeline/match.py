@@ -234,7 +234,7 @@ class _Match:
     def run(self) -> Generator[MatchEvent, None, None]:
         yield Accepted(self.match_id, self.request.seed, self.pipeline)
         if self.may_report():
-            yield Progress(Phase.SEGMENT, self.elapsed())
+            yield Progress(Phase.SEGMENT, self.reported - self.started)
         with self.timed("segment"):
             sketch = self.segmented("sketch", self.request.sketch, self.pipeline.sketch_segmenter)
             self.check_budget(Phase.SEGMENT)
@@ -278,7 +278,7 @@ class _Match:
                 except StopIteration as stop:
                     return stop.value  # type: ignore[no-any-return]
             if self.may_report():
-                yield Progress(phase, self.elapsed(), fraction)
+                yield Progress(phase, self.reported - self.started, fraction)
 
     def search(
         self, table: RelationTable, exchanged: bool
@@ -302,7 +302,7 @@ class _Match:
                     mapped = object_map(occm(best.fmap, table))
                     yield Progress(
                         Phase.SEARCH,
-                        self.elapsed(),
+                        self.reported - self.started,
                         iteration=best.iteration,
                         evaluations=best.evaluations,
                         confidence=best.confidence,
