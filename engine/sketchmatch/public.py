@@ -31,6 +31,7 @@ def match(
     seed: int = 0,
     time_budget: float | None = None,
     weights: Weights = (1.0, 1.0, 1.0),
+    alternatives: int | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> MatchResult:
     """Find which sketched object is which mapped object.
@@ -51,6 +52,9 @@ def match(
         Seconds after which the best answer so far is given, or None for no limit.
     weights
         Of ζσ, ζR and ζL in ζ.
+    alternatives
+        How many of the next best object maps the result shall hold; None for 3, or as many as
+        there are.
     on_progress
         Called with the state of the match, at most 20 times a second.
 
@@ -83,6 +87,7 @@ def match(
         seed=seed,
         time_budget=time_budget,
         weights=weights,
+        alternatives=alternatives,
     )
     for event in run_match(request, default_registry()):
         if isinstance(event, Finished):

@@ -39,5 +39,8 @@ def sketchmatch_register_similarities() -> list[type[Similarity]]:
 def sketchmatch_register_searchers() -> list[type[Searcher]]:
     """Offer the built-in searchers."""
     from sketchmatch_builtin.searchers.easm import Easm
+    from sketchmatch_builtin.searchers.fsnn_pso import FsnnPso
+    from sketchmatch_builtin.searchers.nn import Nn
+    from sketchmatch_builtin.searchers.nn_pso import NnPso
 
-    return [Easm]
+    return [Nn, NnPso, FsnnPso, Easm]

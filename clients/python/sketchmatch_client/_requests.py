@@ -37,6 +37,9 @@ class MatchOptions(TypedDict, total=False):
         Seconds, or a timedelta, after which the best match so far is the result.
     weights
         Weights of similarity, rotation and dilation in ζ. Left out: 1, 1, 1.
+    alternatives
+        How many of the next best object maps the result shall hold. Left out: 3, or as many as
+        there are.
     """
 
     sketch_segmenter: str | None
@@ -48,6 +51,7 @@ class MatchOptions(TypedDict, total=False):
     seed: int | None
     time_budget: float | timedelta | None
     weights: tuple[float, float, float] | None
+    alternatives: int | None
 
 
 def match_request(
@@ -58,6 +62,7 @@ def match_request(
     seed: int | None = None,
     time_budget: float | timedelta | None = None,
     weights: tuple[float, float, float] | None = None,
+    alternatives: int | None = None,
     **names: str | None,
 ) -> MatchRequest:
     """Return the request for a match; see :class:`MatchOptions`.
@@ -82,6 +87,9 @@ def match_request(
             request.weights.CopyFrom(
                 ConfidenceWeights(similarity=similarity, rotation=rotation, dilation=dilation)
             )
+    if alternatives is not None:
+        with refused_as("INVALID_FIELD", "alternatives", "is not a whole number from 0 to 100"):
+            request.alternatives = alternatives
     return request
 
 

@@ -35,10 +35,16 @@ class MatchProblem:
         most as many objects as the argument.
     weights
         Weights of the three parts of ζ.
+    alternatives
+        How many object maps beside the best the caller wants to see.
+    time_budget
+        Seconds left for the search, or None for no limit; the host stops the search by then.
     """
 
     table: RelationTable
     weights: Weights = (1.0, 1.0, 1.0)
+    alternatives: int = 0
+    time_budget: float | None = None
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,11 @@ class SearchProgress:
         FMAPs evaluated.
     upper_bound
         A ζ that no legal FMAP exceeds, or None where the searcher proves nothing.
+    alternatives
+        Good legal FMAPs beside the best, in any order; the host picks the best of them that lead
+        to other object maps. Only those of the last progress count.
+    note
+        One sentence on what the searcher did, where there is something to say.
     """
 
     fmap: Fmap
@@ -64,6 +75,8 @@ class SearchProgress:
     iteration: int
     evaluations: int
     upper_bound: float | None = None
+    alternatives: tuple[Fmap, ...] = ()
+    note: str = ""
 
 
 class Searcher(Algorithm, ABC):

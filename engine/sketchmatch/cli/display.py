@@ -32,6 +32,8 @@ _PHASES = {
     match_pb2.PHASE_RELATE: "comparing relations",
     match_pb2.PHASE_SEARCH: "searching",
 }
+# A margin in ζ below this is within what a wobbling outline changes.
+_AMBIGUOUS = 0.005
 _OUTCOMES = {
     match_pb2.OUTCOME_CONVERGED: "converged",
     match_pb2.OUTCOME_OPTIMAL: "proved optimal",
@@ -127,6 +129,7 @@ def _match_table(match: Match) -> RenderableType:
     table.add_column("label")
     table.add_column("confidence", justify="right")
     table.add_column("", width=12)
+    table.add_column("margin", justify="right")
     for line in result.object_matches:
         table.add_row(
             str(line.sketch_object + 1),
@@ -135,6 +138,7 @@ def _match_table(match: Match) -> RenderableType:
             line.map_label,
             f"{line.confidence:.3f}",
             ProgressBar(total=1.0, completed=line.confidence, width=12),
+            _margin(line),
         )
     parts = result.fmap_confidence
     summary = "  ".join(f"{name} {value}" for name, value in facts(result))
@@ -142,7 +146,29 @@ def _match_table(match: Match) -> RenderableType:
         f"ζ {parts.total:.3f} of relations {parts.similarity:.3f}, "
         f"rotations {parts.rotation:.3f}, dilations {parts.dilation:.3f}"
     )
-    return Group(table, Text(summary), Text(detail), Text(_effort(result)))
+    lines = [summary, detail, _effort(result), *filter(None, [result.search_note])]
+    return Group(table, *map(Text, lines), *_alternatives(result))
+
+
+def _margin(line: match_pb2.ObjectMatch) -> Text:
+    """Return by how much ζ falls with another partner, loud where the two are as good."""
+    if not line.HasField("margin"):
+        return Text("")
+    return Text(f"{line.margin:.3f}", style="bold red" if line.margin < _AMBIGUOUS else "")
+
+
+def _alternatives(result: match_pb2.MatchResult) -> list[Text]:
+    """Say what else it could be: only the objects that another map maps otherwise."""
+    best = {line.sketch_object: line.map_object for line in result.object_matches}
+    lines = []
+    for other in result.alternatives:
+        changes = "  ".join(
+            f"{line.sketch_object + 1}→{line.map_object + 1}"
+            for line in other.object_matches
+            if best.get(line.sketch_object) != line.map_object
+        )
+        lines.append(Text(f"else ζ {other.fmap_confidence.total:.3f}: {changes}", style="dim"))
+    return lines
 
 
 def _headline(match: Match) -> str:

@@ -40,6 +40,7 @@ def match_events(
         seed=settings.seed,
         time_budget=settings.time_budget,
         weights=settings.weights,
+        alternatives=settings.alternatives,
     )
     writer = responses.ResponseWriter(request)
     with announcing_compilation(say):

@@ -39,6 +39,9 @@ def match(
     weights: Annotated[
         str, typer.Option(metavar="W1,W2,W3", help="Weights of ζσ, ζR and ζL in ζ.")
     ] = "1,1,1",
+    alternatives: Annotated[
+        int | None, typer.Option(metavar="K", help="How many of the next best maps; 3 by default.")
+    ] = None,
     json: Json = False,
     overlay: Overlay = None,
 ) -> None:
@@ -65,6 +68,7 @@ def match(
         seed=seed,
         time_budget=time_budget,
         weights=_weights(weights),
+        alternatives=alternatives,
     )
     with places.places_in(sketch=sketch, map=map_):
         answer = display.watch(_events(server, sketch, map_, how))

@@ -48,7 +48,7 @@ class MatchSettings:
         Algorithm by stage; empty for the default.
     params
         Parameters by stage, where some were set.
-    seed, time_budget, weights
+    seed, time_budget, weights, alternatives
         As in :class:`sketchmatch.pipeline.match.MatchRequest`.
     """
 
@@ -57,6 +57,7 @@ class MatchSettings:
     seed: int = 0
     time_budget: float | None = None
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    alternatives: int | None = None
 
 
 def parse_settings(settings: Iterable[str] | None) -> dict[str, dict[str, Any]]:

@@ -36,6 +36,7 @@ def match_events(
             seed=settings.seed,
             time_budget=settings.time_budget,
             weights=settings.weights,
+            alternatives=settings.alternatives,
         )
 
 

@@ -25,6 +25,7 @@ from sketchmatch.api import (
 )
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, Reason
 from sketchmatch.model import (
+    FloatArray,
     Fmap,
     ObjectMap,
     RelationTable,
@@ -34,6 +35,7 @@ from sketchmatch.model import (
     object_pairs,
     pair_count,
 )
+from sketchmatch.pipeline.alternatives import best_others, exchange_confidences, partner_margins
 from sketchmatch.pipeline.correspond import (
     fmap_confidence,
     global_dilation,
@@ -44,7 +46,13 @@ from sketchmatch.pipeline.correspond import (
 from sketchmatch.pipeline.describe import describe
 from sketchmatch.pipeline.plugins import blaming, checked_progress, segmented
 from sketchmatch.pipeline.relate import relate
-from sketchmatch.pipeline.result import Correspondence, MatchResult, ObjectMatch, Statistics
+from sketchmatch.pipeline.result import (
+    AlternativeMap,
+    Correspondence,
+    MatchResult,
+    ObjectMatch,
+    Statistics,
+)
 from sketchmatch.pipeline.selection import Pipeline, Selection, resolve
 from sketchmatch.registry import Registry
 
@@ -62,6 +70,8 @@ __all__ = [
 _PROGRESS_EVERY = 0.05
 _MAX_SEED = 2**64 - 1
 _MAX_WEIGHT = 1e6
+_MAX_ALTERNATIVES = 100
+_ALTERNATIVES = 3
 # What 2 GB hold: 100 × 100 objects, and the histograms of 700 objects in 180 directions.
 _MAX_COMPARISONS = 30_000_000
 _MAX_HISTOGRAM_VALUES = 50_000_000
@@ -93,6 +103,9 @@ class MatchRequest:
         Seconds after which the best answer so far is given, or None for no limit.
     weights
         Of ζσ, ζR and ζL in ζ.
+    alternatives
+        How many of the next best object maps the result shall hold; None for 3, or as many as
+        there are.
     """
 
     sketch: Source | Scene
@@ -101,6 +114,7 @@ class MatchRequest:
     seed: int = 0
     time_budget: float | None = None
     weights: Weights = (1.0, 1.0, 1.0)
+    alternatives: int | None = None
 
     def __post_init__(self) -> None:
         if not (isinstance(self.seed, int) and 0 <= self.seed <= _MAX_SEED):
@@ -127,6 +141,12 @@ class MatchRequest:
                     f"weights.{name}",
                     f"is {weight:g}; give a number from 0 to {_MAX_WEIGHT:g}",
                 )
+        if self.alternatives is not None and not 0 <= self.alternatives <= _MAX_ALTERNATIVES:
+            raise InvalidInputError(
+                Reason.INVALID_FIELD,
+                "alternatives",
+                f"is {self.alternatives}; give a number from 0 to {_MAX_ALTERNATIVES}",
+            )
         if sum(self.weights) == 0:
             raise InvalidInputError(
                 Reason.INVALID_FIELD, "weights", "are all zero; give at least one above zero"
@@ -241,6 +261,7 @@ class _Match:
             map_ = self.segmented("map", self.request.map, self.pipeline.map_segmenter)
         _check_size(sketch.scene, map_.scene, self.pipeline)
         yield Segmented(sketch, map_)
+        count = _alternatives_wanted(self.request.alternatives, sketch.scene, map_.scene)
         exchanged = len(sketch.scene) > len(map_.scene)
         scenes = (sketch.scene, map_.scene)
         template, argument = reversed(scenes) if exchanged else scenes
@@ -254,8 +275,8 @@ class _Match:
             comparing = relate(first, second, similarity)
             table = yield from self.watched(Phase.RELATE, similarity, comparing)
         with self.timed("search"):
-            found, outcome = yield from self.search(table, exchanged)
-        yield Finished(self.result(sketch, map_, table, exchanged, found, outcome))
+            found, outcome = yield from self.search(table, exchanged, count)
+        yield Finished(self.result(sketch, map_, table, exchanged, found, outcome, count))
 
     def segmented(
         self, side: str, source: Source | Scene, segmenter: Segmenter | None
@@ -281,11 +302,13 @@ class _Match:
                 yield Progress(phase, self.reported - self.started, fraction)
 
     def search(
-        self, table: RelationTable, exchanged: bool
+        self, table: RelationTable, exchanged: bool, count: int
     ) -> Generator[MatchEvent, None, tuple[SearchProgress, Outcome]]:
         """Run the searcher until it ends or the time budget does."""
         searcher = self.pipeline.searcher
-        problem = MatchProblem(table, self.request.weights)
+        budget = self.request.time_budget
+        left = None if budget is None else max(0.0, budget - self.elapsed())
+        problem = MatchProblem(table, self.request.weights, count, left)
         best: SearchProgress | None = None
         with self.searching(searcher, problem) as work:
             while True:
@@ -333,16 +356,22 @@ class _Match:
         exchanged: bool,
         found: SearchProgress,
         outcome: Outcome,
+        count: int,
     ) -> MatchResult:
         """Read what was found from sketch to map."""
+        weights = self.request.weights
         mapped = object_map(occm(found.fmap, table))
+        best = fmap_confidence(found.fmap, table, weights)
+        exchanges = exchange_confidences(mapped, table, weights)
+        others = best_others(mapped, found.alternatives, exchanges, table, weights, count)
+        margins = partner_margins(mapped, best.total, others, exchanges)
         rotation = global_rotation(found.fmap, table)
         dilation = global_dilation(found.fmap, table)
         self.seconds["total"] = self.elapsed()
         return MatchResult(
-            matches=_matches(mapped, exchanged),
+            matches=_matches(mapped, exchanged, margins),
             omap_confidence=mapped.confidence,
-            confidence=fmap_confidence(found.fmap, table, self.request.weights),
+            confidence=best,
             fmap=_correspondences(found.fmap, table, exchanged),
             rotation=_half_turned(-rotation if exchanged else rotation),
             scale=1.0 / dilation if exchanged else dilation,
@@ -359,6 +388,13 @@ class _Match:
                 *(f"sketch: {warning}" for warning in sketch.warnings),
                 *(f"map: {warning}" for warning in map_.warnings),
             ),
+            alternatives=tuple(
+                AlternativeMap(
+                    _matches(other.mapped, exchanged), other.confidence, other.mapped.confidence
+                )
+                for other in others
+            ),
+            search_note=found.note,
         )
 
     def elapsed(self) -> float:
@@ -413,11 +449,30 @@ def _check_size(sketch: Scene, map_: Scene, pipeline: Pipeline) -> None:
         )
 
 
-def _matches(mapped: ObjectMap, exchanged: bool) -> tuple[ObjectMatch, ...]:
-    pairs = zip(mapped.partners.tolist(), mapped.confidences.tolist(), strict=True)
+def _alternatives_wanted(requested: int | None, sketch: Scene, map_: Scene) -> int:
+    """Return how many object maps beside the best there shall be."""
+    few, many = sorted((len(sketch), len(map_)))
+    there_are = math.perm(many, few) - 1
+    if requested is None:
+        return min(_ALTERNATIVES, there_are)
+    if requested > there_are:
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "alternatives",
+            f"is {requested}, but {few} objects in {many} have {there_are} other maps; "
+            "ask for no more",
+        )
+    return requested
+
+
+def _matches(
+    mapped: ObjectMap, exchanged: bool, margins: FloatArray | None = None
+) -> tuple[ObjectMatch, ...]:
+    known = [None] * len(mapped.partners) if margins is None else margins.tolist()
+    lines = zip(mapped.partners.tolist(), mapped.confidences.tolist(), known, strict=True)
     read = (
-        ObjectMatch(h, g, confidence) if exchanged else ObjectMatch(g, h, confidence)
-        for g, (h, confidence) in enumerate(pairs)
+        ObjectMatch(h if exchanged else g, g if exchanged else h, confidence, margin)
+        for g, (h, confidence, margin) in enumerate(lines)
     )
     return tuple(sorted(read, key=lambda match: match.sketch_object))
 

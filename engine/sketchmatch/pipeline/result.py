@@ -8,16 +8,42 @@ from dataclasses import dataclass
 from sketchmatch.api import Outcome
 from sketchmatch.model import Confidence, Scene
 
-__all__ = ["Correspondence", "MatchResult", "ObjectMatch", "Statistics"]
+__all__ = ["AlternativeMap", "Correspondence", "MatchResult", "ObjectMatch", "Statistics"]
 
 
 @dataclass(frozen=True)
 class ObjectMatch:
-    """One sketched object, the mapped object that it is, and how sure that is, 0 … 1."""
+    """One sketched object and the mapped object that it is.
+
+    Attributes
+    ----------
+    sketch_object, map_object
+        Indices from 0.
+    confidence
+        How much of the evidence speaks for it, within [0, 1].
+    margin
+        By how much ζ falls if the sketched object takes its best other partner, in one exchange
+        or in one of the alternatives; about 0 where it is ambiguous, None where unknown.
+    """
 
     sketch_object: int
     map_object: int
     confidence: float
+    margin: float | None = None
+
+
+@dataclass(frozen=True)
+class AlternativeMap:
+    """An object map that is not the best, with ζ of its FMAP and Ω."""
+
+    matches: tuple[ObjectMatch, ...]
+    confidence: Confidence
+    omap_confidence: float
+
+    @property
+    def object_map(self) -> dict[int, int]:
+        """Sketch index → map index, from 0."""
+        return {match.sketch_object: match.map_object for match in self.matches}
 
 
 @dataclass(frozen=True)
@@ -92,6 +118,10 @@ class MatchResult:
         The scenes that were matched.
     warnings
         What segmentation left out or decided, each naming its side.
+    alternatives
+        The next best object maps that were found, the highest ζ first.
+    search_note
+        What the searcher says of what it did, or empty.
     """
 
     matches: tuple[ObjectMatch, ...]
@@ -108,6 +138,8 @@ class MatchResult:
     sketch: Scene
     map: Scene
     warnings: tuple[str, ...] = ()
+    alternatives: tuple[AlternativeMap, ...] = ()
+    search_note: str = ""
 
     @property
     def object_map(self) -> dict[int, int]:

@@ -10,7 +10,8 @@ import numpy as np
 
 from sketchmatch.kernels._jit import on_compile
 from sketchmatch.model import Fmap, SceneDescriptor
-from sketchmatch.pipeline.correspond import fmap_confidence
+from sketchmatch.pipeline.alternatives import exchange_confidences
+from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
 from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.selection import resolve
 from sketchmatch.pipeline.slices import finish
@@ -51,7 +52,9 @@ def warm_up(registry: Registry, unwanted: Callable[[], bool] = lambda: False) ->
     pipeline = resolve(registry, {})
     one = SceneDescriptor(np.array([[1.0, 0.0, 0.0, 0.0]]), 2, 0.0)
     table = finish(relate(one, one, pipeline.similarity))
-    fmap_confidence(Fmap(np.array([0])), table)
+    fmap = Fmap(np.array([0]))
+    fmap_confidence(fmap, table)
+    exchange_confidences(object_map(occm(fmap, table)), table, (1.0, 1.0, 1.0))
     for item in registry.algorithms:
         if unwanted():
             return

@@ -58,6 +58,7 @@ def match_request(
             weights.rotation if weights.HasField("rotation") else 1.0,
             weights.dilation if weights.HasField("dilation") else 1.0,
         ),
+        alternatives=request.alternatives if request.HasField("alternatives") else None,
     )
 
 

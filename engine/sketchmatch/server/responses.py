@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from google.protobuf.duration_pb2 import Duration
 
 from sketchmatch.api import Algorithm, Segmentation, Segmenter
-from sketchmatch.model import Image, OccupancyGrid, PolygonSet, Scene, StrokeSet
+from sketchmatch.model import Confidence, Image, OccupancyGrid, PolygonSet, Scene, StrokeSet
 from sketchmatch.pipeline.match import (
     Accepted,
     Finished,
@@ -106,12 +106,7 @@ def result(value: MatchResult) -> match_pb2.MatchResult:
         unmatched_sketch_objects=value.unmatched_sketch_objects,
         unmatched_map_objects=value.unmatched_map_objects,
         omap_confidence=value.omap_confidence,
-        fmap_confidence=match_pb2.FmapConfidence(
-            total=value.confidence.total,
-            similarity=value.confidence.similarity,
-            rotation=value.confidence.rotation,
-            dilation=value.confidence.dilation,
-        ),
+        fmap_confidence=_fmap_confidence(value.confidence),
         upper_bound=value.upper_bound,
         fmap_entries=[_entry(entry) for entry in value.fmap],
         rotation_radians=value.rotation,
@@ -121,6 +116,17 @@ def result(value: MatchResult) -> match_pb2.MatchResult:
             evaluations=value.statistics.evaluations,
             **{f"{stage}_elapsed": _duration(spent) for stage, spent in seconds.items()},
         ),
+        alternatives=[
+            match_pb2.AlternativeMap(
+                object_matches=_object_matches(
+                    other.matches, value.sketch.labels, value.map.labels
+                ),
+                fmap_confidence=_fmap_confidence(other.confidence),
+                omap_confidence=other.omap_confidence,
+            )
+            for other in value.alternatives
+        ],
+        search_note=value.search_note,
     )
 
 
@@ -183,9 +189,19 @@ def _object_matches(
             sketch_label=sketch_labels[match.sketch_object],
             map_label=map_labels[match.map_object],
             confidence=match.confidence,
+            margin=match.margin,
         )
         for match in matches
     ]
+
+
+def _fmap_confidence(confidence: Confidence) -> match_pb2.FmapConfidence:
+    return match_pb2.FmapConfidence(
+        total=confidence.total,
+        similarity=confidence.similarity,
+        rotation=confidence.rotation,
+        dilation=confidence.dilation,
+    )
 
 
 def _entry(entry: Correspondence) -> match_pb2.FmapEntry:

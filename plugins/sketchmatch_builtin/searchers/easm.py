@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
@@ -120,7 +120,11 @@ class Easm(Searcher):
             best = float(state.fitness[0])
             if stale == params.patience:
                 break
-        yield self._progress(problem, state, generation, evaluations)
+        last_progress = self._progress(problem, state, generation, evaluations)
+        # Several FMAPs may lead to one object map, so there are more than are wanted.
+        others = state.population[1 : 1 + 4 * problem.alternatives]
+        alternatives = tuple(self._fmap(other, problem) for other in others)
+        yield replace(last_progress, alternatives=alternatives)
         return Outcome.CONVERGED if stale == params.patience else Outcome.ITERATION_LIMIT
 
     def _state(self, problem: MatchProblem, rng: np.random.Generator) -> _State:
@@ -162,12 +166,12 @@ class Easm(Searcher):
     def _progress(
         self, problem: MatchProblem, state: _State, generation: int, evaluations: int
     ) -> SearchProgress:
-        fmap = self._fmap(state.population[0].copy(), problem)
+        fmap = self._fmap(state.population[0], problem)
         return SearchProgress(fmap, float(state.fitness[0]), generation, evaluations)
 
     def _fmap(self, individual: IntArray, problem: MatchProblem) -> Fmap:
         if self.params.consistency == "pairwise":
-            return Fmap(individual)
+            return Fmap(individual.copy())
         return Fmap.from_object_map(individual, problem.table.argument_objects)
 
 

@@ -282,6 +282,8 @@ class MatchResult(google.protobuf.message.Message):
     ROTATION_RADIANS_FIELD_NUMBER: builtins.int
     SCALE_FIELD_NUMBER: builtins.int
     STATISTICS_FIELD_NUMBER: builtins.int
+    ALTERNATIVES_FIELD_NUMBER: builtins.int
+    SEARCH_NOTE_FIELD_NUMBER: builtins.int
     match_id: builtins.str
     """Name of the match, as in `MatchAccepted`."""
     seed: builtins.int
@@ -300,6 +302,8 @@ class MatchResult(google.protobuf.message.Message):
     """Factor by which the sketch as a whole grows to the size of the map: units of the map for a
     unit of the sketch.
     """
+    search_note: builtins.str
+    """One sentence on what the searcher did, where it has something to say."""
     @property
     def object_matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectMatch]:
         """The object map: which sketched object is which mapped object, in the order of the sketch."""
@@ -326,6 +330,12 @@ class MatchResult(google.protobuf.message.Message):
     def statistics(self) -> global___MatchStatistics:
         """What the match cost."""
 
+    @property
+    def alternatives(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___AlternativeMap]:
+        """The next best object maps that were found, the highest ζ first. Where one of them comes close to
+        the best, the sketch does not tell the two apart.
+        """
+
     def __init__(
         self,
         *,
@@ -342,12 +352,45 @@ class MatchResult(google.protobuf.message.Message):
         rotation_radians: builtins.float = ...,
         scale: builtins.float = ...,
         statistics: global___MatchStatistics | None = ...,
+        alternatives: collections.abc.Iterable[global___AlternativeMap] | None = ...,
+        search_note: builtins.str = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["_upper_bound", b"_upper_bound", "fmap_confidence", b"fmap_confidence", "statistics", b"statistics", "upper_bound", b"upper_bound"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_upper_bound", b"_upper_bound", "fmap_confidence", b"fmap_confidence", "fmap_entries", b"fmap_entries", "match_id", b"match_id", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence", "outcome", b"outcome", "rotation_radians", b"rotation_radians", "scale", b"scale", "seed", b"seed", "statistics", b"statistics", "unmatched_map_objects", b"unmatched_map_objects", "unmatched_sketch_objects", b"unmatched_sketch_objects", "upper_bound", b"upper_bound"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["_upper_bound", b"_upper_bound", "alternatives", b"alternatives", "fmap_confidence", b"fmap_confidence", "fmap_entries", b"fmap_entries", "match_id", b"match_id", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence", "outcome", b"outcome", "rotation_radians", b"rotation_radians", "scale", b"scale", "search_note", b"search_note", "seed", b"seed", "statistics", b"statistics", "unmatched_map_objects", b"unmatched_map_objects", "unmatched_sketch_objects", b"unmatched_sketch_objects", "upper_bound", b"upper_bound"]) -> None: ...
     def WhichOneof(self, oneof_group: typing.Literal["_upper_bound", b"_upper_bound"]) -> typing.Literal["upper_bound"] | None: ...
 
 global___MatchResult = MatchResult
+
+@typing.final
+class AlternativeMap(google.protobuf.message.Message):
+    """An object map that is not the best."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    OBJECT_MATCHES_FIELD_NUMBER: builtins.int
+    FMAP_CONFIDENCE_FIELD_NUMBER: builtins.int
+    OMAP_CONFIDENCE_FIELD_NUMBER: builtins.int
+    omap_confidence: builtins.float
+    """Ω, the mean confidence of the object map."""
+    @property
+    def object_matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectMatch]:
+        """The object map, in the order of the sketch; without margins."""
+
+    @property
+    def fmap_confidence(self) -> global___FmapConfidence:
+        """ζ of its histogram map, and its parts."""
+
+    def __init__(
+        self,
+        *,
+        object_matches: collections.abc.Iterable[global___ObjectMatch] | None = ...,
+        fmap_confidence: global___FmapConfidence | None = ...,
+        omap_confidence: builtins.float = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["fmap_confidence", b"fmap_confidence"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["fmap_confidence", b"fmap_confidence", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence"]) -> None: ...
+
+global___AlternativeMap = AlternativeMap
 
 @typing.final
 class ObjectMatch(google.protobuf.message.Message):
@@ -360,6 +403,7 @@ class ObjectMatch(google.protobuf.message.Message):
     SKETCH_LABEL_FIELD_NUMBER: builtins.int
     MAP_LABEL_FIELD_NUMBER: builtins.int
     CONFIDENCE_FIELD_NUMBER: builtins.int
+    MARGIN_FIELD_NUMBER: builtins.int
     sketch_object: builtins.int
     """Index in the sketch's scene, from 0."""
     map_object: builtins.int
@@ -370,6 +414,11 @@ class ObjectMatch(google.protobuf.message.Message):
     """Label of the mapped object; empty if it has none."""
     confidence: builtins.float
     """How much of the evidence speaks for this line, within [0, 1]."""
+    margin: builtins.float
+    """By how much ζ falls if the sketched object takes its best other partner, in one exchange or in
+    one of the alternatives. About 0: it could be either. Less than 0: the search ended too early.
+    Absent during the search, and where there are too many objects to try.
+    """
     def __init__(
         self,
         *,
@@ -378,8 +427,11 @@ class ObjectMatch(google.protobuf.message.Message):
         sketch_label: builtins.str = ...,
         map_label: builtins.str = ...,
         confidence: builtins.float = ...,
+        margin: builtins.float | None = ...,
     ) -> None: ...
-    def ClearField(self, field_name: typing.Literal["confidence", b"confidence", "map_label", b"map_label", "map_object", b"map_object", "sketch_label", b"sketch_label", "sketch_object", b"sketch_object"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_margin", b"_margin", "margin", b"margin"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_margin", b"_margin", "confidence", b"confidence", "map_label", b"map_label", "map_object", b"map_object", "margin", b"margin", "sketch_label", b"sketch_label", "sketch_object", b"sketch_object"]) -> None: ...
+    def WhichOneof(self, oneof_group: typing.Literal["_margin", b"_margin"]) -> typing.Literal["margin"] | None: ...
 
 global___ObjectMatch = ObjectMatch
 

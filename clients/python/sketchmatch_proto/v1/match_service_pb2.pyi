@@ -26,8 +26,13 @@ class MatchRequest(google.protobuf.message.Message):
     SEED_FIELD_NUMBER: builtins.int
     TIME_BUDGET_FIELD_NUMBER: builtins.int
     WEIGHTS_FIELD_NUMBER: builtins.int
+    ALTERNATIVES_FIELD_NUMBER: builtins.int
     seed: builtins.int
     """Seed of everything random: the same request with the same seed gives the same result. Absent: 0."""
+    alternatives: builtins.int
+    """How many of the next best object maps the result shall hold, at most 100 and no more than there
+    are. Absent: 3, or as many as there are.
+    """
     @property
     def sketch(self) -> sketchmatch_proto.v1.source_pb2.Source:
         """What the person drew. Required. It may have fewer or more objects than the map."""
@@ -59,9 +64,13 @@ class MatchRequest(google.protobuf.message.Message):
         seed: builtins.int | None = ...,
         time_budget: google.protobuf.duration_pb2.Duration | None = ...,
         weights: sketchmatch_proto.v1.match_pb2.ConfidenceWeights | None = ...,
+        alternatives: builtins.int | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_seed", b"_seed", "map", b"map", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "time_budget", b"time_budget", "weights", b"weights"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_seed", b"_seed", "map", b"map", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "time_budget", b"time_budget", "weights", b"weights"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_alternatives", b"_alternatives", "_seed", b"_seed", "alternatives", b"alternatives", "map", b"map", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "time_budget", b"time_budget", "weights", b"weights"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_alternatives", b"_alternatives", "_seed", b"_seed", "alternatives", b"alternatives", "map", b"map", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "time_budget", b"time_budget", "weights", b"weights"]) -> None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_alternatives", b"_alternatives"]) -> typing.Literal["alternatives"] | None: ...
+    @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_seed", b"_seed"]) -> typing.Literal["seed"] | None: ...
 
 global___MatchRequest = MatchRequest

@@ -1,0 +1,72 @@
+"""The nearest neighbour approach."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+from pydantic import Field
+
+from sketchmatch.api import MatchProblem, Outcome, Params, Searcher, SearchProgress
+from sketchmatch.model import RelationTable
+from sketchmatch_builtin.searchers._growers import (
+    Found,
+    NnGrower,
+    Slices,
+    random_entries,
+    random_seed_point,
+    read_features,
+    reported,
+)
+
+__all__ = ["Nn"]
+
+
+class Nn(Searcher):
+    """Grows one FMAP from each of several random seed points and keeps the best.
+
+    Histogram correspondences enter the FMAP in the order of their Euclidean distance from the
+    seed point in (σ̂, R̂, L̂), unless they conflict with one that is in it: it is one-to-one and
+    holds no histogram beside its dual, but need not lead to a consistent object map. A random
+    FMAP is what the search begins with.
+
+    Source: thesis, section 3.5, after Sjahputera and Keller (2005). The thesis leaves the number
+    of seed points open.
+    """
+
+    name = "nn"
+    summary = "Nearest neighbours of random seed points (the thesis's baseline)."
+
+    class Params(Params):
+        """How often it tries."""
+
+        seed_points: int = Field(
+            1000, ge=1, le=10_000_000, description="Number of random seed points."
+        )
+
+    params: Params
+
+    @classmethod
+    def warm_up(cls) -> None:
+        """Compile the kernels."""
+        one = np.ones((1, 1))
+        problem = MatchProblem(RelationTable(one, one, one, 2, 2))
+        list(cls(cls.Params(seed_points=1)).search(problem, np.random.default_rng(0)))
+
+    def search(
+        self, problem: MatchProblem, rng: np.random.Generator
+    ) -> Generator[SearchProgress, None, Outcome]:
+        """Grow an FMAP from each seed point."""
+        found = Found(problem)
+        found.offer(random_entries(problem.table, rng))
+        return (yield from reported(self._grow_all(problem, found, rng), found))
+
+    def _grow_all(
+        self, problem: MatchProblem, found: Found, rng: np.random.Generator
+    ) -> Slices[Outcome]:
+        grower = NnGrower((yield from read_features(problem.table)), found)
+        for iteration in range(1, self.params.seed_points + 1):
+            yield from grower.grow(random_seed_point(rng))
+            found.iteration = iteration
+            yield
+        return Outcome.ITERATION_LIMIT

@@ -1,0 +1,61 @@
+"""The nearest neighbour approach, its seed points chosen by a particle swarm."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+
+from sketchmatch.api import MatchProblem, Outcome, Searcher, SearchProgress
+from sketchmatch.model import RelationTable
+from sketchmatch_builtin.searchers._growers import (
+    Found,
+    NnGrower,
+    Slices,
+    random_entries,
+    read_features,
+    reported,
+)
+from sketchmatch_builtin.searchers._swarm import SwarmParams, swarm
+
+__all__ = ["NnPso"]
+
+
+class NnPso(Searcher):
+    """Lets a particle swarm choose the seed points from which ``nn`` grows FMAPs.
+
+    The swarm has a star neighbourhood and ζ as its fitness. A random FMAP is what the search
+    begins with.
+
+    Source: thesis, sections 3.5 and 3.7.1, after Sjahputera and Keller (2005).
+    """
+
+    name = "nn-pso"
+    summary = "Particle swarm over seed points, FMAPs grown by distance."
+
+    class Params(SwarmParams):
+        """Parameters of the swarm; the thesis leaves particles, c1, c2 and iterations open."""
+
+    params: Params
+
+    @classmethod
+    def warm_up(cls) -> None:
+        """Compile the kernels."""
+        one = np.ones((1, 1))
+        problem = MatchProblem(RelationTable(one, one, one, 2, 2))
+        params = cls.Params(particles=2, iterations=1)
+        list(cls(params).search(problem, np.random.default_rng(0)))
+
+    def search(
+        self, problem: MatchProblem, rng: np.random.Generator
+    ) -> Generator[SearchProgress, None, Outcome]:
+        """Move the swarm until nothing better was found for ``patience`` iterations."""
+        found = Found(problem)
+        found.offer(random_entries(problem.table, rng))
+        return (yield from reported(self._fly(problem, found, rng), found))
+
+    def _fly(
+        self, problem: MatchProblem, found: Found, rng: np.random.Generator
+    ) -> Slices[Outcome]:
+        grower = NnGrower((yield from read_features(problem.table)), found)
+        return (yield from swarm(grower, self.params, found, rng))

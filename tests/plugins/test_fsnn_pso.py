@@ -1,0 +1,172 @@
+"""The ``fsnn-pso`` searcher: FMAPs that grow by fuzzy closeness."""
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sketchmatch.api import MatchProblem
+from sketchmatch.model import RelationTable
+from sketchmatch.pipeline.describe import describe
+from sketchmatch.pipeline.relate import relate
+from sketchmatch.pipeline.slices import finish
+from sketchmatch.testing import simulate_sketch
+from sketchmatch_builtin.histograms.constant import ConstantForce
+from sketchmatch_builtin.searchers._growers import (
+    Found,
+    FsnnGrower,
+    fit_membership,
+    random_seed_point,
+    read_features,
+)
+from sketchmatch_builtin.searchers.fsnn_pso import FsnnPso
+from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+from tests.oracle import maps, neighbours
+from tests.strategies import random_scene, random_table, tables
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _warm():
+    # On a new machine the kernels compile here, and not while a test measures time.
+    FsnnPso.warm_up()
+
+
+def table_of_a_sketch(seed, drawn, there):
+    rng = np.random.default_rng(seed)
+    scene = random_scene(rng, there)
+    sketch = simulate_sketch(scene, rng, objects=rng.permutation(there)[:drawn].tolist())
+    first, second = (finish(describe(each, ConstantForce())) for each in (sketch.scene, scene))
+    return finish(relate(first, second, CrossCorrelation()))
+
+
+def membership(table, alpha=10.0, k=1.0, seed=0, **options):
+    features = finish(read_features(table))
+    return finish(fit_membership(features, alpha, k, np.random.default_rng(seed), **options))
+
+
+def mean_and_variance(table, **options):
+    fitted = membership(table, **options)
+    variance = 10.0 / fitted.steepness
+    return fitted.centre + variance, variance
+
+
+def grower(table, alpha=10.0, k=1.0, **options):
+    found = Found(MatchProblem(table))
+    features = finish(read_features(table))
+    return FsnnGrower(features, membership(table, alpha, k), found, **options), found
+
+
+def grown(table, seed, **options):
+    grows, found = grower(table, **options)
+    finish(grows.grow(seed))
+    return found.progress().fmap.entries.tolist()
+
+
+@given(tables(most=4, more=1), st.integers(0, 2**32), st.sampled_from([(10, 1), (3, 0.5), (20, 2)]))
+@settings(deadline=None, max_examples=30)
+def test_it_grows_as_the_thesis_says(table, seed, shape):
+    point = random_seed_point(np.random.default_rng(seed))
+    alpha, k = shape
+    expected = neighbours.grow_fuzzy(table, point, alpha, k)
+    assert grown(table, point, alpha=alpha, k=k) == expected
+    assert grown(table, point, alpha=alpha, k=k, store_bytes=0) == expected
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("sizes", [(3, 3), (4, 4), (3, 5), (2, 4)])
+def test_it_grows_as_the_thesis_says_on_scenes(seed, sizes):
+    table = table_of_a_sketch(seed, *sizes)
+    point = random_seed_point(np.random.default_rng(seed))
+    assert grown(table, point) == neighbours.grow_fuzzy(table, point)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_closeness_that_a_float_takes_for_1_is_told_apart(seed):
+    wide = random_table(np.random.default_rng(seed), 4, 4)
+    # Small distances have a far smaller variance, so μ_close is steep.
+    table = RelationTable(
+        0.8 + 0.1 * wide.similarity,
+        np.pi / 2 + 0.05 * (wide.rotation - np.pi),
+        wide.dilation**0.08,
+        4,
+        4,
+    )
+    fitted = membership(table)
+    assert fitted.steepness * fitted.centre > 60, "1 − μ(0) is far below the last digit of 1"
+    point = random_seed_point(np.random.default_rng(seed))
+    assert grown(table, point) == neighbours.grow_fuzzy(table, point)
+
+
+@given(tables(least=3, most=4, more=1))
+@settings(deadline=None, max_examples=20)
+def test_mean_and_variance_are_those_of_all_compatible_vectors(table):
+    assert mean_and_variance(table) == pytest.approx(neighbours.mean_and_variance(table), rel=1e-9)
+
+
+@pytest.mark.parametrize("sizes", [(3, 40), (12, 12)])
+def test_a_sample_estimates_mean_and_variance(sizes):
+    table = random_table(np.random.default_rng(1), *sizes)
+    exact = mean_and_variance(table)
+    sampled = mean_and_variance(table, exact_pairs=0)
+    assert sampled == pytest.approx(exact, rel=0.01)
+    assert sampled != exact
+    assert sampled == mean_and_variance(table, exact_pairs=0), "the same seed, the same sample"
+
+
+def test_slices_and_stored_closeness_do_not_change_what_grows():
+    table = random_table(np.random.default_rng(5), 6, 7)
+    usual, found = grower(table)
+    options = [{"budget": 1}, {"budget": 3000}, {"store_bytes": 0}, {"store_bytes": 200_000}]
+    variants = [grower(table, **each) for each in options]
+    for seed in range(20):
+        point = random_seed_point(np.random.default_rng(seed))
+        confidence = finish(usual.grow(point))
+        for other, _ in variants:
+            assert finish(other.grow(point)) == confidence
+    for _, other in variants:
+        assert other.evaluations == found.evaluations
+
+
+def test_an_fmap_grows_from_a_first_vector_once():
+    table = random_table(np.random.default_rng(5), 4, 5)
+    grows, found = grower(table)
+    rng = np.random.default_rng(0)
+    for _ in range(500):
+        finish(grows.grow(random_seed_point(rng)))
+    assert found.evaluations <= 6 * 20
+
+
+@pytest.mark.parametrize("shape", [(4, 5), (3, 3), (2, 2), (2, 5)])
+def test_where_all_distances_are_equal_the_lowest_index_comes_first(shape):
+    rows, columns = (n * (n - 1) // 2 for n in shape)
+    same = np.ones((rows, columns))
+    table = RelationTable(same, np.pi / 2 * same, same, *shape)
+    assert grown(table, np.array([0.3, 0.2, 0.1])) == list(range(rows))
+
+
+def test_on_small_scenes_it_finds_the_best_fmap_from_a_good_seed_point():
+    hits = 0
+    for seed in range(20):
+        table = table_of_a_sketch(seed, 3, 3)
+        best, partners = maps.best_object_map(table)
+        entries = neighbours.vectors(table)
+        pairs = {tuple(pair): j for j, pair in enumerate(_pairs(table))}
+        chosen = [pairs[pair] for pair in maps.induced(partners)]
+        grows, _ = grower(table)
+        values = [finish(grows.grow(np.array(entries[i, j]))) for i, j in enumerate(chosen)]
+        hits += max(values) >= best - 1e-9
+    assert hits >= 16
+
+
+def _pairs(table):
+    return maps.read(range(2 * table.argument_pairs), table.argument_objects)
+
+
+def test_eight_objects_take_less_than_two_seconds():
+    table = table_of_a_sketch(0, 8, 8)
+    began = time.monotonic()
+    *_, last = FsnnPso().search(MatchProblem(table), np.random.default_rng(0))
+    assert time.monotonic() - began < 2.0
+    assert last.confidence > 0.7
