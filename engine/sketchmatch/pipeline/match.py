@@ -25,16 +25,13 @@ from sketchmatch.api import (
 )
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, Reason
 from sketchmatch.model import (
-    FloatArray,
-    Fmap,
-    ObjectMap,
     RelationTable,
     Scene,
     Source,
     Weights,
-    object_pairs,
     pair_count,
 )
+from sketchmatch.pipeline import reading
 from sketchmatch.pipeline.alternatives import best_others, exchange_confidences, partner_margins
 from sketchmatch.pipeline.correspond import (
     fmap_confidence,
@@ -48,7 +45,6 @@ from sketchmatch.pipeline.plugins import blaming, checked_progress, segmented
 from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.result import (
     AlternativeMap,
-    Correspondence,
     MatchResult,
     ObjectMatch,
     Statistics,
@@ -330,7 +326,7 @@ class _Match:
                         evaluations=best.evaluations,
                         confidence=best.confidence,
                         upper_bound=best.upper_bound,
-                        matches=_matches(mapped, exchanged),
+                        matches=reading.matches(mapped, exchanged),
                     )
 
     @contextmanager
@@ -369,11 +365,11 @@ class _Match:
         dilation = global_dilation(found.fmap, table)
         self.seconds["total"] = self.elapsed()
         return MatchResult(
-            matches=_matches(mapped, exchanged, margins),
+            matches=reading.matches(mapped, exchanged, margins),
             omap_confidence=mapped.confidence,
             confidence=best,
-            fmap=_correspondences(found.fmap, table, exchanged),
-            rotation=_half_turned(-rotation if exchanged else rotation),
+            fmap=reading.correspondences(found.fmap, table, exchanged),
+            rotation=reading.half_turned(-rotation if exchanged else rotation),
             scale=1.0 / dilation if exchanged else dilation,
             outcome=outcome,
             upper_bound=found.upper_bound,
@@ -390,7 +386,9 @@ class _Match:
             ),
             alternatives=tuple(
                 AlternativeMap(
-                    _matches(other.mapped, exchanged), other.confidence, other.mapped.confidence
+                    reading.matches(other.mapped, exchanged),
+                    other.confidence,
+                    other.mapped.confidence,
                 )
                 for other in others
             ),
@@ -463,45 +461,3 @@ def _alternatives_wanted(requested: int | None, sketch: Scene, map_: Scene) -> i
             "ask for no more",
         )
     return requested
-
-
-def _matches(
-    mapped: ObjectMap, exchanged: bool, margins: FloatArray | None = None
-) -> tuple[ObjectMatch, ...]:
-    known = [None] * len(mapped.partners) if margins is None else margins.tolist()
-    lines = zip(mapped.partners.tolist(), mapped.confidences.tolist(), known, strict=True)
-    read = (
-        ObjectMatch(h if exchanged else g, g if exchanged else h, confidence, margin)
-        for g, (h, confidence, margin) in enumerate(lines)
-    )
-    return tuple(sorted(read, key=lambda match: match.sketch_object))
-
-
-def _correspondences(
-    fmap: Fmap, table: RelationTable, exchanged: bool
-) -> tuple[Correspondence, ...]:
-    half = table.argument_pairs
-    argument_pairs = object_pairs(table.argument_objects)
-    entries = []
-    for i, (a, b) in enumerate(object_pairs(table.template_objects).tolist()):
-        column = int(fmap.entries[i]) % half
-        dual = bool(fmap.entries[i] >= half)
-        c, d = argument_pairs[column].tolist()[:: -1 if dual else 1]
-        rotation = float(table.rotation[i, column]) + (math.pi if dual else 0.0)
-        dilation = float(table.dilation[i, column])
-        entries.append(
-            Correspondence(
-                sketch_pair=(c, d) if exchanged else (a, b),
-                map_pair=(a, b) if exchanged else (c, d),
-                similarity=float(table.similarity[i, column]),
-                rotation=_half_turned(-rotation if exchanged else rotation),
-                dilation=1.0 / dilation if exchanged else dilation,
-            )
-        )
-    return tuple(entries)
-
-
-def _half_turned(angle: float) -> float:
-    """Return the same angle within (−π, π]."""
-    turned = math.remainder(angle, 2.0 * math.pi)
-    return math.pi if turned == -math.pi else turned
