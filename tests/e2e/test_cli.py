@@ -26,6 +26,7 @@ from tests.processes import sketchmatch as run
 
 ROOM = (LIVING_ROOM_SKETCH, LIVING_ROOM_MAP)
 LONG = ("--set", "searcher.patience=10000000", "--set", "searcher.generations=10000000")
+LONG += ("--time-budget", "20")  # no command outlives its test, whatever fails to stop it
 ESCAPE = "\x1b"
 
 

@@ -24,6 +24,9 @@ _Answer = TypeVar("_Answer")
 ENDLESS = {"searcher": {"patience": 10_000_000, "generations": 10_000_000}}
 """Parameters with which the default searcher goes on until it is stopped."""
 
+# No search outlives its test, whatever fails to stop it.
+_LONGEST = {"max_time_budget": 20.0}
+
 
 class Host:
     """A server in the event loop that all servers of this process share.
@@ -77,7 +80,7 @@ def serving(
     *plugins: type[Algorithm], warm: bool = True, grace: float = 0.0, **limits: float
 ) -> Iterator[Host]:
     """Run a server that offers the built-in algorithms and ``plugins``."""
-    settings = ServerSettings("127.0.0.1:0", grace, Limits(**limits))
+    settings = ServerSettings("127.0.0.1:0", grace, Limits(**{**_LONGEST, **limits}))
     host = Host(registry_with(*plugins), settings)
     try:
         host.wait_until_listening()
