@@ -97,19 +97,6 @@ def scenes(draw, least=2, most=5):
     return Scene(tuple(objects))
 
 
-def random_scene(rng, objects):
-    """Return a scene of up to 16 random hexagons that lie apart."""
-    places = rng.permutation(16)[:objects]
-    outlines = []
-    for place in places:
-        angles = 2 * np.pi * (np.arange(6) + rng.uniform(0.0, 0.45, 6)) / 6
-        outline = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        outline *= rng.uniform(0.4, 1.2, (6, 1))
-        corner = np.array([4.0 * (place % 4), 4.0 * (place // 4)])
-        outlines.append(outline + corner + rng.uniform(0.0, 1.5, 2))
-    return Scene.from_polygons(outlines)
-
-
 def random_table(rng, template_objects, argument_objects):
     """Return a relation table of independent random values."""
     shape = (pair_count(template_objects), pair_count(argument_objects))

@@ -7,9 +7,9 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import object_pairs
 from sketchmatch.pipeline.selection import Choice, resolve
 from sketchmatch.registry import Kind, default_registry
+from sketchmatch.testing import random_scene
 from sketchmatch_builtin.histograms.constant import ConstantForce
 from tests.oracle.forces import force_histogram as by_definition
-from tests.strategies import random_scene
 
 SCENE = random_scene(np.random.default_rng(5), 4)
 

@@ -16,12 +16,12 @@ from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.selection import Choice, resolve
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import default_registry
-from sketchmatch.testing import simulate_sketch
+from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.histograms.constant import ConstantForce
 from sketchmatch_builtin.searchers.easm import Easm
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from tests.oracle import maps as oracle
-from tests.strategies import random_scene, random_table, tables
+from tests.strategies import random_table, tables
 
 BOTH = pytest.mark.parametrize("consistency", ["object", "pairwise"])
 

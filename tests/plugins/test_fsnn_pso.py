@@ -12,7 +12,7 @@ from sketchmatch.model import RelationTable
 from sketchmatch.pipeline.describe import describe
 from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.slices import finish
-from sketchmatch.testing import simulate_sketch
+from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.histograms.constant import ConstantForce
 from sketchmatch_builtin.searchers._growers import (
     Found,
@@ -24,7 +24,7 @@ from sketchmatch_builtin.searchers._growers import (
 from sketchmatch_builtin.searchers.fsnn_pso import FsnnPso
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from tests.oracle import maps, neighbours
-from tests.strategies import random_scene, random_table, tables
+from tests.strategies import random_table, tables
 
 
 @pytest.fixture(scope="module", autouse=True)

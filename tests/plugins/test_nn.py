@@ -17,7 +17,7 @@ from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.selection import Choice, resolve
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Kind, Registered, Registry
-from sketchmatch.testing import simulate_sketch
+from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.histograms.constant import ConstantForce
 from sketchmatch_builtin.searchers._growers import Found, NnGrower, random_seed_point, read_features
 from sketchmatch_builtin.searchers.fsnn_pso import FsnnPso
@@ -25,7 +25,7 @@ from sketchmatch_builtin.searchers.nn import Nn
 from sketchmatch_builtin.searchers.nn_pso import NnPso
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from tests.oracle import maps, neighbours
-from tests.strategies import random_scene, random_table, tables
+from tests.strategies import random_table, tables
 
 ALL = pytest.mark.parametrize("searcher", [Nn, NnPso, FsnnPso], ids=lambda each: each.name)
 SHORT = {

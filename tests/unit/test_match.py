@@ -22,9 +22,8 @@ from sketchmatch.pipeline.match import (
 from sketchmatch.pipeline.selection import Choice
 from sketchmatch.pipeline.warmup import warm_up
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
-from sketchmatch.testing import simulate_sketch
+from sketchmatch.testing import random_scene, simulate_sketch
 from tests.oracle import maps as oracle
-from tests.strategies import random_scene
 
 ENDLESS = {"searcher": Choice("easm", {"patience": 10_000_000, "generations": 10_000_000})}
 

@@ -15,8 +15,9 @@ from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH, LIVING_ROO
 from sketchmatch.pipeline.match import Progress
 from sketchmatch.pipeline.warmup import warm_up
 from sketchmatch.registry import default_registry
+from sketchmatch.testing import random_scene
 from tests.oracle.forces import force_histogram as by_definition
-from tests.strategies import FRAME, random_scene
+from tests.strategies import FRAME
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 

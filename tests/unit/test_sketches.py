@@ -1,14 +1,16 @@
 """Simulated sketches: their truth is true and their noise is what was asked for."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sketchmatch import Scene
-from sketchmatch.testing import simulate_sketch, spacing
+from sketchmatch.testing import random_scene, simulate_sketch, spacing
 from tests.strategies import CORNERED, scenes
 
 EXACT = {"displacement": 0.0, "turn": 0.0, "stretch": 0.0, "wobble": 0.0}
@@ -80,3 +82,12 @@ def test_however_much_outlines_wobble_every_object_stays_a_polygon(scene, seed):
         assert len(item.rings) == len(scene.objects[partner].rings)
         assert item.polygon.is_valid
         assert item.area > 0
+
+
+@pytest.mark.parametrize("objects", [2, 16, 17, 40])
+def test_random_scenes_have_objects_that_lie_apart(objects):
+    scene = random_scene(np.random.default_rng(objects), objects)
+    assert len(scene) == objects
+    shapes = [shapely.Polygon(item.rings[0]) for item in scene.objects]
+    for first, second in itertools.combinations(shapes, 2):
+        assert first.distance(second) > 0.0

@@ -5,7 +5,12 @@ from sketchmatch.testing.driving import Odometry, estimate_poses, plan_tour
 from sketchmatch.testing.lidar import Lidar, World, cast_rays, scan
 from sketchmatch.testing.mapping import LogOddsGrid, SensorModel, map_scans
 from sketchmatch.testing.robot import Survey, survey
-from sketchmatch.testing.sketches import SimulatedSketch, simulate_sketch, spacing
+from sketchmatch.testing.sketches import (
+    SimulatedSketch,
+    random_scene,
+    simulate_sketch,
+    spacing,
+)
 
 __all__ = [
     "Lidar",
@@ -20,6 +25,7 @@ __all__ = [
     "estimate_poses",
     "map_scans",
     "plan_tour",
+    "random_scene",
     "scan",
     "simulate_sketch",
     "spacing",

@@ -6,6 +6,7 @@ a share of the scene's spacing, turned and stretched a little; outlines wobble s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,7 +15,7 @@ import numpy as np
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.model import FloatArray, IntArray, Scene, SceneObject
 
-__all__ = ["SimulatedSketch", "simulate_sketch", "spacing"]
+__all__ = ["SimulatedSketch", "random_scene", "simulate_sketch", "spacing"]
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,28 @@ class SimulatedSketch:
 
     scene: Scene
     partners: IntArray
+
+
+def random_scene(rng: np.random.Generator, objects: int) -> Scene:
+    """Return a scene of random hexagons that lie apart.
+
+    Parameters
+    ----------
+    rng
+        Source of randomness.
+    objects
+        How many, 2 or more. They lie in random cells, 4 m wide, of a square grid of 16 cells or
+        as many as it takes.
+    """
+    side = max(4, math.isqrt(objects - 1) + 1)
+    outlines = []
+    for place in rng.permutation(side * side)[:objects]:
+        angles = 2 * np.pi * (np.arange(6) + rng.uniform(0.0, 0.45, 6)) / 6
+        outline = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        outline *= rng.uniform(0.4, 1.2, (6, 1))
+        corner = np.array([4.0 * (place % side), 4.0 * (place // side)])
+        outlines.append(outline + corner + rng.uniform(0.0, 1.5, 2))
+    return Scene.from_polygons(outlines)
 
 
 def spacing(scene: Scene) -> float:
