@@ -1,8 +1,9 @@
 """How kernels are compiled is said in one place, and old machine code never outlives its source."""
 
+import os
 import re
-import shutil
-from pathlib import Path
+import subprocess
+import sys
 
 import numba
 import numpy as np
@@ -43,22 +44,51 @@ def test_a_kernel_computes_what_its_python_does():
     assert mean_absolute_difference(values.copy()) == mean_absolute_difference.py_func(values)
 
 
-def test_the_cache_folder_follows_the_source_of_every_kernel(tmp_path, monkeypatch):
-    copy = tmp_path / "kernels"
-    shutil.copytree(Path(_jit.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    before = _jit._source_digest()
-    monkeypatch.setattr(_jit, "__file__", str(copy / "_jit.py"))
-    assert _jit._source_digest() == before, "the same source gives the same folder"
-    for path in sorted(copy.glob("*.py")):
-        path.write_text(path.read_text(encoding="utf-8") + "# changed\n", encoding="utf-8")
-        after = _jit._source_digest()
-        assert after != before
-        before = after
+PACKAGE = {
+    "inner.py": """
+from sketchmatch.kernels._jit import kernel
+@kernel
+def step(x):
+    return x + 1
+""",
+    "constants.py": "FACTOR = 10",
+    "outer.py": """
+from constants import FACTOR
+from inner import step
+from sketchmatch.kernels._jit import kernel, on_compile
+@kernel
+def walk(x):
+    return FACTOR * step(x)
+names = []
+with on_compile(names.append):
+    print(walk(1), *names)
+""",
+}
+
+
+def test_a_change_in_another_file_is_compiled_anew(tmp_path):
+    for name, text in PACKAGE.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+
+    def printed():
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        command = [sys.executable, "-B", "outer.py"]
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment, check=True, capture_output=True, text=True
+        )
+        return done.stdout.split()
+
+    assert printed() == ["20", "walk", "step"]
+    assert printed() == ["20"], "nothing has changed"
+    (tmp_path / "inner.py").write_text(PACKAGE["inner.py"].replace("+ 1", "+ 2"), encoding="utf-8")
+    assert printed() == ["30", "walk", "step"]
+    (tmp_path / "constants.py").write_text("FACTOR = 100", encoding="utf-8")
+    assert printed() == ["300", "walk"]
 
 
 def test_the_cache_lies_where_the_environment_says(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert _jit._cache_folder().parent == tmp_path
+    assert _jit._cache_folder(without_text).parent == tmp_path
     before = numba.config.CACHE_DIR
     _jit.kernel(without_text)
     assert before == numba.config.CACHE_DIR, "kernels of other programs go where they went"

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core import event
+from numba.core.dispatcher import Dispatcher
 from platformdirs import user_cache_path
 
 __all__ = ["kernel", "on_compile"]
@@ -23,7 +24,7 @@ def kernel(function: _Function) -> _Function:
 
     Fast-math stays off because it would reorder sums and break agreement with the oracles.
     """
-    with _cache_in(_cache_folder()):
+    with _cache_in(_cache_folder(function)):
         compiled: _Function = numba.njit(function, cache=True, nogil=True, error_model="numpy")
     return compiled
 
@@ -46,25 +47,35 @@ def on_compile(listener: Callable[[str], None]) -> Iterator[None]:
         yield
 
 
-def _cache_folder() -> Path:
-    """Return a folder named after the source of all kernels.
+def _cache_folder(function: Callable[..., Any]) -> Path:
+    """Return a folder named after all the source that may end up in a function's machine code.
 
-    Numba notices a change in a kernel's own file, but not in the kernels that it inlines from
-    other files; without this an upgrade could go on running the old ones.
+    Numba notices a change in the file of a kernel, but not in what is inlined from other files;
+    without this an upgrade could go on running old machine code.
     """
     base = os.environ.get("NUMBA_CACHE_DIR")
     root = Path(base) if base else user_cache_path("sketchmatch", appauthor=False) / "kernels"
-    return root / _SOURCE_DIGEST
+    return root / _digest(function)
 
 
-def _source_digest() -> str:
-    digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+def _digest(function: Callable[..., Any]) -> str:
+    """Return a digest of a function's file, and of the kernels and constants imported there."""
+    file = function.__code__.co_filename
+    if file not in _DIGESTS:
+        digest = hashlib.sha256(numba.__version__.encode())
+        digest.update(Path(file).read_bytes())
+        _DIGESTS[file] = ""  # a file does not count for itself
+        for name, value in sorted(function.__globals__.items()):
+            if isinstance(value, Dispatcher):
+                digest.update(f"{name} {_digest(value.py_func)}".encode())
+            elif isinstance(value, bool | int | float | tuple):
+                digest.update(f"{name} {value!r}".encode())
+        _DIGESTS[file] = digest.hexdigest()[:16]
+    return _DIGESTS[file]
 
 
-_SOURCE_DIGEST = _source_digest()
+_DIGESTS: dict[str, str] = {}
+"""By file; at the first kernel of a file all its imports have been made."""
 
 
 @contextmanager
