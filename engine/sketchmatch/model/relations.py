@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -50,11 +50,13 @@ def pair_index(a: int, b: int, objects: int) -> int:
     return a * objects - a * (a + 1) // 2 + b - a - 1
 
 
+@lru_cache(maxsize=64)
 def object_pairs(objects: int) -> IntArray:
     """Return all pairs (a, b), a < b, in the order of their index, shape (Q, 2)."""
     return frozen(np.stack(np.triu_indices(objects, k=1), axis=1).astype(np.int64))
 
 
+@lru_cache(maxsize=64)
 def correspondences(objects: int) -> IntArray:
     """Return the index of the histogram of every ordered pair of objects.
 
