@@ -195,6 +195,38 @@ def test_it_yields_often_and_stops_when_it_is_closed(consistency):
     assert time.monotonic() - started < 0.5
 
 
+@pytest.fixture(scope="module")
+def a_hundred_objects():
+    return random_table(np.random.default_rng(9), 100, 100)
+
+
+@BOTH
+def test_every_step_at_a_hundred_objects_is_cut_into_slices(consistency, a_hundred_objects):
+    work = start(a_hundred_objects, consistency=consistency)
+    last, gaps, seen = time.monotonic(), [], []
+    # Relations are read, the population is founded, and then one generation at least is bred.
+    for progress in work:
+        gaps.append(time.monotonic() - last)
+        seen.append(progress)
+        if progress.iteration >= 1:
+            break
+        last = time.monotonic()
+    work.close()
+    assert seen[0].evaluations == 1, "there is an answer before the relations are read"
+    assert_legal(seen[0], a_hundred_objects, consistency)
+    assert len(gaps) > 10
+    # Meant to be 20 to 50 ms; more leaves room for a busy machine.
+    assert max(gaps) < 0.25
+
+
+@pytest.mark.parametrize("consistency", ["object", "pairwise"])
+def test_the_first_answer_has_its_true_confidence(consistency):
+    table = random_table(np.random.default_rng(5), 6, 8)
+    first = next(start(table, consistency=consistency))
+    mapped = oracle.read(first.fmap.entries, table.argument_objects)
+    assert first.confidence == pytest.approx(oracle.confidence(table, mapped)[0], rel=1e-9)
+
+
 def table_of_a_sketch(seed):
     """Return the relations of a simulated sketch and a map of up to 6 objects."""
     rng = np.random.default_rng(seed)

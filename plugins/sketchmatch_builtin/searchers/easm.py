@@ -3,37 +3,43 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Generator, Iterator
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
 from sketchmatch.api import MatchProblem, Outcome, Params, Searcher, SearchProgress
+from sketchmatch.api.kernels import fmap_confidence_above
 from sketchmatch.model import (
-    FloatArray,
+    DILATION_SCALE,
     Fmap,
     IntArray,
     RelationTable,
     correspondences,
     object_pairs,
 )
+from sketchmatch.model.arrays import sealed
 from sketchmatch_builtin.searchers._evolution import (
-    breed_object_maps,
-    breed_pair_maps,
-    found_object_maps,
-    found_pair_maps,
-    judge_object_maps,
-    judge_pair_maps,
+    EVALUATIONS,
+    GENERATION,
+    MEMBERS,
+    STALE,
+    TRIAL,
+    Evolution,
+    evolve,
+    found,
 )
 
 __all__ = ["Easm"]
 
 _REPORT_EVERY = 0.02
-# What is judged between two looks at the clock: about 10 ms.
-_SLICE_ENTRIES = 200_000
+# What is read of the relation table, or drawn and judged, between two looks at the clock: 10 ms.
+_SLICE_VALUES = 200_000
+_SLICE_ENTRIES = 50_000
+# 512 kB of hash codes, to stay in the cache.
+_KNOWN = 2**16
 
 
 class Easm(Searcher):
@@ -63,8 +69,8 @@ class Easm(Searcher):
             None,
             ge=2,
             le=100_000,
-            description="Number of FMAPs that live at once; when left out, 25 for each object of "
-            "the larger scene, at least 100 and at most 400.",
+            description="Number of FMAPs that live at once; when left out, twice the square of "
+            "the number of objects in the larger scene, at least 100 and at most 600.",
         )
         crossover_rate: float = Field(
             0.7, ge=0, le=1, description="Pc, probability that two parents cross over."
@@ -104,84 +110,106 @@ class Easm(Searcher):
     ) -> Generator[SearchProgress, None, Outcome]:
         """Evolve until nothing better was found for ``patience`` generations."""
         params = self.params
-        state = self._state(problem, rng)
-        chunk = max(1, _SLICE_ENTRIES // problem.table.template_pairs)
-        best, stale, evaluations, reported = -1.0, -1, 0, -np.inf
-        for generation in range(params.generations + 1):
-            bred = state.breed() if generation else state.found()
-            for first in range(0, max(1, bred), chunk):
-                last = min(bred, first + chunk)
-                state.judge(state.offspring[first:last])
-                evaluations += last - first
-                if time.monotonic() - reported > _REPORT_EVERY:
-                    reported = time.monotonic()
-                    yield self._progress(problem, state, generation, evaluations)
-            stale = 0 if state.fitness[0] > best else stale + 1
-            best = float(state.fitness[0])
-            if stale == params.patience:
-                break
-        last_progress = self._progress(problem, state, generation, evaluations)
+        evolution = self._evolution(problem, rng)
+        reported = -np.inf
+        for _ in self._steps(problem.table, evolution, rng):
+            if time.monotonic() - reported > _REPORT_EVERY:
+                yield self._progress(problem, evolution)
+                reported = time.monotonic()
         # Several FMAPs may lead to one object map, so there are more than are wanted.
-        others = state.population[1 : 1 + 4 * problem.alternatives]
-        alternatives = tuple(self._fmap(other, problem) for other in others)
-        yield replace(last_progress, alternatives=alternatives)
-        return Outcome.CONVERGED if stale == params.patience else Outcome.ITERATION_LIMIT
+        members = min(1 + 4 * problem.alternatives, evolution.status[MEMBERS])
+        alternatives = tuple(self._fmap(evolution, k, problem) for k in range(1, members))
+        yield replace(self._progress(problem, evolution), alternatives=alternatives)
+        stale = evolution.status[STALE] == params.patience
+        return Outcome.CONVERGED if stale else Outcome.ITERATION_LIMIT
 
-    def _state(self, problem: MatchProblem, rng: np.random.Generator) -> _State:
-        """Return an empty population and what works on it in place."""
+    def _steps(
+        self, table: RelationTable, evolution: Evolution, rng: np.random.Generator
+    ) -> Iterator[None]:
+        """Do all the work; the population has a first member at every pause."""
+        _begin(table, evolution, rng)
+        yield
+        step = max(1, _SLICE_VALUES // table.argument_pairs)
+        for start in range(0, table.template_pairs, step):
+            rows = slice(start, start + step)
+            rotation = table.rotation[rows]
+            np.cos(rotation, out=evolution.cosine[rows])
+            np.sin(rotation, out=evolution.sine[rows])
+            np.multiply(np.log(table.dilation[rows]), DILATION_SCALE, out=evolution.dilation[rows])
+            yield
+        while not found(evolution, _SLICE_ENTRIES):
+            yield
+        limits = (self.params.generations, self.params.patience)
+        while not evolve(evolution, *limits, _SLICE_ENTRIES):
+            yield
+
+    def _evolution(self, problem: MatchProblem, rng: np.random.Generator) -> Evolution:
+        """Return a population without members, and relations that are yet to be read."""
         table, params = problem.table, self.params
         by_object = params.consistency == "object"
-        size = params.population or min(max(100, 25 * table.argument_objects), 400)
+        size = params.population or min(max(100, 2 * table.argument_objects**2), 600)
         genes = table.template_objects if by_object else table.template_pairs
-        population, fitness = np.empty((size, genes), dtype=np.int64), np.empty(size)
-        offspring = np.empty((2 * size, genes), dtype=np.int64)
-        relations = (
-            table.similarity,
-            table.cosine,
-            table.sine,
-            table.normalized_dilation,
-            np.array(problem.weights, dtype=np.float64),
+        others = table.argument_objects if by_object else table.argument_pairs
+        shape = table.similarity.shape
+        return Evolution(
+            by_object=by_object,
+            rates=np.array([params.crossover_rate, params.exchange_rate, params.mutation_rate]),
+            pairs=object_pairs(table.template_objects),
+            columns=correspondences(table.argument_objects),
+            similarity=table.similarity,
+            cosine=np.empty(shape),
+            sine=np.empty(shape),
+            dilation=np.empty(shape),
+            weights=np.array(problem.weights, dtype=np.float64),
+            individuals=np.empty((3 * size, genes), dtype=np.int64),
+            places=np.arange(3 * size),
+            fitness=np.full(3 * size, -1.0),
+            known=np.zeros(_KNOWN, dtype=np.int64),
+            status=np.zeros(7, dtype=np.int64),
+            order=np.arange(table.template_pairs),
+            entries=np.empty(table.template_pairs, dtype=np.int64),
+            holders=np.empty((2, others), dtype=np.int64),
+            free=np.empty(others, dtype=np.int64),
+            scratch=np.empty(table.template_pairs),
+            seed=rng.integers(1, 2**64, 1, dtype=np.uint64),
         )
-        rates = (params.crossover_rate, params.exchange_rate, params.mutation_rate)
 
-        def judge(some: IntArray) -> None:
-            if by_object:
-                judge_object_maps(population, fitness, some, pairs, columns, relations)
-            else:
-                judge_pair_maps(population, fitness, some, relations)
+    def _progress(self, problem: MatchProblem, evolution: Evolution) -> SearchProgress:
+        status = evolution.status
+        return SearchProgress(
+            self._fmap(evolution, 0, problem),
+            float(evolution.fitness[0]),
+            int(status[GENERATION]),
+            int(status[EVALUATIONS]),
+        )
 
-        if by_object:
-            pairs = object_pairs(table.template_objects)
-            columns = correspondences(table.argument_objects)
-            found = partial(found_object_maps, population, fitness, offspring, len(columns), rng)
-            breed = partial(
-                breed_object_maps, population, offspring, pairs, len(columns), rates, rng
-            )
-        else:
-            others = table.argument_pairs
-            found = partial(found_pair_maps, population, fitness, offspring, others, rng)
-            breed = partial(breed_pair_maps, population, offspring, others, rates, rng)
-        return _State(population, fitness, offspring, found, breed, judge)
-
-    def _progress(
-        self, problem: MatchProblem, state: _State, generation: int, evaluations: int
-    ) -> SearchProgress:
-        fmap = self._fmap(state.population[0], problem)
-        return SearchProgress(fmap, float(state.fitness[0]), generation, evaluations)
-
-    def _fmap(self, individual: IntArray, problem: MatchProblem) -> Fmap:
-        if self.params.consistency == "pairwise":
-            return Fmap(individual.copy())
-        return Fmap.from_object_map(individual, problem.table.argument_objects)
+    def _fmap(self, evolution: Evolution, rank: int, problem: MatchProblem) -> Fmap:
+        individual: IntArray = evolution.individuals[evolution.places[rank]]
+        if evolution.by_object:
+            return Fmap.from_object_map(individual, problem.table.argument_objects)
+        return Fmap(individual.copy())
 
 
-@dataclass(frozen=True)
-class _State:
-    """A population, sorted, with its offspring, and the steps of the evolution."""
-
-    population: IntArray
-    fitness: FloatArray
-    offspring: IntArray
-    found: Callable[[], int]
-    breed: Callable[[], int]
-    judge: Callable[[IntArray], None]
+def _begin(table: RelationTable, evolution: Evolution, rng: np.random.Generator) -> None:
+    """Make a random individual the first member, before the relations are read."""
+    first = evolution.individuals[0]
+    if evolution.by_object:
+        first[:] = rng.permutation(table.argument_objects)[: first.size]
+        entries = evolution.columns[first[evolution.pairs[:, 0]], first[evolution.pairs[:, 1]]]
+    else:
+        first[:] = entries = rng.permutation(table.argument_pairs)[: first.size]
+    column = entries % table.argument_pairs
+    rows = np.arange(table.template_pairs)
+    rotation = table.rotation[rows, column, None]
+    evolution.fitness[0] = fmap_confidence_above(
+        -1.0,
+        (entries != column).astype(np.int64),
+        evolution.scratch,
+        sealed(table.similarity[rows, column, None]),
+        np.cos(rotation),
+        np.sin(rotation),
+        DILATION_SCALE * np.log(table.dilation[rows, column, None]),
+        evolution.weights,
+    )[0]
+    evolution.status[[MEMBERS, TRIAL, EVALUATIONS]] = 1
+    evolution.status[STALE] = -1
