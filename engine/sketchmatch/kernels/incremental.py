@@ -1,0 +1,342 @@
+"""ζ of object maps, brought up to date move by move.
+
+A move gives a template object another partner; the object that has that partner, if any, takes
+the old one in exchange. It changes at most 2N−3 of the Q entries of the induced FMAP. ζσ and ζR
+follow from sums. ζL needs Σ|x − y| over all pairs of the Q dilations: with A the dilations that
+leave, B those that come, and f(x) the sum of the distances from x to all Q before the move, it
+changes by Σ_B f − Σ_A f − ∫(n_A − n_B)², where n(x) counts the dilations up to x. f follows from
+prefix sums over the sorted dilations, the integral from A and B alone.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sketchmatch.kernels._jit import kernel
+from sketchmatch.model.arrays import FloatArray, IntArray
+from sketchmatch.model.maps import Weights
+from sketchmatch.model.relations import DILATION_SCALE, RelationTable
+
+__all__ = [
+    "MapState",
+    "confidence_after",
+    "empty_map_state",
+    "make_move",
+    "map_confidence",
+    "map_entry",
+    "place_map",
+    "total_distance",
+]
+
+SIMILARITY, COSINE, SINE, DILATION = range(4)
+
+
+class MapState(NamedTuple):
+    """An object map with all that its next move needs.
+
+    Attributes
+    ----------
+    similarity, rotation, dilation
+        Shape (Q, Q'/2): σ, R and L of the relation table, read only.
+    weights
+        Shape (3,), of ζσ, ζR and ζL; their sum is 1.
+    partners, holders
+        int64, shapes (N,) and (N',): the partner of each template object, and the template object
+        that has each argument object, or −1.
+    entries
+        Shape (N, N, 4): σ, cos R, sin R and L̂ of the entry of each template pair, in either order.
+    sums
+        Shape (4,): Σσ, Σ cos R, Σ sin R, and Σ|x − y| over all pairs of L̂.
+    levels, prefix
+        Shapes (Q,) and (Q+1,): all L̂ in order, and the sums of the first k of them.
+    buckets
+        int64, shape (Q+1,): how many L̂ lie below each of Q buckets of equal width.
+    room
+        Shape (2, 2N), for the L̂ that leave and come with a move.
+    """
+
+    similarity: FloatArray
+    rotation: FloatArray
+    dilation: FloatArray
+    weights: FloatArray
+    partners: IntArray
+    holders: IntArray
+    entries: FloatArray
+    sums: FloatArray
+    levels: FloatArray
+    prefix: FloatArray
+    buckets: IntArray
+    room: FloatArray
+
+
+def empty_map_state(table: RelationTable, weights: Weights) -> MapState:
+    """Return room for an object map; :func:`place_map` fills it."""
+    objects, pairs = table.template_objects, table.template_pairs
+    return MapState(
+        similarity=table.similarity,
+        rotation=table.rotation,
+        dilation=table.dilation,
+        weights=np.array(weights, dtype=np.float64) / sum(weights),
+        partners=np.zeros(objects, dtype=np.int64),
+        holders=np.full(table.argument_objects, -1, dtype=np.int64),
+        entries=np.zeros((objects, objects, 4)),
+        sums=np.zeros(4),
+        levels=np.zeros(pairs),
+        prefix=np.zeros(pairs + 1),
+        buckets=np.zeros(pairs + 1, dtype=np.int64),
+        room=np.empty((2, 2 * objects)),
+    )
+
+
+@kernel
+def place_map(state: MapState, partners: IntArray) -> float:
+    """Make an injective object map, shape (N,), the current one and return its ζ."""
+    for c in range(state.holders.size):
+        state.holders[c] = -1
+    count = 0
+    for a in range(partners.size):
+        state.partners[a] = partners[a]
+        state.holders[partners[a]] = a
+        for b in range(a):
+            _set_entry(state, a, b)
+            state.levels[count] = state.entries[a, b, DILATION]
+            count += 1
+    _sort(state.levels, count)
+    return _settle(state)
+
+
+@kernel
+def map_confidence(state: MapState) -> float:
+    """Return ζ of the current map."""
+    sums = state.sums
+    return _confidence(
+        state.weights,
+        state.levels.size,
+        sums[SIMILARITY],
+        sums[COSINE],
+        sums[SINE],
+        sums[DILATION],
+    )
+
+
+@kernel
+def confidence_after(state: MapState, a: int, c: int) -> float:
+    """Return ζ of the map with partner c for object a, in O(N log N).
+
+    Parameters
+    ----------
+    state
+        The current map, which stays.
+    a
+        A template object.
+    c
+        An argument object other than a's partner. If another template object has it, that one
+        takes a's partner.
+
+    Returns
+    -------
+    float
+        The same as :func:`make_move` would, but for rounding.
+    """
+    entries, partners = state.entries, state.partners
+    leaving, coming = state.room[0], state.room[1]
+    b, old = state.holders[c], partners[a]
+    similar, x, y, spread = state.sums
+    count = 0
+    for k in range(2 * partners.size):
+        # First the entries of a, then those of b; theirs with each other turns round.
+        first, partner = (a, c) if k < partners.size else (b, old)
+        other = k % partners.size
+        if first < 0 or other in (a, b):
+            continue
+        sigma, cosine, sine, level = map_entry(state, first, other, partner, partners[other])
+        similar += sigma - entries[first, other, SIMILARITY]
+        x += cosine - entries[first, other, COSINE]
+        y += sine - entries[first, other, SINE]
+        leaving[count], coming[count] = entries[first, other, DILATION], level
+        spread += total_distance(state.levels, state.prefix, state.buckets, coming[count])
+        spread -= total_distance(state.levels, state.prefix, state.buckets, leaving[count])
+        count += 1
+    if b >= 0:
+        x -= 2.0 * entries[a, b, COSINE]
+        y -= 2.0 * entries[a, b, SINE]
+    _sort(leaving, count)
+    _sort(coming, count)
+    spread -= _imbalance(leaving, coming, count)
+    return _confidence(state.weights, state.levels.size, similar, x, y, spread)
+
+
+@kernel
+def make_move(state: MapState, a: int, c: int) -> float:
+    """Give object a the partner c, as :func:`confidence_after` imagines it, and return ζ.
+
+    All sums are taken anew, in O(Q), so that no rounding builds up over many moves.
+    """
+    partners, entries = state.partners, state.entries
+    leaving, coming = state.room[0], state.room[1]
+    b, old = state.holders[c], partners[a]
+    partners[a] = c
+    state.holders[old], state.holders[c] = b, a
+    if b >= 0:
+        partners[b] = old
+    count = 0
+    for k in range(2 * partners.size):
+        first = a if k < partners.size else b
+        other = k % partners.size
+        if first < 0 or other in (first, a):
+            continue
+        leaving[count] = entries[first, other, DILATION]
+        _set_entry(state, first, other)
+        coming[count] = entries[first, other, DILATION]
+        count += 1
+    _replace(state.levels, leaving, coming, count)
+    return _settle(state)
+
+
+@kernel
+def map_entry(state: MapState, a: int, b: int, c: int, d: int) -> tuple[float, float, float, float]:
+    """Return σ, cos R, sin R and L̂ of the entry (a, b) → (c, d), in any order of the objects."""
+    n, m = state.partners.size, state.holders.size
+    sign = 1.0
+    if a > b:
+        a, b = b, a
+        sign = -sign
+    if c > d:
+        c, d = d, c
+        sign = -sign
+    i = a * n - a * (a + 3) // 2 + b - 1
+    j = c * m - c * (c + 3) // 2 + d - 1
+    rotation = state.rotation[i, j]
+    level = DILATION_SCALE * np.log(state.dilation[i, j])
+    return state.similarity[i, j], sign * np.cos(rotation), sign * np.sin(rotation), level
+
+
+@kernel
+def total_distance(
+    levels: FloatArray, prefix: FloatArray, buckets: IntArray, value: float
+) -> float:
+    """Return f, the sum of the distances from a value to all levels of a state."""
+    bucket = _bucket(levels, value)
+    low, high = buckets[bucket], buckets[bucket + 1]
+    while low < high:
+        middle = (low + high) >> 1
+        if levels[middle] <= value:
+            low = middle + 1
+        else:
+            high = middle
+    return float((2 * low - levels.size) * value + prefix[levels.size] - 2.0 * prefix[low])
+
+
+@kernel
+def _confidence(
+    weights: FloatArray, pairs: int, similar: float, x: float, y: float, spread: float
+) -> float:
+    """Return ζ of four sums."""
+    dilation = 1.0
+    if pairs > 1:
+        dilation = np.exp2(-2.0 * spread / (pairs * (pairs - 1.0)))
+    rotation = np.sqrt(x * x + y * y) / pairs
+    return float(weights[0] * similar / pairs + weights[1] * rotation + weights[2] * dilation)
+
+
+@kernel
+def _set_entry(state: MapState, a: int, b: int) -> None:
+    """Look up the entry of a template pair under the current partners."""
+    values = map_entry(state, a, b, state.partners[a], state.partners[b])
+    for part in range(4):
+        state.entries[a, b, part] = values[part]
+        state.entries[b, a, part] = values[part]
+
+
+@kernel
+def _bucket(levels: FloatArray, value: float) -> int:
+    """Return the bucket of a level; the first and the last hold all that lies beyond."""
+    last = levels.size - 1
+    low, high = levels[0], levels[last]
+    if value <= low or high <= low:
+        return 0
+    # As a float: far beyond nearly equal levels it is larger than any integer.
+    return int(min(float(last), (value - low) / (high - low) * levels.size))
+
+
+@kernel
+def _imbalance(leaving: FloatArray, coming: FloatArray, count: int) -> float:
+    """Return ∫(n_A − n_B)² for the first ``count`` values of two sorted arrays."""
+    total = last = 0.0
+    i = j = 0
+    while i < count or j < count:
+        excess = i - j
+        if j == count or (i < count and leaving[i] <= coming[j]):
+            value = leaving[i]
+            i += 1
+        else:
+            value = coming[j]
+            j += 1
+        total += excess * excess * (value - last)
+        last = value
+    return total
+
+
+@kernel
+def _replace(levels: FloatArray, leaving: FloatArray, coming: FloatArray, count: int) -> None:
+    """Take ``count`` leaving values out of the sorted levels and put the coming ones in."""
+    _sort(leaving, count)
+    _sort(coming, count)
+    gone = 0
+    for k in range(levels.size):
+        if gone < count and leaving[gone] == levels[k]:
+            gone += 1
+        else:
+            levels[k - gone] = levels[k]
+    left = levels.size - count
+    place = levels.size
+    while count > 0:
+        place -= 1
+        if left == 0 or coming[count - 1] > levels[left - 1]:
+            count -= 1
+            levels[place] = coming[count]
+        else:
+            left -= 1
+            levels[place] = levels[left]
+
+
+@kernel
+def _sort(values: FloatArray, count: int) -> None:
+    """Sort the first values by Shell's method, fast enough for what a move changes."""
+    gap = 1
+    while gap < count // 3:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for k in range(gap, count):
+            value = values[k]
+            place = k
+            while place >= gap and values[place - gap] > value:
+                values[place] = values[place - gap]
+                place -= gap
+            values[place] = value
+        gap //= 3
+
+
+@kernel
+def _settle(state: MapState) -> float:
+    """Take all sums from the entries and the levels, and return ζ."""
+    sums, values, buckets, entries = state.sums, state.levels, state.buckets, state.entries
+    similar = x = y = spread = total = 0.0
+    for a in range(state.partners.size):
+        for b in range(a):
+            similar += entries[a, b, SIMILARITY]
+            x += entries[a, b, COSINE]
+            y += entries[a, b, SINE]
+    for k in range(values.size + 1):
+        buckets[k] = 0
+    for k in range(values.size):
+        total += values[k]
+        spread += (2 * k - values.size + 1) * values[k]
+        state.prefix[k + 1] = total
+        buckets[_bucket(values, values[k]) + 1] += 1
+    for k in range(values.size):
+        buckets[k + 1] += buckets[k]
+    sums[SIMILARITY], sums[COSINE], sums[SINE], sums[DILATION] = similar, x, y, spread
+    return map_confidence(state)
