@@ -1,0 +1,64 @@
+"""The relation table as the kernels of branch and bound read it, and ζ of object maps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sketchmatch.api.kernels import fmap_confidence_above, kernel
+from sketchmatch.model import FloatArray, IntArray
+from sketchmatch_builtin.searchers._ranking import Ranking, insert
+
+__all__ = ["Relations", "offer"]
+
+
+class Relations(NamedTuple):
+    """The problem as the kernels read it.
+
+    Attributes
+    ----------
+    pairs
+        Shape (Q, 2), the template pairs.
+    columns
+        Shape (N', N'), the histogram correspondence of each ordered argument pair.
+    similarity, cosine, sine, dilation
+        Shape (Q, Q'/2): σ, cos R, sin R and L̂.
+    weights
+        Shape (3,), of ζσ, ζR and ζL.
+    """
+
+    pairs: IntArray
+    columns: IntArray
+    similarity: FloatArray
+    cosine: FloatArray
+    sine: FloatArray
+    dilation: FloatArray
+    weights: FloatArray
+
+
+@kernel
+def offer(relations: Relations, found: Ranking, partners: IntArray, floor: float) -> float:
+    """Evaluate an object map and keep it if it is among the best.
+
+    Returns
+    -------
+    float
+        Its ζ; anything not above ``floor``, if ζ is above neither that nor the worst kept.
+    """
+    pairs, columns = relations.pairs, relations.columns
+    entries = np.empty(pairs.shape[0], dtype=np.int64)
+    for i in range(entries.size):
+        entries[i] = columns[partners[pairs[i, 0]], partners[pairs[i, 1]]]
+    value = fmap_confidence_above(
+        min(floor, found.values[-1]),
+        entries,
+        np.empty(entries.size),
+        relations.similarity,
+        relations.cosine,
+        relations.sine,
+        relations.dilation,
+        relations.weights,
+    )[0]
+    insert(found, partners, value)
+    return float(value)
