@@ -6,7 +6,7 @@ PIP := -m pip --disable-pip-version-check install --quiet
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 OURS := engine plugins clients/python proto tests
 
-.PHONY: demo test lint proto bench serve clean
+.PHONY: demo test lint proto bench bench-searchers serve clean
 
 demo: .venv/runtime
 	@$(BIN)/sketchmatch demo
@@ -28,6 +28,9 @@ proto: .venv-proto/tools
 bench: .venv/dev
 	@$(BIN)/python -m tests.benchmarks.stages
 
+bench-searchers: .venv/bench
+	@$(BIN)/python -m tests.benchmarks.searchers $(ARGS)
+
 serve: .venv/runtime
 	@$(BIN)/sketchmatch serve $(ARGS)
 
@@ -44,6 +47,11 @@ clean:
 
 .venv/dev: .venv/runtime
 	@$(BIN)/python $(PIP) --editable '.[dev]'
+	@touch $@
+
+# Without a wheel for this Python the benchmark leaves the peers out and says so.
+.venv/bench: .venv/dev
+	@$(BIN)/python $(PIP) --editable '.[bench]' || echo "the peers cannot be installed here"
 	@touch $@
 
 # The oldest gRPC that we support, apart: its generator cannot live beside a new protobuf.

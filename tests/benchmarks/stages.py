@@ -73,7 +73,7 @@ def _stages() -> list[tuple[str, list[float]]]:
             ),
         ),
         ("relate", _times(lambda: finish(relate(template, argument, pipeline.similarity)))),
-        ("search (easm)", _times(search)),
+        (f"search ({pipeline.searcher.name})", _times(search)),
         ("object map", _times(lambda: object_map(occm(fmap, table)))),
     ]
 

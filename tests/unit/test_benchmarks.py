@@ -1,0 +1,87 @@
+"""The benchmark of searchers: what peers are given, and that its table is complete."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from sketchmatch.model import Fmap
+from sketchmatch.registry import Kind, default_registry
+from tests.benchmarks import peers, searchers
+from tests.strategies import random_table
+
+
+def table_with_answer(partners, others):
+    """Return a table where σ is 1 for what an object map implies and small elsewhere."""
+    table = random_table(np.random.default_rng(0), len(partners), others)
+    similarity = 0.2 * table.similarity
+    columns = Fmap.from_object_map(np.array(partners), others).entries % table.argument_pairs
+    similarity[np.arange(table.template_pairs), columns] = 1.0
+    return dataclasses.replace(table, similarity=similarity)
+
+
+def test_affinity_is_what_each_pair_of_pairings_adds():
+    table = random_table(np.random.default_rng(0), 3, 4)
+    rows, columns = {(0, 1): 0, (0, 2): 1, (1, 2): 2}, np.full((4, 4), -1)
+    for j, (c, d) in enumerate([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]):
+        columns[c, d] = columns[d, c] = j
+    values = peers.affinity(table)
+    for a, c, b, d in np.ndindex(3, 4, 3, 4):
+        expected = 0.0
+        if a != b and c != d:
+            sigma = table.similarity[rows[min(a, b), max(a, b)]]
+            expected = sigma[columns[c, d]] - min(sigma)
+        assert values[a, c, b, d] == pytest.approx(expected, abs=1e-15)
+
+
+@pytest.mark.parametrize("peer", peers.PEERS, ids=lambda peer: peer.name)
+@pytest.mark.parametrize("others", [5, 7])
+def test_a_peer_finds_an_obvious_answer(peer, others):
+    pytest.importorskip(peer.library)
+    partners = [3, 0, 4, 2, 1]
+    assert peer.prepare(table_with_answer(partners, others))().tolist() == partners
+
+
+def test_rank_one_keeps_what_tells_maps_apart():
+    pytest.importorskip("scipy")
+    rng = np.random.default_rng(1)
+    table = random_table(rng, 4, 4)
+    # Rank one beside the means of rows and columns: nothing is lost.
+    u, v = (part - part.mean() for part in rng.uniform(-0.4, 0.4, (2, 6)))
+    means = 0.5 + 0.1 * np.add.outer(rng.uniform(-1, 1, 6), rng.uniform(-1, 1, 6))
+    table = dataclasses.replace(table, similarity=means + np.outer(u, v))
+    template, argument = peers.rank_one(table)
+    totals, kept = [], []
+    for _ in range(10):
+        p = rng.permutation(4)
+        columns = Fmap.from_object_map(p, 4).entries % 6
+        totals.append(table.similarity[np.arange(6), columns].sum())
+        kept.append((template * argument[np.ix_(p, p)]).sum() / 2)
+    np.testing.assert_allclose(np.diff(totals), np.diff(kept), atol=1e-9)
+
+
+def test_the_table_has_every_searcher(capsys):
+    searchers.main(["--sizes=3,3x4", "--scenes=1", "--budget=5", "--no-peers"])
+    printed = capsys.readouterr().out
+    for item in default_registry().of_kind(Kind.SEARCHER):
+        assert printed.count(f" {item.name} ") >= 2
+    assert "refutes: none" in printed
+    assert "pygmtools" not in printed
+
+
+def test_a_search_is_closed_at_its_budget():
+    size = searchers.Size(8, 8, 1, 1e-9)
+    easm = default_registry().find(Kind.SEARCHER, "easm").algorithm
+    table, truth = searchers._problem(size, (0,))
+    run = searchers._search(easm, table, truth, size, 0)
+    assert run.stopped
+    assert run.own <= 1.0
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--sizes=2"], ["--sizes=8x4"], ["--searchers=x"], ["--budget=0"]]
+)
+def test_senseless_options_are_refused(arguments, capsys):
+    with pytest.raises(SystemExit):
+        searchers.main(arguments)
+    assert "error" in capsys.readouterr().err
