@@ -24,7 +24,7 @@ def match(
     sketch: Scene | Source | str | Path,
     map: Scene | Source | str | Path,  # noqa: A002
     *,
-    searcher: str = "easm",
+    searcher: str = "auto",
     histogram: str = "constant",
     similarity: str = "cross-correlation",
     params: Mapping[str, Mapping[str, Any]] | None = None,

@@ -38,9 +38,12 @@ def sketchmatch_register_similarities() -> list[type[Similarity]]:
 @hookimpl
 def sketchmatch_register_searchers() -> list[type[Searcher]]:
     """Offer the built-in searchers."""
+    from sketchmatch_builtin.searchers.auto import Auto
+    from sketchmatch_builtin.searchers.direct import Direct
     from sketchmatch_builtin.searchers.easm import Easm
+    from sketchmatch_builtin.searchers.exact import Exact
     from sketchmatch_builtin.searchers.fsnn_pso import FsnnPso
     from sketchmatch_builtin.searchers.nn import Nn
     from sketchmatch_builtin.searchers.nn_pso import NnPso
 
-    return [Nn, NnPso, FsnnPso, Easm]
+    return [Auto, Nn, NnPso, FsnnPso, Easm, Direct, Exact]

@@ -412,6 +412,7 @@ CASES = [
         "searcher.parameters.populaton",
         "is no parameter of easm",
         "it has: consistency, population",
+        chosen={"searcher": "easm"},
         params={"searcher": {"populaton": 3}},
     ),
     bad_choice(
@@ -420,6 +421,7 @@ CASES = [
         "searcher.parameters.population",
         "is 1;",
         "greater than or equal to 2",
+        chosen={"searcher": "easm"},
         params={"searcher": {"population": 1}},
     ),
     bad_choice(
@@ -428,6 +430,7 @@ CASES = [
         "searcher.parameters.population",
         "is 'many'",
         "it should be a valid integer",
+        chosen={"searcher": "easm"},
         params={"searcher": {"population": "many"}},
     ),
     bad_choice(
@@ -436,6 +439,7 @@ CASES = [
         "searcher.parameters.population",
         "is [1",
         "it should be a valid integer",
+        chosen={"searcher": "easm"},
         params={"searcher": {"population": [1, {"a": True}, None]}},
     ),
     bad_choice(
@@ -452,6 +456,7 @@ CASES = [
         "searcher.parameters.consistency",
         "is 'some'",
         "'object' or 'pairwise'",
+        chosen={"searcher": "easm"},
         params={"searcher": {"consistency": "some"}},
     ),
     bad_choice(

@@ -25,7 +25,14 @@ from tests.processes import Terminal
 from tests.processes import sketchmatch as run
 
 ROOM = (LIVING_ROOM_SKETCH, LIVING_ROOM_MAP)
-LONG = ("--set", "searcher.patience=10000000", "--set", "searcher.generations=10000000")
+LONG = (
+    "--searcher",
+    "easm",
+    "--set",
+    "searcher.patience=10000000",
+    "--set",
+    "searcher.generations=10000000",
+)
 LONG += ("--time-budget", "20")  # no command outlives its test, whatever fails to stop it
 ESCAPE = "\x1b"
 
@@ -146,7 +153,14 @@ def test_the_seed_decides_the_search(command_line, where):
 
 
 def test_set_sets_parameters_of_any_stage(command_line, where):
-    sets = ("--set", "searcher.generations=3", "--set", "searcher.consistency=pairwise")
+    sets = (
+        "--searcher",
+        "easm",
+        "--set",
+        "searcher.generations=3",
+        "--set",
+        "searcher.consistency=pairwise",
+    )
     sets += ("--set", "map_segmenter.min_size=0.45")
     answer = result(command_line("match", *ROOM, *where, "--json", *sets))
     assert answer.outcome == match_pb2.OUTCOME_ITERATION_LIMIT
@@ -222,7 +236,7 @@ def test_plugins_list_says_the_same_here_and_of_a_server(command_line, address):
     assert here.stdout == there.stdout
     lines = [line.split("\t") for line in here.stdout.splitlines()]
     assert lines[0] == ["kind", "name", "default", "distribution", "version", "summary"]
-    assert ["searcher", "easm", "true", "sketchmatch"] in [line[:4] for line in lines]
+    assert ["searcher", "auto", "true", "sketchmatch"] in [line[:4] for line in lines]
 
 
 def test_plugins_list_shows_parameters_on_a_terminal():

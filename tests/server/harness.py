@@ -21,7 +21,10 @@ from sketchmatch_proto.v1 import source_pb2
 
 _Answer = TypeVar("_Answer")
 
-ENDLESS = {"searcher": {"patience": 10_000_000, "generations": 10_000_000}}
+ENDLESS = {
+    "searcher": "easm",
+    "params": {"searcher": {"patience": 10_000_000, "generations": 10_000_000}},
+}
 """Parameters with which the default searcher goes on until it is stopped."""
 
 # No search outlives its test, whatever fails to stop it.

@@ -9,6 +9,8 @@ from grpc_reflection.v1alpha.proto_reflection_descriptor_database import (
 )
 
 import sketchmatch
+from sketchmatch.pipeline import warmup
+from sketchmatch.registry import Kind
 from sketchmatch_client import Client, ServerUnavailableError
 from sketchmatch_client.errors import CallCancelledError
 from sketchmatch_proto.v1 import catalog_service_pb2
@@ -27,7 +29,15 @@ def health(address: str, service: str = "") -> str:
     return health_pb2.HealthCheckResponse.ServingStatus.Name(status)
 
 
-def test_health_is_not_serving_until_the_kernels_are_warm():
+@pytest.fixture
+def slow_default(monkeypatch):
+    """Make an algorithm that takes long to warm up one of the defaults."""
+    defaults = {**warmup.DEFAULTS, Kind.SEARCHER: ("slow-to-warm",)}
+    monkeypatch.setattr(warmup, "DEFAULTS", defaults)
+
+
+@pytest.mark.usefixtures("slow_default")
+def test_health_is_not_serving_until_the_default_kernels_are_warm():
     SlowToWarm.may_finish.clear()
     with serving(SlowToWarm, warm=False) as host:
         assert health(host.address) == "NOT_SERVING"
@@ -39,6 +49,7 @@ def test_health_is_not_serving_until_the_kernels_are_warm():
         assert [health(host.address, name) for name in ("", *SERVICES)] == ["SERVING"] * 4
 
 
+@pytest.mark.usefixtures("slow_default")
 def test_a_server_that_is_stopped_while_it_warms_up_stops():
     SlowToWarm.may_finish.clear()
     with serving(SlowToWarm, warm=False) as host:
@@ -46,6 +57,16 @@ def test_a_server_that_is_stopped_while_it_warms_up_stops():
         time.sleep(0.1)
         SlowToWarm.may_finish.set()
     assert "serving" not in host.said
+    assert host.said[-1] == "stopped"
+
+
+def test_it_serves_while_the_other_kernels_warm_up_and_stops_then_too():
+    SlowToWarm.may_finish.clear()
+    with serving(SlowToWarm) as host, Client(host.address) as client:
+        assert client.match(scene(3), scene(3)).object_map == {0: 0, 1: 1, 2: 2}
+        host.stop()
+        time.sleep(0.1)
+        SlowToWarm.may_finish.set()
     assert host.said[-1] == "stopped"
 
 
@@ -72,7 +93,7 @@ def test_the_catalogue_tells_what_there_is_and_what_is_the_default(address):
     assert defaults >= {
         ("ALGORITHM_KIND_HISTOGRAM", "constant"),
         ("ALGORITHM_KIND_SIMILARITY", "cross-correlation"),
-        ("ALGORITHM_KIND_SEARCHER", "easm"),
+        ("ALGORITHM_KIND_SEARCHER", "auto"),
         ("ALGORITHM_KIND_SEGMENTER", "strokes"),
     }
     easm = next(a for a in catalogue.algorithms if a.name == "easm")
@@ -106,7 +127,7 @@ def test_sigterm_ends_an_idle_server_at_once_with_exit_code_0():
 
 def test_sigterm_lets_a_running_match_end_within_the_grace():
     with server("--grace", "10") as running, Client(running.address) as client:
-        events = client.events(scene(20), scene(20, 1), params=ENDLESS, time_budget=1.0)
+        events = client.events(scene(20), scene(20, 1), **ENDLESS, time_budget=1.0)
         while not next(events).progress.HasField("confidence"):
             pass
         asked = time.monotonic()
@@ -118,7 +139,7 @@ def test_sigterm_lets_a_running_match_end_within_the_grace():
 
 def test_sigterm_ends_matches_that_outlast_the_grace():
     with server("--grace", "0.5") as running, Client(running.address) as client:
-        events = client.events(scene(20), scene(20, 1), params=ENDLESS)
+        events = client.events(scene(20), scene(20, 1), **ENDLESS)
         while not next(events).progress.HasField("confidence"):
             pass
         asked = time.monotonic()

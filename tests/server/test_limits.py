@@ -14,7 +14,7 @@ def assert_serves(client):
 
 def test_a_request_more_than_the_server_has_room_for_is_told_when_to_come_again():
     with serving(max_concurrent_matches=2) as host, Client(host.address) as client:
-        running = [client.events(scene(20), scene(20, 1), params=ENDLESS) for _ in range(2)]
+        running = [client.events(scene(20), scene(20, 1), **ENDLESS) for _ in range(2)]
         for events in running:
             assert next(events).WhichOneof("event") == "accepted"
         for refused in (
@@ -57,7 +57,7 @@ def test_a_request_that_even_the_transport_refuses_is_a_clear_error_too():
 def test_a_longer_time_budget_is_cut_to_the_servers_and_said_so(asked):
     with serving(max_time_budget=0.4) as host, Client(host.address) as client:
         began = time.monotonic()
-        match = client.match(scene(20), scene(20, 1), params=ENDLESS, time_budget=asked)
+        match = client.match(scene(20), scene(20, 1), **ENDLESS, time_budget=asked)
         assert time.monotonic() - began < 2.0
     assert match.accepted.time_budget.ToTimedelta().total_seconds() == 0.4
     assert match.result.outcome == OUTCOME_TIME_BUDGET
@@ -65,6 +65,6 @@ def test_a_longer_time_budget_is_cut_to_the_servers_and_said_so(asked):
 
 def test_a_shorter_time_budget_than_the_servers_holds():
     with serving(max_time_budget=30.0) as host, Client(host.address) as client:
-        match = client.match(scene(20), scene(20, 1), params=ENDLESS, time_budget=0.3)
+        match = client.match(scene(20), scene(20, 1), **ENDLESS, time_budget=0.3)
     assert match.accepted.time_budget.ToTimedelta().total_seconds() == 0.3
     assert match.result.outcome == OUTCOME_TIME_BUDGET

@@ -14,7 +14,7 @@ TARGET = 0.1
 """Seconds after which a search must have stopped; the median must keep to it."""
 LENIENT = 0.5
 """What a machine that is busy otherwise may need once."""
-OPTIONS = {"searcher": "recorded-easm", "params": ENDLESS}
+OPTIONS = {**ENDLESS, "searcher": "recorded-easm"}
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_a_search_that_is_stopped_frees_its_place_and_leaves_no_error_in_the_log
     with serving(max_concurrent_matches=1) as host, Client(host.address) as client:
 
         def start_and_leave():
-            events = client.events(scene(30), scene(30, 1), params=ENDLESS)
+            events = client.events(scene(30), scene(30, 1), **ENDLESS)
             assert next(events).WhichOneof("event") == "accepted"
             events.close()
 

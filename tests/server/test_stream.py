@@ -47,9 +47,7 @@ def drawn(size: int = 200) -> np.ndarray:
 
 def test_a_match_streams_accepted_then_scenes_then_progress_and_ends_with_the_result(address):
     with Client(address) as client:
-        events = list(
-            client.events(scene(8), scene(8, 1), params=ENDLESS, time_budget=0.5, timeout=30)
-        )
+        events = list(client.events(scene(8), scene(8, 1), **ENDLESS, time_budget=0.5, timeout=30))
     order = [kind for kind in kinds(events) if kind != "progress"]
     assert order == ["accepted", "scenes", "result"]
     assert kinds(events)[0] == "accepted"
@@ -64,6 +62,7 @@ def test_accepted_echoes_every_algorithm_with_every_parameter(address):
         accepted = client.match(
             scene(4),
             sources.map_server_map(LIVING_ROOM_MAP),
+            searcher="easm",
             params={"searcher": {"population": 60}, "map_segmenter": {"min_size": 0.3}},
             seed=11,
             time_budget=20.0,
@@ -96,7 +95,9 @@ def test_accepted_echoes_every_algorithm_with_every_parameter(address):
 def test_what_accepted_echoes_sent_again_gives_the_same_result(address):
     sketch, map_ = scene(6), scene(7, 1)
     with Client(address) as client:
-        first = client.match(sketch, map_, params={"searcher": {"population": 30}}, seed=4)
+        first = client.match(
+            sketch, map_, searcher="easm", params={"searcher": {"population": 30}}, seed=4
+        )
         echoed = MatchRequest(
             sketch=sketch,
             map=map_,
@@ -117,6 +118,7 @@ def test_the_same_request_with_the_same_seed_gives_the_same_answer_in_process_an
     local = sketchmatch.match(
         Scene.from_polygons(sketch),
         Scene.from_polygons(map_),
+        searcher="easm",
         params=params,
         seed=seed,
         weights=(1, 2, 3),
@@ -125,6 +127,7 @@ def test_the_same_request_with_the_same_seed_gives_the_same_answer_in_process_an
         remote = client.match(
             sources.polygons(sketch),
             sources.polygons(map_),
+            searcher="easm",
             params=params,
             seed=seed,
             weights=(1, 2, 3),
@@ -190,7 +193,7 @@ def test_polygons_give_the_scene_made_in_process_whichever_way_y_grows(address, 
 def assert_same_scene(address, sent, path):
     """Check that a match over gRPC and Segment see the scene that a file holds in process."""
     with Client(address) as client:
-        matched = client.match(sent, sent, params={"searcher": {"generations": 1}})
+        matched = client.match(sent, sent, searcher="easm", params={"searcher": {"generations": 1}})
         segmented = client.segment(sent)
     expected = responses.scene(Scene.from_file(path))
     assert matched.scenes.sketch == expected
@@ -217,7 +220,7 @@ def test_unequal_numbers_leave_the_rest_of_the_larger_scene_unmatched(address, s
 def test_a_long_search_reports_progress_often_and_at_most_20_times_a_second(address):
     with Client(address) as client:
         started = time.monotonic()
-        events = list(client.events(scene(30), scene(30, 1), params=ENDLESS, time_budget=2.0))
+        events = list(client.events(scene(30), scene(30, 1), **ENDLESS, time_budget=2.0))
         seconds = time.monotonic() - started
     progress = [event.progress for event in events if event.WhichOneof("event") == "progress"]
     assert len(progress) <= 20 * seconds + 1
@@ -227,7 +230,7 @@ def test_a_long_search_reports_progress_often_and_at_most_20_times_a_second(addr
 
 def test_progress_of_a_search_never_falls_and_carries_the_best_map_so_far(address):
     with Client(address) as client:
-        events = list(client.events(scene(20), scene(25, 1), params=ENDLESS, time_budget=1.0))
+        events = list(client.events(scene(20), scene(25, 1), **ENDLESS, time_budget=1.0))
     searching = [e.progress for e in events if e.progress.HasField("confidence")]
     result = events[-1].result
     assert len(searching) >= 5
@@ -246,7 +249,7 @@ def test_a_slow_reader_gets_the_latest_progress_and_misses_no_other_event(addres
     with Client(address) as client:
         started = time.monotonic()
         for event in client.events(
-            scene(8, 0, labels), scene(8, 1, labels), params=ENDLESS, time_budget=seconds
+            scene(8, 0, labels), scene(8, 1, labels), **ENDLESS, time_budget=seconds
         ):
             events.append(event)
             if event.WhichOneof("event") == "progress":

@@ -20,7 +20,7 @@ from sketchmatch.pipeline.match import (
     run_match,
 )
 from sketchmatch.pipeline.selection import Choice
-from sketchmatch.pipeline.warmup import warm_up
+from sketchmatch.pipeline.warmup import warm_up, warm_up_others
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from sketchmatch.testing import random_scene, simulate_sketch
 from tests.oracle import maps as oracle
@@ -32,6 +32,7 @@ ENDLESS = {"searcher": Choice("easm", {"patience": 10_000_000, "generations": 10
 def _warm():
     # On a new machine the kernels compile here, and not while a test measures time.
     warm_up(default_registry())
+    warm_up_others(default_registry())
 
 
 def polygons(scene, turn=0.0, factor=1.0, order=None):
@@ -104,7 +105,7 @@ def test_what_was_accepted_is_what_runs():
     first = next(events(seven(), seven(), seed=9))
     assert isinstance(first, Accepted)
     assert first.seed == 9
-    assert first.pipeline.searcher.name == "easm"
+    assert first.pipeline.searcher.name == "auto"
     result = matched(seven(), seven(), seed=9)
     assert result.seed == 9
     assert result.match_id != first.match_id
@@ -117,8 +118,8 @@ def test_a_scene_and_its_turned_copy_are_one(turn):
     assert result.object_map == {k: k for k in range(7)}
     assert result.fmap_confidence > 0.99
     assert result.omap_confidence > 0.99
-    assert result.outcome is Outcome.CONVERGED
-    assert result.upper_bound is None
+    assert result.outcome is Outcome.OPTIMAL
+    assert result.fmap_confidence <= result.upper_bound <= result.fmap_confidence + 1e-12
 
 
 # Which objects of the map are drawn, and which of the drawn are on the map.
@@ -188,8 +189,8 @@ def test_a_result_is_consistent_in_itself():
     assert parts.rotation == pytest.approx(abs(sum(turns)) / len(turns), rel=1e-9)
     assert result.omap_confidence == pytest.approx(np.mean([m.confidence for m in result.matches]))
     assert set(result.statistics.seconds) == {"segment", "describe", "relate", "search", "total"}
-    assert result.statistics.iterations >= 400
-    assert result.statistics.evaluations > result.statistics.iterations
+    assert result.statistics.iterations > 0
+    assert result.statistics.evaluations > 0
 
 
 def fingerprint(result):
@@ -209,7 +210,8 @@ def fingerprint(result):
 def test_the_same_seed_gives_the_same_result_and_another_another_run():
     scene = seven()
     sketch = simulate_sketch(scene, np.random.default_rng(2)).scene
-    one, same, other = (matched(sketch, scene, seed=seed) for seed in (5, 5, 6))
+    evolved = {"searcher": Choice("easm")}
+    one, same, other = (matched(sketch, scene, seed=seed, selection=evolved) for seed in (5, 5, 6))
     assert fingerprint(one) == fingerprint(same)
     assert one.statistics.evaluations != other.statistics.evaluations
 

@@ -13,7 +13,7 @@ from sketchmatch import InvalidInputError, Scene, SketchmatchError, force_histog
 from sketchmatch.api import Outcome
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH, LIVING_ROOM_TRUTH
 from sketchmatch.pipeline.match import Progress
-from sketchmatch.pipeline.warmup import warm_up
+from sketchmatch.pipeline.warmup import warm_up_others
 from sketchmatch.registry import default_registry
 from sketchmatch.testing import random_scene
 from tests.oracle.forces import force_histogram as by_definition
@@ -61,8 +61,8 @@ def test_a_result_has_what_was_promised(living_room):
     assert living_room.seed == 1
     assert 0.8 < living_room.fmap_confidence < 1.0
     assert 0.7 < living_room.omap_confidence < 1.0
-    assert living_room.outcome is Outcome.CONVERGED
-    assert living_room.upper_bound is None
+    assert living_room.outcome is Outcome.OPTIMAL
+    assert living_room.upper_bound == pytest.approx(living_room.fmap_confidence, abs=1e-12)
     assert living_room.statistics.evaluations > 0
 
 
@@ -82,6 +82,7 @@ def test_arguments_reach_the_match():
     result = match(
         scene,
         scene,
+        searcher="easm",
         params={"searcher": {"generations": 5}, "histogram": {"directions": 36}},
         seed=3,
         weights=(1, 0, 0),
@@ -95,10 +96,11 @@ def test_arguments_reach_the_match():
 
 
 def test_a_time_budget_reaches_the_match():
-    warm_up(default_registry())
+    warm_up_others(default_registry())
     scene = random_scene(np.random.default_rng(0), 5)
     endless = {"searcher": {"patience": 10_000_000, "generations": 10_000_000}}
-    assert match(scene, scene, params=endless, time_budget=0.3).outcome is Outcome.TIME_BUDGET
+    result = match(scene, scene, searcher="easm", params=endless, time_budget=0.3)
+    assert result.outcome is Outcome.TIME_BUDGET
 
 
 @pytest.mark.parametrize(
@@ -108,7 +110,7 @@ def test_a_time_budget_reaches_the_match():
         ({"histogram": "best"}, r"histogram\.name is 'best'"),
         ({"similarity": "best"}, r"similarity\.name is 'best'"),
         ({"params": {"finder": {}}}, r"params\.finder is no stage"),
-        ({"params": {"searcher": {"speed": 1}}}, r"speed is no parameter of easm"),
+        ({"params": {"searcher": {"speed": 1}}}, r"speed is no parameter of auto"),
         ({"params": {"map_segmenter": {"min_size": 1}}}, r"map_segmenter is set for a scene"),
         ({"seed": -1}, "seed is -1"),
         ({"time_budget": -1}, "time_budget is -1 s"),

@@ -65,7 +65,10 @@ def test_the_built_in_algorithms_are_found_like_any_others():
         ("segmenter", "image"),
         ("histogram", "constant"),
         ("similarity", "cross-correlation"),
+        ("searcher", "auto"),
         ("searcher", "easm"),
+        ("searcher", "direct"),
+        ("searcher", "exact"),
     }
     (status,) = (s for s in registry.statuses if s.entry_point == "builtin")
     assert (status.distribution, status.failure) == ("sketchmatch", "")

@@ -31,7 +31,7 @@ def test_every_kind_of_source_has_its_segmenter(name):
         "map_segmenter": "polygons",
         "histogram": "constant",
         "similarity": "cross-correlation",
-        "searcher": "easm",
+        "searcher": "auto",
     }
     assert list(pipeline.stages()) == list(STAGES)
 
@@ -43,7 +43,7 @@ def test_scenes_need_no_segmenter():
 
 def test_parameters_reach_their_stage_alone():
     selection = {
-        "searcher": Choice("", {"population": 7}),
+        "searcher": Choice("easm", {"population": 7}),
         "map_segmenter": Choice("occupancy-grid", {"min_size": 0.5}),
     }
     pipeline = resolve(default_registry(), selection, SOURCES["strokes"], SOURCES["occupancy-grid"])

@@ -363,6 +363,9 @@ class _Match:
         margins = partner_margins(mapped, best.total, others, exchanges)
         rotation = global_rotation(found.fmap, table)
         dilation = global_dilation(found.fmap, table)
+        bound = found.upper_bound
+        if bound is not None:
+            bound = max(bound, best.total)  # ζ was taken anew, and may differ by rounding
         self.seconds["total"] = self.elapsed()
         return MatchResult(
             matches=reading.matches(mapped, exchanged, margins),
@@ -372,7 +375,7 @@ class _Match:
             rotation=reading.half_turned(-rotation if exchanged else rotation),
             scale=1.0 / dilation if exchanged else dilation,
             outcome=outcome,
-            upper_bound=found.upper_bound,
+            upper_bound=bound,
             seed=self.request.seed,
             match_id=self.match_id,
             statistics=Statistics(

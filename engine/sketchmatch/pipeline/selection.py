@@ -32,7 +32,7 @@ DEFAULTS: Mapping[Kind, tuple[str, ...]] = MappingProxyType(
         Kind.SEGMENTER: tuple(_DEFAULT_SEGMENTERS.values()),
         Kind.HISTOGRAM: ("constant",),
         Kind.SIMILARITY: ("cross-correlation",),
-        Kind.SEARCHER: ("easm",),
+        Kind.SEARCHER: ("auto",),
     }
 )
 """What is used where the caller chooses nothing: a segmenter for each type of source."""

@@ -13,11 +13,11 @@ from sketchmatch.model import Fmap, SceneDescriptor
 from sketchmatch.pipeline.alternatives import exchange_confidences
 from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
 from sketchmatch.pipeline.relate import relate
-from sketchmatch.pipeline.selection import resolve
+from sketchmatch.pipeline.selection import DEFAULTS, resolve
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Registry
 
-__all__ = ["COMPILING", "announcing_compilation", "warm_up"]
+__all__ = ["COMPILING", "announcing_compilation", "warm_up", "warm_up_others"]
 
 _log = logging.getLogger(__name__)
 
@@ -40,7 +40,7 @@ def announcing_compilation(say: Callable[[str], None]) -> Iterator[None]:
 
 
 def warm_up(registry: Registry, unwanted: Callable[[], bool] = lambda: False) -> None:
-    """Load the kernels of the pipeline and of every algorithm, or compile them.
+    """Load the kernels of the default pipeline, or compile them.
 
     Parameters
     ----------
@@ -55,7 +55,18 @@ def warm_up(registry: Registry, unwanted: Callable[[], bool] = lambda: False) ->
     fmap = Fmap(np.array([0]))
     fmap_confidence(fmap, table)
     exchange_confidences(object_map(occm(fmap, table)), table, (1.0, 1.0, 1.0))
+    _warm_up(registry, unwanted, default=True)
+
+
+def warm_up_others(registry: Registry, unwanted: Callable[[], bool] = lambda: False) -> None:
+    """Load or compile the kernels of the algorithms that :func:`warm_up` leaves out."""
+    _warm_up(registry, unwanted, default=False)
+
+
+def _warm_up(registry: Registry, unwanted: Callable[[], bool], *, default: bool) -> None:
     for item in registry.algorithms:
+        if (item.algorithm.name in DEFAULTS[item.kind]) is not default:
+            continue
         if unwanted():
             return
         try:

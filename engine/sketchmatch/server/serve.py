@@ -14,7 +14,7 @@ from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.pipeline.warmup import announcing_compilation, warm_up
+from sketchmatch.pipeline.warmup import announcing_compilation, warm_up, warm_up_others
 from sketchmatch.registry import Registry
 from sketchmatch.server.limits import Limits
 from sketchmatch.server.services import CatalogService, MatchService, SceneService, Workers
@@ -107,6 +107,8 @@ async def serve(
             for name in ("", *_SERVICES):
                 await checks.set(name, health_pb2.HealthCheckResponse.SERVING)
             say("serving")
+            others = asyncio.to_thread(warm_up_others, registry, stopping.is_set)
+            await _first(asyncio.ensure_future(others), stopping)
         await stopping.wait()
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:

@@ -69,7 +69,7 @@ class AlgorithmSelection(google.protobuf.message.Message):
     NAME_FIELD_NUMBER: builtins.int
     PARAMETERS_FIELD_NUMBER: builtins.int
     name: builtins.str
-    """Name of the algorithm, e.g. "easm". Empty: the server's default for the stage, so that
+    """Name of the algorithm, e.g. "auto". Empty: the server's default for the stage, so that
     parameters may be set without a name.
     """
     @property
