@@ -1,6 +1,7 @@
 """The benchmark of searchers: what peers are given, and that its table is complete."""
 
 import dataclasses
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from sketchmatch.model import Fmap
 from sketchmatch.registry import Kind, default_registry
 from tests.benchmarks import peers, searchers
 from tests.strategies import random_table
+from tests.tools import require
 
 
 def table_with_answer(partners, others):
@@ -37,13 +39,13 @@ def test_affinity_is_what_each_pair_of_pairings_adds():
 @pytest.mark.parametrize("peer", peers.PEERS, ids=lambda peer: peer.name)
 @pytest.mark.parametrize("others", [5, 7])
 def test_a_peer_finds_an_obvious_answer(peer, others):
-    pytest.importorskip(peer.library)
+    require(peer.installed, f"{peer.library} (`make .venv/bench` installs it)")
     partners = [3, 0, 4, 2, 1]
     assert peer.prepare(table_with_answer(partners, others))().tolist() == partners
 
 
 def test_rank_one_keeps_what_tells_maps_apart():
-    pytest.importorskip("scipy")
+    require(find_spec("scipy"), "scipy (`make .venv/bench` installs it)")
     rng = np.random.default_rng(1)
     table = random_table(rng, 4, 4)
     # Rank one beside the means of rows and columns: nothing is lost.
