@@ -91,7 +91,7 @@ class Direct(Searcher):
             le=1_000_000_000,
             description="Maps without a better best after which it has converged; when left out, "
             "200, and 40 more for each argument object that a map leaves over, up to 30 of these; "
-            "beyond 30 template objects fewer in proportion.",
+            "beyond 30 template objects fewer.",
         )
 
     params: Params
@@ -172,7 +172,8 @@ def _population(objects: int) -> int:
 
 def _patience(objects: int, others: int) -> int:
     """Return a patience: more where there are many maps, less where each takes long."""
-    return (200 + 40 * min(others - objects, 30)) * 30 // max(objects, 30)
+    patience = 200 + 40 * min(others - objects, 30)
+    return round(patience * (30 / max(objects, 30)) ** 1.5)
 
 
 class _Evolution:

@@ -225,7 +225,8 @@ class _Search:
             backtrack(self.relations, self.found, path, steps)
             self.iterations = before + int(path.place[STEPS])
             self.evaluations = int(path.place[LEAVES])
-            yield
+            if path.place[DEPTH] >= 0:
+                yield
         if path.place[DEPTH] < 0:
             self.cells.bounds[:] = -np.inf
 
