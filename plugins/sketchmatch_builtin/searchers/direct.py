@@ -173,7 +173,8 @@ def _population(objects: int) -> int:
 def _patience(objects: int, others: int) -> int:
     """Return a patience: more where there are many maps, less where each takes long."""
     patience = 200 + 40 * min(others - objects, 30)
-    return round(patience * (30 / max(objects, 30)) ** 1.5)
+    share: float = (30 / max(objects, 30)) ** 1.5
+    return round(share * patience)
 
 
 class _Evolution:
