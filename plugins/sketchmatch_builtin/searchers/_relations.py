@@ -1,16 +1,20 @@
-"""The relation table as the kernels of branch and bound read it, and ζ of object maps."""
+"""The relation table as kernels read it, and ζ of object maps for branch and bound."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from sketchmatch.api.kernels import fmap_confidence_above, kernel
-from sketchmatch.model import FloatArray, IntArray
+from sketchmatch.model import DILATION_SCALE, FloatArray, IntArray, RelationTable
 from sketchmatch_builtin.searchers._ranking import Ranking, insert
 
-__all__ = ["Relations", "offer"]
+__all__ = ["Relations", "offer", "read_slices"]
+
+_VALUES = 200_000
+"""Values of the relation table to read at a time, in about 10 ms."""
 
 
 class Relations(NamedTuple):
@@ -35,6 +39,25 @@ class Relations(NamedTuple):
     sine: FloatArray
     dilation: FloatArray
     weights: FloatArray
+
+
+def read_slices(
+    table: RelationTable, cosine: FloatArray, sine: FloatArray, dilation: FloatArray
+) -> Iterator[slice]:
+    """Write cos R, sin R and L̂ of a relation table into arrays of its shape.
+
+    Yields
+    ------
+    slice
+        The rows that were written just now.
+    """
+    step = max(1, _VALUES // table.argument_pairs)
+    for first in range(0, table.template_pairs, step):
+        rows = slice(first, first + step)
+        np.cos(table.rotation[rows], out=cosine[rows])
+        np.sin(table.rotation[rows], out=sine[rows])
+        np.multiply(np.log(table.dilation[rows]), DILATION_SCALE, out=dilation[rows])
+        yield rows
 
 
 @kernel

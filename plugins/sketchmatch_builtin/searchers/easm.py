@@ -31,12 +31,12 @@ from sketchmatch_builtin.searchers._evolution import (
     evolve,
     found,
 )
+from sketchmatch_builtin.searchers._relations import read_slices
 
 __all__ = ["Easm"]
 
 _REPORT_EVERY = 0.02
-# What is read of the relation table, or drawn and judged, between two looks at the clock: 10 ms.
-_SLICE_VALUES = 200_000
+# What is drawn and judged between two looks at the clock: 10 ms.
 _SLICE_ENTRIES = 50_000
 # 512 kB of hash codes, to stay in the cache.
 _KNOWN = 2**16
@@ -129,13 +129,7 @@ class Easm(Searcher):
         """Do all the work; the population has a first member at every pause."""
         _begin(table, evolution, rng)
         yield
-        step = max(1, _SLICE_VALUES // table.argument_pairs)
-        for start in range(0, table.template_pairs, step):
-            rows = slice(start, start + step)
-            rotation = table.rotation[rows]
-            np.cos(rotation, out=evolution.cosine[rows])
-            np.sin(rotation, out=evolution.sine[rows])
-            np.multiply(np.log(table.dilation[rows]), DILATION_SCALE, out=evolution.dilation[rows])
+        for _ in read_slices(table, evolution.cosine, evolution.sine, evolution.dilation):
             yield
         while not found(evolution, _SLICE_ENTRIES):
             yield

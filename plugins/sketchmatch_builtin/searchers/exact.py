@@ -10,7 +10,6 @@ from pydantic import Field
 
 from sketchmatch.api import MatchProblem, Outcome, Params, Searcher, SearchProgress
 from sketchmatch.model import (
-    DILATION_SCALE,
     FloatArray,
     IntArray,
     RelationTable,
@@ -33,7 +32,7 @@ from sketchmatch_builtin.searchers._cells import (
 )
 from sketchmatch_builtin.searchers._fixed import empty_fixed
 from sketchmatch_builtin.searchers._ranking import ranked_fmaps
-from sketchmatch_builtin.searchers._relations import Relations
+from sketchmatch_builtin.searchers._relations import Relations, read_slices
 from sketchmatch_builtin.searchers._residual import empty_tree
 from sketchmatch_builtin.searchers.direct import Direct, Evolved, evolve
 
@@ -192,18 +191,12 @@ class _Search:
 
     def read(self) -> Iterator[None]:
         """Take cosines, sines and logarithms of the relation table."""
-        rotation, dilation = self.table.rotation, self.table.dilation
         relations = self.relations
         cosine, sine, level = relations.cosine, relations.sine, relations.dilation
         least, most = math.inf, -math.inf
-        step = max(1, _BUDGET // (10 * rotation.shape[1]))
-        for first in range(0, len(rotation), step):
-            if first > 0:
+        for rows in read_slices(self.table, cosine, sine, level):
+            if rows.start > 0:
                 yield
-            rows = slice(first, first + step)
-            np.cos(rotation[rows], out=cosine[rows])
-            np.sin(rotation[rows], out=sine[rows])
-            np.multiply(np.log(dilation[rows]), DILATION_SCALE, out=level[rows])
             least = min(least, float(level[rows].min()))
             most = max(most, float(level[rows].max()))
         self.relations = relations._replace(
