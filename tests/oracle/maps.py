@@ -47,8 +47,8 @@ def confidence(table, mapped, weights=(1.0, 1.0, 1.0)):
     levels = [1.5 / math.log(2) * math.log(dilation) for _, _, dilation in entries]
     gaps = [abs(x - y) for k, x in enumerate(levels) for y in levels[k + 1 :]]
     zeta_l = math.exp(-math.log(2) * (sum(gaps) / len(gaps) if gaps else 0.0))
-    w1, w2, w3 = weights
-    return (w1 * zeta_s + w2 * zeta_r + w3 * zeta_l) / (w1 + w2 + w3), zeta_s, zeta_r, zeta_l
+    w1, w2, w3 = (weight / sum(weights) for weight in weights)
+    return w1 * zeta_s + w2 * zeta_r + w3 * zeta_l, zeta_s, zeta_r, zeta_l
 
 
 def induced(partners):

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from sketchmatch.api import MatchProblem, Outcome
@@ -98,6 +98,7 @@ def test_random_relations(seed):
 
 
 @given(tables(most=5, more=3), st.tuples(*3 * [st.floats(0.0, 10.0)]).filter(any))
+@example(random_table(np.random.default_rng(0), 2, 2), (5e-324, 0.0, 0.0))
 @settings(deadline=None, max_examples=80)
 def test_any_weights_agree_with_the_slow_oracle(table, weights):
     best = max(every_confidence(table, weights).values())

@@ -76,12 +76,14 @@ def fmap_confidence_above(
         scratch[i] = normalized_dilation[i, column]
     zeta_s = similar / count
     zeta_r = np.sqrt(x * x + y * y) / count
+    # Shares first: a product of a part and a tiny weight would lose its digits.
     total_weight = weights[0] + weights[1] + weights[2]
-    most = (weights[0] * zeta_s + weights[1] * zeta_r + weights[2]) / total_weight
+    share_l = weights[2] / total_weight
+    most = weights[0] / total_weight * zeta_s + weights[1] / total_weight * zeta_r + share_l
     if most <= floor:
         return most, zeta_s, zeta_r, 1.0
     zeta_l = np.exp2(-mean_absolute_difference(scratch))
-    return most - weights[2] * (1.0 - zeta_l) / total_weight, zeta_s, zeta_r, zeta_l
+    return most - share_l * (1.0 - zeta_l), zeta_s, zeta_r, zeta_l
 
 
 @kernel
