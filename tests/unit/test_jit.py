@@ -66,17 +66,21 @@ with on_compile(names.append):
 }
 
 
+def run_outer(folder):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
+    command = [sys.executable, "-B", "outer.py"]
+    done = subprocess.run(
+        command, cwd=folder, env=environment, check=True, capture_output=True, text=True
+    )
+    return done.stdout.strip()
+
+
 def test_a_change_in_another_file_is_compiled_anew(tmp_path):
     for name, text in PACKAGE.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
 
     def printed():
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-        command = [sys.executable, "-B", "outer.py"]
-        done = subprocess.run(
-            command, cwd=tmp_path, env=environment, check=True, capture_output=True, text=True
-        )
-        return done.stdout.split()
+        return run_outer(tmp_path).split()
 
     assert printed() == ["20", "walk", "step"]
     assert printed() == ["20"], "nothing has changed"
@@ -84,6 +88,46 @@ def test_a_change_in_another_file_is_compiled_anew(tmp_path):
     assert printed() == ["30", "walk", "step"]
     (tmp_path / "constants.py").write_text("FACTOR = 100", encoding="utf-8")
     assert printed() == ["300", "walk"]
+
+
+MAKER = {
+    "maker.py": """
+from sketchmatch.kernels._jit import kernel
+def twice(step):
+    @kernel
+    def compute(x):
+        return step(step(x))
+    return compute
+""",
+    "step.py": """
+from sketchmatch.kernels._jit import kernel
+@kernel
+def step(x):
+    return x + 1
+""",
+    "outer.py": """
+from maker import twice
+from step import step
+from sketchmatch.kernels._jit import kernel
+both = twice(step)
+@kernel
+def walk(x):
+    return both(x)
+print(walk(1))
+""",
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "before", "after"),
+    [("maker.py", "step(step(x))", "step(step(step(x)))"), ("step.py", "+ 1", "+ 2")],
+)
+def test_a_change_in_what_makes_a_kernel_is_compiled_anew(tmp_path, name, before, after):
+    for file, text in MAKER.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    assert run_outer(tmp_path) == "3"
+    (tmp_path / name).write_text(MAKER[name].replace(before, after), encoding="utf-8")
+    assert run_outer(tmp_path) == {"maker.py": "4", "step.py": "5"}[name]
 
 
 def test_the_cache_lies_where_the_environment_says(tmp_path, monkeypatch):

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FunctionType
 from typing import Any, TypeVar
 
 import numba
@@ -55,11 +56,15 @@ def _cache_folder(function: Callable[..., Any]) -> Path:
     """
     base = os.environ.get("NUMBA_CACHE_DIR")
     root = Path(base) if base else user_cache_path("sketchmatch", appauthor=False) / "kernels"
-    return root / _digest(function)
+    digest = hashlib.sha256(_digest(function).encode())
+    for cell in function.__closure__ or ():
+        if isinstance(cell.cell_contents, Dispatcher):
+            digest.update(_digest(cell.cell_contents.py_func).encode())
+    return root / digest.hexdigest()[:16]
 
 
 def _digest(function: Callable[..., Any]) -> str:
-    """Return a digest of a function's file, and of the kernels and constants imported there."""
+    """Return a digest of a function's file and of the kernels, their makers and constants there."""
     file = function.__code__.co_filename
     if file not in _DIGESTS:
         digest = hashlib.sha256(numba.__version__.encode())
@@ -68,6 +73,8 @@ def _digest(function: Callable[..., Any]) -> str:
         for name, value in sorted(function.__globals__.items()):
             if isinstance(value, Dispatcher):
                 digest.update(f"{name} {_digest(value.py_func)}".encode())
+            elif isinstance(value, FunctionType) and value.__globals__.get("kernel") is kernel:
+                digest.update(f"{name} {_digest(value)}".encode())
             elif isinstance(value, bool | int | float | tuple):
                 digest.update(f"{name} {value!r}".encode())
         _DIGESTS[file] = digest.hexdigest()[:16]
