@@ -8,16 +8,26 @@ from typing import Any
 
 import numpy as np
 
+from sketchmatch.api.forces import force_histograms, refuse_infinite, scene_relations
+from sketchmatch.api.pixels import PixelObject, outlines, pixel_object, pixel_relations
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
-from sketchmatch.model import FloatArray, Scene, SceneObject, Source, Weights
+from sketchmatch.model import (
+    BoolArray,
+    FloatArray,
+    Scene,
+    SceneObject,
+    Source,
+    Weights,
+    object_pairs,
+)
 from sketchmatch.pipeline.match import Finished, MatchRequest, Progress, run_match
 from sketchmatch.pipeline.plugins import segmented
 from sketchmatch.pipeline.result import MatchResult
 from sketchmatch.pipeline.selection import STAGES, Choice, Selection, resolve, resolve_segmenter
 from sketchmatch.registry import default_registry
 
-__all__ = ["force_histogram", "match", "read_scene"]
+__all__ = ["force_histogram", "label_force_histograms", "match", "read_scene"]
 
 
 def match(
@@ -112,22 +122,32 @@ def read_scene(path: str | Path) -> Scene:
 
 
 def force_histogram(a: Any, b: Any, *, r: float = 0.0, directions: int = 180) -> FloatArray:
-    """Return the exact histogram of forces of object ``a`` on object ``b``.
+    """Return the exact histogram of the forces d^−r of object ``a`` on object ``b``.
 
     Parameters
     ----------
     a, b
         Polygons: each a (k, 2) array-like, a list of such rings (outer, holes …), or a
-        :class:`~sketchmatch.model.SceneObject`.
+        :class:`~sketchmatch.model.SceneObject`. Or two boolean arrays of one shape: masks of an
+        image, whose pixel at row i and column j is the unit square with its lower left corner at
+        (j, rows − 1 − i).
     r
-        Exponent of the force; constant forces, r = 0, are built in.
+        Exponent of the force: 0 for constant forces, 2 for gravitational ones, −1 for the
+        histogram of angles, any real number −10 … 10.
     directions
         Number of directions over the full turn, even, 4 … 3600.
 
     Returns
     -------
     ndarray
-        Shape (directions,): entry k supports "a is in direction 2πk/directions of b".
+        Shape (directions,): entry k supports "a is in direction 2πk/directions of b", in units of
+        length to the power 3 − r.
+
+    Raises
+    ------
+    InvalidInputError
+        If an argument cannot be used, or the force is infinite: objects that overlap for r ≥ 1,
+        or that touch for r ≥ 2.
 
     References
     ----------
@@ -136,22 +156,110 @@ def force_histogram(a: Any, b: Any, *, r: float = 0.0, directions: int = 180) ->
 
     Examples
     --------
-    Two unit squares side by side: along the x axis each line meets both in sections of length 1.
+    Two unit squares side by side: along the x axis each line meets both in sections of length 1,
+    with a gap of 2 between them.
 
     >>> left = [[0, 0], [1, 0], [1, 1], [0, 1]]
     >>> right = [[3, 0], [4, 0], [4, 1], [3, 1]]
     >>> float(force_histogram(right, left)[0])
     1.0
+    >>> round(float(force_histogram(right, left, r=2)[0]), 6)  # ln (3² / (2 · 4))
+    0.117783
     """
-    if r != 0.0:
-        raise InvalidInputError(
-            Reason.INVALID_PARAMETER, "r", f"is {r:g}; only constant forces, r = 0, are built in"
-        )
-    chosen = {"histogram": Choice("constant", {"directions": directions})}
-    histogram = resolve(default_registry(), chosen).histogram
+    params = _force_params(r, directions)
+    if _is_mask(a) or _is_mask(b):
+        masks = [_mask(name, mask) for name, mask in (("a", a), ("b", b))]
+        if masks[0].shape != masks[1].shape:
+            raise InvalidInputError(
+                Reason.INVALID_IMAGE, "b", "has another shape than a; cut both from one image"
+            )
+        objects = [pixel_object(mask[::-1]) for mask in masks]
+        return np.asarray(_pixel_forces(objects, params, "ab".__getitem__)[0])
     scene = Scene((_object("a", a), _object("b", b)))
-    (row,) = histogram.describe(scene, np.array([[0, 1]]))
+    relations = scene_relations(scene, _PAIR)
+    refuse_infinite(relations, _PAIR, params.r, "ab".__getitem__)
+    (row,) = force_histograms(scene.edges, _PAIR, params.directions, params.r, relations)
     return np.asarray(row)
+
+
+def label_force_histograms(labels: Any, *, r: float = 0.0, directions: int = 180) -> FloatArray:
+    """Return the histograms of forces of all pairs of objects in a label image.
+
+    Parameters
+    ----------
+    labels
+        Integers, shape (rows, columns): 0 for the background, 1 … N for the objects, each of
+        which has at least one pixel; row 0 is the top.
+    r, directions
+        As in :func:`force_histogram`.
+
+    Returns
+    -------
+    ndarray
+        Shape (N(N−1)/2, directions), in units of pixels: the pairs (1, 2), (1, 3) … (2, 3) … in
+        this order, entry k of (a, b) supporting "a is in direction 2πk/directions of b".
+
+    Raises
+    ------
+    InvalidInputError
+        If the image cannot be used, or two objects touch and r ≥ 2.
+
+    Examples
+    --------
+    >>> label_force_histograms([[1, 0, 2]], directions=4).tolist()
+    [[0.0, 0.0, 1.0, 0.0]]
+    """
+    params = _force_params(r, directions)
+    image = np.asarray(labels)
+    if image.ndim != 2 or not np.issubdtype(image.dtype, np.integer):
+        raise InvalidInputError(
+            Reason.INVALID_IMAGE, "labels", "are not a grid of integers; give rows of labels"
+        )
+    present = np.setdiff1d(image, [0])
+    if present.size < 2 or (present != np.arange(1, present.size + 1)).any():
+        raise InvalidInputError(
+            Reason.INVALID_IMAGE,
+            "labels",
+            "are not 0 and 1 … N, N at least 2, without a gap; number the objects from 1",
+        )
+    objects = [pixel_object((image == label)[::-1]) for label in present]
+    return _pixel_forces(objects, params, lambda k: f"labels {k + 1}")
+
+
+_PAIR = object_pairs(2)
+
+
+def _force_params(r: float, directions: int) -> Any:
+    """Return both as parameters of the histogram ``force``, which says what they may be."""
+    stage = {"histogram": Choice("force", {"r": r, "directions": directions})}
+    try:
+        return resolve(default_registry(), stage).histogram.params
+    except InvalidInputError as error:
+        field = error.field.removeprefix("histogram.parameters.")
+        raise InvalidInputError(error.reason, field, error.problem) from None
+
+
+def _is_mask(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype == np.bool_
+
+
+def _mask(name: str, value: Any) -> BoolArray:
+    if not _is_mask(value) or value.ndim != 2 or not value.any():
+        raise InvalidInputError(
+            Reason.INVALID_IMAGE,
+            name,
+            "is no mask with a pixel in it; give two boolean arrays of shape (rows, columns)",
+        )
+    return np.asarray(value)
+
+
+def _pixel_forces(
+    objects: list[PixelObject], params: Any, name: Callable[[int], str]
+) -> FloatArray:
+    pairs = object_pairs(len(objects))
+    relations = pixel_relations(objects, pairs)
+    refuse_infinite(relations, pairs, params.r, name)
+    return force_histograms(outlines(objects), pairs, params.directions, params.r, relations)
 
 
 def _object(name: str, polygon: Any) -> SceneObject:

@@ -147,7 +147,7 @@ def test_force_histograms_take_arrays_lists_and_objects(directions):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"r": 2.0}, "r is 2"),
+        ({"r": 10.5}, r"r is 10\.5; it should be less than or equal to 10"),
         ({"directions": 5}, r"directions is 5; it should be a multiple of 2"),
         ({"a": SQUARE[:2]}, r"a\.rings\[0\] has 2 distinct points"),
         ({"b": SQUARE * np.nan}, r"b\.rings\[0\]\.points\[0\] is not finite"),

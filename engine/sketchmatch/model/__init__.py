@@ -1,6 +1,6 @@
 """The values that flow through a match: immutable, and easy to build by hand in a test."""
 
-from sketchmatch.model.arrays import FloatArray, IntArray
+from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray
 from sketchmatch.model.maps import Confidence, Fmap, ObjectMap, Occm, Weights
 from sketchmatch.model.relations import (
     DILATION_SCALE,
@@ -11,7 +11,7 @@ from sketchmatch.model.relations import (
     pair_count,
     pair_index,
 )
-from sketchmatch.model.scene import Scene, SceneObject
+from sketchmatch.model.scene import Edges, Scene, SceneObject
 from sketchmatch.model.sources import (
     Image,
     LabelledPolygon,
@@ -24,7 +24,9 @@ from sketchmatch.model.sources import (
 
 __all__ = [
     "DILATION_SCALE",
+    "BoolArray",
     "Confidence",
+    "Edges",
     "FloatArray",
     "Fmap",
     "Image",

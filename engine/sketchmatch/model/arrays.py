@@ -7,10 +7,11 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FloatArray", "IntArray", "frozen", "frozen_floats", "sealed"]
+__all__ = ["BoolArray", "FloatArray", "IntArray", "frozen", "frozen_floats", "sealed"]
 
 _DType = TypeVar("_DType", bound=np.generic)
 
+BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 

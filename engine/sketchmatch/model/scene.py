@@ -6,16 +6,16 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike, fspath
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import shapely
 from shapely.validation import explain_validity
 
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.model.arrays import FloatArray, frozen_floats
+from sketchmatch.model.arrays import FloatArray, IntArray, frozen_floats, sealed
 
-__all__ = ["Scene", "SceneObject"]
+__all__ = ["Edges", "Scene", "SceneObject"]
 
 # Below this share of its squared extent an area is rounding, not a shape.
 _FLAT = 1e-9
@@ -111,6 +111,22 @@ class SceneObject:
         return (point.x, point.y)
 
 
+class Edges(NamedTuple):
+    """The outlines of several objects as directed edges, the object on their left.
+
+    Attributes
+    ----------
+    starts, ends
+        Shape (e, 2).
+    offsets
+        Shape (objects + 1,): object k owns the edges offsets[k] … offsets[k+1].
+    """
+
+    starts: FloatArray
+    ends: FloatArray
+    offsets: IntArray
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Two or more objects in one frame.
@@ -184,6 +200,17 @@ class Scene:
 
     def __len__(self) -> int:
         return len(self.objects)
+
+    @cached_property
+    def edges(self) -> Edges:
+        """The edges of all objects, ring by ring."""
+        rings = [ring for item in self.objects for ring in item.rings]
+        counts = [sum(len(ring) for ring in item.rings) for item in self.objects]
+        return Edges(
+            sealed(np.concatenate(rings)),
+            sealed(np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])),
+            sealed(np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)),
+        )
 
     @property
     def labels(self) -> tuple[str, ...]:

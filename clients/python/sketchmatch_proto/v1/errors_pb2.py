@@ -14,7 +14,7 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1bsketchmatch/v1/errors.proto\x12\x0esketchmatch.v1*\xa5\x04\n\x0b\x45rrorReason\x12\x1c\n\x18\x45RROR_REASON_UNSPECIFIED\x10\x00\x12\x1e\n\x1a\x45RROR_REASON_MISSING_FIELD\x10\x01\x12\x1e\n\x1a\x45RROR_REASON_INVALID_FIELD\x10\x02\x12 \n\x1c\x45RROR_REASON_INVALID_POLYGON\x10\x03\x12\x1f\n\x1b\x45RROR_REASON_INVALID_STROKE\x10\x04\x12\x1d\n\x19\x45RROR_REASON_INVALID_GRID\x10\x05\x12\x1e\n\x1a\x45RROR_REASON_INVALID_IMAGE\x10\x06\x12\x1d\n\x19\x45RROR_REASON_INVALID_FILE\x10\x07\x12 \n\x1c\x45RROR_REASON_TOO_FEW_OBJECTS\x10\x08\x12\"\n\x1e\x45RROR_REASON_UNKNOWN_ALGORITHM\x10\t\x12 \n\x1c\x45RROR_REASON_WRONG_ALGORITHM\x10\n\x12\"\n\x1e\x45RROR_REASON_INVALID_PARAMETER\x10\x0b\x12\"\n\x1e\x45RROR_REASON_MESSAGE_TOO_LARGE\x10\x0c\x12\x1f\n\x1b\x45RROR_REASON_LIMIT_EXCEEDED\x10\r\x12&\n\"ERROR_REASON_TIME_BUDGET_EXHAUSTED\x10\x0e\x12\x1e\n\x1a\x45RROR_REASON_PLUGIN_FAILED\x10\x0f\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1bsketchmatch/v1/errors.proto\x12\x0esketchmatch.v1*\xc6\x04\n\x0b\x45rrorReason\x12\x1c\n\x18\x45RROR_REASON_UNSPECIFIED\x10\x00\x12\x1e\n\x1a\x45RROR_REASON_MISSING_FIELD\x10\x01\x12\x1e\n\x1a\x45RROR_REASON_INVALID_FIELD\x10\x02\x12 \n\x1c\x45RROR_REASON_INVALID_POLYGON\x10\x03\x12\x1f\n\x1b\x45RROR_REASON_INVALID_STROKE\x10\x04\x12\x1d\n\x19\x45RROR_REASON_INVALID_GRID\x10\x05\x12\x1e\n\x1a\x45RROR_REASON_INVALID_IMAGE\x10\x06\x12\x1d\n\x19\x45RROR_REASON_INVALID_FILE\x10\x07\x12 \n\x1c\x45RROR_REASON_TOO_FEW_OBJECTS\x10\x08\x12\"\n\x1e\x45RROR_REASON_UNKNOWN_ALGORITHM\x10\t\x12 \n\x1c\x45RROR_REASON_WRONG_ALGORITHM\x10\n\x12\"\n\x1e\x45RROR_REASON_INVALID_PARAMETER\x10\x0b\x12\"\n\x1e\x45RROR_REASON_MESSAGE_TOO_LARGE\x10\x0c\x12\x1f\n\x1b\x45RROR_REASON_LIMIT_EXCEEDED\x10\r\x12&\n\"ERROR_REASON_TIME_BUDGET_EXHAUSTED\x10\x0e\x12\x1e\n\x1a\x45RROR_REASON_PLUGIN_FAILED\x10\x0f\x12\x1f\n\x1b\x45RROR_REASON_INFINITE_FORCE\x10\x10\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -22,5 +22,5 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'sketchmatch_proto.v1.errors
 if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
   _globals['_ERRORREASON']._serialized_start=48
-  _globals['_ERRORREASON']._serialized_end=597
+  _globals['_ERRORREASON']._serialized_end=630
 # @@protoc_insertion_point(module_scope)

@@ -58,6 +58,8 @@ class _ErrorReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._En
     """DEADLINE_EXCEEDED: the time budget ended before there was any answer to give."""
     ERROR_REASON_PLUGIN_FAILED: _ErrorReason.ValueType  # 15
     """INTERNAL: an algorithm raised an error or broke its contract."""
+    ERROR_REASON_INFINITE_FORCE: _ErrorReason.ValueType  # 16
+    """INVALID_ARGUMENT: two objects overlap or touch, which makes the chosen forces infinite."""
 
 class ErrorReason(_ErrorReason, metaclass=_ErrorReasonEnumTypeWrapper):
     """Why a request was refused, for programs. People read the status message.
@@ -109,4 +111,6 @@ ERROR_REASON_TIME_BUDGET_EXHAUSTED: ErrorReason.ValueType  # 14
 """DEADLINE_EXCEEDED: the time budget ended before there was any answer to give."""
 ERROR_REASON_PLUGIN_FAILED: ErrorReason.ValueType  # 15
 """INTERNAL: an algorithm raised an error or broke its contract."""
+ERROR_REASON_INFINITE_FORCE: ErrorReason.ValueType  # 16
+"""INVALID_ARGUMENT: two objects overlap or touch, which makes the chosen forces infinite."""
 global___ErrorReason = ErrorReason

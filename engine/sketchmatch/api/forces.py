@@ -1,0 +1,146 @@
+"""What histograms of forces share: which objects overlap or touch, and the forces between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import shapely
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.kernels.constant_force import constant_force_histograms
+from sketchmatch.kernels.power_force import (
+    APART,
+    MEETING,
+    OVERLAPPING,
+    TOUCHING,
+    power_force_histograms,
+)
+from sketchmatch.model import Edges, FloatArray, IntArray, Scene
+
+__all__ = [
+    "APART",
+    "MEETING",
+    "OVERLAPPING",
+    "TOUCHING",
+    "force_histograms",
+    "object_name",
+    "refuse_infinite",
+    "relations_matter",
+    "scene_relations",
+]
+
+# Shares of two objects' extent, and of the smaller one's area, that are rounding, not geometry.
+_HAIR = 1e-12
+# Up to this r the plain antiderivatives of forces keep enough digits under overlap.
+_PLAIN = 0.9
+
+
+def relations_matter(r: float) -> bool:
+    """Whether forces d^−r want to know which objects overlap and which touch."""
+    return r > _PLAIN
+
+
+def scene_relations(scene: Scene, pairs: IntArray) -> IntArray:
+    """Say of each pair of a scene's objects whether they overlap, touch, meet or lie apart.
+
+    What could be the rounding of coordinates counts as touching.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    pairs
+        Shape (p, 2), indices into ``scene.objects``.
+
+    Returns
+    -------
+    ndarray
+        Shape (p,): OVERLAPPING, TOUCHING along a line, MEETING at points alone, or APART.
+    """
+    polygons = np.array([item.polygon for item in scene.objects])
+    first, second = pairs.T
+    boxes = shapely.bounds(polygons)
+    low, high = boxes[:, :2], boxes[:, 2:]
+    extents = np.maximum(high[first], high[second]) - np.minimum(low[first], low[second])
+    hair = _HAIR * extents.max(axis=1)
+    gaps = np.maximum(low[first] - high[second], low[second] - high[first]).max(axis=1)
+    relations = np.full(len(pairs), APART, dtype=np.int64)
+    (near,) = np.nonzero(gaps <= hair)
+    a, b = polygons[first[near]], polygons[second[near]]
+    close = shapely.distance(a, b) <= hair[near]
+    near, a, b = near[close], a[close], b[close]
+    shared = shapely.intersection(a, b)
+    smaller = np.minimum(shapely.area(a), shapely.area(b))
+    overlapping = shapely.area(shared) > _HAIR * smaller
+    # Within a hair nothing tells a line from a point.
+    meeting = ~shapely.is_empty(shared) & (shapely.length(shared) <= hair[near])
+    relations[near] = np.where(overlapping, OVERLAPPING, np.where(meeting, MEETING, TOUCHING))
+    return relations
+
+
+def object_name(scene: Scene, index: int) -> str:
+    """Return an object as a sentence names it: its path and, if it has one, its label."""
+    label = scene.objects[index].label
+    return f"objects[{index}] ({label!r})" if label else f"objects[{index}]"
+
+
+def refuse_infinite(
+    relations: IntArray, pairs: IntArray, r: float, name: Callable[[int], str]
+) -> None:
+    """Refuse forces d^−r between objects that overlap, for r ≥ 1, or that touch, for r ≥ 2.
+
+    Parameters
+    ----------
+    relations, pairs
+        Shapes (p,) and (p, 2): how the objects of each pair lie to each other.
+    r
+        Exponent of the force.
+    name
+        Gives the path of an object, and what else a sentence should call it.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is an infinite force; the sentence names both objects.
+    """
+    for closest, least, verb in ((OVERLAPPING, 1, "overlap"), (MEETING, 2, "touch")):
+        (found,) = np.nonzero(relations <= closest)
+        if r >= least and found.size > 0:
+            a, b = pairs[found[0]]
+            path, _, aside = name(int(a)).partition(" ")
+            raise InvalidInputError(
+                Reason.INFINITE_FORCE,
+                path,
+                f"{aside} and {name(int(b))} {verb}, so forces with r = {r:g} between them are "
+                f"infinite; use the hybrid histogram, or r below {least}".lstrip(),
+            )
+
+
+def force_histograms(
+    edges: Edges, pairs: IntArray, directions: int, r: float, relations: IntArray
+) -> FloatArray:
+    """Return the exact histograms of the forces d^−r between objects.
+
+    Parameters
+    ----------
+    edges
+        Outlines of the objects.
+    pairs
+        Shape (p, 2): objects (a, b) of each pair.
+    directions
+        n, even.
+    r
+        Exponent of the force.
+    relations
+        Shape (p,): how the objects of each pair lie to each other; OVERLAPPING where that is not
+        known, which it need not be unless :func:`relations_matter`.
+
+    Returns
+    -------
+    ndarray
+        Shape (p, n).
+    """
+    if r == 0.0:
+        return constant_force_histograms(*edges, pairs, directions)
+    return power_force_histograms(*edges, pairs, directions, float(r), relations)

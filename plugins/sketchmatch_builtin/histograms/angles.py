@@ -1,0 +1,23 @@
+"""The histogram of angles."""
+
+from __future__ import annotations
+
+from sketchmatch_builtin.histograms._forces import PowerForce
+
+__all__ = ["Angles"]
+
+
+class Angles(PowerForce):
+    """Histogram of the angles of all pairs of points, exactly and not by counting pixels.
+
+    In polar coordinates about a point b of B the point a of A lies at b + ρ(cos θ, sin θ), and
+    da = ρ dρ dθ. The density of the angle θ over all pairs of points is therefore the histogram of
+    the forces φ(d) = d, r = −1; its integral over the full turn is the product of the areas.
+
+    Source: K. Miyajima, A. Ralescu, "Spatial organization in 2D segmented images: representation
+    and recognition of primitive spatial relations", Fuzzy Sets and Systems 65(2–3), 1994.
+    """
+
+    name = "angles"
+    summary = "Histogram of the angles of all pairs of points, the classical baseline."
+    exponent = -1.0
