@@ -22,17 +22,26 @@ def sketchmatch_register_segmenters() -> list[type[Segmenter]]:
 @hookimpl
 def sketchmatch_register_histograms() -> list[type[Histogram]]:
     """Offer the built-in histograms."""
+    from sketchmatch_builtin.histograms.angles import Angles
     from sketchmatch_builtin.histograms.constant import ConstantForce
+    from sketchmatch_builtin.histograms.force import Force
+    from sketchmatch_builtin.histograms.gravitational import GravitationalForce
+    from sketchmatch_builtin.histograms.hybrid import HybridForce
+    from sketchmatch_builtin.histograms.raster import RasterForce
 
-    return [ConstantForce]
+    return [ConstantForce, GravitationalForce, Force, HybridForce, RasterForce, Angles]
 
 
 @hookimpl
 def sketchmatch_register_similarities() -> list[type[Similarity]]:
     """Offer the built-in similarity measures."""
+    from sketchmatch_builtin.similarities.circular_peak import CircularPeak
     from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+    from sketchmatch_builtin.similarities.overlap import Overlap
+    from sketchmatch_builtin.similarities.pappis import Pappis
+    from sketchmatch_builtin.similarities.santini_jain import SantiniJain
 
-    return [CrossCorrelation]
+    return [CrossCorrelation, CircularPeak, Pappis, Overlap, SantiniJain]
 
 
 @hookimpl

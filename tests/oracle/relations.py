@@ -49,13 +49,55 @@ def cross_correlation(first, second):
     return product / math.sqrt(sum(x * x for x in first)) / math.sqrt(sum(y * y for y in second))
 
 
-def relation(template, argument, exponent=0.0):
+def pappis(first, second):
+    pairs = list(zip(first, second, strict=True))
+    return sum(min(pair) for pair in pairs) / sum(max(pair) for pair in pairs)
+
+
+def overlap(first, second):
+    empty = 1e-9 * max(*first, *second)
+    pairs = [pair for pair in zip(first, second, strict=True) if max(pair) > empty]
+    return sum(min(pair) / max(pair) for pair in pairs) / len(pairs)
+
+
+def santini_jain(first, second, alpha=0.5, beta=0.5):
+    common = sum(min(x, y) for x, y in zip(first, second, strict=True))
+    first_alone = sum(max(x - y, 0.0) for x, y in zip(first, second, strict=True))
+    second_alone = sum(max(y - x, 0.0) for x, y in zip(first, second, strict=True))
+    apart = alpha * first_alone + beta * second_alone
+    return common / (common + apart) if common > 0.0 else 0.0
+
+
+def main_rotation(template, argument):
+    return (main_direction(argument) - main_direction(template)) % (2 * math.pi)
+
+
+def peak_rotation(template, argument):
+    """Return the rotation of the largest cross-correlation, by ternary search between all bins."""
+    step = 2 * math.pi / len(template)
+
+    def alike(rotation):
+        return cross_correlation(turned(template, rotation), argument)
+
+    found = []
+    for w in range(len(template)):
+        low, high = w * step, (w + 1) * step
+        while high - low > 1e-9 * step:
+            early, late = low + (high - low) / 3, high - (high - low) / 3
+            low, high = (early, high) if alike(early) < alike(late) else (low, late)
+        found += [w * step, (low + high) / 2]
+    return max(found, key=alike)
+
+
+def relation(
+    template, argument, exponent=0.0, measure=cross_correlation, rotation_of=main_rotation
+):
     """Return (σ, R, L) of two histograms."""
     power = 3 - exponent
     dilation = (np.mean(argument) / np.mean(template)) ** (1 / power)
-    rotation = (main_direction(argument) - main_direction(template)) % (2 * math.pi)
+    rotation = rotation_of(template, argument)
     aligned = turned([h * dilation**power for h in template], rotation)
-    return cross_correlation(aligned, argument), rotation, dilation
+    return measure(aligned, argument), rotation, dilation
 
 
 def relation_table(template, argument):

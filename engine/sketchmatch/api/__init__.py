@@ -15,18 +15,20 @@ from sketchmatch.api._hooks import hookimpl
 from sketchmatch.api.histogram import Histogram, HistogramParams
 from sketchmatch.api.searcher import MatchProblem, Outcome, Searcher, SearchProgress
 from sketchmatch.api.segmenter import Segmentation, Segmenter
-from sketchmatch.api.similarity import Similarity
+from sketchmatch.api.similarity import Alignment, ProductSimilarity, Similarity
 from sketchmatch.errors import InvalidInputError, Reason
 
 __all__ = [
     "API_VERSION",
     "Algorithm",
+    "Alignment",
     "Histogram",
     "HistogramParams",
     "InvalidInputError",
     "MatchProblem",
     "Outcome",
     "Params",
+    "ProductSimilarity",
     "Reason",
     "SearchProgress",
     "Searcher",

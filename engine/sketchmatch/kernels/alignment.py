@@ -1,13 +1,30 @@
-"""Turning and dilating template histograms onto argument histograms."""
+"""Turning template histograms onto argument histograms.
+
+A turn is written as ``whole`` bins and the ``rest`` of a bin, 0 ≤ rest ≤ 1. Between bins a
+histogram is read by periodic linear interpolation: turned by w + f it is
+h₂[m] = (1−f)·h[m−w] + f·h[m−w−1]. So with C[w] = Σ h[m−w]·h'[m], S = Σ h[m]² and
+D = ½ Σ (h[m] − h[m−1])²
+
+    Σ h₂h' = (1−f)·C[w] + f·C[w+1]   and   Σ h₂² = S − 2f(1−f)·D.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sketchmatch.kernels._jit import kernel
-from sketchmatch.model.arrays import FloatArray
+from sketchmatch.model.arrays import FloatArray, IntArray
 
-__all__ = ["cosine_rows", "main_directions", "rotated_rows"]
+__all__ = [
+    "interpolated_products",
+    "main_directions",
+    "main_turns",
+    "peak_turns",
+    "rolled_rows",
+    "roughness",
+    "split_turns",
+    "turned_rows",
+]
 
 
 def main_directions(histograms: FloatArray) -> FloatArray:
@@ -28,19 +45,165 @@ def main_directions(histograms: FloatArray) -> FloatArray:
     return directions
 
 
-@kernel
-def rotated_rows(histogram: FloatArray, rotations: FloatArray, factors: FloatArray) -> FloatArray:
-    """Return one histogram turned by each of many angles and multiplied by each of many factors.
+def split_turns(angles: FloatArray, bins: int) -> tuple[IntArray, FloatArray]:
+    """Return angles as whole bins, within 0 … ``bins`` − 1, and rests of a bin, within [0, 1)."""
+    places = np.mod(angles, 2.0 * np.pi) * bins / (2.0 * np.pi)
+    whole = np.floor(places)
+    return whole.astype(np.int64) % bins, places - whole
 
-    Between bins it is read by periodic linear interpolation: h2(θ) = factor · h(θ − rotation).
+
+def roughness(histograms: FloatArray) -> FloatArray:
+    """Return D = ½ Σ (h[m] − h[m−1])² of each histogram, shape (k,)."""
+    steps = histograms - np.roll(histograms, 1, axis=1)
+    halves: FloatArray = 0.5 * np.einsum("kn,kn->k", steps, steps)
+    return halves
+
+
+@kernel
+def main_turns(
+    template_whole: IntArray,
+    template_rest: FloatArray,
+    argument_whole: IntArray,
+    argument_rest: FloatArray,
+    bins: int,
+) -> tuple[IntArray, FloatArray]:
+    """Return the turns from template to argument main directions.
+
+    Parameters
+    ----------
+    template_whole, template_rest
+        Shape (k,), main directions as :func:`split_turns` gives them.
+    argument_whole, argument_rest
+        Shape (l,), the same.
+    bins
+        n.
+
+    Returns
+    -------
+    whole, rest
+        Shape (k, l).
+    """
+    shape = (template_whole.size, argument_whole.size)
+    whole, rest = np.empty(shape, np.int64), np.empty(shape)
+    for i in range(shape[0]):
+        for j in range(shape[1]):
+            between = argument_rest[j] - template_rest[i]
+            borrowed = 1 if between < 0.0 else 0
+            steps = argument_whole[j] - template_whole[i] - borrowed
+            whole[i, j] = steps if steps >= 0 else steps + bins
+            rest[i, j] = between + borrowed
+    return whole, rest
+
+
+@kernel
+def interpolated_products(
+    products: FloatArray, template_rest: FloatArray, argument_rest: FloatArray
+) -> FloatArray:
+    """Return Σ h₂h' at the main turns, from C at the three whole turns about them.
+
+    Parameters
+    ----------
+    products
+        Shape (t, 3·k, width): C at a turn of argument minus template whole bins, and −1, 0, 1
+        more, for k template histograms and t·width argument histograms.
+    template_rest
+        Shape (k,).
+    argument_rest
+        Shape (l,), l ≤ t·width.
+
+    Returns
+    -------
+    ndarray
+        Shape (k, l).
+    """
+    count, width = template_rest.size, products.shape[2]
+    result = np.empty((count, argument_rest.size))
+    for tile in range(products.shape[0]):
+        first = tile * width
+        last = min(first + width, argument_rest.size)
+        for i in range(count):
+            for j in range(first, last):
+                rest = argument_rest[j] - template_rest[i]
+                here = products[tile, count + i, j - first]
+                before = products[tile, i, j - first]
+                after = products[tile, 2 * count + i, j - first]
+                beside = after if rest >= 0.0 else before
+                share = abs(rest)
+                result[i, j] = (1.0 - share) * here + share * beside
+    return result
+
+
+@kernel
+def peak_turns(
+    products: FloatArray, squares: FloatArray, roughnesses: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return the turns that make Σ h₂h' / (‖h₂‖‖h'‖) largest, whole or between bins.
+
+    Between two bins h₂ lies in the plane of h turned by w and by w + 1, where the cosine with h' is
+    largest along the projection of h', if that is between the two; else it is largest at one of
+    them. Of turns that are equally good to 12 digits the smallest counts.
+
+    Parameters
+    ----------
+    products
+        Shape (k, l, n): C at every whole turn.
+    squares, roughnesses
+        Shape (k,): S and D of the template histograms.
+
+    Returns
+    -------
+    whole, rest
+        Shape (k, l).
+    product
+        Shape (k, l): Σ h₂h' there.
+    """
+    shape, bins = products.shape[:2], products.shape[2]
+    whole, rest, product = np.zeros(shape, np.int64), np.zeros(shape), np.empty(shape)
+    for i in range(shape[0]):
+        square, rough = squares[i], roughnesses[i]
+        for j in range(shape[1]):
+            best = -1.0
+            for w in range(bins):
+                here = max(products[i, j, w], 0.0)
+                after = max(products[i, j, w + 1 if w + 1 < bins else 0], 0.0)
+                early = square * (here - after) + rough * after
+                late = square * (after - here) + rough * here
+                between = early > 0.0 and late > 0.0
+                if between:
+                    steep = square * (here - after) ** 2 / rough
+                    value = (steep + 2.0 * here * after) / (2.0 * square - rough)
+                else:
+                    value = here * here / square
+                if value > best * (1.0 + 2e-12):
+                    best = value
+                    share = late / (early + late) if between else 0.0
+                    whole[i, j], rest[i, j] = w, share
+                    product[i, j] = (1.0 - share) * here + share * after
+    return whole, rest, product
+
+
+@kernel
+def rolled_rows(histograms: FloatArray, whole: IntArray) -> FloatArray:
+    """Return each histogram, shape (k, n), turned by its own number of whole bins, shape (k,)."""
+    rows = np.empty(histograms.shape)
+    bins = histograms.shape[1]
+    for k in range(histograms.shape[0]):
+        target = whole[k] % bins
+        for m in range(bins):
+            rows[k, target] = histograms[k, m]
+            target = target + 1 if target + 1 < bins else 0
+    return rows
+
+
+@kernel
+def turned_rows(histogram: FloatArray, whole: IntArray, rest: FloatArray) -> FloatArray:
+    """Return one histogram turned in each of many ways.
 
     Parameters
     ----------
     histogram
         Shape (n,).
-    rotations
-        Shape (k,), radians within [0, 2π).
-    factors
+    whole, rest
         Shape (k,).
 
     Returns
@@ -49,13 +212,11 @@ def rotated_rows(histogram: FloatArray, rotations: FloatArray, factors: FloatArr
         Shape (k, n).
     """
     n = histogram.size
-    rows = np.empty((rotations.size, n))
-    for k in range(rotations.size):
-        shift = rotations[k] * n / (2.0 * np.pi)
-        whole = int(np.floor(shift))
-        late = (shift - whole) * factors[k]
-        early = factors[k] - late
-        source = (-whole - 1) % n
+    rows = np.empty((whole.size, n))
+    for k in range(whole.size):
+        late = rest[k]
+        early = 1.0 - late
+        source = (-whole[k] - 1) % n
         before = histogram[source]
         for m in range(n):
             source = source + 1 if source + 1 < n else 0
@@ -63,29 +224,3 @@ def rotated_rows(histogram: FloatArray, rotations: FloatArray, factors: FloatArr
             rows[k, m] = early * here + late * before
             before = here
     return rows
-
-
-@kernel
-def cosine_rows(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return Σ xy / (‖x‖‖y‖) for each row x of ``first`` and the same row y of ``second``.
-
-    Parameters
-    ----------
-    first, second
-        Shape (k, n), no row all zero.
-
-    Returns
-    -------
-    ndarray
-        Shape (k,).
-    """
-    result = np.empty(first.shape[0])
-    for k in range(first.shape[0]):
-        product = square_first = square_second = 0.0
-        for m in range(first.shape[1]):
-            x, y = first[k, m], second[k, m]
-            product += x * y
-            square_first += x * x
-            square_second += y * y
-        result[k] = product / np.sqrt(square_first) / np.sqrt(square_second)
-    return result

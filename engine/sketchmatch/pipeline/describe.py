@@ -11,7 +11,7 @@ from sketchmatch.api import Histogram
 from sketchmatch.model import FloatArray, Scene, SceneDescriptor, object_pairs
 from sketchmatch.model.arrays import sealed
 from sketchmatch.pipeline.plugins import checked_array
-from sketchmatch.pipeline.slices import slices
+from sketchmatch.pipeline.slices import in_slices
 
 __all__ = ["describe"]
 
@@ -35,10 +35,12 @@ def describe(scene: Scene, histogram: Histogram) -> Generator[float, None, Scene
     """
     pairs = object_pairs(len(scene))
     histograms = np.empty((len(pairs), histogram.params.directions))
-    for first, last in slices(len(pairs)):
+
+    def fill(first: int, last: int) -> None:
         found = histogram.describe(scene, pairs[first:last])
         histograms[first:last] = checked_array(found, (last - first, histograms.shape[1]))
-        yield last / len(pairs)
+
+    yield from in_slices(len(pairs), fill)
     for index in np.flatnonzero(~histograms.any(axis=1)):
         a, b = (scene.objects[k] for k in pairs[index])
         offset = np.subtract(a.centroid, b.centroid)

@@ -2,30 +2,49 @@
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Any, TypeVar
 
-__all__ = ["finish", "slices"]
+__all__ = ["finish", "in_slices"]
 
 _Value = TypeVar("_Value")
 _SLICE_SECONDS = 0.02
+_MOST_THREADS = 4
 
 
-def slices(total: int) -> Iterator[tuple[int, int]]:
-    """Yield consecutive ranges [first, last) of ``total`` items that take about 20 ms each.
+def in_slices(total: int, work: Callable[[int, int], None]) -> Generator[float, None, None]:
+    """Do ``total`` items of work in threads, a range of items that takes about 20 ms at a time.
 
-    The size follows the time that the consumer took for the range before.
+    Short work is done in the caller's thread; a pool starts once a range is worth one. Between two
+    values no range is started beyond those under way, one a thread: closing the generator waits
+    for these alone.
+
+    Parameters
+    ----------
+    total
+        Number of items.
+    work
+        Called with consecutive ranges [first, last), from several threads at once. It should
+        release the GIL; what it raises ends the generator. What it does for an item must not
+        depend on the range that the item comes in.
+
+    Yields
+    ------
+    float
+        The share that is done.
     """
-    first, size = 0, 1
-    while first < total:
-        last = min(total, first + size)
-        started = time.monotonic()
-        yield first, last
-        seconds = max(time.monotonic() - started, 1e-6)
-        wanted = int((last - first) * _SLICE_SECONDS / seconds)
-        size = max(1, min(wanted, 8 * size))
-        first = last
+    threads = min(_usable_cpus(), _MOST_THREADS)
+    done, size, seconds = 0, 1, 0.0
+    while done < total and (threads == 1 or seconds < _SLICE_SECONDS / 4):
+        first, done = done, min(total, done + size)
+        seconds = _seconds(work, first, done)
+        size = _next_size(done - first, seconds)
+        yield done / total
+    if done < total:
+        yield from _in_threads(done, total, size, work, threads)
 
 
 def finish(work: Generator[Any, None, _Value]) -> _Value:
@@ -35,3 +54,44 @@ def finish(work: Generator[Any, None, _Value]) -> _Value:
             next(work)
         except StopIteration as stop:
             return stop.value  # type: ignore[no-any-return]
+
+
+def _in_threads(
+    first: int, total: int, size: int, work: Callable[[int, int], None], threads: int
+) -> Generator[float, None, None]:
+    """Do items ``first`` … ``total`` − 1 of work in a pool of threads."""
+    running: dict[Future[float], int] = {}
+    done, started = first, first
+    with ThreadPoolExecutor(threads, "sketchmatch") as pool:
+        while started < total or running:
+            while started < total and len(running) < threads:
+                last = min(total, started + size)
+                running[pool.submit(_seconds, work, started, last)] = last - started
+                started = last
+            if done > first:
+                yield done / total
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                items = running.pop(future)
+                size = _next_size(items, future.result())
+                done += items
+    yield 1.0
+
+
+def _seconds(work: Callable[[int, int], None], first: int, last: int) -> float:
+    """Do a range of work and return how long it took."""
+    started = time.monotonic()
+    work(first, last)
+    return time.monotonic() - started
+
+
+def _next_size(items: int, seconds: float) -> int:
+    """Return how many items take 20 ms, if ``items`` took ``seconds``; at most eightfold."""
+    wanted = int(items * _SLICE_SECONDS / max(seconds, 1e-6))
+    return max(1, min(wanted, 8 * items))
+
+
+def _usable_cpus() -> int:
+    """Return the number of processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

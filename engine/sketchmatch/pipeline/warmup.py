@@ -5,17 +5,18 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
 from sketchmatch.kernels._jit import on_compile
-from sketchmatch.model import Fmap, SceneDescriptor
+from sketchmatch.model import Fmap, RelationTable, SceneDescriptor
 from sketchmatch.pipeline.alternatives import exchange_confidences
 from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
 from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.selection import DEFAULTS, resolve
 from sketchmatch.pipeline.slices import finish
-from sketchmatch.registry import Registry
+from sketchmatch.registry import Kind, Registry
 
 __all__ = ["COMPILING", "announcing_compilation", "warm_up", "warm_up_others"]
 
@@ -50,8 +51,7 @@ def warm_up(registry: Registry, unwanted: Callable[[], bool] = lambda: False) ->
         Asked before each algorithm; once it says so, the rest is left out.
     """
     pipeline = resolve(registry, {})
-    one = SceneDescriptor(np.array([[1.0, 0.0, 0.0, 0.0]]), 2, 0.0)
-    table = finish(relate(one, one, pipeline.similarity))
+    table = _relate_one(pipeline.similarity)
     fmap = Fmap(np.array([0]))
     fmap_confidence(fmap, table)
     exchange_confidences(object_map(occm(fmap, table)), table, (1.0, 1.0, 1.0))
@@ -63,6 +63,12 @@ def warm_up_others(registry: Registry, unwanted: Callable[[], bool] = lambda: Fa
     _warm_up(registry, unwanted, default=False)
 
 
+def _relate_one(similarity: Any) -> RelationTable:
+    """Compare one histogram with itself, which takes what aligns histograms for the measure."""
+    one = SceneDescriptor(np.array([[1.0, 0.0, 0.0, 0.0]]), 2, 0.0)
+    return finish(relate(one, one, similarity))
+
+
 def _warm_up(registry: Registry, unwanted: Callable[[], bool], *, default: bool) -> None:
     for item in registry.algorithms:
         if (item.algorithm.name in DEFAULTS[item.kind]) is not default:
@@ -71,5 +77,7 @@ def _warm_up(registry: Registry, unwanted: Callable[[], bool], *, default: bool)
             return
         try:
             item.algorithm.warm_up()
+            if item.kind is Kind.SIMILARITY:
+                _relate_one(item.algorithm())
         except Exception:  # a plugin may raise anything; it will fail again when it is asked for
             _log.exception("%s failed to warm up", registry.whose(item.algorithm))

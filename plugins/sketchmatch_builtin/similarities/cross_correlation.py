@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from sketchmatch.api import Similarity
-from sketchmatch.api.kernels import cosine_rows
+from sketchmatch.api import ProductSimilarity
 from sketchmatch.model import FloatArray
 
 __all__ = ["CrossCorrelation"]
 
 
-class CrossCorrelation(Similarity):
+class CrossCorrelation(ProductSimilarity):
     """Normalised cross-correlation, Σ h₂h' / (‖h₂‖‖h'‖).
 
     Source: P. Matsakis, J. M. Keller, O. Sjahputera, J. Marjamaa, "The use of force histograms for
@@ -21,11 +20,9 @@ class CrossCorrelation(Similarity):
     name = "cross-correlation"
     summary = "Normalised cross-correlation of the aligned histograms."
 
-    @classmethod
-    def warm_up(cls) -> None:
-        """Compile the kernel."""
-        cls().compare(np.ones((1, 4)), np.ones((1, 4)))
-
-    def compare(self, aligned: FloatArray, argument: FloatArray) -> FloatArray:
-        """Return σ of each pair of rows, shape (k,)."""
-        return np.minimum(cosine_rows(aligned, argument), 1.0)
+    def combine(
+        self, product: FloatArray, template_square: FloatArray, argument_square: FloatArray
+    ) -> FloatArray:
+        """Return σ of pairs of histograms."""
+        cosine = product / np.sqrt(template_square * argument_square)
+        return np.clip(cosine, 0.0, 1.0)
