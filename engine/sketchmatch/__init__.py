@@ -13,25 +13,32 @@ if TYPE_CHECKING:
     from sketchmatch.errors import InvalidInputError, SketchmatchError
     from sketchmatch.model import Scene
     from sketchmatch.pipeline.result import MatchResult
-    from sketchmatch.public import force_histogram, match, read_scene
+    from sketchmatch.pipeline.words import DirectionalRelation, directional_relation
+    from sketchmatch.public import force_histogram, label_force_histograms, match, read_scene
 
 __all__ = [
+    "DirectionalRelation",
     "InvalidInputError",
     "MatchResult",
     "Scene",
     "SketchmatchError",
+    "directional_relation",
     "force_histogram",
+    "label_force_histograms",
     "match",
     "read_scene",
 ]
 __version__ = "0.1.0"
 
 _HOMES = {
+    "DirectionalRelation": "sketchmatch.pipeline.words",
     "InvalidInputError": "sketchmatch.errors",
     "MatchResult": "sketchmatch.pipeline.result",
     "Scene": "sketchmatch.model",
     "SketchmatchError": "sketchmatch.errors",
+    "directional_relation": "sketchmatch.pipeline.words",
     "force_histogram": "sketchmatch.public",
+    "label_force_histograms": "sketchmatch.public",
     "match": "sketchmatch.public",
     "read_scene": "sketchmatch.public",
 }

@@ -86,6 +86,14 @@ def test_json_is_the_contracts_message_and_the_same_in_process_and_from_a_server
     assert answers[0]["seed"] == "5"
 
 
+def test_json_tells_how_each_sketched_object_lies_to_another(command_line, where):
+    lines = result(command_line("match", *ROOM, *where, "--json")).object_matches
+    for line in lines:
+        assert line.relation.reference_object in {other.sketch_object for other in lines}
+        assert line.relation.phrase
+        assert 0 <= line.relation.degree <= 1
+
+
 def test_json_writes_out_index_0_and_empty_lists(command_line):
     answer = json.loads(command_line("match", *ROOM, "--json").stdout)
     assert answer["objectMatches"][0]["sketchObject"] == 0
@@ -116,6 +124,7 @@ def test_a_terminal_shows_the_search_while_it_runs_and_then_a_table(where):
     assert "8 of 8 sketched objects matched" in terminal.shown
     assert "sideboard" in terminal.shown
     assert "stopped by the time budget after" in terminal.shown
+    assert "to the left of round table" in terminal.shown, "the piano, in the sketch"
 
 
 def test_a_pipe_stays_clean_while_the_terminal_shows_the_search():
@@ -197,6 +206,7 @@ def test_the_table_says_how_many_are_without_a_partner(uneven):
     terminal = Terminal("match", four, three)
     assert terminal.end()[0] == 0
     assert "3 of 4 sketched objects matched, 1 in the sketch without partner" in terminal.shown
+    assert "to the right of No. 1" in terminal.shown, "objects without labels go by number"
 
 
 # segment, plugins -------------------------------------------------------------------------------

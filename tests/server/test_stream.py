@@ -217,6 +217,30 @@ def test_unequal_numbers_leave_the_rest_of_the_larger_scene_unmatched(address, s
     assert result.scale == pytest.approx(2.0, abs=0.02)
 
 
+@pytest.mark.parametrize(("sketched", "mapped"), [(5, 7), (7, 5), (2, 7)])
+def test_each_matched_object_comes_with_its_relation_in_the_sketch(address, sketched, mapped):
+    polygons = shapes(7)
+    with Client(address) as client:
+        events = list(
+            client.events(
+                sources.polygons(polygons[:sketched]), sources.polygons(turned(polygons)[:mapped])
+            )
+        )
+    result, progress = events[-1].result, [event.progress for event in events[:-1]]
+    drawn = Scene.from_polygons(polygons[:sketched])
+    matched = {line.sketch_object for line in result.object_matches}
+    assert len(matched) == min(sketched, mapped)
+    for line in result.object_matches:
+        assert line.HasField("relation")
+        told = line.relation
+        assert told.reference_object in matched - {line.sketch_object}
+        pair = (drawn.objects[k] for k in (line.sketch_object, told.reference_object))
+        expected = sketchmatch.directional_relation(sketchmatch.force_histogram(*pair))
+        assert (told.phrase, told.degree) == (expected.phrase, pytest.approx(expected.degree))
+    for part in [*progress, *result.alternatives]:
+        assert not any(line.HasField("relation") for line in part.object_matches)
+
+
 def test_a_long_search_reports_progress_often_and_at_most_20_times_a_second(address):
     with Client(address) as client:
         started = time.monotonic()

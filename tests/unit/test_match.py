@@ -1,12 +1,13 @@
 """A whole match: its events, what comes out both ways round, its limits and its refusals."""
 
+import itertools
 import math
 import time
 
 import numpy as np
 import pytest
 
-from sketchmatch import Scene
+from sketchmatch import Scene, directional_relation, force_histogram
 from sketchmatch.api import Outcome, Searcher, SearchProgress
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError, Reason
 from sketchmatch.model import Fmap, LabelledPolygon, OccupancyGrid, PolygonSet
@@ -158,6 +159,56 @@ def test_turn_and_scale_read_from_sketch_to_map(drawn, mapped, degrees, scale):
         assert entry.dilation == pytest.approx(scale, rel=1e-6)
         off = math.remainder(entry.rotation - math.radians(degrees), math.tau)
         assert off == pytest.approx(0.0, abs=1e-6)
+
+
+def in_words(scene):
+    """Return how each object of a scene lies to the nearest other, by hand."""
+    shapes, found = [item.polygon for item in scene.objects], {}
+    for a, shape in enumerate(shapes):
+        b = min((k for k in range(len(shapes)) if k != a), key=lambda k: shape.distance(shapes[k]))
+        relation = directional_relation(force_histogram(scene.objects[a], scene.objects[b]))
+        found[a] = (b, relation.phrase, pytest.approx(relation.degree, abs=1e-9))
+    return found
+
+
+def told(result):
+    lines = {match.sketch_object: match.relation for match in result.matches}
+    return {k: (r.reference_object, r.phrase, r.degree) for k, r in lines.items()}
+
+
+@pytest.mark.parametrize(("drawn", "mapped"), CASES.values(), ids=CASES)
+def test_each_match_tells_how_the_object_lies_in_the_sketch(drawn, mapped):
+    world = seven()
+    sketch = changed(world, math.radians(-136), 0.2, drawn)
+    result = matched(sketch, changed(world, order=mapped))
+    kept = list(result.object_map)
+    names = dict(enumerate(kept))
+    expected = in_words(Scene(tuple(sketch.objects[k] for k in kept)))
+    assert told(result) == {names[a]: (names[b], *rest) for a, (b, *rest) in expected.items()}
+    turned = in_words(Scene(tuple(world.objects[drawn[k]] for k in kept)))
+    assert [line[1] for line in turned.values()] != [line[1] for line in expected.values()]
+
+
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_two_matched_objects_are_told_from_each_other(exchanged):
+    pair = [SQUARE, SQUARE + np.array([4.0, 0.2])]
+    scenes = [Scene.from_polygons(pair), Scene.from_polygons([*pair, 3 * SQUARE + [1, 40]])]
+    result = matched(*scenes[:: -1 if exchanged else 1])
+    lines = {match.sketch_object: match.relation for match in result.matches}
+    assert len(lines) == 2
+    for (a, here), (b, there) in itertools.permutations(lines.items()):
+        assert (here.reference_object, there.reference_object) == (b, a)
+        assert here.degree == pytest.approx(there.degree, abs=1e-12)
+
+
+def test_only_the_result_tells_relations():
+    scene = seven()
+    *before, last = events(scene, scene, selection=ENDLESS, time_budget=0.3)
+    lines = [line for event in before if isinstance(event, Progress) for line in event.matches]
+    assert lines
+    others = [line for other in last.result.alternatives for line in other.matches]
+    assert others
+    assert all(line.relation is None for line in lines + others)
 
 
 def test_exchanging_sketch_and_map_turns_the_answer_around():

@@ -11,7 +11,7 @@ from typing import Annotated, NoReturn
 import typer
 
 import sketchmatch
-from sketchmatch.cli import demo, match, plugins, segment, serve
+from sketchmatch.cli import demo, describe, match, plugins, relate, segment, serve
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError
 
 __all__ = ["ExitCode", "main"]
@@ -25,6 +25,8 @@ app = typer.Typer(
 )
 app.command("match")(match.match)
 app.command("segment")(segment.segment)
+app.command("describe")(describe.describe)
+app.command("relate")(relate.relate)
 app.command("serve")(serve.serve)
 app.command("demo")(demo.demo)
 app.add_typer(plugins.app, name="plugins")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
@@ -21,7 +22,21 @@ from sketchmatch_proto.v1 import match_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 
-__all__ = ["JSON_STYLE", "facts", "show_match", "show_scene", "watch"]
+if TYPE_CHECKING:
+    from sketchmatch.api import Algorithm
+
+__all__ = [
+    "JSON_STYLE",
+    "chosen",
+    "facts",
+    "follow",
+    "named",
+    "print_document",
+    "say_warnings",
+    "show_match",
+    "show_scene",
+    "watch",
+]
 
 JSON_STYLE: dict[str, Any] = {"always_print_fields_with_no_presence": True, "ensure_ascii": False}
 """How messages become JSON: index 0 and empty lists are written out."""
@@ -32,6 +47,7 @@ _PHASES = {
     match_pb2.PHASE_RELATE: "comparing relations",
     match_pb2.PHASE_SEARCH: "searching",
 }
+_Value = TypeVar("_Value")
 # A margin in ζ below this is within what a wobbling outline changes.
 _AMBIGUOUS = 0.005
 _OUTCOMES = {
@@ -51,6 +67,30 @@ def watch(events: Generator[MatchResponse, None, None]) -> Match:
         return _collected(events, lambda progress: live.update(_progress(progress)))
 
 
+def follow(work: Generator[float, None, _Value], what: str) -> _Value:
+    """Run a generator of shares done to its end, showing it where standard error is a terminal."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        return _finished(work, None)
+    grid, bar = Table.grid(padding=(0, 2)), ProgressBar(total=1.0, width=24)
+    grid.add_row(Spinner("dots", what), bar)
+    with Live(grid, console=console, transient=True):
+        return _finished(work, bar.update)
+
+
+def _finished(
+    work: Generator[float, None, _Value], on_share: Callable[[float], object] | None
+) -> _Value:
+    with closing(work):
+        while True:
+            try:
+                share = next(work)
+            except StopIteration as stop:
+                return stop.value  # type: ignore[no-any-return]
+            if on_share is not None:
+                on_share(share)
+
+
 def _collected(
     events: Generator[MatchResponse, None, None],
     on_progress: Callable[[match_pb2.MatchProgress], object] | None,
@@ -64,8 +104,8 @@ def _collected(
 
 def show_match(match: Match) -> None:
     """Print the object map: a table on a terminal, tab-separated lines elsewhere."""
-    _say_warnings("sketch", match.scenes.sketch_warnings)
-    _say_warnings("map", match.scenes.map_warnings)
+    say_warnings("sketch", match.scenes.sketch_warnings)
+    say_warnings("map", match.scenes.map_warnings)
     if sys.stdout.isatty():
         Console().print(_match_table(match))
         return
@@ -84,7 +124,7 @@ def show_match(match: Match) -> None:
 
 def show_scene(response: SegmentResponse) -> None:
     """Print the objects of a scene: a table on a terminal, tab-separated lines elsewhere."""
-    _say_warnings("", response.warnings)
+    say_warnings("", response.warnings)
     rows = [
         (
             item.label,
@@ -110,6 +150,36 @@ def show_scene(response: SegmentResponse) -> None:
     Console().print(table)
 
 
+def say_warnings(side: str, warnings: Iterable[str]) -> None:
+    """Tell what segmentation left out or decided."""
+    for warning in warnings:
+        say(f"{side}: {warning}" if side else warning)
+
+
+def print_document(document: Mapping[str, Any]) -> None:
+    """Print what no message of the contract holds as JSON, in the same style."""
+    print(json.dumps(document, ensure_ascii=False, indent=2))
+
+
+def chosen(algorithm: Algorithm) -> dict[str, Any]:
+    """Return an algorithm for a JSON document: its name and all its parameters."""
+    return {"name": algorithm.name, "parameters": algorithm.params.model_dump(mode="json")}
+
+
+def named(index: int, labels: Sequence[str]) -> str:
+    """Return what a person calls an object: its label, its number, or both where labels repeat.
+
+    Examples
+    --------
+    >>> [named(k, ["desk", "chair", "chair", ""]) for k in range(4)]
+    ['desk', 'chair (2)', 'chair (3)', 'No. 4']
+    """
+    label = labels[index].strip()
+    if not label:
+        return f"No. {index + 1}"
+    return f"{label} ({index + 1})" if labels.count(labels[index]) > 1 else label
+
+
 def facts(result: match_pb2.MatchResult) -> list[tuple[str, str]]:
     """Return the figures that sum a result up, by name."""
     return [
@@ -130,6 +200,8 @@ def _match_table(match: Match) -> RenderableType:
     table.add_column("confidence", justify="right")
     table.add_column("", width=12)
     table.add_column("margin", justify="right")
+    table.add_column("in the sketch")
+    labels = [item.label for item in match.scenes.sketch.objects]
     for line in result.object_matches:
         table.add_row(
             str(line.sketch_object + 1),
@@ -139,6 +211,7 @@ def _match_table(match: Match) -> RenderableType:
             f"{line.confidence:.3f}",
             ProgressBar(total=1.0, completed=line.confidence, width=12),
             _margin(line),
+            _relation(line, labels),
         )
     parts = result.fmap_confidence
     summary = "  ".join(f"{name} {value}" for name, value in facts(result))
@@ -155,6 +228,13 @@ def _margin(line: match_pb2.ObjectMatch) -> Text:
     if not line.HasField("margin"):
         return Text("")
     return Text(f"{line.margin:.3f}", style="bold red" if line.margin < _AMBIGUOUS else "")
+
+
+def _relation(line: match_pb2.ObjectMatch, labels: Sequence[str]) -> Text:
+    """Return how the sketched object lies to the nearest other; no markup, whatever the label."""
+    if not line.HasField("relation"):
+        return Text("")
+    return Text(f"{line.relation.phrase} {named(line.relation.reference_object, labels)}")
 
 
 def _alternatives(result: match_pb2.MatchResult) -> list[Text]:
@@ -213,11 +293,6 @@ def _progress(progress: match_pb2.MatchProgress) -> RenderableType:
     return Group(
         grid, Text(f"best so far: {pairs}", style="dim", overflow="ellipsis", no_wrap=True)
     )
-
-
-def _say_warnings(side: str, warnings: Any) -> None:
-    for warning in warnings:
-        say(f"{side}: {warning}" if side else warning)
 
 
 def _seconds(duration: Any) -> float:

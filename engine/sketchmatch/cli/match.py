@@ -48,8 +48,9 @@ def match(
     """Find which sketched object is which mapped object.
 
     On a terminal it shows the search while it runs and then a table that counts objects from 1, as
-    the overlay does. In a pipe it prints tab-separated lines; these and --json count from 0, as
-    the API does.
+    the overlay does, and says how each sketched object lies to the nearest other. In a pipe it
+    prints tab-separated lines; these and --json, which says that too, count from 0, as the API
+    does.
     """
     from sketchmatch.cli import display, pictures, places
 

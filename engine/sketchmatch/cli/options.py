@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +13,18 @@ import typer
 
 from sketchmatch.errors import InvalidInputError, Reason
 
-__all__ = ["Json", "MatchSettings", "Overlay", "Server", "Settings", "parse_settings", "say"]
+__all__ = [
+    "Histogram",
+    "Json",
+    "JsonDocument",
+    "MatchSettings",
+    "Overlay",
+    "Server",
+    "Settings",
+    "parse_pairs",
+    "parse_settings",
+    "say",
+]
 
 Server = Annotated[
     str | None,
@@ -33,6 +44,10 @@ Settings = Annotated[
 Json = Annotated[
     bool, typer.Option("--json", help="Print the answer as the contract's message in JSON.")
 ]
+JsonDocument = Annotated[
+    bool, typer.Option("--json", help="Print one JSON document, which counts objects from 0.")
+]
+Histogram = Annotated[str, typer.Option(help="Histogram; `constant` by default.")]
 Overlay = Annotated[
     Path | None, typer.Option("--overlay", metavar="FILE", help="Draw the answer into a picture.")
 ]
@@ -60,13 +75,22 @@ class MatchSettings:
     alternatives: int | None = None
 
 
-def parse_settings(settings: Iterable[str] | None) -> dict[str, dict[str, Any]]:
+def parse_settings(
+    settings: Iterable[str] | None, allowed: Sequence[str] = ()
+) -> dict[str, dict[str, Any]]:
     """Read ``stage.parameter=value`` settings; a value is JSON, or else a string.
+
+    Parameters
+    ----------
+    settings
+        As typed.
+    allowed
+        The stages that the command has; all if left out.
 
     Raises
     ------
     InvalidInputError
-        If one has another form.
+        If one has another form, or is for another stage.
 
     Examples
     --------
@@ -88,8 +112,42 @@ def parse_settings(settings: Iterable[str] | None) -> dict[str, dict[str, Any]]:
             value = json.loads(text)
         except ValueError:
             value = text
+        if allowed and stage not in allowed:
+            known = " or ".join(f"{name}.…" for name in allowed)
+            raise InvalidInputError(
+                Reason.INVALID_PARAMETER, "--set", f"{stage!r} is no stage here; use {known}"
+            )
         stages.setdefault(stage, {})[parameter] = value
     return stages
+
+
+def parse_pairs(texts: Iterable[str] | None, option: str) -> list[tuple[int, int]]:
+    """Read pairs of objects, numbered from 1 as tables and pictures do, and count them from 0.
+
+    Raises
+    ------
+    InvalidInputError
+        If one has another form or names one object twice.
+
+    Examples
+    --------
+    >>> parse_pairs(["3,1"], "--pair")
+    [(2, 0)]
+    """
+    pairs = []
+    for text in texts or ():
+        try:
+            a, b = (int(part) for part in text.split(","))
+        except ValueError:
+            raise InvalidInputError(
+                Reason.INVALID_FIELD, option, f"{text!r} is not two numbers of objects, as in 3,1"
+            ) from None
+        if a == b:
+            raise InvalidInputError(
+                Reason.INVALID_FIELD, option, f"{text!r} names one object twice; give two objects"
+            )
+        pairs.append((a - 1, b - 1))
+    return pairs
 
 
 def say(sentence: str) -> None:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sketchmatch.cli.display import facts
 from sketchmatch.io import read_source
 from sketchmatch.io.overlay import (
+    MOST_PLOTS,
     OverlayMatch,
+    OverlayRelation,
     check_picture_path,
     draw_overlay,
+    draw_relations,
     draw_scene,
     save_overlay,
 )
@@ -21,7 +25,10 @@ from sketchmatch_client import Match
 from sketchmatch_proto.v1 import scene_pb2
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 
-__all__ = ["check_path", "draw_match", "draw_segmentation"]
+if TYPE_CHECKING:
+    from sketchmatch.cli.relations import Description
+
+__all__ = ["check_path", "draw_description", "draw_match", "draw_segmentation"]
 
 check_path = check_picture_path
 
@@ -47,6 +54,27 @@ def draw_segmentation(response: SegmentResponse, source: Path, target: Path) -> 
     grid = _grid(source)
     pen = response.segmenter.name == "strokes"
     save_overlay(target, draw_scene(_scene(response.scene), underlay=grid, pen=pen))
+
+
+def draw_description(found: Description, source: Path, target: Path) -> None:
+    """Draw a scene and the histograms of its pairs: where not all fit, those of most force."""
+    most = np.argsort(-found.histograms.sum(axis=1), kind="stable")[:MOST_PLOTS]
+    relations = []
+    for k in sorted(most.tolist()):
+        (a, b), relation, row = found.pairs[k], found.relations[k], found.histograms[k]
+        main = None if relation.direction is None else float(found.directions[k])
+        relations.append(OverlayRelation(a, b, relation.phrase, relation.degree, row, main))
+    directions = found.histograms.shape[1]
+    kind = f"{found.histogram.name} histograms, {directions} directions"
+    picture = draw_relations(
+        found.scene,
+        relations,
+        left_out=len(found.pairs) - len(relations),
+        caption=f"{kind}, each drawn to its own peak; an arrow marks the main direction",
+        underlay=_grid(source),
+        pen=found.segmenter.name == "strokes",
+    )
+    save_overlay(target, picture, "--plot")
 
 
 def _scene(message: scene_pb2.Scene) -> Scene:

@@ -9,7 +9,6 @@ import typer
 from google.protobuf.json_format import MessageToJson
 
 from sketchmatch.cli.options import Json, Overlay, Server, Settings, parse_settings
-from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 
 __all__ = ["segment"]
@@ -47,12 +46,7 @@ def segment(
 def _segmented(
     server: str | None, file: Path, segmenter: str, settings: list[str] | None
 ) -> SegmentResponse:
-    stages = parse_settings(settings)
-    parameters = stages.pop("segmenter", {})
-    for stage in stages:
-        raise InvalidInputError(
-            Reason.INVALID_PARAMETER, "--set", f"{stage!r} is no stage here; use segmenter.…"
-        )
+    parameters = parse_settings(settings, ("segmenter",)).get("segmenter", {})
     if server:
         from sketchmatch.cli import remote
 

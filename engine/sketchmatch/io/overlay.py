@@ -17,9 +17,19 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io._overlay.canvas import printable
 from sketchmatch.io._overlay.page import Entry, Page
 from sketchmatch.io._overlay.panel import Panel, badge_size
-from sketchmatch.model import OccupancyGrid, Scene
+from sketchmatch.io._overlay.relations import MOST_PLOTS, Plot, RelationsPage
+from sketchmatch.model import FloatArray, OccupancyGrid, Scene
 
-__all__ = ["OverlayMatch", "check_picture_path", "draw_overlay", "draw_scene", "save_overlay"]
+__all__ = [
+    "MOST_PLOTS",
+    "OverlayMatch",
+    "OverlayRelation",
+    "check_picture_path",
+    "draw_overlay",
+    "draw_relations",
+    "draw_scene",
+    "save_overlay",
+]
 
 _FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
 
@@ -41,6 +51,32 @@ class OverlayMatch:
     sketch_object: int
     map_object: int
     confidence: float
+
+
+@dataclass(frozen=True, eq=False)
+class OverlayRelation:
+    """How one object of a scene lies to another.
+
+    Attributes
+    ----------
+    a, b
+        Indices of the objects, from 0.
+    phrase
+        Completes "a is … b".
+    degree
+        How well it describes the histogram, 0 … 1.
+    histogram
+        Shape (n,): entry k supports "a is in direction 2πk/n of b".
+    direction
+        The main direction in radians, or None where none shall be marked.
+    """
+
+    a: int
+    b: int
+    phrase: str
+    degree: float
+    histogram: FloatArray
+    direction: float | None
 
 
 def draw_overlay(
@@ -144,13 +180,78 @@ def draw_scene(
     metres = underlay is not None if metres is None else metres
     numbers = {k: k + 1 for k in range(len(scene))}
     panel = Panel("", scene, numbers, underlay, pen, metres, badge_size(len(scene)))
-    labelled = [Entry(k + 1, printable(name)) for k, name in enumerate(scene.labels) if name]
     title = f"{len(scene)} objects" if title is None else title
-    return Page(_SINGLE, [panel], labelled, "").drawn(title, caption, (), width)
+    return Page(_SINGLE, [panel], _labelled(scene), "").drawn(title, caption, (), width)
 
 
-def check_picture_path(path: str | Path) -> None:
+def draw_relations(
+    scene: Scene,
+    relations: Sequence[OverlayRelation],
+    *,
+    left_out: int = 0,
+    title: str | None = None,
+    caption: str = "",
+    underlay: OccupancyGrid | None = None,
+    metres: bool | None = None,
+    pen: bool = False,
+    width: int = 1600,
+) -> Image.Image:
+    """Draw one scene and beside it polar plots of the histograms of its pairs.
+
+    Each plot is as large as its own peak allows; the pointer marks the main direction.
+
+    Parameters
+    ----------
+    scene
+        The objects.
+    relations
+        1 to 16 of them, in the order of the plots.
+    left_out
+        How many others are not drawn, which the headline tells.
+    title, caption
+        The headline, which counts the relations when left out, and a line below it.
+    underlay, metres, pen
+        As :func:`draw_scene` takes them.
+    width
+        Of the picture, in pixels, 400 … 6400. The height follows from the content.
+
+    Returns
+    -------
+    PIL.Image.Image
+        RGB.
+
+    Raises
+    ------
+    InvalidInputError
+        If there are too many relations or none, one names an object that is not there, or the
+        width is out of range.
+    """
+    _check_width(width)
+    _check_relations(scene, relations)
+    numbers = {k: k + 1 for k in range(len(scene))}
+    metres = underlay is not None if metres is None else metres
+    panel = Panel("", scene, numbers, underlay, pen, metres, badge_size(len(scene)))
+    plots = [
+        Plot((item.a + 1, item.b + 1), item.phrase, item.degree, item.histogram, item.direction)
+        for item in relations
+    ]
+    if title is None:
+        total = len(relations) + left_out
+        counted = f"{total} relation" if total == 1 else f"{total} relations"
+        rest = f", {left_out} of them not drawn" if left_out else ""
+        title = f"{counted} of {len(scene)} objects{rest}"
+    return RelationsPage(panel, _labelled(scene), plots).drawn(title, caption, width)
+
+
+def check_picture_path(path: str | Path, field: str = "overlay") -> None:
     """Refuse a path that no picture can be saved under, before any work is done.
+
+    Parameters
+    ----------
+    path
+        Where the picture shall be.
+    field
+        What an error calls it.
 
     Raises
     ------
@@ -161,33 +262,40 @@ def check_picture_path(path: str | Path) -> None:
     if path.suffix.lower() not in _FORMATS:
         raise InvalidInputError(
             Reason.INVALID_FILE,
-            "overlay",
+            field,
             f"is {str(path)!r}; let its name end in .png, .jpg or .webp",
         )
     if not path.parent.is_dir():
         raise InvalidInputError(
             Reason.INVALID_FILE,
-            "overlay",
+            field,
             f"is {str(path)!r}, but there is no folder {str(path.parent)!r}; create it first",
         )
 
 
-def save_overlay(path: str | Path, image: Image.Image) -> None:
+def save_overlay(path: str | Path, image: Image.Image, field: str = "overlay") -> None:
     """Save a picture, in the format that its name's ending says.
+
+    Parameters
+    ----------
+    path, field
+        As :func:`check_picture_path` takes them.
+    image
+        The picture.
 
     Raises
     ------
     InvalidInputError
         If the name's ending is no picture's, or the file cannot be written.
     """
-    check_picture_path(path)
+    check_picture_path(path, field)
     try:
         image.save(path, _FORMATS[Path(path).suffix.lower()], quality=92)
     except OSError as error:
         why = error.strerror or "the disk refused it"
         raise InvalidInputError(
             Reason.INVALID_FILE,
-            "overlay",
+            field,
             f"cannot be written to {str(path)!r} ({why}); name a file in a folder of yours",
         ) from None
 
@@ -217,6 +325,25 @@ def _check_matches(sketch: Scene, map: Scene, matches: Sequence[OverlayMatch]) -
             raise InvalidInputError(
                 Reason.INVALID_FIELD, field, "is not finite; give a number from 0 to 1"
             )
+
+
+def _check_relations(scene: Scene, relations: Sequence[OverlayRelation]) -> None:
+    if not 1 <= len(relations) <= MOST_PLOTS:
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "relations",
+            f"are {len(relations)}; give 1 … {MOST_PLOTS}, and the number left out",
+        )
+    for k, relation in enumerate(relations):
+        for name, index in (("a", relation.a), ("b", relation.b)):
+            if not 0 <= index < len(scene):
+                problem = f"is {index}; the scene has objects 0 … {len(scene) - 1}"
+                raise InvalidInputError(Reason.INVALID_FIELD, f"relations[{k}].{name}", problem)
+
+
+def _labelled(scene: Scene) -> list[Entry]:
+    """Return a legend of the objects that have labels."""
+    return [Entry(k + 1, printable(name)) for k, name in enumerate(scene.labels) if name]
 
 
 def _entry(match: OverlayMatch, sketch: Scene, map: Scene) -> Entry:  # noqa: A002

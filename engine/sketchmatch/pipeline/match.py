@@ -27,9 +27,9 @@ from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, Reason
 from sketchmatch.model import (
     RelationTable,
     Scene,
+    SceneDescriptor,
     Source,
     Weights,
-    pair_count,
 )
 from sketchmatch.pipeline import reading
 from sketchmatch.pipeline.alternatives import best_others, exchange_confidences, partner_margins
@@ -41,8 +41,9 @@ from sketchmatch.pipeline.correspond import (
     occm,
 )
 from sketchmatch.pipeline.describe import describe
+from sketchmatch.pipeline.limits import check_comparisons, check_histograms
 from sketchmatch.pipeline.plugins import blaming, checked_progress, segmented
-from sketchmatch.pipeline.relate import relate
+from sketchmatch.pipeline.relate import check_exponent, relate
 from sketchmatch.pipeline.result import (
     AlternativeMap,
     MatchResult,
@@ -50,6 +51,7 @@ from sketchmatch.pipeline.result import (
     Statistics,
 )
 from sketchmatch.pipeline.selection import Pipeline, Selection, resolve
+from sketchmatch.pipeline.words import nearest_relations
 from sketchmatch.registry import Registry
 
 __all__ = [
@@ -68,9 +70,6 @@ _MAX_SEED = 2**64 - 1
 _MAX_WEIGHT = 1e6
 _MAX_ALTERNATIVES = 100
 _ALTERNATIVES = 3
-# What 2 GB hold: 100 × 100 objects, and the histograms of 700 objects in 180 directions.
-_MAX_COMPARISONS = 30_000_000
-_MAX_HISTOGRAM_VALUES = 50_000_000
 _Value = TypeVar("_Value")
 
 
@@ -255,24 +254,33 @@ class _Match:
             sketch = self.segmented("sketch", self.request.sketch, self.pipeline.sketch_segmenter)
             self.check_budget(Phase.SEGMENT)
             map_ = self.segmented("map", self.request.map, self.pipeline.map_segmenter)
-        _check_size(sketch.scene, map_.scene, self.pipeline)
+        check_histograms("sketch", sketch.scene, self.pipeline.histogram)
+        check_histograms("map", map_.scene, self.pipeline.histogram)
+        check_comparisons(sketch.scene, map_.scene)
+        check_exponent(self.pipeline.histogram.exponent)
         yield Segmented(sketch, map_)
         count = _alternatives_wanted(self.request.alternatives, sketch.scene, map_.scene)
         exchanged = len(sketch.scene) > len(map_.scene)
-        scenes = (sketch.scene, map_.scene)
-        template, argument = reversed(scenes) if exchanged else scenes
-        histogram, similarity = self.pipeline.histogram, self.pipeline.similarity
+        similarity = self.pipeline.similarity
         with self.timed("describe"):
-            work = describe(template, histogram)
-            first = yield from self.watched(Phase.DESCRIBE, histogram, work)
-            work = describe(argument, histogram)
-            second = yield from self.watched(Phase.DESCRIBE, histogram, work)
+            drawn = yield from self.described("sketch", sketch.scene)
+            mapped = yield from self.described("map", map_.scene)
+        first, second = (mapped, drawn) if exchanged else (drawn, mapped)
         with self.timed("relate"):
             comparing = relate(first, second, similarity)
             table = yield from self.watched(Phase.RELATE, similarity, comparing)
         with self.timed("search"):
             found, outcome = yield from self.search(table, exchanged, count)
-        yield Finished(self.result(sketch, map_, table, exchanged, found, outcome, count))
+        yield Finished(self.result(sketch, map_, drawn, table, exchanged, found, outcome, count))
+
+    def described(self, side: str, scene: Scene) -> Generator[MatchEvent, None, SceneDescriptor]:
+        """Return the histograms of one side."""
+        histogram = self.pipeline.histogram
+        try:
+            work = describe(scene, histogram)
+            return (yield from self.watched(Phase.DESCRIBE, histogram, work))
+        except InvalidInputError as error:
+            raise error.within(side) from None
 
     def segmented(
         self, side: str, source: Source | Scene, segmenter: Segmenter | None
@@ -348,19 +356,22 @@ class _Match:
         self,
         sketch: Segmentation,
         map_: Segmentation,
+        drawn: SceneDescriptor,
         table: RelationTable,
         exchanged: bool,
         found: SearchProgress,
         outcome: Outcome,
         count: int,
     ) -> MatchResult:
-        """Read what was found from sketch to map."""
+        """Read what was found from sketch to map; ``drawn`` describes the sketch."""
         weights = self.request.weights
         mapped = object_map(occm(found.fmap, table))
         best = fmap_confidence(found.fmap, table, weights)
         exchanges = exchange_confidences(mapped, table, weights)
         others = best_others(mapped, found.alternatives, exchanges, table, weights, count)
         margins = partner_margins(mapped, best.total, others, exchanges)
+        matched = mapped.partners.tolist() if exchanged else range(len(mapped.partners))
+        relations = nearest_relations(sketch.scene, drawn, matched)
         rotation = global_rotation(found.fmap, table)
         dilation = global_dilation(found.fmap, table)
         bound = found.upper_bound
@@ -368,7 +379,7 @@ class _Match:
             bound = max(bound, best.total)  # ζ was taken anew, and may differ by rounding
         self.seconds["total"] = self.elapsed()
         return MatchResult(
-            matches=reading.matches(mapped, exchanged, margins),
+            matches=reading.matches(mapped, exchanged, margins, relations),
             omap_confidence=mapped.confidence,
             confidence=best,
             fmap=reading.correspondences(found.fmap, table, exchanged),
@@ -426,28 +437,6 @@ class _Match:
         started = time.monotonic()
         yield
         self.seconds[stage] = time.monotonic() - started
-
-
-def _check_size(sketch: Scene, map_: Scene, pipeline: Pipeline) -> None:
-    """Refuse scenes whose relations would not fit into memory."""
-    for side, scene in (("sketch", sketch), ("map", map_)):
-        values = pair_count(len(scene)) * pipeline.histogram.params.directions
-        if values > _MAX_HISTOGRAM_VALUES:
-            raise InvalidInputError(
-                Reason.LIMIT_EXCEEDED,
-                side,
-                f"has {len(scene)} objects, whose relations take {values} numbers, more than the "
-                f"limit of {_MAX_HISTOGRAM_VALUES}; leave out small objects",
-            )
-    comparisons = pair_count(len(sketch)) * pair_count(len(map_))
-    if comparisons > _MAX_COMPARISONS:
-        raise InvalidInputError(
-            Reason.LIMIT_EXCEEDED,
-            "sketch",
-            f"has {len(sketch)} objects and the map {len(map_)}, which makes {comparisons} "
-            f"comparisons of relations, more than the limit of {_MAX_COMPARISONS}; "
-            "leave out small objects",
-        )
 
 
 def _alternatives_wanted(requested: int | None, sketch: Scene, map_: Scene) -> int:

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 
 from sketchmatch.model import FloatArray, Fmap, ObjectMap, RelationTable, object_pairs
-from sketchmatch.pipeline.result import Correspondence, ObjectMatch
+from sketchmatch.pipeline.result import Correspondence, ObjectMatch, ObjectRelation
 
 __all__ = ["correspondences", "half_turned", "matches"]
 
+_UNKNOWN: Mapping[int, ObjectRelation] = MappingProxyType({})
+
 
 def matches(
-    mapped: ObjectMap, exchanged: bool, margins: FloatArray | None = None
+    mapped: ObjectMap,
+    exchanged: bool,
+    margins: FloatArray | None = None,
+    relations: Mapping[int, ObjectRelation] = _UNKNOWN,
 ) -> tuple[ObjectMatch, ...]:
     """Return the lines of an object map, in the order of the sketch.
 
@@ -23,12 +30,16 @@ def matches(
         Whether the template is the map.
     margins
         Shape (N,), of each template object, or None where unknown.
+    relations
+        By sketched object, where known.
     """
-    known = [None] * len(mapped.partners) if margins is None else margins.tolist()
-    lines = zip(mapped.partners.tolist(), mapped.confidences.tolist(), known, strict=True)
+    partners = mapped.partners.tolist()
+    pairs = ((h, g) if exchanged else (g, h) for g, h in enumerate(partners))
+    known = [None] * len(partners) if margins is None else margins.tolist()
+    lines = zip(pairs, mapped.confidences.tolist(), known, strict=True)
     read = (
-        ObjectMatch(h if exchanged else g, g if exchanged else h, confidence, margin)
-        for g, (h, confidence, margin) in enumerate(lines)
+        ObjectMatch(a, b, confidence, margin, relations.get(a))
+        for (a, b), confidence, margin in lines
     )
     return tuple(sorted(read, key=lambda match: match.sketch_object))
 

@@ -8,7 +8,33 @@ from dataclasses import dataclass
 from sketchmatch.api import Outcome
 from sketchmatch.model import Confidence, Scene
 
-__all__ = ["AlternativeMap", "Correspondence", "MatchResult", "ObjectMatch", "Statistics"]
+__all__ = [
+    "AlternativeMap",
+    "Correspondence",
+    "MatchResult",
+    "ObjectMatch",
+    "ObjectRelation",
+    "Statistics",
+]
+
+
+@dataclass(frozen=True)
+class ObjectRelation:
+    """How an object lies to another one of the same scene, in words.
+
+    Attributes
+    ----------
+    reference_object
+        Index of the other object, from 0.
+    phrase
+        Completes "the object is … the reference object", e.g. "to the left of and below".
+    degree
+        How well the phrase describes it, within [0, 1].
+    """
+
+    reference_object: int
+    phrase: str
+    degree: float
 
 
 @dataclass(frozen=True)
@@ -24,12 +50,16 @@ class ObjectMatch:
     margin
         By how much ζ falls if the sketched object takes its best other partner, in one exchange
         or in one of the alternatives; about 0 where it is ambiguous, None where unknown.
+    relation
+        How the sketched object lies, in the sketch, to the nearest other matched one; None in
+        progress and alternatives.
     """
 
     sketch_object: int
     map_object: int
     confidence: float
     margin: float | None = None
+    relation: ObjectRelation | None = None
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from sketchmatch.pipeline.match import (
     Progress,
     Segmented,
 )
-from sketchmatch.pipeline.result import Correspondence, MatchResult, ObjectMatch
+from sketchmatch.pipeline.result import Correspondence, MatchResult, ObjectMatch, ObjectRelation
 from sketchmatch.pipeline.selection import DEFAULTS
 from sketchmatch.registry import Kind, PluginStatus, Registered, Registry
 from sketchmatch_proto.v1 import (
@@ -29,7 +29,15 @@ from sketchmatch_proto.v1 import (
     source_pb2,
 )
 
-__all__ = ["ResponseWriter", "catalogue", "result", "scene", "segmented", "selection"]
+__all__ = [
+    "ResponseWriter",
+    "catalogue",
+    "fmap_entry",
+    "result",
+    "scene",
+    "segmented",
+    "selection",
+]
 
 _SOURCE_KINDS = {
     StrokeSet: [catalog_service_pb2.SOURCE_KIND_STROKE_SET],
@@ -108,7 +116,7 @@ def result(value: MatchResult) -> match_pb2.MatchResult:
         omap_confidence=value.omap_confidence,
         fmap_confidence=_fmap_confidence(value.confidence),
         upper_bound=value.upper_bound,
-        fmap_entries=[_entry(entry) for entry in value.fmap],
+        fmap_entries=[fmap_entry(entry) for entry in value.fmap],
         rotation_radians=value.rotation,
         scale=value.scale,
         statistics=match_pb2.MatchStatistics(
@@ -127,6 +135,18 @@ def result(value: MatchResult) -> match_pb2.MatchResult:
             for other in value.alternatives
         ],
         search_note=value.search_note,
+    )
+
+
+def fmap_entry(entry: Correspondence) -> match_pb2.FmapEntry:
+    """Return a line of a histogram map as a message."""
+    (a, b), (c, d) = entry.sketch_pair, entry.map_pair
+    return match_pb2.FmapEntry(
+        sketch_pair=match_pb2.ObjectPair(first=a, second=b),
+        map_pair=match_pb2.ObjectPair(first=c, second=d),
+        similarity=entry.similarity,
+        rotation_radians=entry.rotation,
+        dilation=entry.dilation,
     )
 
 
@@ -190,9 +210,20 @@ def _object_matches(
             map_label=map_labels[match.map_object],
             confidence=match.confidence,
             margin=match.margin,
+            relation=_relation(match.relation),
         )
         for match in matches
     ]
+
+
+def _relation(relation: ObjectRelation | None) -> match_pb2.ObjectRelation | None:
+    if relation is None:
+        return None
+    return match_pb2.ObjectRelation(
+        reference_object=relation.reference_object,
+        phrase=relation.phrase,
+        degree=relation.degree,
+    )
 
 
 def _fmap_confidence(confidence: Confidence) -> match_pb2.FmapConfidence:
@@ -201,17 +232,6 @@ def _fmap_confidence(confidence: Confidence) -> match_pb2.FmapConfidence:
         similarity=confidence.similarity,
         rotation=confidence.rotation,
         dilation=confidence.dilation,
-    )
-
-
-def _entry(entry: Correspondence) -> match_pb2.FmapEntry:
-    (a, b), (c, d) = entry.sketch_pair, entry.map_pair
-    return match_pb2.FmapEntry(
-        sketch_pair=match_pb2.ObjectPair(first=a, second=b),
-        map_pair=match_pb2.ObjectPair(first=c, second=d),
-        similarity=entry.similarity,
-        rotation_radians=entry.rotation,
-        dilation=entry.dilation,
     )
 
 

@@ -374,7 +374,7 @@ class AlternativeMap(google.protobuf.message.Message):
     """Ω, the mean confidence of the object map."""
     @property
     def object_matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectMatch]:
-        """The object map, in the order of the sketch; without margins."""
+        """The object map, in the order of the sketch; without margins and relations."""
 
     @property
     def fmap_confidence(self) -> global___FmapConfidence:
@@ -404,6 +404,7 @@ class ObjectMatch(google.protobuf.message.Message):
     MAP_LABEL_FIELD_NUMBER: builtins.int
     CONFIDENCE_FIELD_NUMBER: builtins.int
     MARGIN_FIELD_NUMBER: builtins.int
+    RELATION_FIELD_NUMBER: builtins.int
     sketch_object: builtins.int
     """Index in the sketch's scene, from 0."""
     map_object: builtins.int
@@ -419,6 +420,12 @@ class ObjectMatch(google.protobuf.message.Message):
     one of the alternatives. About 0: it could be either. Less than 0: the search ended too early.
     Absent during the search, and where there are too many objects to try.
     """
+    @property
+    def relation(self) -> global___ObjectRelation:
+        """How the sketched object lies, in the sketch, to the nearest other matched one: what a robot
+        interface says beside a label, or instead of one. Absent during the search and in alternatives.
+        """
+
     def __init__(
         self,
         *,
@@ -428,12 +435,41 @@ class ObjectMatch(google.protobuf.message.Message):
         map_label: builtins.str = ...,
         confidence: builtins.float = ...,
         margin: builtins.float | None = ...,
+        relation: global___ObjectRelation | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_margin", b"_margin", "margin", b"margin"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_margin", b"_margin", "confidence", b"confidence", "map_label", b"map_label", "map_object", b"map_object", "margin", b"margin", "sketch_label", b"sketch_label", "sketch_object", b"sketch_object"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_margin", b"_margin", "margin", b"margin", "relation", b"relation"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_margin", b"_margin", "confidence", b"confidence", "map_label", b"map_label", "map_object", b"map_object", "margin", b"margin", "relation", b"relation", "sketch_label", b"sketch_label", "sketch_object", b"sketch_object"]) -> None: ...
     def WhichOneof(self, oneof_group: typing.Literal["_margin", b"_margin"]) -> typing.Literal["margin"] | None: ...
 
 global___ObjectMatch = ObjectMatch
+
+@typing.final
+class ObjectRelation(google.protobuf.message.Message):
+    """How a sketched object lies to another, in words and as the person drew it: the map may be turned."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    REFERENCE_OBJECT_FIELD_NUMBER: builtins.int
+    PHRASE_FIELD_NUMBER: builtins.int
+    DEGREE_FIELD_NUMBER: builtins.int
+    reference_object: builtins.int
+    """Index in the sketch's scene of the object that it is seen from, from 0."""
+    phrase: builtins.str
+    """Completes the sentence "the object is … the reference object": "to the left of and below". Show
+    it as it is; "in no clear direction from" where one surrounds the other, for example.
+    """
+    degree: builtins.float
+    """How well the phrase describes it, within [0, 1]; below 0.3 no direction is clear."""
+    def __init__(
+        self,
+        *,
+        reference_object: builtins.int = ...,
+        phrase: builtins.str = ...,
+        degree: builtins.float = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["degree", b"degree", "phrase", b"phrase", "reference_object", b"reference_object"]) -> None: ...
+
+global___ObjectRelation = ObjectRelation
 
 @typing.final
 class FmapConfidence(google.protobuf.message.Message):

@@ -23,11 +23,23 @@ from sketchmatch.io._overlay.panel import (
 )
 from sketchmatch.io._overlay.places import Place
 
-__all__ = ["Entry", "Page"]
+__all__ = [
+    "GUTTER",
+    "HEADER",
+    "MARGIN",
+    "PAGE",
+    "ROW",
+    "SOFT",
+    "Entry",
+    "Page",
+    "draw_entry",
+    "draw_header",
+    "panel_height",
+]
 
-_MARGIN, _GUTTER, _HEADER, _ROW = 36.0, 24.0, 108.0, 38.0
-_PAGE: Colour = (246, 247, 249)
-_SOFT: Colour = (98, 112, 134)
+MARGIN, GUTTER, HEADER, ROW = 36.0, 24.0, 108.0, 38.0
+PAGE: Colour = (246, 247, 249)
+SOFT: Colour = (98, 112, 134)
 
 
 @dataclass(frozen=True)
@@ -54,8 +66,8 @@ class Page:
         """Return the finished picture."""
         boxes = self._boxes()
         legend = self._legend_box(boxes[0][3])
-        canvas = Canvas((self.across, legend[3] + _MARGIN), width, _PAGE)
-        _draw_header(canvas, self.across, title, caption, facts)
+        canvas = Canvas((self.across, legend[3] + MARGIN), width, PAGE)
+        draw_header(canvas, self.across, title, caption, facts)
         for panel, box in zip(self.panels, boxes, strict=True):
             draw_panel(canvas, panel, box)
         if legend[3] > legend[1]:
@@ -63,30 +75,26 @@ class Page:
         return canvas.finished()
 
     def _boxes(self) -> list[Box]:
-        """Return the panels' boxes, as high as the scenes need within reason."""
+        """Return the panels' boxes."""
         count = len(self.panels)
-        width = (self.across - 2.0 * _MARGIN - (count - 1) * _GUTTER) / count
-        left, top, right, bottom = PADDING
-        areas = [panel.area() for panel in self.panels]
-        slope = max((area[3] - area[1]) / (area[2] - area[0]) for area in areas)
-        height = (width - left - right) * slope + top + bottom
-        height = min(max(height, 0.62 * width), 0.96 * width)
-        lefts = [_MARGIN + k * (width + _GUTTER) for k in range(count)]
-        return [(x, _HEADER, x + width, _HEADER + height) for x in lefts]
+        width = (self.across - 2.0 * MARGIN - (count - 1) * GUTTER) / count
+        height = panel_height(self.panels, width)
+        lefts = [MARGIN + k * (width + GUTTER) for k in range(count)]
+        return [(x, HEADER, x + width, HEADER + height) for x in lefts]
 
     def _legend_box(self, top: float) -> Box:
         rows = math.ceil(len(self.entries) / self._columns()) + (1 if self.note else 0)
         if not rows:
-            return (_MARGIN, top, self.across - _MARGIN, top)
-        top += _GUTTER
-        return (_MARGIN, top, self.across - _MARGIN, top + rows * _ROW + 20.0)
+            return (MARGIN, top, self.across - MARGIN, top)
+        top += GUTTER
+        return (MARGIN, top, self.across - MARGIN, top + rows * ROW + 20.0)
 
     def _columns(self) -> int:
         """Return how many entries share a row, the rows evenly filled."""
         if not self.entries:
             return 1
         named = any(entry.name for entry in self.entries)
-        most = int((self.across - 2.0 * _MARGIN) / (340.0 if named else 186.0))
+        most = int((self.across - 2.0 * MARGIN) / (340.0 if named else 186.0))
         rows = math.ceil(len(self.entries) / most)
         return max(math.ceil(len(self.entries) / rows), min(4, most))
 
@@ -96,32 +104,43 @@ class Page:
         pitch = (box[2] - box[0] - 24.0) / columns
         for k, entry in enumerate(self.entries):
             row, column = divmod(k, columns)
-            x, y = box[0] + 20.0 + column * pitch, box[1] + 10.0 + (row + 0.5) * _ROW
-            _draw_entry(canvas, entry, x, y, pitch - (44.0 if entry.name else 34.0))
+            x, y = box[0] + 20.0 + column * pitch, box[1] + 10.0 + (row + 0.5) * ROW
+            draw_entry(canvas, entry, x, y, pitch - (44.0 if entry.name else 34.0))
         if self.note:
-            _draw_note(canvas, self.note, box[0] + 20.0, box[3] - 10.0 - 0.5 * _ROW)
+            _draw_note(canvas, self.note, box[0] + 20.0, box[3] - 10.0 - 0.5 * ROW)
 
 
-def _draw_header(
+def panel_height(panels: Sequence[Panel], width: float) -> float:
+    """Return how high panels of a width are: as the scenes need, within reason."""
+    left, top, right, bottom = PADDING
+    areas = [panel.area() for panel in panels]
+    slope = max((area[3] - area[1]) / (area[2] - area[0]) for area in areas)
+    height = (width - left - right) * slope + top + bottom
+    return min(max(height, 0.62 * width), 0.96 * width)
+
+
+def draw_header(
     canvas: Canvas, across: float, title: str, caption: str, facts: Sequence[tuple[str, str]]
 ) -> None:
-    right = across - _MARGIN
+    """Write the headline, the line below it, and the facts on the right."""
+    right = across - MARGIN
     for name, value in [(printable(name), printable(value)) for name, value in reversed(facts)]:
         left = right - max(canvas.text_width(name, 15.0), canvas.text_width(value, 25.0))
-        canvas.text((left, 44.0), name, 15.0, _SOFT)
+        canvas.text((left, 44.0), name, 15.0, SOFT)
         canvas.text((left, 72.0), value, 25.0, INK, weight=0.012)
         canvas.line(np.array([[left - 22.0, 36.0], [left - 22.0, 84.0]]), BORDER, 1.5)
         right = left - 44.0
-    room = right - _MARGIN
+    room = right - MARGIN
     title, caption = printable(title), printable(caption)
     middle = 47.0 if caption else 60.0
     title = canvas.truncated(title, 34.0, room)
-    canvas.text((_MARGIN, middle), title, 34.0, INK, weight=0.018)
+    canvas.text((MARGIN, middle), title, 34.0, INK, weight=0.018)
     if caption:
-        canvas.text((_MARGIN, 83.0), canvas.truncated(caption, 17.0, room), 17.0, _SOFT)
+        canvas.text((MARGIN, 83.0), canvas.truncated(caption, 17.0, room), 17.0, SOFT)
 
 
-def _draw_entry(canvas: Canvas, entry: Entry, x: float, y: float, width: float) -> None:
+def draw_entry(canvas: Canvas, entry: Entry, x: float, y: float, width: float) -> None:
+    """Draw one entry of a legend, from ``x`` on around the height ``y``."""
     draw_badge(canvas, Place(x + 16.0, y), entry.number, 25.0)
     left, right = x + 40.0, x + width
     if entry.confidence is not None:
@@ -146,4 +165,4 @@ def _draw_bar(canvas: Canvas, box: Box, share: float, number: int) -> None:
 def _draw_note(canvas: Canvas, note: str, x: float, y: float) -> None:
     swatch = np.array([[x + 3, y - 10], [x + 29, y - 10], [x + 29, y + 10], [x + 3, y + 10]])
     draw_object(canvas, [swatch], None)
-    canvas.text((x + 40.0, y), note, 16.0, _SOFT)
+    canvas.text((x + 40.0, y), note, 16.0, SOFT)
