@@ -11,7 +11,7 @@ import pytest
 
 from sketchmatch.kernels import _jit
 from sketchmatch.kernels.confidence import fmap_confidence, mean_absolute_difference
-from sketchmatch.kernels.constant_force import constant_force_histograms
+from sketchmatch.kernels.projection import project
 from tests.tools import ROOT
 
 NUMBA = re.compile(r"\b(numba|n?jit)\b")
@@ -32,7 +32,7 @@ def without_text(source):
 
 
 @pytest.mark.parametrize(
-    "function", [fmap_confidence, mean_absolute_difference, constant_force_histograms]
+    "function", [fmap_confidence, mean_absolute_difference, project]
 )
 def test_kernels_run_without_the_gil_and_without_fast_math(function):
     assert function.targetoptions["nogil"] is True

@@ -9,6 +9,7 @@ import shapely
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.kernels.constant_force import constant_force_histograms
+from sketchmatch.kernels.hybrid_force import hybrid_force_histograms
 from sketchmatch.kernels.power_force import (
     APART,
     MEETING,
@@ -24,6 +25,7 @@ __all__ = [
     "OVERLAPPING",
     "TOUCHING",
     "force_histograms",
+    "hybrid_force_histograms",
     "object_name",
     "refuse_infinite",
     "relations_matter",

@@ -94,7 +94,6 @@ def _pair_force(
 _histograms = histograms_of_pairs(_pair_force, sections=True)
 
 
-@kernel
 def constant_force_histograms(
     starts: FloatArray,
     ends: FloatArray,

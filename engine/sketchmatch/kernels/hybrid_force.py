@@ -98,7 +98,6 @@ def _pair_force(
 _histograms = histograms_of_pairs(_pair_force, sections=False)
 
 
-@kernel
 def hybrid_force_histograms(
     starts: FloatArray,
     ends: FloatArray,

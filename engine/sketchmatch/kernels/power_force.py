@@ -95,7 +95,6 @@ class _Line(NamedTuple):
     means: FloatArray
 
 
-@kernel
 def power_law(exponent: float, relations: IntArray) -> PowerLaw:
     """Prepare the force d^−exponent for pairs that lie to each other as ``relations`` says."""
     means = np.empty(_TERMS)
@@ -251,7 +250,6 @@ def pair_power_force(
 _histograms = histograms_of_pairs(pair_power_force, sections=False)
 
 
-@kernel
 def power_force_histograms(
     starts: FloatArray,
     ends: FloatArray,

@@ -31,6 +31,7 @@ __all__ = [
     "V_HIGH",
     "V_LOW",
     "Projection",
+    "Scratch",
     "direction_cosines",
     "empty_projection",
     "measure_sections",
@@ -78,7 +79,7 @@ class Projection(NamedTuple):
     active: IntArray
 
 
-class _Scratch(NamedTuple):
+class Scratch(NamedTuple):
     """What sorting the edges of one object needs.
 
     Attributes
@@ -110,14 +111,11 @@ def direction_cosines(direction: int, directions: int) -> tuple[float, float]:
     return cosine, sine
 
 
-@kernel
-def empty_projection(offsets: IntArray) -> tuple[Projection, _Scratch]:
+def empty_projection(offsets: IntArray) -> tuple[Projection, Scratch]:
     """Return room for the projection of objects with these offsets."""
     objects = offsets.size - 1
-    edges = offsets[objects]
-    longest = 1
-    for k in range(objects):
-        longest = max(longest, offsets[k + 1] - offsets[k])
+    edges = int(offsets[objects])
+    longest = int(np.diff(offsets).max())
     projection = Projection(
         offsets,
         np.empty((edges, 5)),
@@ -126,7 +124,7 @@ def empty_projection(offsets: IntArray) -> tuple[Projection, _Scratch]:
         np.zeros((objects, 4)),
         np.empty((2, longest), dtype=np.int64),
     )
-    scratch = _Scratch(
+    scratch = Scratch(
         np.empty((longest, 5)),
         np.empty((2, longest), dtype=np.int64),
         np.empty(longest + 1, dtype=np.int64),
@@ -137,7 +135,7 @@ def empty_projection(offsets: IntArray) -> tuple[Projection, _Scratch]:
 @kernel
 def project(
     projection: Projection,
-    scratch: _Scratch,
+    scratch: Scratch,
     starts: FloatArray,
     ends: FloatArray,
     used: BoolArray,
@@ -180,7 +178,7 @@ def project(
         spans[k, U_LOW], spans[k, U_HIGH] = u_low, u_high
         spans[k, V_LOW], spans[k, V_HIGH] = v_low, v_high
         projection.counts[k, EDGES] = count
-        row = _sort(raw, count, places, scratch.runs)
+        row = _sort(raw, projection.counts[k, EDGES], places, scratch.runs)
         for place in range(count):
             for column in range(5):
                 edges[offsets[k] + place, column] = raw[places[row, place], column]

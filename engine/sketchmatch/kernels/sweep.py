@@ -35,13 +35,14 @@ from sketchmatch.kernels.projection import (
     V_HIGH,
     V_LOW,
     Projection,
+    Scratch,
     direction_cosines,
     empty_projection,
     measure_sections,
     project,
     separating_directions,
 )
-from sketchmatch.model.arrays import FloatArray, IntArray
+from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = ["histograms_of_pairs", "sum_over_edges"]
 
@@ -49,7 +50,7 @@ __all__ = ["histograms_of_pairs", "sum_over_edges"]
 def histograms_of_pairs(
     pair_force: Callable[..., Any], sections: bool
 ) -> Callable[..., FloatArray]:
-    """Make the kernel that gives the histograms of pairs of objects for one family of forces.
+    """Make the function that gives the histograms of pairs of objects for one family of forces.
 
     Parameters
     ----------
@@ -67,8 +68,7 @@ def histograms_of_pairs(
         :func:`~sketchmatch.kernels.constant_force.constant_force_histograms`.
     """
 
-    @kernel
-    def compute(
+    def histograms(
         starts: FloatArray,
         ends: FloatArray,
         offsets: IntArray,
@@ -76,15 +76,29 @@ def histograms_of_pairs(
         directions: int,
         law: Any,
     ) -> FloatArray:
-        objects, half = offsets.size - 1, directions // 2
-        used = np.zeros(objects, dtype=np.bool_)
-        for p in range(pairs.shape[0]):
-            used[pairs[p, 0]] = used[pairs[p, 1]] = True
-        starts, ends = _centred(starts, ends)
+        # Floats are finest about the origin. The middle is that of all objects, so that a histogram
+        # does not depend on which others are asked for.
+        middle = 0.5 * (starts.min(axis=0) + starts.max(axis=0))
+        used = np.zeros(offsets.size - 1, dtype=np.bool_)
+        used[pairs] = True
+        room = empty_projection(offsets)
+        return compute(room, starts - middle, ends - middle, used, pairs, directions, law)
+
+    @kernel
+    def compute(
+        room: tuple[Projection, Scratch],
+        starts: FloatArray,
+        ends: FloatArray,
+        used: BoolArray,
+        pairs: IntArray,
+        directions: int,
+        law: Any,
+    ) -> FloatArray:
+        projection, scratch = room
+        offsets, spans = projection.offsets, projection.spans
+        half = directions // 2
         separating, orders = separating_directions(starts, offsets, used, pairs, directions)
-        projection, scratch = empty_projection(offsets)
-        spans = projection.spans
-        histograms = np.zeros((pairs.shape[0], directions))
+        found = np.zeros((pairs.shape[0], directions))
         for direction in range(half):
             cosine, sine = direction_cosines(direction, directions)
             project(projection, scratch, starts, ends, used, cosine, sine)
@@ -100,11 +114,11 @@ def histograms_of_pairs(
                     acute = 4 * abs(direction - separating[p]) < directions
                     order = orders[p] if acute else -orders[p]
                 forward, backward = pair_force(projection, a, b, p, order, law)
-                histograms[p, direction] = forward
-                histograms[p, direction + half] = backward
-        return histograms
+                found[p, direction] = forward
+                found[p, direction + half] = backward
+        return found
 
-    return compute
+    return histograms
 
 
 def sum_over_edges(edge_force: Callable[..., Any]) -> Callable[..., tuple[float, float]]:
@@ -174,16 +188,3 @@ def sum_over_edges(edge_force: Callable[..., Any]) -> Callable[..., tuple[float,
         return max(forward, 0.0), max(backward, 0.0)
 
     return compute
-
-
-@kernel
-def _centred(starts: FloatArray, ends: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the edges with the middle of all objects in the origin, where floats are finest."""
-    low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    for e in range(starts.shape[0]):
-        for axis in range(2):
-            low[axis] = min(low[axis], starts[e, axis])
-            high[axis] = max(high[axis], starts[e, axis])
-    # Of all objects, used or not: a histogram must not depend on which others are asked for.
-    centre = 0.5 * (low + high)
-    return starts - centre, ends - centre

@@ -7,8 +7,12 @@ import shapely
 from pydantic import Field
 
 from sketchmatch.api import Histogram, HistogramParams
-from sketchmatch.api.forces import APART, OVERLAPPING, scene_relations
-from sketchmatch.api.kernels import hybrid_force_histograms
+from sketchmatch.api.forces import (
+    APART,
+    OVERLAPPING,
+    hybrid_force_histograms,
+    scene_relations,
+)
 from sketchmatch.model import FloatArray, IntArray, Scene
 from sketchmatch_builtin.histograms._forces import two_squares
 
