@@ -14,6 +14,7 @@ from sketchmatch.kernels.power_force import (
     APART,
     MEETING,
     OVERLAPPING,
+    PLAIN,
     TOUCHING,
     power_force_histograms,
 )
@@ -34,13 +35,11 @@ __all__ = [
 
 # Shares of two objects' extent, and of the smaller one's area, that are rounding, not geometry.
 _HAIR = 1e-12
-# Up to this r the plain antiderivatives of forces keep enough digits under overlap.
-_PLAIN = 0.9
 
 
 def relations_matter(r: float) -> bool:
     """Whether forces d^−r want to know which objects overlap and which touch."""
-    return r > _PLAIN
+    return r > PLAIN
 
 
 def scene_relations(scene: Scene, pairs: IntArray) -> IntArray:

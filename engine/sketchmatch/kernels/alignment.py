@@ -212,15 +212,13 @@ def turned_rows(histogram: FloatArray, whole: IntArray, rest: FloatArray) -> Flo
         Shape (k, n).
     """
     n = histogram.size
+    # Entry m is h[m − 1], for two rounds, so that no turn meets an end.
+    rounds = np.concatenate((histogram[n - 1 :], histogram, histogram))
     rows = np.empty((whole.size, n))
     for k in range(whole.size):
-        late = rest[k]
-        early = 1.0 - late
-        source = (-whole[k] - 1) % n
-        before = histogram[source]
+        late, early = rest[k], 1.0 - rest[k]
+        start = n - whole[k] % n
+        here, before, row = rounds[start + 1 :], rounds[start:], rows[k]
         for m in range(n):
-            source = source + 1 if source + 1 < n else 0
-            here = histogram[source]
-            rows[k, m] = early * here + late * before
-            before = here
+            row[m] = early * here[m] + late * before[m]
     return rows

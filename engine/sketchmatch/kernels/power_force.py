@@ -3,13 +3,14 @@
 With E_p(x) = (x^p − 1) / p, which is ln x for p = 0, and x a distance in a unit about as large as
 the distances at hand, an antiderivative Ψ'' = φ and one more, Θ' = Ψ, are
 
+    Ψ = x^(2−r) / ((1−r)(2−r))     Θ = x^(3−r) / ((1−r)(2−r)(3−r))            for r ≤ 0.9
     Ψ = x E_{1−r}(x) / (2−r)       Θ = x² (E_{1−r}(x) − ½) / ((2−r)(3−r))     for r < 1.5
     Ψ = E_{2−r}(x) / (1−r)         Θ = x (E_{2−r}(x) − 1) / ((1−r)(3−r))      for 1.5 ≤ r < 2.5
     Ψ = E_{2−r}(x) / (1−r)         Θ = (E_{3−r}(x) − x) / ((1−r)(2−r))        for r ≥ 2.5
 
-They differ from the powers x^(2−r) / ((1−r)(2−r)) and its integral by terms that cancel in the sum
-over the edges: the linear ones for objects that do not overlap, the constant ones for objects that
-touch at most at points. Unlike the powers they keep their digits for every r, also near 1, 2, 3.
+The others differ from the plain powers by terms that cancel in the sum over the edges: the linear
+ones for objects that do not overlap, the constant ones for objects that touch at most at points.
+Unlike the powers they keep their digits near 1, 2 and 3.
 
 The mean of Ψ over the distances between two edges is (Θ(x₁) − Θ(x₀)) / (x₁ − x₀), or where x₀ and
 x₁ are alike its Taylor series about the middle. Where two objects are small for their distance the
@@ -29,11 +30,20 @@ from sketchmatch.kernels.projection import U_HIGH, U_LOW, Projection
 from sketchmatch.kernels.sweep import histograms_of_pairs, sum_over_edges
 from sketchmatch.model.arrays import FloatArray, IntArray
 
-__all__ = ["APART", "MEETING", "OVERLAPPING", "TOUCHING", "power_force_histograms"]
+__all__ = [
+    "APART",
+    "MEETING",
+    "OVERLAPPING",
+    "PLAIN",
+    "TOUCHING",
+    "power_force_histograms",
+]
 
 OVERLAPPING, TOUCHING, MEETING, APART = 0, 1, 2, 3
 """How two objects lie to each other: they overlap, or nobody knows; touch along a line; meet at
 points alone; lie apart."""
+PLAIN = 0.9
+"""Up to this r the plain powers keep their digits, however objects lie to each other."""
 
 # Half of the sum of two extents over the distance of the middles, below which φ is expanded, and
 # the degree of the expansion: it errs by less than 1e-12 for |r| ≤ 10.
@@ -233,8 +243,10 @@ def pair_power_force(
         force, _ = _sum_of_moments(projection, a, b, far)
         force *= distance ** (2.0 - r)
         return (force, 0.0) if order > 0 else (0.0, force)
-    if r < 1.5:
-        form = 1 if order != 0 or relation != OVERLAPPING else 0
+    if r <= PLAIN:
+        form = 0
+    elif r < 1.5:
+        form = 0 if relation == OVERLAPPING else 1
     elif relation >= MEETING:
         form = 2 if r < 2.5 else 3
     else:
@@ -268,8 +280,8 @@ def power_force_histograms(
     exponent
         r, any real number.
     relations
-        Shape (p,): OVERLAPPING, TOUCHING, MEETING or APART for each pair; the first where it is
-        not known. Forces between objects that overlap are infinite for r ≥ 1, between objects
+        Shape (p,): OVERLAPPING, TOUCHING, MEETING or APART for each pair; nobody asks for r up to
+        PLAIN. Forces between objects that overlap are infinite for r ≥ 1, between objects
         that touch for r ≥ 2: the values of such pairs mean nothing.
 
     Returns

@@ -35,15 +35,42 @@ def contrast_rows(
     """
     result = np.empty(first.shape[0])
     for k in range(first.shape[0]):
-        common = first_alone = second_alone = 0.0
-        for m in range(first.shape[1]):
-            x, y = first[k, m], second[k, m]
-            common += min(x, y)
-            first_alone += max(x - y, 0.0)
-            second_alone += max(y - x, 0.0)
+        common = _sum_of_minima(first[k], second[k])
+        first_alone = max(_sum(first[k]) - common, 0.0)
+        second_alone = max(_sum(second[k]) - common, 0.0)
         apart = first_weight * first_alone + second_weight * second_alone
         result[k] = common / (common + apart) if common > 0.0 else 0.0
     return result
+
+
+@kernel
+def _sum_of_minima(x: FloatArray, y: FloatArray) -> float:
+    """Return Σ min(x, y), in four sums that a processor adds at once."""
+    a = b = c = d = 0.0
+    whole = x.size - x.size % 4
+    for m in range(0, whole, 4):
+        a += min(x[m], y[m])
+        b += min(x[m + 1], y[m + 1])
+        c += min(x[m + 2], y[m + 2])
+        d += min(x[m + 3], y[m + 3])
+    for m in range(whole, x.size):
+        a += min(x[m], y[m])
+    return (a + b) + (c + d)
+
+
+@kernel
+def _sum(x: FloatArray) -> float:
+    """Return Σ x, likewise."""
+    a = b = c = d = 0.0
+    whole = x.size - x.size % 4
+    for m in range(0, whole, 4):
+        a += x[m]
+        b += x[m + 1]
+        c += x[m + 2]
+        d += x[m + 3]
+    for m in range(whole, x.size):
+        a += x[m]
+    return (a + b) + (c + d)
 
 
 @kernel
