@@ -6,7 +6,7 @@ PIP := -m pip --disable-pip-version-check install --quiet
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 OURS := engine plugins clients/python proto tests
 
-.PHONY: demo test lint proto bench bench-searchers serve clean
+.PHONY: demo test lint proto bench bench-histograms bench-searchers serve clean
 
 demo: .venv/runtime
 	@$(BIN)/sketchmatch demo
@@ -27,6 +27,9 @@ proto: .venv-proto/tools
 
 bench: .venv/dev
 	@$(BIN)/python -m tests.benchmarks.stages
+
+bench-histograms: .venv/dev
+	@$(BIN)/python -m tests.benchmarks.histograms
 
 bench-searchers: .venv/bench
 	@$(BIN)/python -m tests.benchmarks.searchers $(ARGS)

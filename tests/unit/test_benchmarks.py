@@ -1,4 +1,4 @@
-"""The benchmark of searchers: what peers are given, and that its table is complete."""
+"""The benchmarks: what peers are given, what is counted, and that tables are complete."""
 
 import dataclasses
 from importlib.util import find_spec
@@ -8,7 +8,7 @@ import pytest
 
 from sketchmatch.model import Fmap
 from sketchmatch.registry import Kind, default_registry
-from tests.benchmarks import peers, searchers
+from tests.benchmarks import histograms, peers, searchers
 from tests.strategies import random_table
 from tests.tools import require
 
@@ -87,3 +87,28 @@ def test_senseless_options_are_refused(arguments, capsys):
     with pytest.raises(SystemExit):
         searchers.main(arguments)
     assert "error" in capsys.readouterr().err
+
+
+def test_histograms_count_the_edges_that_share_a_line():
+    scene = histograms._two_outlines(5, jagged=True)
+    starts, ends, offsets = scene.edges
+    count = 0
+    for k in range(90):
+        across = -np.sin(np.pi * k / 90), np.cos(np.pi * k / 90)
+        spans = [
+            sorted((start @ across, end @ across)) for start, end in zip(starts, ends, strict=True)
+        ]
+        pairs = [(a, b) for a in spans[: offsets[1]] for b in spans[offsets[1] :]]
+        count += sum(max(a[0], b[0]) < min(a[1], b[1]) for a, b in pairs)
+    assert histograms.edge_pairs(scene) == count
+
+
+def test_the_tables_of_histograms_are_complete(monkeypatch):
+    monkeypatch.setattr(histograms, "_SECONDS", 0.0)
+    vertices = histograms.by_vertices("constant", [5, 10])
+    assert vertices.row_count == 2
+    plugins = histograms.by_plugin(5, None)
+    assert list(plugins.columns[0].cells) == histograms.names(Kind.HISTOGRAM)
+    assert "missing" in plugins.caption
+    objects = histograms.by_objects([3])
+    assert len(objects.columns) == len(histograms.names(Kind.SIMILARITY)) + 3

@@ -31,9 +31,7 @@ def without_text(source):
     return re.sub(r'""".*?"""|#[^\n]*', "", source, flags=re.S)
 
 
-@pytest.mark.parametrize(
-    "function", [fmap_confidence, mean_absolute_difference, project]
-)
+@pytest.mark.parametrize("function", [fmap_confidence, mean_absolute_difference, project])
 def test_kernels_run_without_the_gil_and_without_fast_math(function):
     assert function.targetoptions["nogil"] is True
     assert not function.targetoptions.get("fastmath")
