@@ -127,6 +127,22 @@ def test_a_terminal_shows_the_search_while_it_runs_and_then_a_table(where):
     assert "to the left of round table" in terminal.shown, "the piano, in the sketch"
 
 
+@pytest.mark.parametrize("command", ["segment", "match", "describe"])
+def test_a_label_that_looks_like_markup_is_shown_as_it_is(command, tmp_path):
+    def feature(name, x, size):
+        ring = [[x, 0], [x + size, 0], [x + size, 1], [x, 1 + size]]
+        shape = {"type": "Polygon", "coordinates": [ring]}
+        return {"type": "Feature", "properties": {"name": name}, "geometry": shape}
+
+    file = tmp_path / "office.geojson"
+    features = [feature("[red]desk[/red]", 0, 1), feature("[b]", 4, 2), feature("[/]", 9, 1)]
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    terminal = Terminal(command, *(file,) * (2 if command == "match" else 1))
+    assert terminal.end()[0] == ExitCode.OK
+    for label in ("[red]desk[/red]", "[b]", "[/]"):
+        assert label in terminal.shown
+
+
 def test_a_pipe_stays_clean_while_the_terminal_shows_the_search():
     terminal = Terminal("match", *ROOM, *LONG, "--time-budget", "1", "--json", stdout=False)
     terminal.wait_for("searching")

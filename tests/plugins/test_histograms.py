@@ -13,10 +13,12 @@ import sketchmatch
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import Scene, SceneObject, object_pairs
 from sketchmatch.pipeline.describe import describe
+from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.selection import Choice, resolve
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Kind, default_registry
 from sketchmatch.testing import random_scene
+from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from tests.oracle.laws import facing_force, force, hybrid, law_histogram
 from tests.oracle.pixels import mask_histogram
 from tests.strategies import FRAME, pairs_apart, pairs_in_overlap, pairs_in_touch, scenes, slivers
@@ -166,6 +168,19 @@ def test_a_scene_turned_by_any_angle_matches_itself(name, seed):
     result = sketchmatch.match(scene, other, histogram=name)
     assert result.confidence.total > LIKENESS[name]
     assert min(entry.similarity for entry in result.fmap) > LIKENESS[name]
+
+
+@pytest.mark.parametrize("name", EXACT)
+@pytest.mark.parametrize("seed", range(3))
+def test_relations_that_eight_directions_meet_survive_any_turn(name, seed):
+    rng = np.random.default_rng(seed)
+    scene = random_scene(rng, 12)
+    other = turned(scene, rng.uniform(0.0, math.tau), rng.uniform(0.3, 3.0))
+    first, second = (finish(describe(each, histogram(name))) for each in (scene, other))
+    alike = np.diag(finish(relate(first, second, CrossCorrelation())).similarity)
+    met = (first.histograms > 0.0).sum(axis=1)
+    assert alike[met >= 8].min() > 0.995
+    assert (met < 8).any(), "there are narrower ones, of which nothing is said"
 
 
 @pytest.mark.parametrize("name", EXACT)

@@ -146,7 +146,7 @@ def show_scene(response: SegmentResponse) -> None:
     for name in names:
         table.add_column(name.replace("_", " "), justify="left" if name == "label" else "right")
     for k, row in enumerate(rows, start=1):
-        table.add_row(str(k), *row)
+        table.add_row(str(k), *map(Text, row))  # a label may look like markup
     Console().print(table)
 
 
@@ -205,9 +205,9 @@ def _match_table(match: Match) -> RenderableType:
     for line in result.object_matches:
         table.add_row(
             str(line.sketch_object + 1),
-            line.sketch_label,
+            Text(line.sketch_label),
             str(line.map_object + 1),
-            line.map_label,
+            Text(line.map_label),
             f"{line.confidence:.3f}",
             ProgressBar(total=1.0, completed=line.confidence, width=12),
             _margin(line),
