@@ -128,6 +128,23 @@ def test_a_change_in_what_makes_a_kernel_is_compiled_anew(tmp_path, name, before
     assert run_outer(tmp_path) == {"maker.py": "4", "step.py": "5"}[name]
 
 
+def test_a_second_process_finds_all_histograms_compiled():
+    code = """
+import sketchmatch_builtin
+from sketchmatch.kernels._jit import on_compile
+names = []
+with on_compile(names.append):
+    for histogram in sketchmatch_builtin.sketchmatch_register_histograms():
+        histogram.warm_up()
+print(*names)
+"""
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "-c", code], check=True, capture_output=True, text=True
+        )
+    assert done.stdout.split() == []
+
+
 def test_the_cache_lies_where_the_environment_says(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert _jit._cache_folder(without_text).parent == tmp_path

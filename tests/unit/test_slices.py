@@ -23,7 +23,9 @@ def quick_to_pool(monkeypatch):
 
 
 def pool_threads():
-    return [thread for thread in threading.enumerate() if thread.name.startswith("sketchmatch")]
+    return [
+        thread for thread in threading.enumerate() if thread.name.startswith("sketchmatch-slice")
+    ]
 
 
 @pytest.mark.usefixtures("quick_to_pool")

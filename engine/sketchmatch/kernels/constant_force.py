@@ -9,9 +9,9 @@ other, Ψ(d) = d²/2 is summed over pairs of edges.
 from __future__ import annotations
 
 from sketchmatch.kernels._jit import kernel
-from sketchmatch.kernels.projection import BREAK, FIRST, LAST, SEGMENTS, Projection
-from sketchmatch.kernels.sweep import histograms_of_pairs, sum_over_edges
-from sketchmatch.model.arrays import FloatArray, IntArray
+from sketchmatch.kernels.projection import BREAK, FIRST, LAST, SEGMENTS, Projection, Scratch
+from sketchmatch.kernels.sweep import pair_sweep, sum_over_edges, sweep_pairs
+from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = ["constant_force_histograms"]
 
@@ -91,7 +91,20 @@ def _pair_force(
     return _sum_over_edges(projection, a, b, law)
 
 
-_histograms = histograms_of_pairs(_pair_force, sections=True)
+_compute = pair_sweep(_pair_force, sections=True)
+
+
+@kernel
+def _sweep(
+    room: tuple[Projection, Scratch],
+    starts: FloatArray,
+    ends: FloatArray,
+    used: BoolArray,
+    pairs: IntArray,
+    directions: int,
+    law: None,
+) -> FloatArray:
+    return _compute(room, starts, ends, used, pairs, directions, law)
 
 
 def constant_force_histograms(
@@ -120,4 +133,4 @@ def constant_force_histograms(
     ndarray
         Shape (p, n), in units of length to the third power.
     """
-    return _histograms(starts, ends, offsets, pairs, directions, None)
+    return sweep_pairs(_sweep, starts, ends, offsets, pairs, directions, None)

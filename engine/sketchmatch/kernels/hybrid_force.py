@@ -22,9 +22,9 @@ from sketchmatch.kernels.power_force import (
     pair_power_force,
     power_law,
 )
-from sketchmatch.kernels.projection import Projection
-from sketchmatch.kernels.sweep import histograms_of_pairs, sum_over_edges
-from sketchmatch.model.arrays import FloatArray, IntArray
+from sketchmatch.kernels.projection import Projection, Scratch
+from sketchmatch.kernels.sweep import pair_sweep, sum_over_edges, sweep_pairs
+from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = ["hybrid_force_histograms"]
 
@@ -95,7 +95,20 @@ def _pair_force(
     return _sum_over_edges(projection, a, b, line)
 
 
-_histograms = histograms_of_pairs(_pair_force, sections=False)
+_compute = pair_sweep(_pair_force, sections=False)
+
+
+@kernel
+def _sweep(
+    room: tuple[Projection, Scratch],
+    starts: FloatArray,
+    ends: FloatArray,
+    used: BoolArray,
+    pairs: IntArray,
+    directions: int,
+    law: _HybridLaw,
+) -> FloatArray:
+    return _compute(room, starts, ends, used, pairs, directions, law)
 
 
 def hybrid_force_histograms(
@@ -125,4 +138,4 @@ def hybrid_force_histograms(
         Shape (p, n), in units of length.
     """
     law = _HybridLaw(radii, power_law(2.0, relations))
-    return _histograms(starts, ends, offsets, pairs, directions, law)
+    return sweep_pairs(_sweep, starts, ends, offsets, pairs, directions, law)

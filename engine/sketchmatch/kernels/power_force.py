@@ -26,9 +26,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sketchmatch.kernels._jit import kernel
-from sketchmatch.kernels.projection import U_HIGH, U_LOW, Projection
-from sketchmatch.kernels.sweep import histograms_of_pairs, sum_over_edges
-from sketchmatch.model.arrays import FloatArray, IntArray
+from sketchmatch.kernels.projection import U_HIGH, U_LOW, Projection, Scratch
+from sketchmatch.kernels.sweep import pair_sweep, sum_over_edges, sweep_pairs
+from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = [
     "APART",
@@ -259,7 +259,20 @@ def pair_power_force(
     return scale * forward, scale * backward
 
 
-_histograms = histograms_of_pairs(pair_power_force, sections=False)
+_compute = pair_sweep(pair_power_force, sections=False)
+
+
+@kernel
+def _sweep(
+    room: tuple[Projection, Scratch],
+    starts: FloatArray,
+    ends: FloatArray,
+    used: BoolArray,
+    pairs: IntArray,
+    directions: int,
+    law: PowerLaw,
+) -> FloatArray:
+    return _compute(room, starts, ends, used, pairs, directions, law)
 
 
 def power_force_histograms(
@@ -290,4 +303,4 @@ def power_force_histograms(
         Shape (p, n), in units of length to the power 3 − r.
     """
     law = power_law(exponent, relations)
-    return _histograms(starts, ends, offsets, pairs, directions, law)
+    return sweep_pairs(_sweep, starts, ends, offsets, pairs, directions, law)

@@ -44,13 +44,41 @@ from sketchmatch.kernels.projection import (
 )
 from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["histograms_of_pairs", "sum_over_edges"]
+__all__ = ["pair_sweep", "sum_over_edges", "sweep_pairs"]
 
 
-def histograms_of_pairs(
-    pair_force: Callable[..., Any], sections: bool
-) -> Callable[..., FloatArray]:
-    """Make the function that gives the histograms of pairs of objects for one family of forces.
+def sweep_pairs(
+    sweep: Callable[..., FloatArray],
+    starts: FloatArray,
+    ends: FloatArray,
+    offsets: IntArray,
+    pairs: IntArray,
+    directions: int,
+    law: Any,
+) -> FloatArray:
+    """Return the histograms of pairs of objects for one family of forces.
+
+    Parameters
+    ----------
+    sweep
+        The family's kernel, which calls what :func:`pair_sweep` made for it. It must be a function
+        of a module: numba keeps no machine code of a closure that Python calls.
+    starts, ends, offsets, pairs, directions
+        As in :func:`~sketchmatch.kernels.constant_force.constant_force_histograms`.
+    law
+        What the family wants to know.
+    """
+    # Floats are finest about the origin. The middle is that of all objects, so that a histogram
+    # does not depend on which others are asked for.
+    middle = 0.5 * (starts.min(axis=0) + starts.max(axis=0))
+    used = np.zeros(offsets.size - 1, dtype=np.bool_)
+    used[pairs] = True
+    room = empty_projection(offsets)
+    return sweep(room, starts - middle, ends - middle, used, pairs, directions, law)
+
+
+def pair_sweep(pair_force: Callable[..., Any], sections: bool) -> Callable[..., FloatArray]:
+    """Make the kernel that sweeps all pairs in all directions for one family of forces.
 
     Parameters
     ----------
@@ -64,25 +92,10 @@ def histograms_of_pairs(
     Returns
     -------
     callable
-        ``(starts, ends, offsets, pairs, directions, law) -> histograms``, the arrays as in
-        :func:`~sketchmatch.kernels.constant_force.constant_force_histograms`.
+        ``(room, starts, ends, used, pairs, directions, law) -> histograms``: room for a
+        projection, the edges about the origin, which objects the pairs use, and the rest as in
+        :func:`sweep_pairs`.
     """
-
-    def histograms(
-        starts: FloatArray,
-        ends: FloatArray,
-        offsets: IntArray,
-        pairs: IntArray,
-        directions: int,
-        law: Any,
-    ) -> FloatArray:
-        # Floats are finest about the origin. The middle is that of all objects, so that a histogram
-        # does not depend on which others are asked for.
-        middle = 0.5 * (starts.min(axis=0) + starts.max(axis=0))
-        used = np.zeros(offsets.size - 1, dtype=np.bool_)
-        used[pairs] = True
-        room = empty_projection(offsets)
-        return compute(room, starts - middle, ends - middle, used, pairs, directions, law)
 
     @kernel
     def compute(
@@ -118,7 +131,7 @@ def histograms_of_pairs(
                 found[p, direction + half] = backward
         return found
 
-    return histograms
+    return compute
 
 
 def sum_over_edges(edge_force: Callable[..., Any]) -> Callable[..., tuple[float, float]]:

@@ -62,7 +62,7 @@ def _in_threads(
     """Do items ``first`` … ``total`` − 1 of work in a pool of threads."""
     running: dict[Future[float], int] = {}
     done, started = first, first
-    with ThreadPoolExecutor(threads, "sketchmatch") as pool:
+    with ThreadPoolExecutor(threads, "sketchmatch-slice") as pool:
         while started < total or running:
             while started < total and len(running) < threads:
                 last = min(total, started + size)
