@@ -189,6 +189,24 @@ def test_single_scene_numbers_every_object():
             assert (np.abs(image - tint) <= 6).all(axis=2).sum() > 3000
 
 
+def test_a_route_is_a_light_arrow_and_all_of_it_is_seen():
+    light = mixed((23, 32, 51), WHITE, 0.45)
+    way = np.array([[-4.0, 4.0], [3.5, 3.0], [13.0, 4.0]])
+    ends = []
+    for route in (way, way[::-1]):
+        image = pixels(draw_scene(room(), pen=True, route=route))
+        like = (np.abs(image - light) <= 12).all(axis=2)[110:]
+        columns = np.flatnonzero(like.any(axis=0))
+        assert 75 < columns[0] < 90
+        assert 910 < columns[-1] < 925
+        ends.append((like[:, columns[0] :][:, :16].sum(), like[:, columns[-1] - 16 :].sum()))
+    (tail, head), (other_head, other_tail) = ends
+    assert head > 2 * tail
+    assert other_head > 2 * other_tail
+    for short in ([[1.0, 1.0], [1.0, 1.0]], [[1.0, 1.0], [1.001, 1.0]]):
+        assert draw_scene(room(), route=np.array(short), width=400).width == 400
+
+
 @settings(max_examples=25, deadline=None)
 @given(
     offset=st.sampled_from([0.0, -3.0, 5e5, 5e6]),

@@ -12,6 +12,7 @@ import sketchmatch
 from sketchmatch import InvalidInputError, Scene, SketchmatchError, force_histogram, match
 from sketchmatch.api import Outcome
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH, LIVING_ROOM_TRUTH
+from sketchmatch.model import Stroke, StrokeSet
 from sketchmatch.pipeline.match import Progress
 from sketchmatch.pipeline.warmup import warm_up_others
 from sketchmatch.registry import default_registry
@@ -156,3 +157,14 @@ def test_force_histograms_take_arrays_lists_and_objects(directions):
 def test_force_histograms_refuse_what_cannot_be(arguments, words):
     with pytest.raises(InvalidInputError, match=words):
         force_histogram(**{"a": SQUARE, "b": SQUARE + 2.0, **arguments})
+
+
+def test_a_route_drawn_through_the_sketch_comes_with_the_result():
+    boxes = [SQUARE, 2.0 * SQUARE + np.array([5.0, 0.0]), SQUARE + np.array([0.0, 6.0])]
+    way = np.array([(-1.0, -1.0), (3.0, 3.0), (9.0, 9.0)])
+    strokes = [Stroke(np.vstack([box, box[:1]])) for box in boxes]
+    sketch = StrokeSet((*strokes, Stroke(way, label="route")))
+    result = sketchmatch.match(sketch, Scene.from_polygons(boxes))
+    assert result.object_map == {0: 0, 1: 1, 2: 2}
+    np.testing.assert_array_equal(result.sketch_route, way)
+    assert sketchmatch.match(Scene.from_polygons(boxes), sketch).sketch_route is None

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from sketchmatch.api._algorithm import Algorithm
-from sketchmatch.model import Scene
+from sketchmatch.model import FloatArray, Scene
 
 __all__ = ["Segmentation", "Segmenter"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Segmentation:
     """What a segmenter found.
 
@@ -22,10 +22,14 @@ class Segmentation:
         The objects.
     warnings
         What it left out or decided on its own, each one sentence for the person who drew it.
+    route
+        Shape (k, 2), the way that a person drew through the scene, in its coordinates and from
+        its beginning to its end, or None. It is no object and never influences a match.
     """
 
     scene: Scene
     warnings: tuple[str, ...] = ()
+    route: FloatArray | None = None
 
 
 class Segmenter(Algorithm, ABC):

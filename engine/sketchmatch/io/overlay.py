@@ -147,6 +147,7 @@ def draw_scene(
     underlay: OccupancyGrid | None = None,
     metres: bool | None = None,
     pen: bool = False,
+    route: FloatArray | None = None,
     width: int = 1000,
 ) -> Image.Image:
     """Draw one scene, its objects numbered from 1.
@@ -163,6 +164,8 @@ def draw_scene(
         Whether the scene is in metres and gets a scale bar; with an underlay when left out.
     pen
         Draw outlines as a pen does.
+    route
+        Shape (k, 2), two points or more: a way through the scene, drawn as a light dashed arrow.
     width
         Of the picture, in pixels, 400 … 6400.
 
@@ -179,7 +182,7 @@ def draw_scene(
     _check_width(width)
     metres = underlay is not None if metres is None else metres
     numbers = {k: k + 1 for k in range(len(scene))}
-    panel = Panel("", scene, numbers, underlay, pen, metres, badge_size(len(scene)))
+    panel = Panel("", scene, numbers, underlay, pen, metres, badge_size(len(scene)), route)
     title = f"{len(scene)} objects" if title is None else title
     return Page(_SINGLE, [panel], _labelled(scene), "").drawn(title, caption, (), width)
 

@@ -407,6 +407,7 @@ class _Match:
                 for other in others
             ),
             search_note=found.note,
+            sketch_route=sketch.route,
         )
 
     def elapsed(self) -> float:

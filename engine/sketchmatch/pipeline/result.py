@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from sketchmatch.api import Outcome
-from sketchmatch.model import Confidence, Scene
+from sketchmatch.model import Confidence, FloatArray, Scene
 
 __all__ = [
     "AlternativeMap",
@@ -152,6 +152,8 @@ class MatchResult:
         The next best object maps that were found, the highest ζ first.
     search_note
         What the searcher says of what it did, or empty.
+    sketch_route
+        Shape (k, 2), the way drawn through the sketch, in its coordinates, or None.
     """
 
     matches: tuple[ObjectMatch, ...]
@@ -170,6 +172,7 @@ class MatchResult:
     warnings: tuple[str, ...] = ()
     alternatives: tuple[AlternativeMap, ...] = ()
     search_note: str = ""
+    sketch_route: FloatArray | None = field(default=None, compare=False)
 
     @property
     def object_map(self) -> dict[int, int]:

@@ -7,7 +7,15 @@ from collections.abc import Iterable, Sequence
 from google.protobuf.duration_pb2 import Duration
 
 from sketchmatch.api import Algorithm, Segmentation, Segmenter
-from sketchmatch.model import Confidence, Image, OccupancyGrid, PolygonSet, Scene, StrokeSet
+from sketchmatch.model import (
+    Confidence,
+    FloatArray,
+    Image,
+    OccupancyGrid,
+    PolygonSet,
+    Scene,
+    StrokeSet,
+)
 from sketchmatch.pipeline.match import (
     Accepted,
     Finished,
@@ -155,10 +163,7 @@ def scene(value: Scene) -> scene_pb2.Scene:
     return scene_pb2.Scene(
         objects=[
             scene_pb2.SceneObject(
-                rings=[
-                    source_pb2.Ring(points=[source_pb2.Point(x=x, y=y) for x, y in ring.tolist()])
-                    for ring in item.rings
-                ],
+                rings=[source_pb2.Ring(points=_points(ring)) for ring in item.rings],
                 label=item.label,
                 area=item.area,
                 centroid=source_pb2.Point(x=item.centroid[0], y=item.centroid[1]),
@@ -178,7 +183,10 @@ def selection(value: Algorithm) -> pipeline_pb2.AlgorithmSelection:
 def segmented(found: Segmentation, segmenter: Segmenter) -> scene_service_pb2.SegmentResponse:
     """Return what a segmenter found as a message."""
     return scene_service_pb2.SegmentResponse(
-        scene=scene(found.scene), warnings=found.warnings, segmenter=selection(segmenter)
+        scene=scene(found.scene),
+        warnings=found.warnings,
+        segmenter=selection(segmenter),
+        route=_points(found.route),
     )
 
 
@@ -196,7 +204,12 @@ def _scenes(event: Segmented) -> match_pb2.MatchScenes:
         map=scene(event.map.scene),
         sketch_warnings=event.sketch.warnings,
         map_warnings=event.map.warnings,
+        sketch_route=_points(event.sketch.route),
     )
+
+
+def _points(points: FloatArray | None) -> list[source_pb2.Point]:
+    return [] if points is None else [source_pb2.Point(x=x, y=y) for x, y in points.tolist()]
 
 
 def _object_matches(

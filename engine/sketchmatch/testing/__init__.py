@@ -11,6 +11,7 @@ from sketchmatch.testing.sketches import (
     simulate_sketch,
     spacing,
 )
+from sketchmatch.testing.sloppy import SloppySketch, draw_sloppily
 
 __all__ = [
     "Lidar",
@@ -18,9 +19,11 @@ __all__ = [
     "Odometry",
     "SensorModel",
     "SimulatedSketch",
+    "SloppySketch",
     "Survey",
     "World",
     "cast_rays",
+    "draw_sloppily",
     "draw_strokes",
     "estimate_poses",
     "map_scans",

@@ -1,66 +1,82 @@
-"""Objects of a sketch drawn with a pen: one stroke around each."""
+"""Objects of a sketch drawn with a pen: a stroke around each, or several."""
 
 from __future__ import annotations
 
 import math
+import re
+from typing import Literal
 
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely.ops import substring
 
 from sketchmatch.api import InvalidInputError, Params, Reason, Segmentation, Segmenter
 from sketchmatch.model import FloatArray, Scene, SceneObject, Stroke, StrokeSet
 
+from ._strokes_chains import closed_chains
+from ._strokes_drawing import FLICK, LONGHAND, ROUTE, TANGLED, Drawing, Outline
+from ._strokes_marks import along_others, hosts, places, repeated, typical_span
+from ._strokes_outline import areas_of, enclosed_by, own_gap, tangled, total_of
+from ._strokes_trace import traced
+
 __all__ = ["StrokeSegmenter"]
 
-# What a crossing closes must be this share of what the joined ends enclose: less is a flourish on
-# the way round, not the place where the outline closes.
-_MAIN_LOOP = 0.5
-# A tail beside the outline's start is at most this share of the stroke, and at most this many
-# times as long as the ends are apart: a half circle's arc is π/2 times its chord.
-_END = 1.0 / 3.0
-_BEND = 1.6
-_ROUNDING = 1e-9
-# Enclosed area, as a share of the squared size, below which a stroke is a line there and back.
-_LINE = 1e-3
 # Beyond this, coordinates are a fault, and their squares would soon overflow.
 _LARGEST = 1e15
 # Share of the enclosed area in separate parts from which on a person is told that they are lost.
 _NOTABLE = 0.05
+# Longhand closes in many loops: none has this share of what they enclose.
+_LOOP = 0.5
+# A stroke that closes by itself over a gap wider than this share of its span may be part of more.
+_WIDE = 0.05
+# Inside another outline, what is this many times ``min_size`` is still a mark.
+_MARK = 3.0
+# … and so are strokes in it that make a chain this much of which is gaps.
+_LOOSE = 0.1
+# Span of an unlabelled route as a share of the sketch's.
+_ACROSS = 0.5
+_ROUTE = re.compile(r"\b(route|path)\b", re.IGNORECASE)
 
 
 class StrokeSegmenter(Segmenter):
-    """Takes every pen stroke as the outline of one object.
+    """Takes what pen strokes enclose as objects, each drawn with one stroke or several.
 
     Hands overshoot and undershoot the point where an outline closes, the *failure of
     co-termination* of [1]_. A stroke that crosses itself near its ends is closed at the crossing
     and its tails are cut; else its ends are joined, if the gap is small. The object is
     everything that the stroke encloses, so that an outline drawn over twice counts once.
 
-    Sizes are relative to the stroke's: the larger side of its bounding box.
+    Strokes that stay open are joined end to end to chains that close: those with the smallest
+    gaps and the shortest tails first, which is the perceptual organisation by proximity and good
+    continuation of [2]_. What is left is a stroke drawn over an outline again, a mark inside an
+    object, a flick, or the route.
+
+    Sizes of a stroke are the larger side of its bounding box; spans, of chains and of the sketch,
+    are the largest distance between two points.
 
     References
     ----------
     .. [1] J. V. Mahoney, M. P. J. Fromherz, "Three main concerns in sketch recognition and an
        approach to addressing them", AAAI Spring Symposium on Sketch Understanding, 2002 (thesis
        2.1).
+    .. [2] E. Saund, "Finding perceptually closed paths in sketches and drawings", IEEE
+       Transactions on Pattern Analysis and Machine Intelligence 25(4), 2003.
     """
 
     name = "strokes"
-    summary = "Every pen stroke is the outline of one object; small gaps and tails are mended."
+    summary = "Objects drawn with one pen stroke or several; gaps and tails are mended."
     sources = (StrokeSet,)
 
     class Params(Params):
-        """How large a gap is closed, and how much an outline is smoothed."""
+        """How large a gap is closed, what is too small, and how much an outline is smoothed."""
 
         max_gap: float = Field(
             0.25,
             ge=0.0,
             le=1.0,
             description=(
-                "Largest gap in an outline that is closed, as a share of the stroke's size; "
-                "strokes that are open wider are left out."
+                "Largest gap in an outline that is closed, as a share of its size; strokes that "
+                "are open wider are left out."
             ),
         )
         simplify: float = Field(
@@ -71,37 +87,170 @@ class StrokeSegmenter(Segmenter):
                 "How far a simplified outline may leave the stroke, as a share of its size."
             ),
         )
+        min_size: float = Field(
+            0.1,
+            ge=0.0,
+            le=1.0,
+            description=(
+                "Size of the smallest object, as a share of the typical one's; what is smaller "
+                "is a dot or a flick and left out. Inside another object it is three times this."
+            ),
+        )
+        route: Literal["auto", "never"] = Field(
+            "auto",
+            description=(
+                "auto: a stroke labelled route or path, or else the last open one across half of "
+                "the sketch, is the sketched route. never: there is none."
+            ),
+        )
 
     params: Params
 
     def segment(self, source: StrokeSet) -> Segmentation:
-        """Return the closed strokes as objects, in the order they were drawn."""
-        objects: list[SceneObject] = []
-        warnings: list[str] = []
-        for k, stroke in enumerate(source.strokes):
-            points = _checked(stroke, f"strokes[{k}]")
-            name = f"strokes[{k}] ({stroke.label})" if stroke.label else f"strokes[{k}]"
-            areas = self._enclosed(points)
-            if not areas:
-                warnings.append(f"{name} was left out: {_why_open(points)}")
-                continue
-            if areas[0].area < (1.0 - _NOTABLE) * _total(areas):
-                warnings.append(f"{name} encloses separate areas: the largest alone was taken.")
-            outline = areas[0].simplify(self.params.simplify * _size(points))
-            ring = shapely.get_coordinates(outline)
-            objects.append(SceneObject.from_rings([ring], stroke.label))
+        """Return the closed outlines as objects, in the order in which they were begun."""
+        points = [_checked(stroke, f"strokes[{k}]") for k, stroke in enumerate(source.strokes)]
+        drawing = Drawing([traced(each) for each in points], [s.label for s in source.strokes])
+        route = _labelled_route(drawing) if self.params.route == "auto" else None
+        outlines = self._outlines(drawing, route)
+        objects = self._objects(drawing, outlines)
+        drawn = {k for item in objects for k in item.strokes}
+        left = [k for k in range(len(points)) if k not in drawn | drawing.explained | {route}]
+        left = self._without_marks(drawing, left, objects)
+        if route is None and self.params.route == "auto":
+            route = _route_across(drawing, left)
+        for k in left:
+            if k != route:
+                why = _why_open(points[k])
+                drawing.note(k, f"{drawing.named([k])} was left out: {why}")
         if len(objects) < 2:
-            raise _too_few(len(objects), len(source.strokes) - len(objects), self.params.max_gap)
-        return Segmentation(Scene(tuple(objects)), tuple(warnings))
+            raise _too_few(len(objects), len(points) - len(drawn), self.params.max_gap)
+        scene = [
+            SceneObject.from_rings([shapely.get_coordinates(item.area)], item.label)
+            for item in objects
+        ]
+        way = None if route is None else points[route]
+        return Segmentation(Scene(tuple(scene)), drawing.sentences(), way)
 
-    def _enclosed(self, points: FloatArray) -> list[shapely.Polygon]:
-        """Return the separate areas that a stroke encloses, largest first; none if it is open."""
-        line = shapely.LineString(points)
-        areas = _areas(line)
-        if _total(areas) < _MAIN_LOOP * _total(_areas(_joined(line))):
-            closed = _closed(line, self.params.max_gap * _size(points))
-            areas = [] if closed is None else _areas(closed)
-        return areas if _total(areas) >= _LINE * _size(points) ** 2 else []
+    def _outlines(self, drawing: Drawing, route: int | None) -> list[Outline]:
+        """Return all closed outlines, of single strokes and of chains."""
+        strokes, max_gap = drawing.strokes, self.params.max_gap
+        closed: dict[int, list[shapely.Polygon]] = {}
+        pool: dict[int, float] = {}
+        if unseen := tangled(strokes) - {route}:
+            drawing.explain(sorted(unseen), TANGLED)
+        seen = [k for k in range(len(strokes)) if k not in unseen]
+        for k, over in zip(seen, along_others([strokes[k] for k in seen]), strict=True):
+            stroke = strokes[k]
+            areas = enclosed_by(stroke, max_gap) if k != route else []
+            if areas and areas[0].area < _LOOP * total_of(areas):
+                drawing.explain([k], LONGHAND)
+            elif areas:
+                closed[k] = areas
+                if (gap := own_gap(stroke)) > _WIDE * stroke.span:
+                    pool[k] = gap
+            elif k != route and over is None:
+                pool[k] = math.inf
+        chains = closed_chains([strokes[k] for k in pool], list(pool.values()), max_gap)
+        outlines = []
+        members = list(pool)
+        for chain in chains:
+            joined = tuple(sorted(members[k] for k in chain.strokes))
+            outlines.append(self._outline(drawing, joined, areas_of(chain.line), chain.open))
+        chained = {k for outline in outlines for k in outline.strokes}
+        outlines += [
+            self._outline(drawing, (k,), areas) for k, areas in closed.items() if k not in chained
+        ]
+        return sorted(outlines, key=lambda outline: outline.strokes)
+
+    def _outline(
+        self,
+        drawing: Drawing,
+        members: tuple[int, ...],
+        areas: list[shapely.Polygon],
+        share: float = 0.0,
+    ) -> Outline:
+        size = (
+            drawing.strokes[members[0]].size
+            if len(members) == 1
+            else float(np.ptp(shapely.get_coordinates(areas[0]), axis=0).max())
+        )
+        return Outline(
+            members,
+            shapely.simplify(areas[0], self.params.simplify * size),
+            next((drawing.labels[k] for k in members if drawing.labels[k]), ""),
+            share,
+            areas[0].area < (1.0 - _NOTABLE) * total_of(areas),
+        )
+
+    def _objects(self, drawing: Drawing, outlines: list[Outline]) -> list[Outline]:
+        """Return the outlines that are objects, and explain the others."""
+        areas = [outline.area for outline in outlines]
+        smallest = self._smallest(outlines)
+        mark = min(_MARK * smallest, _second_largest(outlines))
+        objects = []
+        for outline, first, around in zip(outlines, repeated(areas), hosts(areas), strict=True):
+            members, name = outline.strokes, drawing.named(outline.strokes)
+            if outline.span < smallest:
+                drawing.explain(members, FLICK)
+            elif first is not None:
+                drawing.explain(members, drawing.again(outlines[first].strokes))
+            elif around is not None and (outline.span < mark or outline.open > _LOOSE):
+                drawing.explain(members, drawing.inside(outlines[around].strokes))
+            else:
+                objects.append(outline)
+                if around is not None:
+                    host = drawing.named(outlines[around].strokes)
+                    drawing.note(members[0], f"{name} inside {host} was taken as an object, too.")
+                if outline.parted:
+                    verb = "encloses" if len(members) == 1 else "enclose"
+                    drawing.note(
+                        members[0],
+                        f"{name} {verb} separate areas: the largest alone was taken.",
+                    )
+        return objects
+
+    def _smallest(self, outlines: list[Outline]) -> float:
+        """Return the least span of an object: a match needs two, so two are large enough."""
+        typical = typical_span([outline.span for outline in outlines])
+        return min(self.params.min_size * typical, _second_largest(outlines))
+
+    def _without_marks(
+        self, drawing: Drawing, left: list[int], objects: list[Outline]
+    ) -> list[int]:
+        """Explain what strokes beside objects are, and return those that are none of it."""
+        along, within = places([drawing.strokes[k] for k in left], [item.area for item in objects])
+        smallest = self._smallest(objects)
+        others = []
+        for k, border, around in zip(left, along, within, strict=True):
+            if border is not None:
+                drawing.explain([k], drawing.again(objects[border].strokes))
+            elif around is not None:
+                drawing.explain([k], drawing.inside(objects[around].strokes))
+            elif drawing.strokes[k].span < smallest:
+                drawing.explain([k], FLICK)
+            else:
+                others.append(k)
+        return others
+
+
+def _second_largest(outlines: list[Outline]) -> float:
+    return sorted([0.0, 0.0, *(outline.span for outline in outlines)])[-2]
+
+
+def _labelled_route(drawing: Drawing) -> int | None:
+    return next(
+        (k for k, name in reversed([*enumerate(drawing.labels)]) if _ROUTE.search(name)), None
+    )
+
+
+def _route_across(drawing: Drawing, left: list[int]) -> int | None:
+    """Return the last of the strokes left that leads across much of the sketch, or None."""
+    least = _ACROSS * drawing.span if left else 0.0
+    across = [k for k in left if drawing.strokes[k].span > least]
+    if not across:
+        return None
+    drawing.explain(across[-1:], ROUTE)
+    return across[-1]
 
 
 def _checked(stroke: Stroke, field: str) -> FloatArray:
@@ -124,55 +273,8 @@ def _checked(stroke: Stroke, field: str) -> FloatArray:
     return points[moved]
 
 
-def _size(points: FloatArray) -> float:
-    return float(np.ptp(points, axis=0).max())
-
-
-def _areas(line: shapely.LineString) -> list[shapely.Polygon]:
-    """Return the separate areas that a line encloses, largest first."""
-    noded = shapely.get_parts(shapely.union_all([line]))
-    enclosed = shapely.union_all(shapely.get_parts(shapely.polygonize(noded)))
-    return sorted(shapely.get_parts(enclosed), key=lambda area: -area.area)
-
-
-def _total(areas: list[shapely.Polygon]) -> float:
-    return sum(area.area for area in areas)
-
-
-def _part(line: shapely.LineString, start: float, end: float) -> shapely.LineString:
-    return shapely.LineString(substring(line, start, end).coords)
-
-
-def _joined(line: shapely.LineString) -> shapely.LineString:
-    return shapely.LineString([*line.coords, line.coords[0]])
-
-
-def _gap(line: shapely.LineString) -> float:
-    return math.dist(line.coords[0], line.coords[-1])
-
-
-def _closed(line: shapely.LineString, longest: float) -> shapely.LineString | None:
-    """Return a line with its ends joined, or None if it is open wider than ``longest``.
-
-    A line may run on beside its own start without crossing it: then its tail is cut where it
-    comes nearest to the other end.
-    """
-    gap, length = _gap(line), line.length
-    if gap > _ROUNDING * length:
-        tail = min(_BEND * gap, _END * length)
-        first, last = shapely.get_point(line, 0), shapely.get_point(line, -1)
-        early, late = _part(line, 0.0, tail), _part(line, length - tail, length)
-        line = min(
-            line,
-            _part(line, early.project(last), length),
-            _part(line, 0.0, length - tail + late.project(first)),
-            key=_gap,
-        )
-    return _joined(line) if _gap(line) <= longest else None
-
-
 def _why_open(points: FloatArray) -> str:
-    gap = math.dist(points[0], points[-1]) / _size(points)
+    gap = math.dist(points[0], points[-1]) / float(np.ptp(points, axis=0).max())
     if gap < 0.01:
         return "it encloses nothing; draw around the object."
     return f"its ends are {gap:.0%} of its size apart; close the outline or raise max_gap."

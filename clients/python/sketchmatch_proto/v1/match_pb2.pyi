@@ -12,6 +12,7 @@ import google.protobuf.internal.enum_type_wrapper
 import google.protobuf.message
 import sketchmatch_proto.v1.pipeline_pb2
 import sketchmatch_proto.v1.scene_pb2
+import sketchmatch_proto.v1.source_pb2
 import sys
 import typing
 
@@ -175,6 +176,7 @@ class MatchScenes(google.protobuf.message.Message):
     MAP_FIELD_NUMBER: builtins.int
     SKETCH_WARNINGS_FIELD_NUMBER: builtins.int
     MAP_WARNINGS_FIELD_NUMBER: builtins.int
+    SKETCH_ROUTE_FIELD_NUMBER: builtins.int
     @property
     def sketch(self) -> sketchmatch_proto.v1.scene_pb2.Scene:
         """The objects of the sketch."""
@@ -193,6 +195,12 @@ class MatchScenes(google.protobuf.message.Message):
     def map_warnings(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.str]:
         """The same for the map."""
 
+    @property
+    def sketch_route(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[sketchmatch_proto.v1.source_pb2.Point]:
+        """The way that the person drew through the sketch, from its beginning to its end, in the
+        coordinates of `sketch`; empty if there is none. It is no object and never influences a match.
+        """
+
     def __init__(
         self,
         *,
@@ -200,9 +208,10 @@ class MatchScenes(google.protobuf.message.Message):
         map: sketchmatch_proto.v1.scene_pb2.Scene | None = ...,
         sketch_warnings: collections.abc.Iterable[builtins.str] | None = ...,
         map_warnings: collections.abc.Iterable[builtins.str] | None = ...,
+        sketch_route: collections.abc.Iterable[sketchmatch_proto.v1.source_pb2.Point] | None = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["map", b"map", "sketch", b"sketch"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["map", b"map", "map_warnings", b"map_warnings", "sketch", b"sketch", "sketch_warnings", b"sketch_warnings"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["map", b"map", "map_warnings", b"map_warnings", "sketch", b"sketch", "sketch_route", b"sketch_route", "sketch_warnings", b"sketch_warnings"]) -> None: ...
 
 global___MatchScenes = MatchScenes
 

@@ -51,6 +51,7 @@ class SegmentResponse(google.protobuf.message.Message):
     SCENE_FIELD_NUMBER: builtins.int
     WARNINGS_FIELD_NUMBER: builtins.int
     SEGMENTER_FIELD_NUMBER: builtins.int
+    ROUTE_FIELD_NUMBER: builtins.int
     @property
     def scene(self) -> sketchmatch_proto.v1.scene_pb2.Scene:
         """The objects, two or more."""
@@ -63,14 +64,21 @@ class SegmentResponse(google.protobuf.message.Message):
     def segmenter(self) -> sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection:
         """The segmenter that ran, with the value of every parameter."""
 
+    @property
+    def route(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[sketchmatch_proto.v1.source_pb2.Point]:
+        """The way that the person drew through the scene, from its beginning to its end, in the
+        coordinates of `scene`; empty if there is none. It is not among the objects.
+        """
+
     def __init__(
         self,
         *,
         scene: sketchmatch_proto.v1.scene_pb2.Scene | None = ...,
         warnings: collections.abc.Iterable[builtins.str] | None = ...,
         segmenter: sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection | None = ...,
+        route: collections.abc.Iterable[sketchmatch_proto.v1.source_pb2.Point] | None = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["scene", b"scene", "segmenter", b"segmenter"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["scene", b"scene", "segmenter", b"segmenter", "warnings", b"warnings"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["route", b"route", "scene", b"scene", "segmenter", b"segmenter", "warnings", b"warnings"]) -> None: ...
 
 global___SegmentResponse = SegmentResponse

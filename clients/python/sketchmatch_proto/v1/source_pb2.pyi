@@ -131,7 +131,9 @@ class Stroke(google.protobuf.message.Message):
     POINTS_FIELD_NUMBER: builtins.int
     LABEL_FIELD_NUMBER: builtins.int
     label: builtins.str
-    """A name for people, e.g. "sofa". It never influences a match."""
+    """A name for people, e.g. "sofa". It never influences a match; but the segmenter `strokes` takes
+    a stroke named "route" or "path" for the sketched route, which is no object.
+    """
     @property
     def points(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___StrokePoint]:
         """Its points in the order they were drawn, at least two."""

@@ -112,12 +112,21 @@ class Canvas:
         self.line(np.vstack([ring, ring[:2]]), colour, line)
 
     def dashed(
-        self, ring: FloatArray, colour: Colour, line: float, dash: float, gap: float
+        self,
+        ring: FloatArray,
+        colour: Colour,
+        line: float,
+        dash: float,
+        gap: float,
+        *,
+        ends: bool = False,
     ) -> None:
-        """Draw a closed line in dashes that meet evenly; a dot where there is no length."""
+        """Draw a line, closed or with two ends, in even dashes; a dot where there is no length."""
         if self._dot(ring, colour, line):
             return
         along, closed = _arc_length(ring)
+        if ends:
+            along, closed = along[:-1], ring
         count = max(2, round(along[-1] / (dash + gap)))
         period = along[-1] / count
         for k in range(count):

@@ -34,6 +34,8 @@ BORDER: Colour = (221, 226, 233)
 _GREY: Colour = (140, 148, 160)
 _PAPER: Colour = (255, 254, 250)
 _DOTS: Colour = (229, 226, 215)
+# Length of the head of a route's arrow, and half its width.
+_HEAD = (13.0, 5.0)
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,8 @@ class Panel:
         Whether it gets a scale bar.
     badge
         Height of the numbers' badges.
+    route
+        The way through the scene, shape (k, 2), or None.
     """
 
     name: str
@@ -65,14 +69,18 @@ class Panel:
     pen: bool = False
     metres: bool = False
     badge: float = 28.0
+    route: FloatArray | None = None
 
     def colour(self, index: int) -> Colour:
         """Return an object's colour."""
         return pair_colour(self.numbers[index]) if index in self.numbers else _GREY
 
     def area(self) -> Box:
-        """Return what is worth showing, in scene units: the objects and the room around them."""
+        """Return what is worth showing, in scene units: what is drawn and the room around it."""
         x0, y0, x1, y1 = self.scene.bounds
+        if self.route is not None:
+            (u0, v0), (u1, v1) = self.route.min(axis=0).tolist(), self.route.max(axis=0).tolist()
+            x0, y0, x1, y1 = min(x0, u0), min(y0, v0), max(x1, u1), max(y1, v1)
         if self.underlay is None:
             return (x0, y0, x1, y1)
         around = 0.75 * max(x1 - x0, y1 - y0)
@@ -115,6 +123,8 @@ def draw_panel(canvas: Canvas, panel: Panel, box: Box) -> None:
     rings = [frame.rings(item.rings) for item in panel.scene.objects]
     for k in sorted(range(len(rings)), key=lambda k: -panel.scene.objects[k].area):
         draw_object(canvas, rings[k], panel.numbers.get(k), pen=panel.pen, over_cells=over_cells)
+    if panel.route is not None:
+        _draw_route(canvas, frame.rings([panel.route])[0])
     if panel.metres:
         _draw_scale_bar(canvas, frame.scale, box)
     _draw_names(canvas, panel, [shapely.Polygon(ring[0], ring[1:]) for ring in rings], box)
@@ -164,6 +174,21 @@ def draw_object(
             canvas.pen(ring, edge, 2.8, float(number + k))
         else:
             canvas.outline(ring, edge, 2.8)
+
+
+def _draw_route(canvas: Canvas, points: FloatArray) -> None:
+    """Draw a way, given in design units, as a light dashed line with an arrow head at its end."""
+    colour = mixed(INK, WHITE, 0.45)
+    canvas.dashed(points, colour, 1.6, 8.0, 5.0, ends=True)
+    length, half = _HEAD
+    away = np.hypot(*(points - points[-1]).T)
+    before = np.flatnonzero(away >= length)
+    if not before.size:
+        return
+    # Where the way comes in, not how its last few points tremble.
+    heading = (points[-1] - points[before[-1]]) / away[before[-1]]
+    back, across = points[-1] - length * heading, half * heading[::-1] * (-1.0, 1.0)
+    canvas.fill([np.array([points[-1], back + across, back - across])], colour, 1.0)
 
 
 def _draw_names(canvas: Canvas, panel: Panel, shapes: Sequence[shapely.Polygon], box: Box) -> None:
