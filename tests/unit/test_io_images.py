@@ -27,6 +27,42 @@ def test_lossless_formats_keep_every_grey(kind, mode):
     assert (decode_image(data).pixels == GREY).all()
 
 
+COLOURS = np.zeros((40, 60, 3), np.uint8) + np.array([255, 250, 240], np.uint8)
+COLOURS[5:15, 5:25], COLOURS[20:35, 30:50] = [250, 220, 0], [200, 30, 40]
+
+
+@pytest.mark.parametrize("kind", ["PNG", "BMP", "TIFF", "PPM"])
+def test_colours_are_kept(kind):
+    assert (decode_image(saved(PIL.Image.fromarray(COLOURS), kind)).pixels == COLOURS).all()
+
+
+def test_colours_of_a_palette_are_kept_and_its_transparent_parts_are_white():
+    picture = PIL.Image.fromarray(COLOURS).quantize(3)
+    paper = picture.getpixel((0, 0))
+    pixels = decode_image(saved(picture, "PNG", transparency=paper)).pixels
+    assert pixels[0, 0].tolist() == [255, 255, 255]
+    assert abs(pixels[10, 10].astype(int) - [250, 220, 0]).max() <= 4
+
+
+def test_a_faint_tint_and_a_few_coloured_pixels_are_grey():
+    tinted = np.array(COLOURS[:1, :1].repeat(300, axis=0).repeat(300, axis=1))
+    tinted[:3, :3] = [255, 0, 0]
+    picture = PIL.Image.fromarray(tinted)
+    pixels = decode_image(saved(picture, "PNG")).pixels
+    assert (pixels == np.asarray(picture.convert("L"))).all()
+
+
+def test_colours_after_the_first_strip_are_found(monkeypatch):
+    monkeypatch.setattr("sketchmatch.io.images._STRIP", 60)
+    data = saved(PIL.Image.fromarray(COLOURS), "PNG")
+    assert (decode_image(data).pixels == COLOURS).all()
+
+
+def test_lab_colours_are_refused():
+    with pytest.raises(InvalidInputError, match="save it with RGB colours"):
+        decode_image(saved(PIL.Image.new("LAB", (3, 3)), "TIFF"))
+
+
 def test_jpeg_is_read():
     data = saved(PIL.Image.fromarray(np.full((8, 8), 128, np.uint8)), "JPEG")
     assert abs(decode_image(data).pixels.astype(int) - 128).max() <= 2

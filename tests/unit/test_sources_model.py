@@ -59,13 +59,22 @@ def test_a_grid_that_cannot_be_is_refused(changes, field, words):
 
 
 @pytest.mark.parametrize(
-    "pixels", [np.zeros((0, 4), np.uint8), np.zeros((4, 4)), np.zeros((4, 4, 3), np.uint8)]
+    "pixels",
+    [
+        np.zeros((0, 4), np.uint8),
+        np.zeros((4, 4)),
+        np.zeros(4, np.uint8),
+        np.zeros((4, 4, 4), np.uint8),
+        np.zeros((4, 4, 3)),
+        np.zeros((0, 4, 3), np.uint8),
+    ],
 )
-def test_an_image_is_grey_and_of_eight_bits(pixels):
+def test_an_image_is_grey_or_red_green_and_blue_of_eight_bits(pixels):
     with pytest.raises(InvalidInputError) as caught:
         Image(pixels)
     assert (caught.value.reason, caught.value.field) == (Reason.INVALID_IMAGE, "pixels")
 
 
-def test_an_image_cannot_be_written_to():
-    assert not Image(np.zeros((2, 3), np.uint8)).pixels.flags.writeable
+@pytest.mark.parametrize("shape", [(2, 3), (2, 3, 3)])
+def test_an_image_cannot_be_written_to(shape):
+    assert not Image(np.zeros(shape, np.uint8)).pixels.flags.writeable

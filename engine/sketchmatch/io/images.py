@@ -2,30 +2,43 @@
 
 from __future__ import annotations
 
+import struct
+from contextlib import suppress
 from io import BytesIO
 from typing import Any
 
 import numpy as np
+import PIL.BmpImagePlugin
 import PIL.Image
+import PIL.ImageChops
 import PIL.ImageOps
+import PIL.JpegImagePlugin
+import PIL.PngImagePlugin
+import PIL.PpmImagePlugin
+import PIL.TiffImagePlugin
 from numpy.typing import NDArray
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import Image
+from sketchmatch.model.limits import check_bytes, check_pixels
 
-__all__ = ["MAX_PIXELS", "decode_image", "load_picture", "scaled_to_8_bits"]
-
-MAX_PIXELS = 64_000_000
-"""A picture that announces more pixels is refused before any of them is decoded."""
+__all__ = ["decode_image", "load_picture", "scaled_to_8_bits"]
 
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "PPM")
+_GREY = ("1", "L", "LA", "La")
+
+# Pixels whose channels differ by this much are in colour; fewer than this share are blemishes.
+_COLOURED = 24
+_LEAST_COLOUR = 2e-4
+# Pixels that are looked at together.
+_STRIP = 1 << 20
 
 
 def decode_image(data: bytes) -> Image:
-    """Decode a picture of a map or of a sketch as grey.
+    """Decode a picture of a map or of a sketch, in grey unless it has colours.
 
-    Colours become their luminance, transparent parts white paper, and a photograph is turned the
-    way its camera was held (EXIF orientation).
+    Faint tints become their luminance, transparent parts white paper, and a photograph is turned
+    the way its camera was held (EXIF orientation).
 
     Parameters
     ----------
@@ -35,15 +48,33 @@ def decode_image(data: bytes) -> Image:
     Raises
     ------
     InvalidInputError
-        With the path ``data``, if it is no such file, is damaged or cut short, or has more than
-        :data:`MAX_PIXELS` pixels.
+        With the path ``data``, if it is no such file, is damaged or cut short, or announces more
+        pixels than :func:`sketchmatch.model.limits.source_limits` allows.
     """
-    picture = PIL.ImageOps.exif_transpose(scaled_to_8_bits(load_picture(data, "data"), "data"))
+    picture = _upright(scaled_to_8_bits(load_picture(data, "data"), "data"))
     if picture.has_transparency_data:
         paper = PIL.Image.new("RGBA", picture.size, "white")
         paper.alpha_composite(picture.convert("RGBA"))
         picture = paper
-    return Image(np.asarray(picture.convert("L")))
+    if picture.mode in _GREY:
+        return Image(np.asarray(picture.convert("L")))
+    if picture.mode != "RGB":
+        picture = picture.convert("RGB")
+    return Image(np.asarray(picture if _has_colour(picture) else picture.convert("L")))
+
+
+def _has_colour(picture: PIL.Image.Image) -> bool:
+    """Return whether enough of a picture, mode RGB, is neither grey nor nearly so."""
+    width, height = picture.size
+    least, coloured, rows = _LEAST_COLOUR * width * height, 0, max(1, _STRIP // width)
+    for top in range(0, height, rows):
+        red, green, blue = picture.crop((0, top, width, min(height, top + rows))).split()
+        light = PIL.ImageChops.lighter(PIL.ImageChops.lighter(red, green), blue)
+        dark = PIL.ImageChops.darker(PIL.ImageChops.darker(red, green), blue)
+        coloured += sum(PIL.ImageChops.subtract(light, dark).histogram()[_COLOURED:])
+        if coloured > least:
+            return True
+    return False
 
 
 def load_picture(data: bytes, field: str) -> PIL.Image.Image:
@@ -54,22 +85,45 @@ def load_picture(data: bytes, field: str) -> PIL.Image.Image:
     InvalidInputError
         As :func:`decode_image` does.
     """
+    check_bytes(len(data), field)
     # Pillow's decoders raise whatever a broken file makes them stumble over.
     try:
-        picture = PIL.Image.open(BytesIO(data), formats=_FORMATS)
-        width, height = picture.size
-        if width * height <= MAX_PIXELS:
+        picture = _announced(data)
+        if picture is not None:
+            check_pixels(*picture.size, field)
             picture.load()
+            if picture.mode == "LAB":
+                raise _invalid(field, "has Lab colours; save it with RGB colours or in grey")
             return picture
-    except PIL.UnidentifiedImageError:
-        raise _invalid(field, "is not a picture; give a PNG, JPEG, BMP, TIFF or PGM file") from None
-    except (PIL.Image.DecompressionBombError, PIL.Image.DecompressionBombWarning):
-        raise _too_large(field, "has") from None
+    except InvalidInputError:
+        raise
     except Exception as error:
+        cause = " ".join(str(error).split()) or type(error).__name__
         raise _invalid(
-            field, f"is damaged or cut short ({error}); save the picture again"
+            field, f"is damaged or cut short ({cause}); save the picture again"
         ) from None
-    raise _too_large(field, f"has {width} × {height} pixels,")
+    raise _invalid(field, "is not a picture; give a PNG, JPEG, BMP, TIFF or PGM file")
+
+
+def _announced(data: bytes) -> PIL.Image.Image | None:
+    """Return a picture of which the header alone is read, or None if it is of no known format.
+
+    ``PIL.Image.open`` does the same, but refuses pictures above a limit of its own.
+    """
+    for name in _FORMATS:
+        factory, accept = PIL.Image.OPEN[name]
+        if accept is None or accept(data[:16]) is True:
+            with suppress(SyntaxError, IndexError, TypeError, struct.error):
+                return factory(BytesIO(data), "")
+    return None
+
+
+def _upright(picture: PIL.Image.Image) -> PIL.Image.Image:
+    """Return a photograph turned the way its camera was held, if it says so legibly."""
+    try:
+        return PIL.ImageOps.exif_transpose(picture)
+    except Exception:  # as in load_picture; the pixels are whole
+        return picture
 
 
 def scaled_to_8_bits(picture: PIL.Image.Image, field: str) -> PIL.Image.Image:
@@ -80,15 +134,6 @@ def scaled_to_8_bits(picture: PIL.Image.Image, field: str) -> PIL.Image.Image:
         return picture
     deep: NDArray[Any] = np.clip(np.asarray(picture), 0, 65535).astype(np.uint32)
     return PIL.Image.fromarray(((deep + 128) // 257).astype(np.uint8))
-
-
-def _too_large(field: str, size: str) -> InvalidInputError:
-    limit = MAX_PIXELS // 1_000_000
-    return InvalidInputError(
-        Reason.LIMIT_EXCEEDED,
-        field,
-        f"{size} more than the limit of {limit} million pixels; scale it down",
-    )
 
 
 def _invalid(field: str, problem: str) -> InvalidInputError:

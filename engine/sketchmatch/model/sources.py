@@ -104,11 +104,15 @@ class OccupancyGrid:
     origin
         Pose (x, y, yaw) of the lower left corner of cell (0, 0) in the map's frame, in metres
         and radians counter-clockwise.
+    notes
+        What whoever read the map's file had to decide, each one sentence for people: segmenters
+        hand them on among their warnings.
     """
 
     cells: NDArray[np.int8]
     resolution: float
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    notes: tuple[str, ...] = ()
 
     field = "occupancy_grid"
 
@@ -135,7 +139,8 @@ class Image:
     Attributes
     ----------
     pixels
-        uint8, shape (rows, columns), grey, row 0 the highest; 0 is black.
+        uint8, row 0 the highest; 0 is black. Shape (rows, columns) if grey, (rows, columns, 3)
+        if in colour: red, green, blue.
     """
 
     pixels: NDArray[np.uint8]
@@ -144,9 +149,12 @@ class Image:
 
     def __post_init__(self) -> None:
         pixels = np.asarray(self.pixels)
-        if pixels.ndim != 2 or pixels.size == 0 or pixels.dtype != np.uint8:
+        shaped = pixels.ndim == 2 or (pixels.ndim == 3 and pixels.shape[2] == 3)
+        if not shaped or pixels.size == 0 or pixels.dtype != np.uint8:
             raise InvalidInputError(
-                Reason.INVALID_IMAGE, "pixels", "is not a grey 8-bit picture; decode it as grey"
+                Reason.INVALID_IMAGE,
+                "pixels",
+                "is not an 8-bit picture; give rows × columns of grey or of red, green and blue",
             )
         object.__setattr__(self, "pixels", frozen(pixels))
 

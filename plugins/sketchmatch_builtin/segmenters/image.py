@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from collections.abc import Iterator
+from typing import Literal
 
-import cv2
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pydantic import Field
 
 from sketchmatch.api import InvalidInputError, Params, Reason, Segmentation, Segmenter
 from sketchmatch.model import FloatArray, Image, Scene, SceneObject
 from sketchmatch_builtin.segmenters._border import outer_border
+from sketchmatch_builtin.segmenters._image_colours import areas_of_colours
+from sketchmatch_builtin.segmenters._image_drawing import Shape
+from sketchmatch_builtin.segmenters._image_ink import Ink, find_ink
+from sketchmatch_builtin.segmenters._image_shapes import Tracing, trace
 
 __all__ = ["ImageSegmenter"]
 
-_Mask = NDArray[np.uint8]
-
-# Grey levels between the darkest and the lightest spot, after smoothing, that paper alone reaches.
-_PAPER_CONTRAST = 32
-_MOST_OBJECTS = 1000
-
-_INVERTED = "The picture is light on dark: it was read as its negative."
 _FRAMED = (
     "The line around everything was taken as a frame and left out: set frame to 'keep' if it is "
     "an object."
@@ -31,28 +27,29 @@ _FRAMED = (
 
 
 class ImageSegmenter(Segmenter):
-    """Takes dark shapes as objects, filled or drawn in outline.
+    """Takes dark or coloured shapes as objects, filled or outlined, scanned or photographed.
 
-    Otsu's threshold [1]_ parts ink from paper; each shape is then traced around its outside [2]_,
-    so that an outline counts as what it encloses, and nothing within an object is looked at. One
-    shape around at least two others is a frame and left out. Coordinates are pixels from the
-    lower left corner. Objects come in reading order: by their highest point from the top down,
-    then from the left.
+    The light on the paper is divided out and ink parted from paper halfway between them [1]_; each
+    shape is then traced around its outside [2]_, so that an outline counts as what it encloses,
+    and nothing within an object is looked at. Gaps in outlines are closed, lines that enclose
+    nothing are left out, and so are ruled lines and a table around the sheet. Outlines that touch
+    or overlap are parted where that gives the fewest convex shapes. One shape around most of the
+    drawing is a frame and left out. Coordinates are pixels from the lower left corner. Objects come
+    in reading order: by their highest point from the top down, then from the left.
 
     References
     ----------
-    .. [1] N. Otsu, "A threshold selection method from gray-level histograms", IEEE Transactions
-       on Systems, Man, and Cybernetics 9(1), 1979.
+    .. [1] J. Bernsen, "Dynamic thresholding of gray-level images", ICPR 1986.
     .. [2] S. Suzuki, K. Abe, "Topological structural analysis of digitized binary images by
        border following", Computer Vision, Graphics, and Image Processing 30(1), 1985.
     """
 
     name = "image"
-    summary = "Dark shapes or outlines on light paper."
+    summary = "Dark shapes or outlines on light paper, scanned, photographed or drawn to scale."
     sources = (Image,)
 
     class Params(Params):
-        """What is noise, what is a frame, and how outlines are smoothed."""
+        """What is noise, what is a frame, and how outlines are closed and smoothed."""
 
         blur: float = Field(
             1.0,
@@ -81,8 +78,24 @@ class ImageSegmenter(Segmenter):
         frame: Literal["auto", "keep"] = Field(
             "auto",
             description=(
-                "What to do with one shape around at least two others: 'auto' leaves it out as a "
-                "frame, 'keep' takes it as the one object it is."
+                "What to do with one shape around at least two others, and with a table around "
+                "the sheet: 'auto' leaves it out, 'keep' takes it as the one object it is."
+            ),
+        )
+        max_gap: float = Field(
+            0.15,
+            ge=0.0,
+            le=0.5,
+            description=(
+                "Widest gap in an outline that is closed, as a share of the outline's size; "
+                "0 for none."
+            ),
+        )
+        colours: Literal["merge", "separate"] = Field(
+            "merge",
+            description=(
+                "Filled areas of different colours or shades that touch: 'merge' takes them as "
+                "one object, 'separate' each as its own."
             ),
         )
 
@@ -90,89 +103,72 @@ class ImageSegmenter(Segmenter):
 
     def segment(self, source: Image) -> Segmentation:
         """Return the shapes as objects, in pixels from the picture's lower left corner."""
-        ink, inverted = _ink(source.pixels, self.params.blur)
-        side = self.params.min_size * max(ink.shape)
-        # Row 0 of a picture is its highest: here, once, y turns up.
-        drawing = _Drawing(ink[::-1], side * side)
-        shapes = drawing.outermost()
-        framed = False
-        if self.params.frame == "auto" and len(shapes) == 1:
-            inside = drawing.inside(shapes[0])
-            framed = len(inside) >= 2
-            shapes = inside if framed else shapes
-        _check_count(len(shapes), side)
+        keep = self.params.frame == "keep"
+        ink = find_ink(source.pixels, self.params.blur, keep)
+        least = (self.params.min_size * max(ink.mask.shape)) ** 2
+        found = trace(ink.mask, least, self.params.max_gap, not keep)
+        if self.params.colours == "separate":
+            found.shapes = areas_of_colours(ink, found.shapes, least)
+        rows, columns = source.pixels.shape[:2]
+        _check_count(len(found.shapes), math.ceil(self.params.min_size * max(rows, columns)))
         outlines = sorted(
-            (self._simplified(drawing.outline(shape)) for shape in shapes),
+            (self._simplified(_outline(shape, ink, rows)) for shape in found.shapes),
             key=lambda outline: (-outline[:, 1].max(), outline[:, 0].min()),
         )
         scene = Scene(tuple(SceneObject.from_rings([outline]) for outline in outlines))
-        said = ((_INVERTED, inverted), (_FRAMED, framed))
-        return Segmentation(scene, tuple(warning for warning, true in said if true))
+        return Segmentation(scene, (*ink.warnings, *_said(found)))
 
     def _simplified(self, outline: FloatArray) -> FloatArray:
         tolerance = self.params.simplify * float(np.ptp(outline, axis=0).max())
         return shapely.get_coordinates(shapely.Polygon(outline).simplify(tolerance))
 
 
-class _Drawing:
-    """The shapes of a picture, and which lies in which; a shape is the index of its contour."""
-
-    def __init__(self, ink: _Mask, least: float) -> None:
-        self._contours, hierarchy = cv2.findContours(ink, cv2.RETR_TREE, cv2.CHAIN_APPROX_NONE)
-        self._parents = np.zeros(0, np.int64) if hierarchy is None else hierarchy[0][:, 3]
-        # Pick's theorem: the pixels within a contour, from its area between pixel centres.
-        pixels = [cv2.contourArea(c) + len(c) / 2.0 + 1.0 for c in self._contours]
-        self._large = np.array(pixels) >= least
-
-    def outermost(self) -> list[int]:
-        """Return the large shapes that lie in no other."""
-        return self._children([-1])
-
-    def inside(self, shape: int) -> list[int]:
-        """Return the large shapes that lie in the holes of a shape."""
-        return self._children(np.flatnonzero(self._parents == shape))
-
-    def outline(self, shape: int) -> FloatArray:
-        """Return the border of a shape and all that it encloses, in pixels, shape (k, 2)."""
-        x, y, width, height = cv2.boundingRect(self._contours[shape])
-        mask = np.zeros((height, width), np.uint8)
-        cv2.drawContours(mask, self._contours, shape, 1, cv2.FILLED, offset=(-x, -y))
-        return np.add(outer_border(mask), (x, y), dtype=np.float64)
-
-    def _children(self, parents: Any) -> list[int]:
-        return [int(k) for k in np.flatnonzero(np.isin(self._parents, parents) & self._large)]
+def _outline(shape: Shape, ink: Ink, rows: int) -> FloatArray:
+    """Return the border of a shape in pixels of the picture; row 0 is its highest: y turns up."""
+    outline = (outer_border(shape.mask) + shape.corner) * ink.scale
+    return np.asarray(np.stack([outline[:, 0], rows - outline[:, 1]], axis=1))
 
 
-def _ink(pixels: NDArray[np.uint8], blur: float) -> tuple[_Mask, bool]:
-    """Return where the ink is, and whether it is the lighter of the two."""
-    grey = cv2.GaussianBlur(pixels, (0, 0), blur) if blur > 0.0 else pixels
-    contrast = int(grey.max()) - int(grey.min())
-    if contrast < _PAPER_CONTRAST:
-        raise InvalidInputError(
-            Reason.INVALID_IMAGE,
-            "pixels",
-            f"is blank: lightest and darkest differ by {contrast} of 255 grey levels; give a "
-            "picture with dark shapes on light paper",
+def _said(found: Tracing) -> Iterator[str]:
+    if found.framed:
+        yield _FRAMED
+    if found.attached:
+        yield (
+            f"{_count(found.attached, 'shape')} drawn against the frame {_was(found.attached)} "
+            f"taken as {'objects' if found.attached > 1 else 'an object'}."
         )
-    _, below = cv2.threshold(grey, 0, 1, cv2.THRESH_BINARY_INV | cv2.THRESH_OTSU)
-    dark = np.asarray(below, dtype=np.uint8)
-    border = np.concatenate([dark[0], dark[-1], dark[:, 0], dark[:, -1]])
-    inverted = bool(border.mean() > 0.5)
-    return (1 - dark if inverted else dark), inverted
-
-
-def _check_count(found: int, side: float) -> None:
-    if found > _MOST_OBJECTS:
-        raise InvalidInputError(
-            Reason.LIMIT_EXCEEDED,
-            "pixels",
-            f"has {found} shapes, more than the limit of {_MOST_OBJECTS}; raise blur or min_size",
+    if found.parted:
+        yield (
+            f"{_count(found.parted, 'drawing')} of touching or overlapping outlines "
+            f"{_was(found.parted)} parted into the likely objects: draw objects apart to be sure."
         )
+    if found.closed:
+        yield (
+            f"{_count(found.closed, 'outline')} with gaps {_was(found.closed)} closed: lower "
+            f"max_gap if {'it is no object' if found.closed == 1 else 'they are no objects'}."
+        )
+    if found.open_lines:
+        yield (
+            f"{_count(found.open_lines, 'line')} that enclose{'s' * (found.open_lines == 1)} "
+            f"nothing {_was(found.open_lines)} left out: close an outline, or raise max_gap, to "
+            "have an object."
+        )
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def _was(number: int) -> str:
+    return "was" if number == 1 else "were"
+
+
+def _check_count(found: int, side: int) -> None:
     if found < 2:
         raise InvalidInputError(
             Reason.TOO_FEW_OBJECTS,
             "pixels",
-            f"has {'no shape' if not found else 'only one shape'} of at least {math.ceil(side)} "
+            f"has {'no shape' if not found else 'only one shape'} of at least {side} "
             "pixels' side, and a match needs two; draw objects apart from each other, or lower "
             "min_size",
         )

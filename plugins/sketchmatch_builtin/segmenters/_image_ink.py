@@ -1,0 +1,280 @@
+"""Where the ink is in a picture, whatever the light: scans, photographs, clean drawings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from sketchmatch.api import InvalidInputError, Reason
+from sketchmatch_builtin.segmenters._image_light import (
+    PAPER_CONTRAST,
+    Mask,
+    continued,
+    find_sheet,
+    is_light_on_dark,
+    odd,
+    paper_light,
+)
+
+__all__ = ["Ink", "find_ink"]
+
+# Pixels along the larger side at which shapes are looked for, and the light is estimated.
+_WORKING_SIDE = 2048
+_LIGHT_SIDE = 512
+# Ink absorbs at least this share of the light that paper returns, this many standard deviations
+# of the paper's texture, and this share of what the picture's dark ink absorbs.
+_LEAST_INK = 0.05
+_TEXTURE = 4.5
+_FAINT = 0.2
+# Filled areas are even to this many grey levels beside one another, and their edges, in pixels,
+# twice this wide at most.
+_EVEN = 10
+_EDGE = 9
+
+_INVERTED = "The picture is light on dark: it was read as its negative."
+_TABLE = (
+    "What surrounds the sheet of paper was left out: set frame to 'keep' if it belongs to the "
+    "drawing."
+)
+_RULED = "The paper's ruled lines were left out."
+
+
+@dataclass(frozen=True)
+class Ink:
+    """The ink of a picture, at the size at which shapes are looked for.
+
+    Attributes
+    ----------
+    mask
+        Shape (rows, columns), 1 on ink.
+    absorbed
+        Shape (rows, columns, 1) for grey and (rows, columns, 3) for red, green and blue: the share
+        of the paper's light that is missing, in 1/255.
+    scale
+        Pixels of the picture in one of the mask, along x and y.
+    warnings
+        What was decided, one sentence each.
+    """
+
+    mask: Mask
+    absorbed: Mask
+    scale: tuple[float, float]
+    warnings: tuple[str, ...]
+
+
+def find_ink(pixels: Mask, blur: float, whole: bool) -> Ink:
+    """Find the ink of a picture.
+
+    In a picture in colour, ink is what absorbs light of any colour, as a yellow pen absorbs blue:
+    the channel in which it is darkest counts. The light on the paper is estimated and divided out.
+    Ink is then what absorbs at least half as much as the darkest spot nearby, so that faint and
+    dark pens are both traced along the middle of their edges [1]_, and clearly more than the
+    paper's texture and ruled lines do.
+
+    Parameters
+    ----------
+    pixels
+        Shape (rows, columns), grey, or (rows, columns, 3), red, green and blue.
+    blur
+        Standard deviation of the Gaussian that evens out noise, in pixels.
+    whole
+        Whether all of the picture is the drawing; otherwise a table around the sheet is left out.
+
+    Raises
+    ------
+    InvalidInputError
+        With the path ``pixels``, if the picture is blank.
+
+    References
+    ----------
+    .. [1] J. Bernsen, "Dynamic thresholding of gray-level images", ICPR 1986: a threshold halfway
+       between the local extremes, with a floor on the contrast.
+    """
+    rows, columns = pixels.shape[:2]
+    factor = math.ceil(max(rows, columns) / _WORKING_SIDE)
+    if factor > 1:
+        size = (math.ceil(columns / factor), math.ceil(rows / factor))
+        pixels = np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), np.uint8)
+    if blur > 0.0:
+        pixels = np.asarray(cv2.GaussianBlur(pixels, (0, 0), blur / factor), np.uint8)
+    channels = _channels(pixels)
+    _check_contrast(channels)
+    small = [_reduced(channel, _LIGHT_SIDE) for channel in channels]
+    grey = _most_telling(small)
+    sheet = None if whole else find_sheet(grey)
+    inverted = sheet.inverted if sheet else is_light_on_dark(grey)
+    if inverted:
+        channels, small = [255 - channel for channel in channels], [255 - some for some in small]
+    if sheet:
+        small = [continued(some, sheet.mask) for some in small]
+    absorbed = _absorbed(channels, [paper_light(some) for some in small])
+    if sheet:
+        size = channels[0].shape[::-1]
+        inside = np.asarray(cv2.resize(sheet.mask, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+        absorbed *= inside[:, :, None]
+    mask, ruled = _threshold(np.ascontiguousarray(absorbed.max(axis=2)))
+    said = ((_INVERTED, inverted), (_TABLE, sheet is not None), (_RULED, ruled))
+    return Ink(
+        mask,
+        absorbed,
+        (columns / mask.shape[1], rows / mask.shape[0]),
+        tuple(warning for warning, true in said if true),
+    )
+
+
+def _channels(pixels: Mask) -> list[Mask]:
+    """Return one channel of a picture that is grey, and three of one in colour."""
+    if pixels.ndim == 2:
+        return [pixels]
+    channels = [np.ascontiguousarray(pixels[:, :, k]) for k in range(3)]
+    grey = all((channel == channels[0]).all() for channel in channels[1:])
+    return channels[:1] if grey else channels
+
+
+def _contrast(channel: Mask) -> int:
+    return int(channel.max()) - int(channel.min())
+
+
+def _most_telling(channels: list[Mask]) -> Mask:
+    """Return a picture's luminance, or the channel of most contrast where that shows nothing."""
+    if len(channels) == 1:
+        return channels[0]
+    luminance = np.asarray(cv2.cvtColor(np.dstack(channels), cv2.COLOR_RGB2GRAY), np.uint8)
+    if _contrast(luminance) >= PAPER_CONTRAST:
+        return luminance
+    return max(channels, key=_contrast)
+
+
+def _check_contrast(channels: list[Mask]) -> None:
+    contrast = max(map(_contrast, channels))
+    if contrast < PAPER_CONTRAST:
+        raise InvalidInputError(
+            Reason.INVALID_IMAGE,
+            "pixels",
+            f"is blank: lightest and darkest differ by {contrast} of 255 grey levels; "
+            "give a picture with dark shapes on light paper, taken in good light",
+        )
+
+
+def _reduced(picture: Mask, side: int) -> Mask:
+    share = side / max(picture.shape)
+    if share >= 1.0:
+        return picture
+    size = tuple(max(1, round(share * length)) for length in picture.shape[::-1])
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _absorbed(channels: list[Mask], lights: list[Mask]) -> Mask:
+    """Return the share of the light that is missing in each channel, in 1/255.
+
+    It is a share of the lightest channel's light: of what paper hardly returns, noise is most.
+    """
+    size = channels[0].shape[::-1]
+    papers: list[Mask] = []
+    for light in lights:
+        smooth = cv2.GaussianBlur(light, (0, 0), 1.0) if min(light.shape) > 3 else light
+        papers.append(
+            np.asarray(cv2.resize(smooth, size, interpolation=cv2.INTER_LINEAR), np.uint8)
+        )
+    lightest = np.maximum(np.maximum.reduce(papers), 1)
+    missing = [
+        cv2.divide(cv2.subtract(paper, channel), lightest, scale=255.0)
+        for paper, channel in zip(papers, channels, strict=True)
+    ]
+    return np.asarray(np.dstack(missing), np.uint8)
+
+
+# Ink
+
+
+def _threshold(absorbed: Mask) -> tuple[Mask, bool]:
+    """Return the ink, and whether ruled lines had to be told from it."""
+    floor = max(255.0 * _LEAST_INK, _rough(absorbed))
+    shades = np.cumsum(np.bincount(absorbed.ravel(), minlength=256)[::-1])[::-1]
+    visible = shades[min(255, math.ceil(floor))]
+    if visible == 0:
+        return np.zeros_like(absorbed), False
+    # The dark pen's shade: what the darkest 0.4 % of the picture reach, or half of all ink.
+    darkest = min(visible / 2.0, 0.004 * absorbed.size)
+    pen = int(np.flatnonzero(shades >= darkest).max())
+    floor = max(floor, _FAINT * pen)
+    ruling = _ruling(absorbed, floor, pen)
+    if ruling is not None:
+        floor = max(floor, ruling)
+    window = np.ones((max(7, odd(0.012 * max(absorbed.shape))),) * 2, np.uint8)
+    half = cv2.dilate(absorbed, window) // 2
+    lowest = min(254, math.ceil(floor) - 1)
+    mask = np.asarray(absorbed > np.maximum(half, lowest), np.uint8)
+    return mask | _pale(absorbed, lowest, window), ruling is not None
+
+
+def _pale(absorbed: Mask, lowest: int, window: Mask) -> Mask:
+    """Return evenly filled areas up to their edges, also where they touch darker ones."""
+    even = cv2.medianBlur(absorbed, 5)
+    three = np.ones((3, 3), np.uint8)
+    steep = np.asarray(cv2.subtract(cv2.dilate(even, three), cv2.erode(even, three)), np.uint8)
+    plain = np.asarray((steep <= _EVEN) & (np.asarray(even) > lowest), np.uint8)
+    wide = np.asarray(cv2.morphologyEx(plain, cv2.MORPH_OPEN, window), np.uint8)
+    if not wide.any():
+        return wide
+    level = cv2.dilate(np.asarray(absorbed * wide, np.uint8), np.ones((_EDGE, _EDGE), np.uint8))
+    near = np.asarray(level, np.uint8)
+    return np.asarray((near > 0) & (absorbed > np.maximum(near // 2, lowest)), np.uint8)
+
+
+def _rough(absorbed: Mask) -> float:
+    """Return what bare paper may absorb, from differences over a few pixels: mostly of paper."""
+    some = absorbed[::2].astype(np.int16)
+    if min(some.shape) <= 8:
+        return 0.0
+    spread = 1.0484 * float(np.median(np.abs(some[:, 8:] - some[:, :-8])))
+    return float(np.percentile(some, 30)) + _TEXTURE * spread
+
+
+def _ruling(absorbed: Mask, floor: float, pen: int) -> float | None:
+    """Return the shade between ruled lines and ink, if there are lines all over the picture.
+
+    Ruled lines are fainter than the pen, straight, span half of the picture, and have at least
+    three parallel ones at regular distances; they are looked for with the Hough transform [1]_.
+
+    References
+    ----------
+    .. [1] R. O. Duda, P. E. Hart, "Use of the Hough transformation to detect lines and curves in
+       pictures", Communications of the ACM 15(1), 1972.
+    """
+    strong = np.asarray(absorbed >= 0.65 * pen, np.uint8)
+    beside = cv2.dilate(strong, np.ones((7, 7), np.uint8))
+    faint = np.asarray((absorbed >= floor) & (beside == 0), np.uint8)
+    if faint.sum() < 2.0 * max(faint.shape):
+        return None
+    small = _reduced(faint * 255, 700)
+    dots = np.asarray(small >= 64, np.uint8)
+    found = cv2.HoughLines(dots, 1.0, np.pi / 360.0, int(0.35 * min(dots.shape)))
+    if found is None:
+        return None
+    lines = found[:2000, 0, :]
+    for angle in lines[:12:3, 1]:
+        turn = np.abs((lines[:, 1] - angle + np.pi / 2) % np.pi - np.pi / 2)
+        parallel = lines[turn < np.deg2rad(2.5)]
+        away = np.where(np.abs(parallel[:, 1] - angle) > np.pi / 2, -1.0, 1.0) * parallel[:, 0]
+        if _regular(np.sort(away)):
+            shade = float(np.percentile(absorbed[faint > 0], 90))
+            return min(0.65 * pen, (shade + pen) / 2.0)
+    return None
+
+
+def _regular(places: NDArray[Any]) -> bool:
+    """Return whether there are at least four distinct places with mostly equal distances."""
+    groups = np.split(places, np.flatnonzero(np.diff(places) > 5.0) + 1)
+    centres = np.array([group.mean() for group in groups])
+    if len(centres) < 4:
+        return False
+    steps = np.diff(centres)
+    unit = float(np.median(steps))
+    off = np.abs(steps / unit - np.maximum(1.0, np.rint(steps / unit)))
+    return bool(np.mean(off < 0.25) > 0.6)

@@ -1,0 +1,329 @@
+"""From ink to the shapes that it fills or encloses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from sketchmatch.api import InvalidInputError, Reason
+from sketchmatch_builtin.segmenters._image_drawing import Drawing, Shape, without_specks
+from sketchmatch_builtin.segmenters._image_light import Mask
+
+__all__ = ["MOST_SHAPES", "Tracing", "trace"]
+
+MOST_SHAPES = 1000
+"""A picture with more shapes is noise, and refused before they are looked at."""
+
+# Pixels along the larger side at which gaps are closed.
+_GAP_SIDE = 640
+# A shape is whole if what is left of it without its lines spans, and fills, these shares of it.
+_WHOLE = 0.5
+_FULL = 0.15
+# Closed from several pieces and smaller than this share of the other shapes, it is handwriting.
+_WRITING = 0.15
+# Faces of a drawing belong to one object if together they fill this share of their convex hull.
+_CONVEX = 0.88
+_MOST_FACES = 7
+
+
+@dataclass
+class Tracing:
+    """What was found, and what had to be decided on the way."""
+
+    shapes: list[Shape] = field(default_factory=list)
+    framed: bool = False
+    attached: int = 0
+    closed: int = 0
+    parted: int = 0
+    open_lines: int = 0
+
+
+def trace(ink: Mask, least: float, gap: float, frames: bool) -> Tracing:
+    """Trace each shape around its outside [1]_, so that an outline counts as what it encloses.
+
+    Parameters
+    ----------
+    ink
+        Shape (rows, columns), 1 on ink.
+    least
+        Pixels that a shape has at least.
+    gap
+        Largest gap in an outline, as a share of the outline's size.
+    frames
+        Whether one shape around at least two others is left out.
+
+    Raises
+    ------
+    InvalidInputError
+        With the path ``pixels``, if there are more than :data:`MOST_SHAPES` shapes.
+
+    References
+    ----------
+    .. [1] S. Suzuki, K. Abe, "Topological structural analysis of digitized binary images by
+       border following", Computer Vision, Graphics, and Image Processing 30(1), 1985.
+    """
+    found = Tracing()
+    drawing = Drawing(without_specks(ink, math.sqrt(least)), least)
+    shapes = drawing.outermost()
+    attached: list[int] = []
+    while frames and (frame := drawing.frame(shapes)) is not None:
+        attached += drawing.drawn_against(frame)
+        shapes = [shape for shape in shapes if shape != frame] + drawing.inside(frame)
+        found.framed = True
+    if len(shapes) > MOST_SHAPES:
+        raise InvalidInputError(
+            Reason.LIMIT_EXCEEDED,
+            "pixels",
+            f"has {len(shapes)} shapes, more than the limit of {MOST_SHAPES}; raise blur or "
+            "min_size",
+        )
+    pen = drawing.pen()
+    radius = 1 + math.ceil(1.2 * pen) if pen else 0
+    lines = []
+    for hole in attached:
+        found.shapes.append(_widened(drawing.filled(hole), max(1, round(pen))))
+        found.attached += 1
+    for shape in shapes:
+        whole = drawing.filled(shape)
+        if radius and not _is_whole(whole.mask, radius, least):
+            lines.append(shape)
+            continue
+        parts = _parts(drawing.ink_of(shape), whole, radius, least)
+        found.parted += len(parts) > 1
+        found.shapes.extend(parts)
+    if not radius:
+        return found
+    loose = drawing.loose(shapes, lines)
+    open_frame: Shape | None = None
+    for part, pieces in _closed_outlines(loose, gap, radius, least):
+        within = [other for other in found.shapes if _covers(part, _box(other))]
+        if frames and len(within) >= 2:
+            found.framed, open_frame = True, part
+            continue
+        if pieces > 1 and _is_writing(part, found.shapes):
+            continue
+        found.shapes = [other for other in found.shapes if all(other is not w for w in within)]
+        found.shapes.append(part)
+        found.closed += 1
+    for shape in lines:
+        if any(_covers(part, drawing.box(shape)) for part in found.shapes):
+            continue
+        if open_frame and drawing.box(shape)[2] > 0.8 * open_frame.mask.shape[1]:
+            continue
+        rest = _opened(drawing.filled(shape), radius, least)
+        found.shapes.extend(rest)
+        found.open_lines += not rest
+    return found
+
+
+def _disk(radius: int) -> Mask:
+    size = (2 * radius + 1, 2 * radius + 1)
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, size), np.uint8)
+
+
+def _core(mask: Mask, radius: int) -> Mask:
+    """Return a mask without what is thinner than a disk: opening by it."""
+    padded = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
+    core = cv2.morphologyEx(padded, cv2.MORPH_OPEN, _disk(radius))
+    return np.asarray(core, np.uint8)[1:-1, 1:-1]
+
+
+def _hull_area(mask: Mask) -> float:
+    points = cv2.findNonZero(mask)
+    return float(cv2.contourArea(cv2.convexHull(points))) if points is not None else 0.0
+
+
+def _is_whole(mask: Mask, radius: int, least: float) -> bool:
+    core, span = _core(mask, radius), _hull_area(mask)
+    enough = int(core.sum()) >= max(0.5 * least, _FULL * span)
+    return enough and _hull_area(core) >= _WHOLE * span
+
+
+def _opened(shape: Shape, radius: int, least: float) -> list[Shape]:
+    """Return the large pieces of a shape without the lines that stick out or connect them."""
+    core = _core(shape.mask, radius)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(core, connectivity=4)
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    large = 1 + np.flatnonzero(areas >= max(0.5 * least, 0.1 * areas.max(initial=0)))
+    pieces = []
+    for label in large:
+        piece = np.asarray(labels == label, np.uint8)
+        # Opening rounds corners: what is near is given back, and the stub of a line with it.
+        near = np.asarray(cv2.dilate(piece, _disk(max(1, radius // 2))), np.uint8)
+        for other in large[large != label]:
+            near[labels == other] = 0
+        pieces.append(_cropped(near & shape.mask, shape.corner))
+    return pieces
+
+
+def _cropped(mask: Mask, corner: tuple[int, int]) -> Shape:
+    """Return the largest piece of a mask, without holes."""
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    largest = max(contours, key=cv2.contourArea)
+    x, y, width, height = cv2.boundingRect(largest)
+    piece = np.zeros((height, width), np.uint8)
+    cv2.drawContours(piece, [largest], 0, 1, cv2.FILLED, offset=(-x, -y))
+    return Shape(piece, (corner[0] + x, corner[1] + y))
+
+
+def _covers(shape: Shape, box: tuple[int, int, int, int]) -> bool:
+    """Return whether the middle of a box, or most of it, lies within a shape's box."""
+    x, y, width, height = box
+    rows, columns = shape.mask.shape
+    left, top = shape.corner
+    wide = min(x + width, left + columns) - max(x, left)
+    high = min(y + height, top + rows) - max(y, top)
+    return bool(wide > 0 and high > 0 and wide * high >= 0.6 * width * height)
+
+
+def _box(shape: Shape) -> tuple[int, int, int, int]:
+    return (*shape.corner, shape.mask.shape[1], shape.mask.shape[0])
+
+
+def _widened(shape: Shape, reach: int) -> Shape:
+    wide = np.asarray(cv2.dilate(np.pad(shape.mask, reach), _disk(reach)), np.uint8)
+    return Shape(wide, (shape.corner[0] - reach, shape.corner[1] - reach))
+
+
+def _is_writing(shape: Shape, others: list[Shape]) -> bool:
+    areas = [float(other.mask.sum()) for other in others]
+    return len(areas) >= 2 and float(shape.mask.sum()) < _WRITING * float(np.median(areas))
+
+
+# Outlines with gaps
+
+
+def _closed_outlines(
+    ink: Mask, gap: float, radius: int, least: float
+) -> Iterator[tuple[Shape, int]]:
+    """Yield the shapes that open outlines enclose once gaps are closed, small gaps first.
+
+    With each comes the number of pieces that it was drawn with.
+    """
+    if gap == 0.0 or not ink.any():
+        return
+    share = min(1.0, _GAP_SIDE / max(ink.shape))
+    small = ink
+    if share < 1.0:
+        size = tuple(max(1, math.ceil(share * length)) for length in ink.shape[::-1])
+        area = cv2.resize(ink * 255, size, interpolation=cv2.INTER_AREA)
+        small = np.asarray(np.asarray(area) > 40, np.uint8)
+    radius = max(1, round(share * radius))
+    largest = gap * max(ink.shape) * share
+    reach = 1
+    while 2 * reach <= largest + 2 and small.any():
+        margin = reach + 2
+        wide = np.pad(small, margin)
+        grown = np.asarray(cv2.dilate(wide, _disk(reach)), np.uint8)
+        contours, _ = cv2.findContours(grown, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        for contour in contours:
+            x, y, width, height = cv2.boundingRect(contour)
+            filled = np.zeros((height + 2, width + 2), np.uint8)
+            cv2.drawContours(filled, [contour], 0, 1, cv2.FILLED, offset=(1 - x, 1 - y))
+            back = np.asarray(cv2.erode(filled, _disk(reach)), np.uint8)
+            span = math.hypot(width, height)
+            if 2 * reach > gap * span + 2 or back.sum() < share**2 * least:
+                continue
+            if not _is_whole(back, max(radius, 1), 2.0 * share**2 * least):
+                continue
+            pieces = _opened(Shape(back, (x - 1 - margin, y - 1 - margin)), radius, 0.0)
+            piece = max(pieces, key=lambda part: int(part.mask.sum()))
+            taken = filled[1:-1, 1:-1] > 0
+            part = wide[y : y + height, x : x + width]
+            drawn = cv2.connectedComponents(np.where(taken, part, 0).astype(np.uint8))[0] - 1
+            along = (ink.shape[1] / small.shape[1], ink.shape[0] / small.shape[0])
+            yield _enlarged(piece, *along), drawn
+            part[taken] = 0
+        small = np.ascontiguousarray(wide[margin:-margin, margin:-margin])
+        reach += max(1, reach // 3)
+
+
+def _enlarged(shape: Shape, along_x: float, along_y: float) -> Shape:
+    if along_x == 1.0 and along_y == 1.0:
+        return shape
+    padded = cv2.copyMakeBorder(shape.mask * 255, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
+    size = (round(padded.shape[1] * along_x), round(padded.shape[0] * along_y))
+    mask = np.asarray(cv2.resize(padded, size, interpolation=cv2.INTER_LINEAR)) > 127
+    corner = (round((shape.corner[0] - 1) * along_x), round((shape.corner[1] - 1) * along_y))
+    return _cropped(np.asarray(mask, np.uint8), corner)
+
+
+# Drawings that touch or overlap
+
+
+def _parts(ink: Mask, whole: Shape, radius: int, least: float) -> list[Shape]:
+    """Return a shape, or the shapes that it is drawn of where they touch or overlap.
+
+    What is drawn within a shape says nothing as long as the whole is convex, as a table with
+    things on it is. Otherwise the fewest convex groups of faces that cover it are taken.
+    """
+    if not radius:
+        return [whole]
+    core = _core(whole.mask, radius)
+    if core.sum() < _CONVEX * _hull_area(core):
+        faces = _faces(ink & whole.mask, whole.mask, core, least)
+        groups = _fewest_convex(faces, radius) if 2 <= len(faces) <= _MOST_FACES else []
+        if len(groups) > 1:
+            return [_cropped(group & whole.mask, whole.corner) for group in groups]
+    near = np.asarray(cv2.dilate(core, _disk(radius)), np.uint8)
+    if (whole.mask & ~near).any() or _pieces(core) > 1:
+        return _opened(whole, radius, least) or [whole]
+    return [whole]
+
+
+def _pieces(mask: Mask) -> int:
+    return int(cv2.connectedComponents(mask, connectivity=4)[0]) - 1
+
+
+def _faces(ink: Mask, filled: Mask, core: Mask, least: float) -> list[Mask]:
+    blank = np.asarray(filled & (1 - ink), np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(blank, connectivity=4)
+    areas = stats[:, cv2.CC_STAT_AREA]
+    enough = max(0.02 * float(core.sum()), 0.25 * least)
+    large = [k for k in range(1, count) if areas[k] >= enough]
+    return [np.asarray(labels == k, np.uint8) for k in large]
+
+
+def _fewest_convex(faces: list[Mask], radius: int) -> list[Mask]:
+    """Return the fewest groups of faces, each nearly convex, that cover all; none if there are."""
+    line = _disk(radius)
+    wide = [np.asarray(cv2.dilate(np.pad(face, radius), line), np.uint8) for face in faces]
+    candidates: list[tuple[float, int, Mask]] = []
+    for chosen in range(1, 1 << len(faces)):
+        union: Mask = np.zeros_like(wide[0])
+        for k, face in enumerate(wide):
+            if chosen >> k & 1:
+                union |= face
+        if cv2.connectedComponents(union)[0] == 2:
+            solidity = float(union.sum()) / max(_hull_area(union), 1.0)
+            if solidity >= _CONVEX:
+                candidates.append((solidity, chosen, union))
+    groups = _cover(candidates, (1 << len(faces)) - 1)
+    inner = slice(radius, -radius)
+    back = _disk(max(1, radius // 2))
+    return [np.asarray(cv2.erode(group, back), np.uint8)[inner, inner] for group in groups]
+
+
+def _cover(candidates: list[tuple[float, int, Mask]], everything: int) -> list[Mask]:
+    """Return the cover by the fewest candidates that overlap least and are most convex."""
+    best: tuple[float, list[Mask]] = (-math.inf, [])
+
+    def extend(taken: int, start: int, groups: list[Mask], worth: float) -> None:
+        nonlocal best
+        if taken == everything:
+            best = max(best, (worth, groups), key=lambda cover: cover[0])
+            return
+        if len(groups) == 3:
+            return
+        for k in range(start, len(candidates)):
+            solidity, chosen, union = candidates[k]
+            if chosen & ~taken:
+                shared = (chosen & taken).bit_count()
+                extend(taken | chosen, k + 1, [*groups, union], worth + solidity - 2 - 0.1 * shared)
+
+    extend(0, 0, [], 0.0)
+    return best[1]
