@@ -14,9 +14,16 @@ def sketchmatch_register_segmenters() -> list[type[Segmenter]]:
     from sketchmatch_builtin.segmenters.image import ImageSegmenter
     from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
     from sketchmatch_builtin.segmenters.polygons import PolygonSegmenter
+    from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
     from sketchmatch_builtin.segmenters.strokes import StrokeSegmenter
 
-    return [PolygonSegmenter, StrokeSegmenter, OccupancyGridSegmenter, ImageSegmenter]
+    return [
+        PolygonSegmenter,
+        StrokeSegmenter,
+        OccupancyGridSegmenter,
+        RoomSegmenter,
+        ImageSegmenter,
+    ]
 
 
 @hookimpl

@@ -14,6 +14,7 @@ from hypothesis.extra.numpy import arrays
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import OccupancyGrid
+from sketchmatch.model.limits import SourceLimits, limited_to
 from sketchmatch_builtin.segmenters._border import outer_border
 from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
 from tests.tools import ROOT, require
@@ -191,6 +192,28 @@ def test_a_map_of_noise_is_refused_before_it_takes_long():
     noise = np.where(np.random.default_rng(0).random((1000, 1000)) < 0.1, 100, 0).astype(np.int8)
     with pytest.raises(InvalidInputError, match="more than the limit of 1000; raise min_size"):
         segmented(OccupancyGrid(noise, 0.05), min_size=0.0, close_gaps=0.0)
+
+
+def test_the_limit_of_objects_in_force_holds():
+    cells = np.zeros((20, 20), np.int8)
+    cells[2:18:5, 2:18:5] = 100
+    with (
+        limited_to(SourceLimits(max_objects=15)),
+        pytest.raises(InvalidInputError, match="has 16 objects, more than the limit of 15; raise"),
+    ):
+        segmented(OccupancyGrid(cells, 0.3))
+
+
+@pytest.mark.parametrize("resolution", [2.55, 655.35, 1000.0])
+@pytest.mark.parametrize("options", [{}, {"attached": 2.0}, {"merge_distance": 1.0}])
+def test_a_coarse_map_that_encloses_nothing_is_refused(resolution, options):
+    cells = np.zeros((5, 6), np.int8)
+    cells[1, 1:3] = cells[3, 1] = 100
+    cells[0, :] = cells[:, 0] = -1
+    cells[:, 1] = 100
+    with pytest.raises(InvalidInputError, match="has no object") as caught:
+        segmented(OccupancyGrid(cells, resolution), **options)
+    assert caught.value.reason is Reason.TOO_FEW_OBJECTS
 
 
 def largest_filled(cells):

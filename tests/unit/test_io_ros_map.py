@@ -1,5 +1,6 @@
 """Robots' maps: every key, mode and kind of picture, and every way to get them wrong."""
 
+import re
 import struct
 import zlib
 
@@ -120,12 +121,39 @@ def test_what_is_transparent_is_unknown(mode, expected, tmp_path):
 
 
 def test_numbers_that_yaml_takes_for_strings_are_numbers():
-    grid = decode_map_server(yaml_text(resolution="5e-2"), pgm([[0]]))
-    assert grid.resolution == 0.05
+    for text in ("5e-2", "'0.05'"):
+        assert decode_map_server(yaml_text(resolution=text), pgm([[0]])).resolution == 0.05
 
 
 def test_keys_of_other_tools_are_ignored():
     assert decode_map_server(yaml_text(author="me"), pgm([[0]])).cells.shape == (1, 1)
+
+
+@pytest.mark.parametrize("yaw", [".nan", "nan", "-nan", "NaN", "-.nan"])
+def test_a_yaw_of_nan_is_0_and_noted(yaw):
+    grid = decode_map_server(yaml_text(origin=f"[1, 2, {yaw}]"), pgm([[0]]))
+    assert grid.origin == (1.0, 2.0, 0.0)
+    assert grid.notes == ("the yaw of the map's origin is nan and was read as 0",)
+
+
+@pytest.mark.parametrize(
+    ("share", "changes", "words"),
+    [
+        (30, {"free_thresh": 0.25}, "free_thresh 0.25 makes 30% of the map free .* 0.196"),
+        (30, {}, None),
+        (0, {"free_thresh": 0.25}, None),
+        (30, {"free_thresh": 0.25, "negate": 1}, None),
+        (30, {"free_thresh": 0.25, "mode": "scale"}, None),
+        (30, {"free_thresh": 0.25, "mode": "raw"}, None),
+    ],
+)
+def test_unknown_grey_that_reads_as_free_is_noted(share, changes, words):
+    greys = np.full((10, 10), 254, np.uint8)
+    greys.flat[:share] = 205
+    notes = decode_map_server(yaml_text(**changes), pgm(greys)).notes
+    assert len(notes) == (words is not None)
+    if words is not None:
+        assert re.search(words, notes[0])
 
 
 BAD_YAML = {
@@ -140,11 +168,14 @@ BAD_YAML = {
     "resolution is huge": ({"resolution": "1" * 400}, "resolution", "give a finite number"),
     "origin is short": ({"origin": [0, 0]}, "origin", "give [x, y, yaw]"),
     "origin is no list": ({"origin": 3}, "origin", "give [x, y, yaw]"),
-    "yaw is nan": ({"origin": "[0, 0, .nan]"}, "origin[2]", "is nan; give a finite number"),
+    "origin is nan": ({"origin": "[0, .nan, 0]"}, "origin[1]", "is nan; give a finite number"),
+    "yaw is infinite": ({"origin": "[0, 0, .inf]"}, "origin[2]", "is inf; give a finite number"),
     "negate is 2": ({"negate": 2}, "negate", "is 2; give 0"),
     "threshold out of range": ({"occupied_thresh": 65}, "occupied_thresh", "a share from 0 to 1"),
     "thresholds swapped": ({"free_thresh": 0.7}, "free_thresh", "not below occupied_thresh 0.65"),
-    "thresholds missing": ({"free_thresh": "left out"}, "free_thresh", "add it"),
+    "free_thresh is missing": ({"free_thresh": "left out"}, "free_thresh", "add it"),
+    "occupied_thresh is missing": ({"occupied_thresh": "left out"}, "occupied_thresh", "add it"),
+    "negate is missing": ({"negate": "left out"}, "negate", "add it"),
     "mode unknown": ({"mode": "binary"}, "mode", "is 'binary'; give trinary, scale or raw"),
     "image is a number": ({"image": 7}, "image", "give the picture's path"),
 }
@@ -167,14 +198,14 @@ def test_a_wrong_key_is_named_with_the_remedy(case):
         ("- 1\n- 2", "is not a list of keys and values"),
         ("a: [1, 2", "is not YAML (line 1)"),
         ("a: b: c", "is not YAML (line 1)"),
-        ("a: !!python/object:os.system x", "is not YAML"),
+        ("a: !!python/object:os.system x", "has types written with '!'; give plain values"),
         ("x: \0", "is not YAML"),
         ("[" * 5000, "is not YAML"),
         ("a: 2001-99-99", "is not YAML"),
     ],
 )
 def test_text_that_is_no_header_is_refused(text, words):
-    with pytest.raises(InvalidInputError, match="file that map_server saved") as caught:
+    with pytest.raises(InvalidInputError, match=r"give (the file that map_server|plain)") as caught:
         decode_map_server(text, pgm([[0]]))
     assert caught.value.field == "yaml"
     assert words in caught.value.problem

@@ -13,13 +13,37 @@ All keys but ``mode`` are required, as map_server requires them; others are igno
 A pixel of value v is occupied with p = (255 − v)/255, or v/255 where negated; v is the mean of
 its colours. In mode ``trinary`` p > occupied_thresh is occupied (100), p < free_thresh free (0)
 and the rest unknown (−1); ``scale`` spreads the rest from 0 to 100; ``raw`` takes v itself, and
-unknown where it is above 100. The thresholds decide alone: where free_thresh is above 0.196, the
-grey 205 with which map_server saves unknown cells reads as free, as it does for the robot.
+unknown where it is above 100. Pictures of 16 bits a channel are read with 8.
 
-ROS 1 and ROS 2 differ in details, and here is what holds. Negate does not apply to ``raw``, and
-``scale`` ends at 0 and 100 (both as in ROS 2). A pixel that is not fully opaque is unknown in
-``trinary`` and ``scale``; map_server does so in ``scale`` and lets alpha falsify the mean in
-``trinary``.
+The thresholds decide alone, but there is a trap: nav2's map_saver writes unknown cells as the grey
+205 (p = 0.19608) and free_thresh 0.25 beside it, by which they come back as free, for the robot as
+here. Where many cells are read so, the grid's notes say it; ``free_thresh: 0.196`` keeps them
+unknown.
+
+ROS 1's map_server [1]_ and nav2's [2]_ agree that all keys but ``mode`` are required, and the
+origin's three numbers; so do we, and assume nothing. In details they differ:
+
+=====================  =========================  =========================  ====================
+what                   ROS 1                      nav2                       here
+=====================  =========================  =========================  ====================
+``negate`` in ``raw``  255 − v                    no effect                  no effect
+``raw`` above 100      as it is                   unknown                    unknown
+``scale`` between      1 to 99, rounded down      0 to 100, rounded          0 to 100, rounded
+not opaque, scale      v as if it were opaque,    unknown                    unknown
+                       but transparent between
+                       the thresholds: unknown
+not opaque, trinary    alpha counts as a colour   alpha counts as a colour   unknown
+palette                the index counts as grey   the colour                 the colour
+``negate``             a whole number             that, or true and false    0, 1, true, false
+yaw of nan             no pose                    no pose                    0, and a note
+=====================  =========================  =========================  ====================
+
+Map savers write a yaw of nan where the map came without an orientation.
+
+References
+----------
+.. [1] https://wiki.ros.org/map_server and ``image_loader.cpp`` of ros-planning/navigation.
+.. [2] ``nav2_map_server/src/map_io.cpp`` of ros-navigation/navigation2.
 """
 
 from __future__ import annotations
@@ -35,6 +59,7 @@ import yaml
 from numpy.typing import NDArray
 
 from sketchmatch.errors import InvalidInputError, Reason, quoted
+from sketchmatch.io._yaml import check_header
 from sketchmatch.io.images import load_picture, scaled_to_8_bits
 from sketchmatch.model import OccupancyGrid
 from sketchmatch.model.sources import check_placement
@@ -50,6 +75,10 @@ _EXAMPLES = {
     "free_thresh": "0.196",
 }
 _MODES = ("trinary", "scale", "raw")
+_SAVED_UNKNOWN = 205
+"""The grey with which map_server saves unknown cells."""
+_MANY = 0.01
+"""As a share of all cells."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +99,8 @@ class MapServerHeader:
         Shares of occupancy, 0 ≤ free < occupied ≤ 1.
     mode
         ``"trinary"``, ``"scale"`` or ``"raw"``.
+    notes
+        What was assumed in reading it, each one sentence.
     """
 
     image: str
@@ -79,6 +110,7 @@ class MapServerHeader:
     occupied_thresh: float
     free_thresh: float
     mode: str
+    notes: tuple[str, ...] = ()
 
     def grid(self, image: bytes) -> OccupancyGrid:
         """Return the occupancy grid that the picture's bytes hold.
@@ -92,7 +124,21 @@ class MapServerHeader:
         cells = self._occupancy()[values]
         if opaque is not None and self.mode != "raw":
             cells[~opaque] = -1
-        return OccupancyGrid(cells[::-1], self.resolution, self.origin)
+        notes = (*self.notes, *self._trap(values, cells))
+        return OccupancyGrid(cells[::-1], self.resolution, self.origin, notes)
+
+    def _trap(self, values: NDArray[np.uint8], cells: NDArray[np.int8]) -> tuple[str, ...]:
+        """Return a warning if many cells that were saved as unknown seem to be read as free."""
+        if self.mode != "trinary" or self._occupancy()[_SAVED_UNKNOWN] != 0:
+            return ()
+        share = np.count_nonzero((values == _SAVED_UNKNOWN) & (cells == 0)) / values.size
+        if share < _MANY:
+            return ()
+        return (
+            f"free_thresh {self.free_thresh:g} makes {share:.0%} of the map free that have the "
+            f"grey {_SAVED_UNKNOWN} with which map_server saves unknown cells; if they were never "
+            "seen, set free_thresh to 0.196",
+        )
 
     def _occupancy(self) -> NDArray[np.int8]:
         """Return the occupancy that each of the 256 pixel values stands for."""
@@ -144,20 +190,23 @@ def parse_header(yaml_text: str) -> MapServerHeader:
     for key, example in _EXAMPLES.items():
         if document.get(key) is None:
             raise _invalid(key, f"is missing; add it, for instance '{key}: {example}'")
+    origin, notes = _origin(document["origin"])
     header = MapServerHeader(
         image=_image(document["image"]),
         resolution=_number(document["resolution"], "resolution"),
-        origin=_origin(document["origin"]),
+        origin=origin,
         negate=_negate(document["negate"]),
         occupied_thresh=_number(document["occupied_thresh"], "occupied_thresh"),
         free_thresh=_number(document["free_thresh"], "free_thresh"),
         mode=_mode(document.get("mode", "trinary")),
+        notes=notes,
     )
     _check_ranges(header)
     return header
 
 
 def _document(text: str) -> Mapping[Any, Any]:
+    check_header(text)
     try:
         document = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
@@ -194,11 +243,20 @@ def _image(value: object) -> str:
     return value
 
 
-def _origin(value: object) -> tuple[float, float, float]:
+def _origin(value: object) -> tuple[tuple[float, float, float], tuple[str, ...]]:
     if not isinstance(value, list) or len(value) != 3:
         raise _invalid("origin", "is not a list of three numbers; give [x, y, yaw]")
-    x, y, yaw = (_number(part, f"origin[{k}]") for k, part in enumerate(value))
-    return (x, y, yaw)
+    x, y = (_number(part, f"origin[{k}]") for k, part in enumerate(value[:2]))
+    if _is_nan(value[2]):
+        return (x, y, 0.0), ("the yaw of the map's origin is nan and was read as 0",)
+    return (x, y, _number(value[2], "origin[2]")), ()
+
+
+def _is_nan(value: object) -> bool:
+    # ROS 1 writes nan or -nan, which YAML reads as a string; nav2 .nan.
+    if isinstance(value, str):
+        return value.strip().lower().lstrip("+-.") == "nan"
+    return isinstance(value, float) and math.isnan(value)
 
 
 def _negate(value: object) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import cast
 
 import cv2
 import numpy as np
@@ -12,27 +13,42 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from sketchmatch.api import InvalidInputError, Params, Reason, Segmentation, Segmenter
-from sketchmatch.model import FloatArray, OccupancyGrid, Scene, SceneObject
-from sketchmatch_builtin.segmenters._border import outer_border
+from sketchmatch.model import IntArray, OccupancyGrid, Scene, SceneObject
+from sketchmatch.model.limits import source_limits
+from sketchmatch_builtin.segmenters._cells import (
+    Mask,
+    closed,
+    components,
+    free_cells,
+    holes,
+    in_map,
+    joined_to_walls,
+    outline,
+    reading_order,
+)
+from sketchmatch_builtin.segmenters._merging import merged
 
 __all__ = ["OccupancyGridSegmenter"]
-
-_Mask = NDArray[np.uint8]
 
 # The steps of a slanted border leave the straight line by up to √½ of a cell.
 _CELLS_TOLERANCE = 0.75
 # As a share of an object's size: a tolerance beyond it would change the shape, not the noise.
 _COARSEST_TOLERANCE = 0.12
-_MOST_OBJECTS = 1000
+# Legs, before they are merged to tables.
+_MOST_PARTS = 10_000
 
 
 class OccupancyGridSegmenter(Segmenter):
-    """Takes as objects the holes in the largest free region.
+    """Takes as objects the holes in free regions.
 
     A region is free cells joined by their sides; a hole is what it encloses, joined by sides or
     corners. That fills an object's unseen interior, whatever its grey, and leaves out the walls
-    and all that lies behind them. Outlines run exactly along the cells' borders and are
-    then simplified [1]_.
+    and all that lies behind them. Regions that are small beside the largest are no rooms but
+    what was seen of an object's inside; a hole with a room in it is a building and no
+    object. Outlines run exactly along the cells' borders and are then simplified [1]_.
+
+    What touches a wall, or was not seen from behind, is no hole. ``attached`` finds such objects
+    by morphological opening [2]_. ``merge_distance`` joins the legs of a table.
 
     Objects come in reading order: by their highest point from the top down, then from the left.
 
@@ -40,10 +56,11 @@ class OccupancyGridSegmenter(Segmenter):
     ----------
     .. [1] D. H. Douglas, T. K. Peucker, "Algorithms for the reduction of the number of points
        required to represent a digitized line or its caricature", Cartographica 10(2), 1973.
+    .. [2] J. Serra, "Image Analysis and Mathematical Morphology", Academic Press, 1982.
     """
 
     name = "occupancy-grid"
-    summary = "Objects standing in the largest free region of a robot's occupancy grid."
+    summary = "Objects standing in the free space of a robot's occupancy grid."
     sources = (OccupancyGrid,)
 
     class Params(Params):
@@ -73,6 +90,51 @@ class OccupancyGridSegmenter(Segmenter):
                 "objects, which then are one; 0 closes none."
             ),
         )
+        merge_distance: float = Field(
+            0.0,
+            ge=0.0,
+            le=100.0,
+            description=(
+                "Small things that are at most this far apart become one with the outline around "
+                "all, in metres: 1 makes four legs a table; 0 is off."
+            ),
+        )
+        leg_size: float = Field(
+            0.25,
+            ge=0.0,
+            le=100.0,
+            description=(
+                "Small things are those no larger than a square with this side, in metres; it "
+                "matters with merge_distance alone."
+            ),
+        )
+        attached: float = Field(
+            0.0,
+            ge=0.0,
+            le=100.0,
+            description=(
+                "Objects that touch a wall, or whose back was not seen, count if they are no "
+                "wider than this, in metres: 2 keeps cupboards and beds; 0 leaves all out."
+            ),
+        )
+        wall_thickness: float = Field(
+            0.3,
+            ge=0.0,
+            le=10.0,
+            description=(
+                "What touches a wall and is no thicker than this is a partition or a bump of "
+                "the wall and no object, in metres; it matters with attached alone."
+            ),
+        )
+        region_share: float = Field(
+            0.1,
+            ge=0.001,
+            le=1.0,
+            description=(
+                "Free regions count, as rooms behind closed doors, from this share of the "
+                "largest's area; 1 takes the largest alone."
+            ),
+        )
         tolerance: float | None = Field(
             None,
             ge=0.0,
@@ -86,94 +148,105 @@ class OccupancyGridSegmenter(Segmenter):
     params: Params
 
     def segment(self, source: OccupancyGrid) -> Segmentation:
-        """Return the holes of the largest free region, in metres in the map's frame."""
-        cells = source.cells
-        region = _largest_region((cells >= 0) & (cells < self.params.free_threshold))
-        holes = _closed(_holes(region), self._gap(source))
-        least = (self.params.min_size / source.resolution) ** 2
-        outlines = [
-            self._outline(mask, corner, source) for mask, corner in _components(holes, least)
+        """Return the holes of the free regions, in metres in the map's frame."""
+        free, corner = free_cells(source, self.params.free_threshold)
+        rooms = list(_rooms(free, self.params.region_share))
+        parts = [
+            (mask, (x + left + corner[0], y + below + corner[1]))
+            for room, held, (left, below) in rooms
+            for mask, (x, y) in self._parts(room, held, source)
         ]
+        outlines = self._outlines(parts, source)
         if len(outlines) < 2:
-            raise _too_few(len(outlines), int(region.sum()), source, self.params.min_size)
-        outlines.sort(key=lambda outline: (-outline[:, 1].max(), outline[:, 0].min()))
+            largest = max(int(np.count_nonzero(room)) for room, _, _ in rooms)
+            raise _too_few(len(outlines), largest, source, self.params.min_size)
         return Segmentation(
-            Scene(tuple(SceneObject.from_rings([_in_map(o, source)]) for o in outlines))
+            Scene(
+                tuple(
+                    SceneObject.from_rings([in_map(shapely.get_coordinates(polygon), source)])
+                    for polygon in outlines
+                )
+            ),
+            source.notes,
         )
 
-    def _gap(self, grid: OccupancyGrid) -> int:
-        """Return the widest gap to close, in cells."""
-        return int(min(self.params.close_gaps / grid.resolution + 0.5, max(grid.cells.shape)))
+    def _parts(
+        self, room: Mask, held: Mask, grid: OccupancyGrid
+    ) -> Iterator[tuple[Mask, tuple[int, int]]]:
+        """Yield what stands in a room, cropped, and the (x, y) of its crop."""
+        params, inside = self.params, held
+        if params.attached > 0.0:
+            widest = min(params.attached / grid.resolution, 2.0 * max(room.shape))
+            inside = held | joined_to_walls(room, widest, params.wall_thickness / grid.resolution)
+        inside = closed(
+            inside, int(min(params.close_gaps / grid.resolution + 0.5, max(room.shape)))
+        )
+        if params.merge_distance > 0.0:
+            yield from components(inside, 1, _MOST_PARTS, "take speckle out of the map")
+        else:
+            least = (params.min_size / grid.resolution) ** 2
+            most = source_limits().max_objects
+            yield from components(inside, least, most, "raise min_size")
 
-    def _outline(self, mask: _Mask, corner: tuple[int, int], grid: OccupancyGrid) -> FloatArray:
-        """Return an object's outline in cells from the grid's lower left corner, shape (k, 2)."""
+    def _outlines(
+        self, parts: list[tuple[Mask, tuple[int, int]]], grid: OccupancyGrid
+    ) -> list[shapely.Polygon]:
+        """Return objects' outlines in cells from the grid's lower left corner, in order."""
+        polygons = np.array([shapely.Polygon(outline(m) + c) for m, c in parts], dtype=object)
+        if self.params.merge_distance > 0.0 and len(polygons):
+            cell = grid.resolution
+            largest = (self.params.leg_size / cell) ** 2
+            polygons = merged(polygons, self.params.merge_distance / cell, largest)
+            least = (self.params.min_size / grid.resolution) ** 2
+            polygons = polygons[shapely.area(polygons) >= least]
+        most = source_limits().max_objects
+        if len(polygons) > most:
+            raise InvalidInputError(
+                Reason.LIMIT_EXCEEDED,
+                "cells",
+                f"has {len(polygons)} objects, more than the limit of {most}; raise min_size",
+            )
+        return sorted((self._simplified(p, grid) for p in polygons), key=reading_order)
+
+    def _simplified(self, polygon: shapely.Polygon, grid: OccupancyGrid) -> shapely.Polygon:
         if self.params.tolerance is None:
             tolerance = _CELLS_TOLERANCE
         else:
             tolerance = self.params.tolerance / grid.resolution
-        tolerance = min(tolerance, _COARSEST_TOLERANCE * math.sqrt(np.count_nonzero(mask)))
-        border = shapely.Polygon(outer_border(mask)).simplify(tolerance)
-        return shapely.get_coordinates(border) + corner
+        coarsest = _COARSEST_TOLERANCE * math.sqrt(polygon.area)
+        return cast(shapely.Polygon, polygon.simplify(min(tolerance, coarsest)))
 
 
-def _largest_region(free: NDArray[np.bool_]) -> _Mask:
-    """Return the largest region of free cells that are joined by their sides."""
-    count, regions, statistics, _ = cv2.connectedComponentsWithStats(
-        free.astype(np.uint8), connectivity=4
-    )
-    if count < 2:
-        raise InvalidInputError(
-            Reason.TOO_FEW_OBJECTS,
-            "cells",
-            "has no free cell; objects are looked for inside free space, so check the "
-            "thresholds of the map and free_threshold",
-        )
-    largest = 1 + int(np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
-    return np.asarray(regions == largest, dtype=np.uint8)
-
-
-def _holes(region: _Mask) -> _Mask:
-    """Return the cells that the region encloses."""
-    # A frame of cells around the grid joins all that lies outside.
-    rest = np.pad(1 - region, 1, constant_values=1)
-    cv2.floodFill(rest, None, (0, 0), 0, flags=8)
-    return rest[1:-1, 1:-1]
-
-
-def _closed(holes: _Mask, gap: int) -> _Mask:
-    """Return the holes with gaps of so many cells closed, and what is then enclosed filled."""
-    kernel = np.ones((gap + 1, gap + 1), np.uint8)
-    there, back = (gap // 2, gap // 2), (gap - gap // 2, gap - gap // 2)
-    grown = cv2.dilate(np.pad(holes, gap), kernel, anchor=there)
-    closed = cv2.erode(grown, kernel, anchor=back)
-    contours, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    filled = np.zeros(closed.shape, np.uint8)
-    cv2.drawContours(filled, contours, -1, 1, cv2.FILLED)
-    rows, columns = holes.shape
-    return filled[gap : gap + rows, gap : gap + columns]
-
-
-def _components(mask: _Mask, least: float) -> Iterator[tuple[_Mask, tuple[int, int]]]:
-    """Yield each component of at least so many cells, cropped, and the (x, y) of its crop."""
-    count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    large = [k for k in range(1, count) if statistics[k, cv2.CC_STAT_AREA] >= least]
-    if len(large) > _MOST_OBJECTS:
-        raise InvalidInputError(
-            Reason.LIMIT_EXCEEDED,
-            "cells",
-            f"has {len(large)} objects, more than the limit of {_MOST_OBJECTS}; raise min_size",
-        )
-    for k in large:
+def _rooms(free: Mask, share: float) -> Iterator[tuple[Mask, Mask, tuple[int, int]]]:
+    """Yield free regions and what stands in each, both cropped, and the (x, y) of the crop."""
+    count, regions, statistics, _ = cv2.connectedComponentsWithStats(free, connectivity=4)
+    areas = statistics[1:count, cv2.CC_STAT_AREA]
+    labels, boxes = np.asarray(regions, dtype=np.int32), np.asarray(statistics, dtype=np.int64)
+    large = 1 + np.flatnonzero(areas >= share * areas.max())
+    for k in large.tolist():
         x, y, width, height, _ = statistics[k].tolist()
-        yield np.asarray(labels[y : y + height, x : x + width] == k, dtype=np.uint8), (x, y)
+        crop = labels[y : y + height, x : x + width]
+        room = np.asarray(crop == k, dtype=np.uint8)
+        held = holes(room)
+        within = _within(boxes[large], boxes[k])
+        for other in large[within].tolist():
+            _drop_around(held, crop, other)
+        yield room, held, (x, y)
 
 
-def _in_map(outline: FloatArray, grid: OccupancyGrid) -> FloatArray:
-    """Return points given in cells in the map's frame, in metres."""
-    x, y, yaw = grid.origin
-    c, s = math.cos(yaw), math.sin(yaw)
-    turning = np.array([[c, s], [-s, c]])
-    return np.asarray(grid.resolution * outline @ turning + (x, y), dtype=np.float64)
+def _within(boxes: IntArray, box: IntArray) -> NDArray[np.bool_]:
+    """Return which of the boxes (x, y, columns, rows, …) lie strictly inside one."""
+    low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:4]
+    inside = (low > box[:2]) & (high < box[:2] + box[2:4])
+    return np.asarray(inside.all(axis=1))
+
+
+def _drop_around(held: Mask, labels: NDArray[np.int32], k: int) -> None:
+    """Take out the hole that another room lies in."""
+    inside = np.flatnonzero((labels == k) & (held > 0))
+    if inside.size:
+        y, x = divmod(int(inside[0]), held.shape[1])
+        cv2.floodFill(held, None, (x, y), (0,), flags=8)
 
 
 def _too_few(found: int, free: int, grid: OccupancyGrid, min_size: float) -> InvalidInputError:

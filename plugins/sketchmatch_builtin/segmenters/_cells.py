@@ -1,0 +1,156 @@
+"""Masks of a grid's cells: what is free, what that encloses, and where it lies in the map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from sketchmatch.api import InvalidInputError, Reason
+from sketchmatch.model import FloatArray, OccupancyGrid
+from sketchmatch_builtin.segmenters._border import outer_border
+
+__all__ = [
+    "Mask",
+    "closed",
+    "components",
+    "free_cells",
+    "holes",
+    "in_map",
+    "joined_to_walls",
+    "outline",
+    "reading_order",
+]
+
+Mask = NDArray[np.uint8]
+
+
+def free_cells(grid: OccupancyGrid, threshold: int) -> tuple[Mask, tuple[int, int]]:
+    """Return a mask of the free cells, cropped to them, and the (x, y) of its first cell.
+
+    Raises
+    ------
+    InvalidInputError
+        With the path ``cells``, if none is free.
+    """
+    # Seen as unsigned, unknown is 255: one comparison is enough.
+    free = (grid.cells.view(np.uint8) < threshold).view(np.uint8)
+    x, y, columns, rows = cv2.boundingRect(free)
+    if not rows:
+        raise InvalidInputError(
+            Reason.TOO_FEW_OBJECTS,
+            "cells",
+            "has no free cell; objects are looked for inside free space, so check the "
+            "thresholds of the map and free_threshold",
+        )
+    return free[y : y + rows, x : x + columns], (x, y)
+
+
+def holes(region: Mask) -> Mask:
+    """Return the cells that a region encloses."""
+    # A frame of cells around the grid joins all that lies outside.
+    rest = cv2.copyMakeBorder(1 - region, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(1,))
+    cv2.floodFill(rest, None, (0, 0), (0,), flags=8)
+    return np.asarray(rest[1:-1, 1:-1])
+
+
+def closed(mask: Mask, gap: int) -> Mask:
+    """Return a mask with gaps of so many cells closed, and what is then enclosed filled."""
+    x, y, columns, rows = cv2.boundingRect(mask)
+    if not rows:
+        return mask
+    kernel = np.ones((gap + 1, gap + 1), np.uint8)
+    there, back = (gap // 2, gap // 2), (gap - gap // 2, gap - gap // 2)
+    grown = cv2.dilate(np.pad(mask[y : y + rows, x : x + columns], gap), kernel, anchor=there)
+    shrunk = cv2.erode(grown, kernel, anchor=back)
+    contours, _ = cv2.findContours(shrunk, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    filled = np.zeros(shrunk.shape, np.uint8)
+    cv2.drawContours(filled, contours, -1, (1,), cv2.FILLED)
+    result = np.zeros_like(mask)
+    result[y : y + rows, x : x + columns] = filled[gap : gap + rows, gap : gap + columns]
+    return result
+
+
+def components(
+    mask: Mask, least: float, most: int, remedy: str
+) -> Iterator[tuple[Mask, tuple[int, int]]]:
+    """Yield each component of at least so many cells, cropped, and the (x, y) of its crop.
+
+    Raises
+    ------
+    InvalidInputError
+        With the path ``cells`` and the remedy, if there are more than ``most`` of them.
+    """
+    count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    large = 1 + np.flatnonzero(statistics[1:count, cv2.CC_STAT_AREA] >= least)
+    if len(large) > most:
+        raise InvalidInputError(
+            Reason.LIMIT_EXCEEDED,
+            "cells",
+            f"has {len(large)} objects, more than the limit of {most}; {remedy}",
+        )
+    for k in large.tolist():
+        x, y, width, height, _ = statistics[k].tolist()
+        yield np.asarray(labels[y : y + height, x : x + width] == k, dtype=np.uint8), (x, y)
+
+
+def joined_to_walls(region: Mask, widest: float, thinnest: float) -> Mask:
+    """Return what juts into a region, no wider than ``widest`` and thicker than ``thinnest``.
+
+    What remains of all outside the region when it is opened by a disc of the first diameter is
+    walls, and what lies behind them. What that took away is what juts out of them; opened by a
+    disc of the second diameter, it keeps neither thin partitions nor bumps. The first disc bulges
+    into what is nearly as wide: that loses some of its depth at the wall.
+
+    Parameters
+    ----------
+    region
+        Free cells, 1 in one region and 0 elsewhere.
+    widest, thinnest
+        In cells.
+    """
+    margin = int(widest) + 2
+    outside = np.pad(1 - region, margin, constant_values=1)
+    # What the region encloses stands free of the walls.
+    outside[margin:-margin, margin:-margin] -= holes(region)
+    jutting = outside - _opened(outside, widest / 2.0)
+    return np.asarray(_opened(jutting, thinnest / 2.0)[margin:-margin, margin:-margin])
+
+
+def _opened(mask: Mask, radius: float) -> Mask:
+    """Return a mask opened by a disc; what lies beyond the mask's edge counts as within."""
+    core = (cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) > radius).astype(
+        np.uint8
+    )
+    if not core.any():
+        return np.zeros_like(mask)
+    near = cv2.distanceTransform(1 - core, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= radius
+    return np.asarray(near & (mask > 0), dtype=np.uint8)
+
+
+def outline(mask: Mask) -> FloatArray:
+    """Return the corners of a mask's outer border, see :func:`outer_border`, shape (k, 2)."""
+    points = outer_border(mask)
+    # The border names some points twice.
+    points = points[(points != np.roll(points, 1, axis=0)).any(axis=1)]
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    turns = before[:, 0] * after[:, 1] != before[:, 1] * after[:, 0]
+    return np.asarray(points[turns])
+
+
+def in_map(points: FloatArray, grid: OccupancyGrid) -> FloatArray:
+    """Return points given in cells in the map's frame, in metres."""
+    x, y, yaw = grid.origin
+    c, s = math.cos(yaw), math.sin(yaw)
+    turning = np.array([[c, s], [-s, c]])
+    return np.asarray(grid.resolution * points @ turning + (x, y), dtype=np.float64)
+
+
+def reading_order(polygon: shapely.Polygon) -> tuple[float, float]:
+    """Return what sorts objects from the top down, then from the left."""
+    left, _, _, top = polygon.bounds
+    return (-top, left)

@@ -1,0 +1,120 @@
+"""Free space cut in two wherever it is as narrow as a doorway."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from sketchmatch.model import FloatArray, IntArray
+from sketchmatch_builtin.segmenters._cells import Mask
+from sketchmatch_builtin.segmenters._merging import groups
+
+__all__ = ["divided"]
+
+_Labels = NDArray[np.int32]
+_Widths = NDArray[np.float32]
+
+# Of the wider part's width: a passage as wide as this is no doorway, but the same corridor.
+_SAME_WIDTH = 0.75
+
+
+def divided(free: Mask, door: float, least: float) -> Mask:
+    """Return the free cells without those along the borders between rooms.
+
+    Parameters
+    ----------
+    free
+        1 where a cell is free, 0 elsewhere.
+    door
+        Widest doorway, in cells.
+    least
+        Area in cells from which a corridor as narrow as a door is a room.
+
+    Returns
+    -------
+    ndarray
+        Shape of ``free``: rooms are components of cells joined by sides or corners. Corners and
+        closets that no room reaches are among them, however small.
+    """
+    free = np.pad(free, 1)
+    width = np.asarray(
+        cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE), dtype=np.float32
+    )
+    labels = _bodies(free, width, door / 2.0 + 0.5)
+    labels = _with_narrow_rooms(free, labels, least)
+    _grow(free, labels)
+    labels = _joined(labels, width)
+    return np.asarray((free & ~_along_borders(labels))[1:-1, 1:-1], dtype=np.uint8)
+
+
+def _bodies(free: Mask, width: _Widths, radius: float) -> _Labels:
+    """Return which discs of a radius cover each cell, one label for discs that are joined."""
+    outside_cores = (width <= radius).astype(np.uint8)
+    if outside_cores.all():
+        return np.zeros(free.shape, np.int32)
+    distance, nearest = cv2.distanceTransformWithLabels(
+        outside_cores, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
+    )
+    # A core's disc is free, so that within it the nearest core lies on this side of all walls.
+    nearest[(distance > radius - 0.5) | (free == 0)] = 0
+    return np.asarray(nearest, dtype=np.int32)
+
+
+def _with_narrow_rooms(free: Mask, labels: _Labels, least: float) -> _Labels:
+    """Add as rooms what is free, without a label, and large: corridors as narrow as a door."""
+    rest = (free > 0) & (labels == 0)
+    _, parts, statistics, _ = cv2.connectedComponentsWithStats(rest.view(np.uint8), connectivity=4)
+    large = statistics[:, cv2.CC_STAT_AREA] >= least
+    large[0] = False
+    narrow = np.where(large, np.cumsum(large) + labels.max(), 0).astype(np.int32)
+    return np.asarray(labels + narrow[parts], dtype=np.int32)
+
+
+def _grow(free: Mask, labels: _Labels) -> None:
+    """Give free cells without a label that of the nearest, in steps from side to side."""
+    flat = labels.reshape(-1)
+    rest = np.flatnonzero((free > 0) & (labels == 0))
+    steps = (1, -1, labels.shape[1], -labels.shape[1])
+    while rest.size:
+        found = np.max([flat[rest + step] for step in steps], axis=0)
+        if not found.any():
+            return
+        flat[rest] = found
+        rest = rest[found == 0]
+
+
+def _joined(labels: _Labels, width: _Widths) -> _Labels:
+    """Join parts whose passage is nearly as wide as the wider of them."""
+    count = int(labels.max()) + 1
+    widest = np.zeros(count, np.float32)
+    np.maximum.at(widest, labels.reshape(-1), width.reshape(-1))
+    pairs, passage = _passages(labels, width)
+    same = passage >= _SAME_WIDTH * widest[pairs].max(axis=1)
+    return groups(count, pairs[same].T).astype(np.int32)[labels]
+
+
+def _passages(labels: _Labels, width: _Widths) -> tuple[IntArray, FloatArray]:
+    """Return which labels touch, shape (k, 2), and how wide each passage is, shape (k,)."""
+    pairs: list[IntArray] = []
+    widths: list[FloatArray] = []
+    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        a, b = labels[here], labels[there]
+        at = np.nonzero((a != b) & (a > 0) & (b > 0))
+        pairs.append(np.sort(np.stack([a[at], b[at]], axis=1), axis=1).astype(np.int64))
+        widths.append(np.minimum(width[here][at], width[there][at]).astype(np.float64))
+    found, number = np.unique(np.concatenate(pairs), axis=0, return_inverse=True)
+    passage = np.zeros(len(found))
+    np.maximum.at(passage, number.reshape(-1), np.concatenate(widths))
+    return found, passage
+
+
+def _along_borders(labels: _Labels) -> NDArray[np.bool_]:
+    """Return the cells that touch, by a side or a corner, a cell of another room."""
+    around = np.ones((3, 3), np.uint8)
+    # Labels are few, far below 2²⁴, and so exact as float32, which OpenCV can dilate.
+    own = labels.astype(np.float32)
+    highest = cv2.dilate(own, around)
+    own[labels == 0] = np.inf
+    lowest = cv2.erode(own, around)
+    return np.asarray((labels > 0) & (highest != lowest))

@@ -1,0 +1,169 @@
+"""Rooms of a robot's occupancy grid: free space cut at its doorways."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import cv2
+import numpy as np
+import shapely
+from pydantic import Field
+
+from sketchmatch.api import InvalidInputError, Params, Reason, Segmentation, Segmenter
+from sketchmatch.model import FloatArray, OccupancyGrid, Scene, SceneObject
+from sketchmatch.model.limits import source_limits
+from sketchmatch_builtin.segmenters._cells import (
+    Mask,
+    components,
+    free_cells,
+    holes,
+    in_map,
+    outline,
+    reading_order,
+)
+from sketchmatch_builtin.segmenters._doorways import divided
+
+__all__ = ["RoomSegmenter"]
+
+_CELLS_TOLERANCE = 0.75
+_MOST_HOLES = 1000
+
+
+class RoomSegmenter(Segmenter):
+    """Takes as objects the rooms: free space, cut where it is narrow.
+
+    Where a disc as wide as a door does not fit, free space is cut [1]_; what is left is a room or
+    part of one, and what was cut away goes to the nearest. Parts that are joined by a passage
+    nearly as wide as the wider of them are one room, so that a corridor stays whole. Things that
+    stand free in a room and are no longer than ``furniture`` neither cut it nor are holes in it;
+    longer ones are holes. Unknown and occupied cells otherwise belong to no room, and
+    two rooms are always at least a cell apart.
+
+    Rooms come in reading order: by their highest point from the top down, then from the left.
+
+    References
+    ----------
+    .. [1] R. Bormann, F. Jordan, W. Li, J. Hampp, M. Hägele, "Room segmentation: survey,
+       implementation, and analysis", ICRA 2016: morphological and distance transform segmentation.
+    """
+
+    name = "rooms"
+    summary = "Rooms of a robot's occupancy grid, cut at the doorways."
+    sources = (OccupancyGrid,)
+
+    class Params(Params):
+        """What is free, how wide doorways are, and what is too small to be a room."""
+
+        free_threshold: int = Field(
+            25,
+            ge=1,
+            le=100,
+            description="Known cells whose occupancy is below this are free, in percent.",
+        )
+        door_width: float = Field(
+            1.2,
+            gt=0.0,
+            le=100.0,
+            description="Passages up to this wide are doorways, in metres.",
+        )
+        min_area: float = Field(
+            2.0,
+            ge=0.0,
+            le=1e6,
+            description="Rooms smaller than this are left out, in m².",
+        )
+        furniture: float = Field(
+            2.0,
+            ge=0.0,
+            le=1000.0,
+            description=(
+                "Things that stand free and are at most this long are furniture and belong to "
+                "the room around them, in metres; longer ones are walls that may part rooms."
+            ),
+        )
+        tolerance: float | None = Field(
+            None,
+            ge=0.0,
+            le=10.0,
+            description=(
+                "How far a simplified outline may leave the cells' borders, in metres; three "
+                "quarters of a cell when left out."
+            ),
+        )
+
+    params: Params
+
+    def segment(self, source: OccupancyGrid) -> Segmentation:
+        """Return the rooms, in metres in the map's frame."""
+        params, cell = self.params, source.resolution
+        free, (left, below) = free_cells(source, params.free_threshold)
+        least = max(params.min_area / cell**2, 1.0)
+        inside = _furnished(free, params.furniture / cell)
+        rooms = divided(inside, params.door_width / cell, least)
+        most = source_limits().max_objects
+        outlines = [
+            _polygon(mask, (x + left, y + below))
+            for mask, (x, y) in components(rooms, least, most, "raise min_area")
+        ]
+        if len(outlines) < 2:
+            raise _too_few(len(outlines), params)
+        tolerance = _CELLS_TOLERANCE if params.tolerance is None else params.tolerance / cell
+        outlines = sorted(_simplified(outlines, tolerance), key=reading_order)
+        scene = Scene(
+            tuple(
+                SceneObject.from_rings([in_map(ring, source) for ring in _rings(room)])
+                for room in outlines
+            )
+        )
+        return Segmentation(scene, source.notes)
+
+
+def _furnished(free: Mask, longest: float) -> Mask:
+    """Return free cells together with the things, no longer than so many cells, among them."""
+    things = cv2.copyMakeBorder(1 - free, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(1,))
+    _, labels, statistics, _ = cv2.connectedComponentsWithStats(things, connectivity=8)
+    sides = statistics[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
+    small = sides <= longest
+    # What lies outside the map is no thing, however small the map is.
+    small[labels[0, 0]] = False
+    small[0] = True
+    return np.asarray(small[labels[1:-1, 1:-1]], dtype=np.uint8)
+
+
+def _polygon(mask: Mask, corner: tuple[int, int]) -> shapely.Polygon:
+    """Return the outline of a room whose crop begins at a corner (x, y), its holes left out."""
+    held = holes(mask)
+    outer = shapely.Polygon(outline(mask | held) + corner)
+    inner = [
+        shapely.Polygon(outline(hole) + np.array([x, y]) + corner)
+        for hole, (x, y) in components(held, 1, _MOST_HOLES, "raise furniture")
+    ]
+    parts = shapely.get_parts(outer.difference(shapely.union_all(inner))) if inner else [outer]
+    return cast(shapely.Polygon, max(parts, key=lambda part: part.area))
+
+
+def _simplified(outlines: list[shapely.Polygon], tolerance: float) -> list[shapely.Polygon]:
+    """Return the outlines simplified, and those left as they are that would then overlap."""
+    result = np.array([exact.simplify(tolerance) for exact in outlines], dtype=object)
+    kept = np.zeros(len(result), dtype=bool)
+    while True:
+        a, b = shapely.STRtree(result).query(result, predicate="intersects")
+        touching = np.unique(a[(a != b) & ~kept[a]])
+        if not touching.size:
+            return list(result)
+        kept[touching] = True
+        result[touching] = [outlines[k] for k in touching]
+
+
+def _rings(room: shapely.Polygon) -> list[FloatArray]:
+    return [shapely.get_coordinates(ring) for ring in (room.exterior, *room.interiors)]
+
+
+def _too_few(found: int, params: RoomSegmenter.Params) -> InvalidInputError:
+    return InvalidInputError(
+        Reason.TOO_FEW_OBJECTS,
+        "cells",
+        f"has {'no room' if not found else 'only one room'} of at least {params.min_area:g} m² "
+        f"when cut at passages of up to {params.door_width:g} m, and a match needs two; give a "
+        "map with several rooms, raise door_width or lower min_area",
+    )

@@ -1,0 +1,255 @@
+"""The segmenter of rooms, on floors drawn here and on real robots' maps."""
+
+import contextlib
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sketchmatch import match
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io import read_source
+from sketchmatch.model import OccupancyGrid
+from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
+from tests.tools import ROOT, require
+
+CELL = 0.05
+
+
+def segmented(cells, cell=CELL, **params):
+    grid = cells if isinstance(cells, OccupancyGrid) else OccupancyGrid(cells, cell)
+    return RoomSegmenter(RoomSegmenter.Params(**params)).segment(grid)
+
+
+def free(cells, *boxes):
+    """Make boxes (x, y, width, height), in metres, free."""
+    for box in boxes:
+        x, y, width, height = (round(value / CELL) for value in box)
+        cells[y : y + height, x : x + width] = 0
+    return cells
+
+
+def walls(width, height):
+    return np.full((round(height / CELL), round(width / CELL)), 100, np.int8)
+
+
+def floor():
+    """Three rooms above a corridor and two below, one of them an L: all with doors of 0.9 m."""
+    return free(
+        walls(12.2, 9.2),
+        (0.2, 5.2, 3.0, 3.8),
+        (3.4, 5.2, 4.0, 3.8),
+        (7.6, 5.2, 4.4, 3.8),
+        (0.2, 3.4, 11.8, 1.6),  # the corridor
+        (0.2, 0.2, 4.0, 3.0),
+        (4.4, 0.2, 7.6, 1.4),
+        (9.4, 1.6, 2.6, 1.6),  # with the box above it an L
+        (1.0, 5.0, 0.9, 0.2),
+        (5.0, 5.0, 0.9, 0.2),
+        (9.0, 5.0, 0.9, 0.2),
+        (2.0, 3.2, 0.9, 0.2),
+        (10.0, 3.2, 0.9, 0.2),
+    )
+
+
+AREAS = [3.0 * 3.8, 4.0 * 3.8, 4.4 * 3.8, 11.8 * 1.6, 4.0 * 3.0, 7.6 * 1.4 + 2.6 * 1.6]
+
+
+def areas(found):
+    return [item.area for item in found.scene.objects]
+
+
+def test_a_floors_rooms_are_found_in_reading_order():
+    found = segmented(floor())
+    assert areas(found) == pytest.approx(AREAS, rel=0.03)
+    assert found.warnings == ()
+
+
+def test_rooms_do_not_overlap_and_keep_off_walls():
+    polygons = [item.polygon for item in segmented(floor()).scene.objects]
+    tree = shapely.STRtree(polygons)
+    assert (np.diff(tree.query(polygons, predicate="intersects"), axis=0) == 0).all()
+    space = shapely.union_all(
+        [shapely.box(x, y, x + CELL, y + CELL) for y, x in np.argwhere(floor() == 0) * CELL]
+    )
+    assert shapely.union_all(polygons).difference(space.buffer(CELL)).area == 0.0
+
+
+def test_furniture_and_speckle_belong_to_the_room_around_them():
+    cells = floor()
+    rng = np.random.default_rng(0)
+    cells[110:125, 80:100] = 100
+    cells[150:160, 165:195] = -1
+    inside = np.argwhere(cells == 0)
+    cells[tuple(inside[rng.permutation(len(inside))[:300]].T)] = 100
+    found = segmented(cells)
+    assert areas(found) == pytest.approx(AREAS, rel=0.06)
+    assert all(len(item.rings) == 1 for item in found.scene.objects)
+
+
+def test_what_is_longer_than_furniture_is_a_hole():
+    cells = floor()
+    cells[131:153, 97:119] = -1
+    assert [len(item.rings) for item in segmented(cells).scene.objects] == [1] * 6
+    longer = segmented(cells, furniture=1.0).scene.objects[1]
+    assert len(longer.rings) == 2
+    assert longer.area == pytest.approx(AREAS[1] - 1.1 * 1.1, rel=0.03)
+
+
+@pytest.mark.parametrize("gap", [0.8, 1.0, 1.2])
+def test_passages_as_wide_as_door_width_are_cut_and_no_wider(gap):
+    cells = free(walls(8.6, 4.4), (0.2, 0.2, 4.0, 4.0), (4.4, 0.2, 4.0, 4.0), (4.2, 1.0, 0.2, gap))
+    assert areas(segmented(cells, door_width=gap)) == pytest.approx([16.0, 16.0], rel=0.03)
+    with pytest.raises(InvalidInputError, match="has only one room"):
+        segmented(cells, door_width=gap - 0.1)
+
+
+def test_a_corridor_as_narrow_as_a_door_is_a_room():
+    cells = free(
+        walls(9.4, 8.0),
+        (0.2, 0.2, 4.0, 3.0),
+        (4.6, 0.2, 4.4, 3.0),
+        (0.2, 3.4, 9.0, 1.0),
+        (0.2, 4.6, 9.0, 3.0),
+        (1.0, 3.2, 0.8, 0.2),
+        (6.0, 3.2, 0.8, 0.2),
+        (3.0, 4.4, 0.8, 0.2),
+    )
+    assert areas(segmented(cells)) == pytest.approx([27.0, 9.0, 12.0, 13.2], rel=0.06)
+
+
+def test_a_corridor_that_narrows_a_little_stays_whole():
+    cells = floor()
+    for x in range(20, 230, 50):
+        cells[68:80, x : x + 4] = 100  # juts 0.6 m out: 1.0 m of 1.6 are left
+        cells[68:76, x : x + 4] = 0
+    assert areas(segmented(cells))[3] == pytest.approx(AREAS[3], rel=0.06)
+    assert len(segmented(cells).scene) == 6
+
+
+def test_min_area_leaves_small_rooms_out_and_the_others_as_they_are():
+    found = segmented(floor(), min_area=12.5)
+    assert areas(found) == pytest.approx([AREAS[k] for k in (1, 2, 3, 5)], rel=0.03)
+
+
+def test_rooms_behind_closed_doors_count():
+    cells = free(walls(9.0, 4.4), (0.2, 0.2, 4.0, 4.0), (4.4, 0.2, 4.0, 3.0))
+    assert areas(segmented(cells)) == pytest.approx([16.0, 12.0])
+
+
+TOO_FEW = {
+    "no free cell": (np.full((5, 5), -1, np.int8), "has no free cell"),
+    "a closet": (free(walls(3, 3), (1, 1, 1, 1)), "has no room of at least 2 m² .*lower min_area"),
+    "one room": (free(walls(5, 5), (1, 1, 3, 3)), "has only one room .*raise door_width"),
+}
+
+
+@pytest.mark.parametrize("case", TOO_FEW)
+def test_too_few_rooms_say_what_was_found_and_the_remedy(case):
+    cells, words = TOO_FEW[case]
+    with pytest.raises(InvalidInputError, match=words) as caught:
+        segmented(cells)
+    assert (caught.value.field, caught.value.reason) == ("cells", Reason.TOO_FEW_OBJECTS)
+
+
+def test_notes_of_the_source_are_handed_on():
+    grid = OccupancyGrid(floor(), CELL, notes=("Something was assumed.",))
+    assert segmented(grid).warnings == ("Something was assumed.",)
+
+
+def offices(rng):
+    """Offices on both sides of a corridor, their walls, doors and furniture at random."""
+    count = int(rng.integers(2, 5))
+    cells = walls(0.2 + 4.2 * count, 9.8)
+    free(cells, (0.2, 4.2, 4.2 * count - 0.2, 1.4))
+    for k in range(count):
+        for y, door in ((0.2, 4.0), (5.8, 5.6)):
+            depth = rng.uniform(2.6, 3.8)
+            bottom = y if y > 1 else 4.0 - depth
+            free(cells, (0.2 + 4.2 * k, bottom, 4.0, depth))
+            free(cells, (0.4 + 4.2 * k + rng.uniform(0, 2.6), door, 0.9, 0.2))
+    rows, columns = cells.shape
+    speckle = rng.random((rows, columns)) < 0.002
+    cells[speckle & (cells == 0)] = 100
+    return cells, 2 * count + 1
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=30)
+def test_offices_at_a_corridor_are_counted(seed):
+    cells, count = offices(np.random.default_rng(seed))
+    assert len(segmented(cells).scene) == count
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 3))
+@settings(max_examples=20)
+def test_turning_padding_and_scaling_the_map_does_that_to_the_rooms(seed, turns):
+    cells, _ = offices(np.random.default_rng(seed))
+    plain = [item.polygon for item in segmented(cells).scene.objects]
+    turned = segmented(np.rot90(cells, turns)).scene.objects
+    assert sorted(item.area for item in turned) == pytest.approx(
+        sorted(polygon.area for polygon in plain), abs=0.1
+    )
+    padded = OccupancyGrid(np.pad(cells, 7, constant_values=-1), CELL, (-7 * CELL, -7 * CELL, 0.0))
+    again = [item.polygon for item in segmented(padded).scene.objects]
+    assert shapely.equals_exact(plain, again, tolerance=1e-9).all()
+    scaled = segmented(cells, cell=0.1, door_width=2.4, min_area=8.0, furniture=4.0).scene.objects
+    for small, large in zip(plain, scaled, strict=True):
+        assert large.area == pytest.approx(4.0 * small.area)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_any_grid_gives_valid_rooms_apart_or_one_sentence(seed):
+    rng = np.random.default_rng(seed)
+    cells = np.kron(rng.choice([0, 0, 0, 100, -1], (14, 14)), np.ones((3, 3))).astype(np.int8)
+    with contextlib.suppress(InvalidInputError):
+        found = segmented(
+            OccupancyGrid(cells, 0.1),
+            min_area=0.05,
+            door_width=0.3,
+            furniture=0.4,
+            tolerance=float(rng.choice([0.0, 0.1, 0.5])),
+        )
+        polygons = [item.polygon for item in found.scene.objects]
+        assert all(polygon.is_valid and polygon.area > 0.0 for polygon in polygons)
+        pairs = shapely.STRtree(polygons).query(polygons, predicate="intersects")
+        assert (pairs[0] == pairs[1]).all()
+
+
+def test_a_floor_turned_by_90_degrees_is_matched_with_itself():
+    scene = segmented(floor()).scene
+    turned = segmented(np.rot90(floor())).scene
+    found = match(scene, turned, seed=0)
+    # A point (x, y) comes to (y, width − x).
+    targets = np.array([item.centroid for item in turned.objects])
+    for k, item in enumerate(scene.objects):
+        x, y = item.centroid
+        nearest = np.hypot(*(targets - (y, floor().shape[1] * CELL - x)).T).argmin()
+        assert found.object_map[k] == nearest
+
+
+def real_map(name):
+    path = ROOT.parent / "shared" / "data" / "ogm" / name
+    require(path.exists(), f"the real map {name}")
+    return read_source(path)
+
+
+def test_the_small_office_is_two_rooms_joined_by_two_metres():
+    found = segmented(real_map("pmb2-small-office/map.yaml"), door_width=2.2)
+    assert areas(found) == pytest.approx([46.7, 95.3], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "turtlebot3/map.yaml",
+        "nav2-depot/depot.yaml",
+        "husky-playpen/playpen_map.yaml",
+        "pmb2-small-office/map.yaml",
+    ],
+)
+def test_maps_of_one_room_say_so(name):
+    with pytest.raises(InvalidInputError, match="has only one room"):
+        segmented(real_map(name))
