@@ -6,7 +6,7 @@ PIP := -m pip --disable-pip-version-check install --quiet
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 OURS := engine plugins clients/python proto tests
 
-.PHONY: demo test lint proto bench bench-histograms bench-searchers serve clean
+.PHONY: demo test lint proto bench bench-histograms bench-searchers fuzz serve clean
 
 demo: .venv/runtime
 	@$(BIN)/sketchmatch demo
@@ -33,6 +33,10 @@ bench-histograms: .venv/dev
 
 bench-searchers: .venv/bench
 	@$(BIN)/python -m tests.benchmarks.searchers $(ARGS)
+
+MINUTES ?= 10
+fuzz: .venv/dev
+	@$(BIN)/python -m tests.fuzz --minutes $(MINUTES) $(ARGS)
 
 serve: .venv/runtime
 	@$(BIN)/sketchmatch serve $(ARGS)

@@ -7,6 +7,7 @@ server sends the same as a gRPC status with ``ErrorInfo`` and ``BadRequest``.
 
 from __future__ import annotations
 
+import reprlib
 from enum import StrEnum
 from typing import Self
 
@@ -21,6 +22,11 @@ __all__ = [
 
 _LONGEST_QUOTE = 60
 
+# Plain repr would take hours for lists that repeat each other, and refuses long numbers.
+_QUOTING = reprlib.Repr()
+_QUOTING.maxstring = _QUOTING.maxother = _QUOTING.maxlong = 100_000
+_QUOTING.maxlevel = 3
+
 
 def quoted(value: object) -> str:
     """Return a caller's value as a sentence may quote it: cut short where it is long.
@@ -30,7 +36,10 @@ def quoted(value: object) -> str:
     >>> quoted("office"), quoted("x" * 1000) == "'" + 59 * "x" + "…"
     ("'office'", True)
     """
-    text = repr(value)
+    try:
+        text = _QUOTING.repr(value)
+    except ValueError:
+        text = "a number of thousands of digits"
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
 
 

@@ -5,7 +5,6 @@ import sys
 
 import pytest
 
-import sketchmatch.io.files
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 
@@ -33,24 +32,21 @@ def test_an_unknown_kind_lists_the_known_ones(tmp_path, name):
     (tmp_path / name).write_text("?")
     error = refused(tmp_path / name)
     assert error.reason == Reason.INVALID_FILE
-    assert "is of no known kind; give a file that ends in one of .bmp .geojson" in error.problem
+    assert "is of no known kind; give a file that ends in one of .bag .bmp" in error.problem
 
 
 def test_a_path_that_the_system_refuses_is_named():
     assert "cannot be read (file name too long)" in refused("x" * 5000 + ".svg").problem
 
 
+@pytest.mark.parametrize("name", ["/dev/zero", "/dev/null"])
+def test_a_device_is_not_read(tmp_path, name):
+    (tmp_path / "endless.png").symlink_to(name)
+    assert "is no plain file" in refused(tmp_path / "endless.png").problem
+
+
 def test_a_path_with_a_null_is_named():
     assert "; " in refused("a\0b.svg").problem
-
-
-def test_a_file_above_the_limit_is_not_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(sketchmatch.io.files, "MAX_BYTES", 2 * 1024**2)
-    path = tmp_path / "sketch.svg"
-    path.write_bytes(b" " * (2 * 1024**2 + 1))
-    error = refused(path)
-    assert str(error) == f"{path} is larger than the limit of 2 MiB; reduce it"
-    assert error.reason == Reason.LIMIT_EXCEEDED
 
 
 def test_contents_at_fault_are_named_after_the_path(tmp_path):

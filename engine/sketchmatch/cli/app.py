@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import traceback
+import warnings
 from enum import IntEnum
 from typing import Annotated, NoReturn
 
@@ -60,6 +61,8 @@ def main() -> NoReturn:
     """Run the command line and exit; an error is one line on standard error."""
     # What gRPC's own library logs is for those who develop it.
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")
+    # An odd tag in a picture is no news to whoever drew it.
+    warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\.")
     code, message = _run()
     if message:
         typer.echo(f"sketchmatch: {message}", err=True)

@@ -19,6 +19,7 @@ from sketchmatch.io.overlay import (
     draw_scene,
     save_overlay,
 )
+from sketchmatch.io.ros_bag import bag_and_topic, is_bag
 from sketchmatch.model import OccupancyGrid, Scene, SceneObject
 from sketchmatch.model.arrays import frozen_floats
 from sketchmatch_client import Match
@@ -28,7 +29,7 @@ from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 if TYPE_CHECKING:
     from sketchmatch.cli.relations import Description
 
-__all__ = ["check_path", "draw_description", "draw_match", "draw_segmentation"]
+__all__ = ["check_path", "draw_description", "draw_match", "draw_segmentation", "scene_of"]
 
 check_path = check_picture_path
 
@@ -40,8 +41,8 @@ def draw_match(match: Match, map_path: Path, target: Path) -> None:
         for line in match.result.object_matches
     ]
     picture = draw_overlay(
-        _scene(match.scenes.sketch),
-        _scene(match.scenes.map),
+        scene_of(match.scenes.sketch),
+        scene_of(match.scenes.map),
         pairs,
         facts=facts(match.result),
         underlay=_grid(map_path),
@@ -50,10 +51,12 @@ def draw_match(match: Match, map_path: Path, target: Path) -> None:
 
 
 def draw_segmentation(response: SegmentResponse, source: Path, target: Path) -> None:
-    """Draw the objects of one scene, numbered, and save the picture."""
+    """Draw the objects of one scene, numbered, and the route, and save the picture."""
     grid = _grid(source)
     pen = response.segmenter.name == "strokes"
-    save_overlay(target, draw_scene(_scene(response.scene), underlay=grid, pen=pen))
+    route = np.array([(point.x, point.y) for point in response.route]) if response.route else None
+    picture = draw_scene(scene_of(response.scene), underlay=grid, pen=pen, route=route)
+    save_overlay(target, picture)
 
 
 def draw_description(found: Description, source: Path, target: Path) -> None:
@@ -77,7 +80,8 @@ def draw_description(found: Description, source: Path, target: Path) -> None:
     save_overlay(target, picture, "--plot")
 
 
-def _scene(message: scene_pb2.Scene) -> Scene:
+def scene_of(message: scene_pb2.Scene) -> Scene:
+    """Return the scene that a message holds, to the last digit."""
     return Scene(
         tuple(
             SceneObject(
@@ -94,7 +98,7 @@ def _scene(message: scene_pb2.Scene) -> Scene:
 
 def _grid(path: Path) -> OccupancyGrid | None:
     """Return the robot's map in a file, if it is one."""
-    if path.suffix.lower() not in {".yaml", ".yml"}:
+    if path.suffix.lower() not in {".yaml", ".yml"} and not is_bag(bag_and_topic(path)[0]):
         return None
     source = read_source(path)
     return source if isinstance(source, OccupancyGrid) else None

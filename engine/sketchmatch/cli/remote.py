@@ -60,8 +60,10 @@ def _message(path: Path) -> Source:
     a server.
     """
     match read_source(path):
-        case OccupancyGrid():
+        case OccupancyGrid() if path.suffix.lower() in (".yaml", ".yml"):
             return sources.map_server_map(path)
+        case OccupancyGrid(cells, resolution, origin):
+            return sources.occupancy_grid(cells, resolution, origin)
         case Image():
             return sources.image(path)
         case StrokeSet(strokes):

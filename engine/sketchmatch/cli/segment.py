@@ -23,6 +23,10 @@ def segment(
     settings: Settings = None,
     json: Json = False,
     overlay: Overlay = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Save the objects as polygons, in .geojson."),
+    ] = None,
 ) -> None:
     """Show which objects are found in a file.
 
@@ -30,9 +34,12 @@ def segment(
     from 1, as the overlay does; in a pipe the lines count from 0, as the API does.
     """
     from sketchmatch.cli import display, pictures, places
+    from sketchmatch.io import scene_files
 
     if overlay is not None:
         pictures.check_path(overlay)
+    if out is not None:
+        scene_files.check_scene_path(out, "--out")
     with places.places_in(source=file):
         found = _segmented(server, file, segmenter, settings)
     if json:
@@ -41,6 +48,8 @@ def segment(
         display.show_scene(found)
     if overlay is not None:
         pictures.draw_segmentation(found, file, overlay)
+    if out is not None:
+        scene_files.save_scene(out, pictures.scene_of(found.scene), "--out")
 
 
 def _segmented(

@@ -7,18 +7,25 @@ import math
 from typing import Any
 
 from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.model.limits import check_vertices
 
 __all__ = ["load_json", "mapping", "number", "sequence", "shown"]
 
 
+# Values that a vertex takes at most, with its share of everything around it.
+_VALUES = 8
+
+
 def load_json(text: str) -> Any:
-    """Parse JSON.
+    """Parse JSON of vertices, unless it has more values than the allowed vertices take.
 
     Raises
     ------
     InvalidInputError
-        If it is not JSON, with the line and column.
+        If it is not JSON, with the line and column, or too large.
     """
+    values = text.count(",") + text.count("[") + text.count("{")
+    check_vertices(values // _VALUES, "", f"has {values} values")
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:

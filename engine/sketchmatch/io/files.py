@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io.geojson import decode_geojson
+from sketchmatch.io.ros_bag import SUFFIXES, bag_and_topic, is_bag, read_bag
 from sketchmatch.io.stroke_json import decode_strokes
 from sketchmatch.model import Source
+from sketchmatch.model.limits import check_bytes, check_source, source_limits
 
-__all__ = ["MAX_BYTES", "read_source"]
+__all__ = ["read_source"]
 
-MAX_BYTES = 256 * 1024 * 1024
-"""A larger file is refused unread."""
+_LONGEST_NAME = 500
 
 
 def read_source(path: str | Path) -> Source:
@@ -23,7 +26,8 @@ def read_source(path: str | Path) -> Source:
     ----------
     path
         ``.svg`` or ``.json`` strokes, ``.geojson`` polygons, ``.yaml`` of a ROS map with its
-        picture beside it, or a picture (``.png``, ``.jpg``, ``.bmp``, ``.tif``, ``.pgm`` …).
+        picture beside it, a picture (``.png``, ``.jpg``, ``.bmp``, ``.tif``, ``.pgm`` …), or a ROS
+        bag (``.bag``, ``.mcap``, ``.db3`` or a folder), as :mod:`sketchmatch.io.ros_bag` tells.
 
     Returns
     -------
@@ -34,15 +38,14 @@ def read_source(path: str | Path) -> Source:
     ------
     InvalidInputError
         In one sentence that begins with the path, if the file is missing, of no known kind,
-        or its contents cannot be used.
+        too large, or its contents cannot be used.
     """
     path = Path(path)
-    decode = _DECODERS.get(path.suffix.lower())
-    if decode is None:
-        kinds = " ".join(sorted(_DECODERS))
-        raise _invalid(str(path), f"is of no known kind; give a file that ends in one of {kinds}")
+    source_limits()  # what is wrong with them is not wrong with the file
     try:
-        return decode(path, _read(path, str(path)))
+        source = _decoded(path)
+        check_source(source)
+        return source
     except InvalidInputError as error:
         if error.field.startswith(str(path)):
             raise
@@ -51,23 +54,37 @@ def read_source(path: str | Path) -> Source:
         raise InvalidInputError(error.reason, place, error.problem) from None
 
 
+def _decoded(path: Path) -> Source:
+    bag, topic = bag_and_topic(path)
+    if is_bag(bag):
+        return read_bag(bag, topic)
+    decode = _DECODERS.get(path.suffix.lower())
+    if decode is None:
+        kinds = " ".join(sorted((*_DECODERS, *SUFFIXES)))
+        raise _invalid(str(path), f"is of no known kind; give a file that ends in one of {kinds}")
+    return decode(path, _read(path, str(path)))
+
+
 def _read(path: Path, field: str) -> bytes:
     """Return a file's bytes; ``field`` is what an error begins with."""
     try:
+        # Devices and pipes would be endless, or wait for a writer.
+        if stat.S_IFMT(path.stat().st_mode) not in (stat.S_IFREG, stat.S_IFDIR):
+            raise _invalid(field, "is no plain file; give one")
         with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
+            size = os.fstat(file.fileno()).st_size
+            check_bytes(size, field)
+            data = file.read(source_limits().max_bytes + 1)
     except FileNotFoundError:
         raise _invalid(field, "does not exist; check the path") from None
     except IsADirectoryError:
         raise _invalid(field, "is a directory; give a file in it") from None
+    except InvalidInputError:
+        raise
     except (OSError, ValueError) as error:
         cause = getattr(error, "strerror", None) or str(error)
         raise _invalid(field, f"cannot be read ({cause.lower()}); check the path") from None
-    if len(data) > MAX_BYTES:
-        limit = MAX_BYTES // 1024**2
-        raise InvalidInputError(
-            Reason.LIMIT_EXCEEDED, field, f"is larger than the limit of {limit} MiB; reduce it"
-        )
+    check_bytes(len(data), field)
     return data
 
 
@@ -86,7 +103,9 @@ def _map_server(path: Path, data: bytes) -> Source:
 
     header = parse_header(_text(data))
     picture = path.parent / header.image
-    return header.grid(_read(picture, f"{path}: image {picture}"))
+    name = str(picture)
+    shown = name if name.isprintable() and len(name) <= _LONGEST_NAME else quoted(header.image)
+    return header.grid(_read(picture, f"{path}: image {shown}"))
 
 
 def _picture(_: Path, data: bytes) -> Source:

@@ -7,7 +7,12 @@ not displayed are ignored. Coordinates are user units: ``viewBox`` scales a draw
 which a match does not see.
 
 A shape's label is the first that it has of: its ``<title>``, ``aria-label``, ``inkscape:label``,
-and an ``id`` that a person gave (``desk-2``, but not a tool's ``path123``).
+and an ``id`` that a person gave (``desk-2``, but not a tool's ``path123``); or else that of the
+innermost group with a title or one of these two labels which is no layer.
+
+Paper is no shape: a rectangle without a stroke that covers the whole drawing is ignored. Of the
+paths with which Excalidraw draws one shape, its hatching or filling first, the last is taken: the
+outline, every line of which is drawn twice.
 
 Nothing outside the document is ever opened, and a document that defines entities is refused.
 """
@@ -26,13 +31,12 @@ import svgelements
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import FloatArray, Stroke, StrokeSet
+from sketchmatch.model.limits import check_vertices, source_limits
 
-__all__ = ["MAX_ELEMENTS", "decode_svg"]
-
-MAX_ELEMENTS = 100_000
-"""A drawing with more elements, counting every repetition by ``use``, is refused."""
+__all__ = ["decode_svg"]
 
 _MAX_DEPTH = 200
+_LONGEST_CAUSE = 100
 # Largest distance between a curve and its stroke, as a share of the drawing's larger side.
 _TOLERANCE = 1e-3
 # Beyond this, coordinates are a broken file's, and their squares would soon overflow.
@@ -52,15 +56,20 @@ _LENGTHS = {"x", "y", "x1", "y1", "x2", "y2", "width", "height", "cx", "cy", "r"
 _LISTS = {"d", "points"}
 _LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(px|pt|pc|mm|cm|in|)\s*", re.I)
 _UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "in": 96.0}
-_CONTAINERS = {"svg", "g", "a", "switch", "use"}
+_DRAWN = {*_SHAPES, "svg", "g", "a", "switch", "use"}
 _HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
-_INKSCAPE_LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
+_INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
+_EXCALIDRAW = b"svg-source:excalidraw"
+_COMMAND = re.compile(r"([MLHVCSQTAZ])([^MLHVCSQTAZ]*)", re.IGNORECASE)
+_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
+_ARITY = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 1}
 _TOOLS_ID = re.compile(
     r"(path|line|polyline|polygon|rect|circle|ellipse|use|g|svg|svgid|xmlid|shape|stroke|object"
     r"|vector|element|layer)?[\W\d_]*",
     re.IGNORECASE,
 )
 _HIDDEN = re.compile(r"(^|;)\s*display\s*:\s*none\b")
+_STROKED = re.compile(r"(^|;)\s*stroke\s*:\s*(?!none\b)")
 
 
 def decode_svg(data: bytes) -> StrokeSet:
@@ -75,7 +84,8 @@ def decode_svg(data: bytes) -> StrokeSet:
     ------
     InvalidInputError
         If it is not SVG, defines entities, is too large or nested too deeply, has nothing drawn
-        in it, or a shape cannot be read; then its path is ``shapes[k]``, counted from 0.
+        in it, or a shape cannot be read; then its path is ``shapes[k]``, counted from 0. What is
+        too large :func:`sketchmatch.model.limits.source_limits` says.
 
     Examples
     --------
@@ -85,10 +95,12 @@ def decode_svg(data: bytes) -> StrokeSet:
     """
     root = _document(data)
     if _tag(root) != "svg":
-        raise _invalid("", f"is XML but no SVG: it begins with <{_tag(root)}>; save it as SVG")
+        raise _invalid(
+            "", f"is XML but no SVG: it begins with <{_tag(root)[:_LONGEST_CAUSE]}>; save it as SVG"
+        )
     drawn = [
-        (subpath, _label(element))
-        for k, (element, matrix) in enumerate(_drawn(root))
+        (subpath, label)
+        for k, (element, matrix, label) in enumerate(_drawn(root, _EXCALIDRAW in data))
         for subpath in _subpaths(element, matrix, f"shapes[{k}]")
     ]
     if not drawn:
@@ -96,6 +108,8 @@ def decode_svg(data: bytes) -> StrokeSet:
             "", "has nothing drawn in it; text and embedded pictures are not read, so draw paths"
         )
     tolerance = _TOLERANCE * _size([curve for subpath, _ in drawn for curve in subpath])
+    steps = sum(_steps(curve, tolerance) for subpath, _ in drawn for curve in subpath)
+    check_vertices(steps + len(drawn), "")
     return StrokeSet(
         tuple(
             Stroke(_flattened(subpath, tolerance) * (1.0, -1.0), None, label)
@@ -112,12 +126,13 @@ def _document(data: bytes) -> ElementTree.Element:
     except InvalidInputError:
         raise
     except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
-        raise _invalid("", f"is not SVG ({error}); save it as SVG again") from None
+        cause = str(error)[:_LONGEST_CAUSE]
+        raise _invalid("", f"is not SVG ({cause}); save it as SVG again") from None
 
 
 def _check(data: bytes) -> None:
     """Refuse what must not reach a parser that builds a tree."""
-    depth = 0
+    depth = elements = vertices = 0
 
     def doctype(_name: str, _system: str | None, _public: str | None, subset: int) -> None:
         if subset:
@@ -125,9 +140,13 @@ def _check(data: bytes) -> None:
                 "", "defines entities or a DTD of its own; save it as plain SVG without them"
             )
 
-    def start(_name: str, _attributes: dict[str, str]) -> None:
-        nonlocal depth
+    def start(_name: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, elements, vertices
         depth += 1
+        elements += 1
+        vertices += sum(_vertices(attributes.get(name, "")) for name in _LISTS)
+        _check_elements(elements)
+        check_vertices(vertices, "")
         if depth > _MAX_DEPTH:
             raise _invalid(
                 "", f"is nested deeper than the limit of {_MAX_DEPTH}; flatten its groups"
@@ -144,33 +163,72 @@ def _check(data: bytes) -> None:
     parser.Parse(data, True)
 
 
-def _drawn(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, Any]]:
-    """Yield the shapes that are drawn, in order, each with its matrix to the drawing."""
+def _check_elements(count: int) -> None:
+    limit = source_limits().max_elements
+    if count > limit:
+        raise InvalidInputError(
+            Reason.LIMIT_EXCEEDED,
+            "",
+            f"draws more than the limit of {limit} elements, a tenth of the vertices; simplify it, "
+            "or raise max_vertices (SKETCHMATCH_MAX_VERTICES)",
+        )
+
+
+def _vertices(data: str) -> int:
+    """Return how many vertices path data or points have, roughly where they are few."""
+    if len(data) < 1000:
+        return len(data) // 4
+    if not _COMMAND.search(data):
+        return sum(1 for _ in _NUMBER.finditer(data)) // 2
+    return sum(
+        max(1, sum(1 for _ in _NUMBER.finditer(command[2])) // _ARITY[command[1].upper()])
+        for command in _COMMAND.finditer(data)
+    )
+
+
+def _drawn(
+    root: ElementTree.Element, excalidraw: bool
+) -> Iterator[tuple[ElementTree.Element, Any, str]]:
+    """Yield the shapes that are drawn, in order, each with its matrix to the drawing and label."""
     named = {element.get("id"): element for element in root.iter()}
-    stack = [(root, svgelements.Matrix())]
+    paper = _paper(root)
+    stack = [(root, svgelements.Matrix(), "")]
     visited = 1
     while stack:
-        element, outer = stack.pop()
+        element, outer, inherited = stack.pop()
         if element.get("display") == "none" or _HIDDEN.search(element.get("style", "")):
             continue
-        matrix = _transform(element) * outer
+        matrix = _transform(element) * outer if "transform" in element.attrib else outer
         if _tag(element) in _SHAPES:
-            yield element, matrix
+            if element is not paper:
+                yield element, matrix, _label(element) or inherited
             continue
+        inherited = _groups_label(element) or inherited
         if _tag(element) == "use":
             target = named.get(_reference(element))
             children = [] if target is None else [target]
             matrix = _offset(element) * matrix
         else:
-            children = [child for child in element if _tag(child) in _SHAPES.keys() | _CONTAINERS]
+            children = [child for child in element if _tag(child) in _DRAWN]
+            if excalidraw and _tag(element) == "g":
+                last = next((child for child in reversed(children) if _tag(child) == "path"), None)
+                children = [c for c in children if _tag(c) != "path" or c is last]
         visited += len(children)
-        if visited > MAX_ELEMENTS:
-            raise InvalidInputError(
-                Reason.LIMIT_EXCEEDED,
-                "",
-                f"draws more than the limit of {MAX_ELEMENTS} elements; simplify it",
-            )
-        stack.extend((child, matrix) for child in reversed(children))
+        _check_elements(visited)
+        stack.extend((child, matrix, inherited) for child in reversed(children))
+
+
+def _paper(root: ElementTree.Element) -> ElementTree.Element | None:
+    """Return the rectangle that a tool laid under the drawing, if there is one."""
+    shapes = (element for element in root.iter() if _tag(element) in _SHAPES)
+    first = next(shapes, None)
+    if first is None or _tag(first) != "rect":
+        return None
+    if first.get("stroke", "none") != "none" or _STROKED.search(first.get("style", "")):
+        return None
+    frame = root.get("viewBox", "").replace(",", " ").split()[2:]
+    sizes = (root.get("width", ""), root.get("height", "")), tuple(frame), ("100%", "100%")
+    return first if (first.get("width"), first.get("height")) in sizes else None
 
 
 def _tag(element: ElementTree.Element) -> str:
@@ -201,14 +259,20 @@ def _offset(use: ElementTree.Element) -> Any:
 
 
 def _label(element: ElementTree.Element) -> str:
-    title = next((child.text for child in element if _tag(child) == "title"), None)
     own = element.get("id", "")
-    names = (
-        title,
-        element.get("aria-label"),
-        element.get(_INKSCAPE_LABEL),
-        "" if _TOOLS_ID.fullmatch(own) else own,
-    )
+    return _given_label(element) or ("" if _TOOLS_ID.fullmatch(own) else own.strip())
+
+
+def _groups_label(element: ElementTree.Element) -> str:
+    """Return what the shapes of a group are called: nothing, if it is a layer or the drawing."""
+    if _tag(element) == "svg" or element.get(f"{_INKSCAPE}groupmode") == "layer":
+        return ""
+    return _given_label(element)
+
+
+def _given_label(element: ElementTree.Element) -> str:
+    title = next((child.text for child in element if _tag(child) == "title"), None)
+    names = (title, element.get("aria-label"), element.get(f"{_INKSCAPE}label"))
     return next((name.strip() for name in names if name and name.strip()), "")
 
 
@@ -279,16 +343,10 @@ def _flattened(curves: list[FloatArray], tolerance: float) -> FloatArray:
 
 
 def _samples(controls: FloatArray, tolerance: float) -> FloatArray:
-    """Return points along a Bézier curve, no farther from it than the tolerance.
-
-    A curve of degree d leaves the chords of n equal steps by at most d(d−1)/8n² times the
-    largest second difference of its control points.
-    """
-    degree = len(controls) - 1
-    if degree < 2 or tolerance <= 0.0:
+    """Return points along a Bézier curve, no farther from it than the tolerance."""
+    steps = _steps(controls, tolerance)
+    if steps == 1:
         return controls[[0, -1]]
-    bend = float(np.hypot(*np.diff(controls, 2, axis=0).T).max())
-    steps = max(1, math.ceil(math.sqrt(degree * (degree - 1) / 8.0 * bend / tolerance)))
     t = np.linspace(0.0, 1.0, steps + 1)[:, None, None]
     level = np.broadcast_to(controls, (steps + 1, *controls.shape))
     while level.shape[1] > 1:
@@ -296,8 +354,22 @@ def _samples(controls: FloatArray, tolerance: float) -> FloatArray:
     return level[:, 0]
 
 
+def _steps(controls: FloatArray, tolerance: float) -> int:
+    """Return into how many chords of equal steps a Bézier curve is cut.
+
+    A curve of degree d leaves the chords of n equal steps by at most d(d−1)/8n² times the
+    largest second difference of its control points.
+    """
+    degree = len(controls) - 1
+    if degree < 2 or tolerance <= 0.0:
+        return 1
+    bend = float(np.hypot(*np.diff(controls, 2, axis=0).T).max())
+    return max(1, math.ceil(math.sqrt(degree * (degree - 1) / 8.0 * bend / tolerance)))
+
+
 def _unreadable(element: ElementTree.Element, field: str, problem: str) -> InvalidInputError:
-    name = f' id="{element.get("id")}"' if element.get("id") else ""
+    own = " ".join(element.get("id", "").split())[:_LONGEST_CAUSE]
+    name = f' id="{own}"' if own else ""
     return _invalid(field, f"(<{_tag(element)}{name}>) has {problem}; draw it again")
 
 

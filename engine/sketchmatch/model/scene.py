@@ -187,7 +187,7 @@ class Scene:
 
     @classmethod
     def from_file(cls, path: str | PathLike[str]) -> Self:
-        """Read a scene from a file: SVG, stroke JSON, GeoJSON, ROS map YAML or an image.
+        """Read a scene from a file: SVG, stroke JSON, GeoJSON, ROS map YAML or bag, image.
 
         Raises
         ------

@@ -12,6 +12,7 @@ import numpy as np
 from sketchmatch.api import Algorithm, SearchProgress, Segmentation, Segmenter
 from sketchmatch.errors import InvalidInputError, PluginError, SketchmatchError
 from sketchmatch.model import FloatArray, RelationTable, Scene, Source
+from sketchmatch.model.limits import check_objects, check_source
 from sketchmatch.registry import Registry
 
 __all__ = ["blaming", "checked_array", "checked_progress", "segmented"]
@@ -67,10 +68,11 @@ def segmented(source: Source, segmenter: Segmenter, registry: Registry, field: s
     Raises
     ------
     InvalidInputError
-        If nothing usable is in it, with a path that begins with ``field``.
+        If nothing usable is in it, or too much, with a path that begins with ``field``.
     PluginError
         If the segmenter breaks its contract.
     """
+    check_source(source, field)
     with blaming(segmenter, registry):
         try:
             found = segmenter.segment(source)
@@ -80,4 +82,7 @@ def segmented(source: Source, segmenter: Segmenter, registry: Registry, field: s
             raise TypeError(f"it returned a {type(found).__name__}, not a Segmentation")
         if not isinstance(found.scene, Scene):
             raise TypeError(f"it found a {type(found.scene).__name__}, not a Scene")
+        if found.route is not None:
+            checked_array(found.route, (len(found.route), 2))
+    check_objects(len(found.scene), field)
     return found

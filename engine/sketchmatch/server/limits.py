@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from sketchmatch.model.limits import SourceLimits
 
 __all__ = ["Limits"]
 
@@ -20,11 +22,14 @@ class Limits:
         Matches and segmentations that run at the same time.
     max_time_budget
         Seconds that one match may take, or None for no limit.
+    sources
+        How large a sketch or a map may be.
     """
 
     max_request_bytes: int = 64 * 1024 * 1024
     max_concurrent_matches: int = 4 * (os.cpu_count() or 1)
     max_time_budget: float | None = None
+    sources: SourceLimits = field(default_factory=SourceLimits.from_environment)
 
     @property
     def transport_bytes(self) -> int:

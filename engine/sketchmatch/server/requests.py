@@ -22,6 +22,7 @@ from sketchmatch.model import (
     Stroke,
     StrokeSet,
 )
+from sketchmatch.model.limits import check_objects, check_pixels, check_vertices
 from sketchmatch.pipeline.match import MatchRequest
 from sketchmatch.pipeline.selection import STAGES, Choice
 from sketchmatch_proto.v1 import (
@@ -152,6 +153,7 @@ def _time_budget(
 
 
 def _stroke_set(message: source_pb2.StrokeSet) -> StrokeSet:
+    check_vertices(sum(len(stroke.points) for stroke in message.strokes), "")
     upward = _upward(message.y_axis)
     strokes = []
     for k, stroke in enumerate(message.strokes):
@@ -175,6 +177,9 @@ def _times(stroke: source_pb2.Stroke, field: str) -> FloatArray | None:
 
 
 def _polygon_set(message: source_pb2.PolygonSet) -> PolygonSet:
+    check_objects(len(message.polygons), "")
+    rings = (ring for polygon in message.polygons for ring in polygon.rings)
+    check_vertices(sum(len(ring.points) for ring in rings), "")
     upward = _upward(message.y_axis)
     return PolygonSet(
         tuple(
@@ -188,6 +193,7 @@ def _polygon_set(message: source_pb2.PolygonSet) -> PolygonSet:
 
 def _occupancy_grid(message: source_pb2.OccupancyGrid) -> OccupancyGrid:
     rows, columns = message.rows, message.columns
+    check_pixels(columns, rows, "")
     if rows * columns != len(message.cells):
         raise InvalidInputError(
             Reason.INVALID_GRID,

@@ -18,6 +18,7 @@ from google.protobuf.message import Message
 import sketchmatch
 from sketchmatch.api import API_VERSION
 from sketchmatch.errors import InvalidInputError, PluginError, Reason, SketchmatchError
+from sketchmatch.model.limits import limited_to
 from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.plugins import segmented
 from sketchmatch.pipeline.selection import resolve_segmenter
@@ -88,9 +89,14 @@ class Workers:
 
     def run(self, work: Callable[[], _Answer]) -> asyncio.Future[_Answer]:
         """Run something in a thread; its place is free again when the thread is."""
+
+        def limited() -> _Answer:
+            with limited_to(self.limits.sources):
+                return work()
+
         loop = asyncio.get_running_loop()
         self._running += 1
-        job = self._threads.submit(work)
+        job = self._threads.submit(limited)
         job.add_done_callback(lambda _: loop.call_soon_threadsafe(self._free))
         return asyncio.wrap_future(job)
 
@@ -203,6 +209,7 @@ class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):
         del request, context
         limits = catalog_service_pb2.ServerLimits(
             max_request_bytes=self._limits.max_request_bytes,
+            max_objects=self._limits.sources.max_objects,
             max_concurrent_matches=self._limits.max_concurrent_matches,
         )
         if self._limits.max_time_budget is not None:

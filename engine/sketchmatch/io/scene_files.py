@@ -1,0 +1,93 @@
+"""Scenes as files, so that what was found in a source can be kept and read again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.model import FloatArray, Scene, SceneObject
+
+__all__ = ["check_scene_path", "encode_geojson", "save_scene"]
+
+
+def encode_geojson(scene: Scene) -> str:
+    """Return a scene as a GeoJSON ``FeatureCollection`` that reads back as the very same scene.
+
+    Each object is a ``Polygon`` with its holes and the property ``label``, in the scene's order
+    and coordinates.
+
+    Examples
+    --------
+    >>> scene = Scene.from_polygons([[[0, 0], [1, 0], [0, 1]], [[3, 0], [4, 0], [3, 1]]])
+    >>> encode_geojson(scene).splitlines()[0]
+    '{"type": "FeatureCollection", "features": ['
+    """
+    features = ",\n".join(
+        json.dumps(_feature(item), ensure_ascii=False, allow_nan=False) for item in scene.objects
+    )
+    return f'{{"type": "FeatureCollection", "features": [\n{features}\n]}}\n'
+
+
+def check_scene_path(path: str | Path, field: str = "out") -> None:
+    """Refuse a path that no scene can be saved under, before any work is done.
+
+    Parameters
+    ----------
+    path
+        Where it shall be.
+    field
+        What an error calls it.
+
+    Raises
+    ------
+    InvalidInputError
+        If the name's ending is not .geojson, or its folder does not exist.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".geojson":
+        raise InvalidInputError(
+            Reason.INVALID_FILE, field, f"is {str(path)!r}; let its name end in .geojson"
+        )
+    if not path.parent.is_dir():
+        raise InvalidInputError(
+            Reason.INVALID_FILE,
+            field,
+            f"is {str(path)!r}, but there is no folder {str(path.parent)!r}; create it first",
+        )
+
+
+def save_scene(path: str | Path, scene: Scene, field: str = "out") -> None:
+    """Save a scene as GeoJSON.
+
+    Raises
+    ------
+    InvalidInputError
+        If the name's ending is not .geojson, or the file cannot be written.
+    """
+    check_scene_path(path, field)
+    try:
+        # What UTF-8 cannot hold is escaped as JSON escapes it.
+        Path(path).write_bytes(encode_geojson(scene).encode("utf-8", "backslashreplace"))
+    except OSError as error:
+        why = error.strerror or "the disk refused it"
+        raise InvalidInputError(
+            Reason.INVALID_FILE,
+            field,
+            f"cannot be written to {str(path)!r} ({why}); name a file in a folder of yours",
+        ) from None
+
+
+def _feature(item: SceneObject) -> dict[str, Any]:
+    return {
+        "type": "Feature",
+        "properties": {"label": item.label},
+        "geometry": {"type": "Polygon", "coordinates": [_closed(ring) for ring in item.rings]},
+    }
+
+
+def _closed(ring: FloatArray) -> list[list[float]]:
+    # Of the two equal ends readers drop the first, so the last point is the one to repeat.
+    points: list[list[float]] = ring.tolist()
+    return [points[-1], *points]

@@ -1,0 +1,103 @@
+"""``segment --out``: what was found is saved, and reads back as it was."""
+
+import importlib.util
+import json
+
+import numpy as np
+import pytest
+from google.protobuf.json_format import Parse
+
+from sketchmatch import Scene
+from sketchmatch.cli.pictures import scene_of
+from sketchmatch.examples import LIVING_ROOM_MAP
+from sketchmatch.io import read_source
+from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+from tests import processes
+from tests.bags import write
+from tests.tools import require
+
+
+@pytest.fixture(params=["in process", "server"])
+def where(request, address):
+    return ["--server", address] if request.param == "server" else []
+
+
+def test_what_was_found_is_saved_to_the_last_digit(command_line, where, tmp_path):
+    saved, again = tmp_path / "scene.geojson", tmp_path / "again.geojson"
+    done = command_line("segment", LIVING_ROOM_MAP, "--json", "--out", saved, *where)
+    assert done.returncode == 0
+    found = scene_of(Parse(done.stdout, SegmentResponse()).scene)
+    read = Scene.from_file(saved)
+    assert read.labels == found.labels
+    for a, b in zip(read.objects, found.objects, strict=True):
+        for ring, other in zip(a.rings, b.rings, strict=True):
+            assert np.array_equal(ring, other)
+    assert command_line("segment", saved, "--out", again, *where).returncode == 0
+    assert again.read_bytes() == saved.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("scene.json", "let its name end in .geojson"), ("no/s.geojson", "there is no folder")],
+)
+def test_other_endings_are_refused_before_the_work_starts(
+    command_line, where, tmp_path, name, words
+):
+    done = command_line("segment", tmp_path / "missing.yaml", "--out", tmp_path / name, *where)
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("sketchmatch: --out is ")
+    assert words in line
+
+
+def test_lines_and_overlay_come_beside_it(command_line, where, tmp_path):
+    saved, picture = tmp_path / "scene.geojson", tmp_path / "scene.png"
+    done = command_line("segment", LIVING_ROOM_MAP, "--out", saved, "--overlay", picture, *where)
+    lines = done.stdout.splitlines()
+    assert len(lines) >= len(json.loads(saved.read_text())["features"]) > 1
+    assert picture.stat().st_size > 0
+
+
+def test_a_bag_is_read_here_and_sent_to_a_server(command_line, where, tmp_path):
+    require(importlib.util.find_spec("rosbags"), "rosbags (`pip install 'sketchmatch[rosbag]'`)")
+    grid = read_source(LIVING_ROOM_MAP)
+    cells = grid.cells.copy()
+    bag = write(tmp_path, "mcap", ("/map", cells, 0.0))
+    done = command_line("segment", f"{bag}#/map", "--overlay", tmp_path / "bag.png", *where)
+    assert done.returncode == 0, done.stderr
+    expected = command_line("segment", LIVING_ROOM_MAP, *where)
+    assert len(done.stdout.splitlines()) == len(expected.stdout.splitlines())
+
+
+# Limits -----------------------------------------------------------------------------------------
+
+
+def test_the_environment_limits_files_in_process(command_line, monkeypatch):
+    monkeypatch.setenv("SKETCHMATCH_MAX_PIXELS", "1000")
+    done = command_line("segment", LIVING_ROOM_MAP)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert "pixels, more than the limit of 1000 pixels; scale it down, or raise max_pixels" in line
+
+
+@pytest.mark.parametrize("command", [["segment", LIVING_ROOM_MAP], ["serve"]])
+def test_a_bad_value_in_the_environment_is_one_sentence(command_line, monkeypatch, command):
+    monkeypatch.setenv("SKETCHMATCH_MAX_OBJECTS", "few")
+    done = command_line(*command)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        "sketchmatch: SKETCHMATCH_MAX_OBJECTS is 'few'; give a whole number of at least 2\n"
+    )
+
+
+def test_serve_takes_its_limits_on_sources_from_options(command_line, tmp_path):
+    with processes.server("--max-pixels", "1000", "--max-objects", "2") as running:
+        done = command_line("segment", LIVING_ROOM_MAP, "--server", running.address)
+        three = tmp_path / "three.geojson"
+        rings = [[[x, 0], [x + 1, 0], [x, 1], [x, 0]] for x in (0, 3, 6)]
+        shapes = [{"type": "Polygon", "coordinates": [ring]} for ring in rings]
+        three.write_text(json.dumps({"type": "GeometryCollection", "geometries": shapes}))
+        few = command_line("segment", three, "--server", running.address)
+    assert (done.returncode, few.returncode) == (2, 2)
+    assert "more than the limit of 1000 pixels" in done.stderr
+    assert "has 3 objects, more than the limit of 2 objects" in few.stderr

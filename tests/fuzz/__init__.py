@@ -1,0 +1,1 @@
+"""Files broken at random, and what must hold of them; ``make fuzz`` runs it for minutes."""

@@ -1,0 +1,80 @@
+"""What must hold of every file, however broken."""
+
+import resource
+import signal
+import sys
+import time
+from pathlib import Path
+
+from sketchmatch.errors import InvalidInputError
+from sketchmatch.io import read_source
+from sketchmatch.pipeline import plugins
+from sketchmatch.pipeline.selection import Choice, resolve_segmenter
+from sketchmatch.registry import default_registry
+from tests.fuzz.mutations import TOKENS
+
+KINDS = tuple(TOKENS)
+SEEDS = Path(__file__).parent / "seeds"
+LONGEST_SECONDS = 2.0
+MOST_BYTES = 1024**3
+PICTURE = b"P5\n6 5\n255\n" + bytes([254] * 7 + [0, 0] + [254] * 9 + [205, 0] + [254] * 10)
+
+
+class BrokenError(AssertionError):
+    """A file that was neither read nor refused as it should be."""
+
+
+def seeds(kind: str) -> list[bytes]:
+    """Return the valid files of a kind that mutations begin with."""
+    return [path.read_bytes() for path in sorted((SEEDS / kind).iterdir())]
+
+
+def check(kind: str, data: bytes, folder: Path, *, segmenting: bool = True) -> bool:
+    """Read a file, find its objects, and return whether there was anything in it.
+
+    Raises
+    ------
+    BrokenError
+        If it is neither read nor refused in one sentence, or takes too much time or memory.
+    """
+    path = folder / f"input.{kind}"
+    path.write_bytes(data)
+    if kind == "yaml" and not (folder / "room.pgm").exists():
+        (folder / "room.pgm").write_bytes(PICTURE)
+    began = time.thread_time()
+    stage = "reading"
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 20.0)
+        source = read_source(path)
+        stage = "segmenting"
+        if segmenting:
+            segmenter = resolve_segmenter(default_registry(), Choice(), source)
+            plugins.segmented(source, segmenter, default_registry(), f"source.{source.field}")
+        return True
+    except InvalidInputError as error:
+        _check_sentence(stage, str(error))
+        return False
+    except (KeyboardInterrupt, BrokenError):
+        raise
+    except BaseException as error:
+        raise BrokenError(f"{stage} raised {type(error).__name__}: {str(error)[:300]}") from error
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        took, most = time.thread_time() - began, peak_bytes()
+        if sys.exc_info()[0] in (None, InvalidInputError):
+            if took > LONGEST_SECONDS:
+                raise BrokenError(f"{stage} took {took:.1f} s")
+            if most > MOST_BYTES:
+                raise BrokenError(f"{stage} took {most / 2**20:.0f} MiB")
+
+
+def peak_bytes() -> int:
+    """Return the most memory that this process has held."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def _check_sentence(stage: str, sentence: str) -> None:
+    if "\n" in sentence or not sentence.strip() or len(sentence) > 1000 or "; " not in sentence:
+        raise BrokenError(
+            f"{stage} is refused in more or less than one sentence: {sentence[:2000]!r}"
+        )
