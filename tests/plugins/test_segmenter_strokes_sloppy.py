@@ -198,3 +198,16 @@ def test_two_thousand_scribbles_are_quick_and_objects_among_them_are_found(kind)
     assert time.process_time() - spent < 4.0  # below 2 s; machines differ
     assert {1600.0 * 4.0} <= set(np.round(areas(found), 6))
     assert any("cross themselves too often to look at them all" in each for each in found.warnings)
+
+
+@pytest.mark.parametrize(("side", "objects"), [(0.7, 2), (0.3, 3)])
+def test_several_strokes_within_an_object_go_over_it_again_unless_they_are_small(side, objects):
+    def box(x, size):
+        return np.array([(x, x), (x + size, x), (x + size, x + size), (x, x + size), (x, x)])
+
+    inner = box(0.1, side)
+    sketch = [box(0.0, 1.0), box(3.0, 1.0), inner[:3], inner[2:]]
+    found = StrokeSegmenter().segment(StrokeSet(tuple(map(Stroke, sketch))))
+    assert len(found.scene) == objects
+    again = any("drawn over it again" in warning for warning in found.warnings)
+    assert again == (objects == 2)

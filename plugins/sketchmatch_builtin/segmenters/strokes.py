@@ -33,6 +33,8 @@ _WIDE = 0.05
 _MARK = 3.0
 # … and so are strokes in it that make a chain this much of which is gaps.
 _LOOSE = 0.1
+# Several strokes that enclose this share of an object from within were drawn over it.
+_RETRACED = 0.25
 # Span of an unlabelled route as a share of the sketch's.
 _ACROSS = 0.5
 _ROUTE = re.compile(r"\b(route|path)\b", re.IGNORECASE)
@@ -194,6 +196,8 @@ class StrokeSegmenter(Segmenter):
                 drawing.explain(members, FLICK)
             elif first is not None:
                 drawing.explain(members, drawing.again(outlines[first].strokes))
+            elif around is not None and _retraces(outline, outlines[around]):
+                drawing.explain(members, drawing.again(outlines[around].strokes))
             elif around is not None and (outline.span < mark or outline.open > _LOOSE):
                 drawing.explain(members, drawing.inside(outlines[around].strokes))
             else:
@@ -231,6 +235,11 @@ class StrokeSegmenter(Segmenter):
             else:
                 others.append(k)
         return others
+
+
+def _retraces(outline: Outline, host: Outline) -> bool:
+    """Whether several strokes inside an object go over it again, rather than stand in a room."""
+    return len(outline.strokes) > 1 and outline.area.area > _RETRACED * host.area.area
 
 
 def _second_largest(outlines: list[Outline]) -> float:
