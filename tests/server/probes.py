@@ -53,6 +53,19 @@ class SlowToWarm(Searcher):
         raise NotImplementedError
 
 
+class TellsWhenWarm(Searcher):
+    name = "tells-when-warm"
+    summary = "Tells a test that it was warmed up."
+    warm = threading.Event()
+
+    @classmethod
+    def warm_up(cls):
+        cls.warm.set()
+
+    def search(self, problem, rng):
+        raise NotImplementedError
+
+
 class Exploding(Searcher):
     name = "exploding"
     summary = "Cannot even warm up."

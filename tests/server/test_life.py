@@ -11,13 +11,14 @@ from grpc_reflection.v1alpha.proto_reflection_descriptor_database import (
 import sketchmatch
 from sketchmatch.pipeline import warmup
 from sketchmatch.registry import Kind
+from sketchmatch.server import serve
 from sketchmatch_client import Client, ServerUnavailableError
 from sketchmatch_client.errors import CallCancelledError
 from sketchmatch_proto.v1 import catalog_service_pb2
 from tests.processes import server
 from tests.processes import sketchmatch as run
 from tests.server.harness import ENDLESS, scene, serving
-from tests.server.probes import Exploding, SlowToWarm
+from tests.server.probes import Exploding, SlowToWarm, TellsWhenWarm
 
 SERVICES = [f"sketchmatch.v1.{name}Service" for name in ("Match", "Scene", "Catalog")]
 
@@ -60,6 +61,13 @@ def test_a_server_that_is_stopped_while_it_warms_up_stops():
     assert host.said[-1] == "stopped"
 
 
+@pytest.fixture
+def at_once(monkeypatch):
+    """Warm up the other algorithms as soon as the server serves."""
+    monkeypatch.setattr(serve, "_QUIET", 0.0)
+
+
+@pytest.mark.usefixtures("at_once")
 def test_it_serves_while_the_other_kernels_warm_up_and_stops_then_too():
     SlowToWarm.may_finish.clear()
     with serving(SlowToWarm) as host, Client(host.address) as client:
@@ -70,6 +78,18 @@ def test_it_serves_while_the_other_kernels_warm_up_and_stops_then_too():
     assert host.said[-1] == "stopped"
 
 
+def test_the_other_kernels_wait_until_no_request_is_under_way(monkeypatch):
+    monkeypatch.setattr(serve, "_QUIET", 0.7)
+    TellsWhenWarm.warm.clear()
+    with serving(TellsWhenWarm) as host, Client(host.address) as client:
+        events = client.events(scene(8), scene(8, 1), **ENDLESS, time_budget=2.0)
+        next(events)
+        assert not TellsWhenWarm.warm.wait(1.0)
+        assert any(event.HasField("result") for event in events)
+        assert TellsWhenWarm.warm.wait(60)
+
+
+@pytest.mark.usefixtures("at_once")
 def test_an_algorithm_that_cannot_warm_up_does_not_keep_the_others_from_serving(caplog):
     with serving(Exploding) as host, Client(host.address) as client:
         assert client.match(scene(3), scene(3)).object_map == {0: 0, 1: 1, 2: 2}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import signal
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -28,6 +29,9 @@ from sketchmatch_proto.v1 import (
 )
 
 __all__ = ["ServerSettings", "serve"]
+
+_QUIET = 1.0
+_LOOK = 0.05
 
 _log = logging.getLogger(__name__)
 _SERVICES = (
@@ -107,7 +111,7 @@ async def serve(
             for name in ("", *_SERVICES):
                 await checks.set(name, health_pb2.HealthCheckResponse.SERVING)
             say("serving")
-            others = asyncio.to_thread(warm_up_others, registry, stopping.is_set)
+            others = asyncio.to_thread(warm_up_others, registry, _unless_quiet(workers, stopping))
             await _first(asyncio.ensure_future(others), stopping)
         await stopping.wait()
         say(f"stopping; running matches have {settings.grace:g} s to end")
@@ -160,6 +164,25 @@ def _stop_on_signals(stopping: asyncio.Event) -> None:
         except (NotImplementedError, RuntimeError, ValueError):
             # Not the main thread, or a system without signals: whoever embeds the server stops it.
             return
+
+
+def _unless_quiet(workers: Workers, stopping: asyncio.Event) -> Callable[[], bool]:
+    """Return a function that waits for quiet, and says whether the server was stopped instead.
+
+    It is quiet when no request has been under way for a second: to compile beside one would slow
+    it down.
+    """
+    busy = time.monotonic()
+
+    def stopped() -> bool:
+        nonlocal busy
+        while not stopping.is_set() and time.monotonic() - busy < _QUIET:
+            time.sleep(_LOOK)
+            if not workers.idle:
+                busy = time.monotonic()
+        return stopping.is_set()
+
+    return stopped
 
 
 async def _first(warming: asyncio.Future[None], stopping: asyncio.Event) -> None:

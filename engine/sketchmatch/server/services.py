@@ -87,6 +87,11 @@ class Workers:
             self._stops.discard(stop)
             stop.set()
 
+    @property
+    def idle(self) -> bool:
+        """Whether no request is under way."""
+        return not self._stops
+
     def run(self, work: Callable[[], _Answer]) -> asyncio.Future[_Answer]:
         """Run something in a thread; its place is free again when the thread is."""
 
