@@ -25,6 +25,7 @@ __all__ = [
     "MEETING",
     "OVERLAPPING",
     "TOUCHING",
+    "about_object",
     "force_histograms",
     "hybrid_force_histograms",
     "object_name",
@@ -86,6 +87,12 @@ def object_name(scene: Scene, index: int) -> str:
     return f"objects[{index}] ({label!r})" if label else f"objects[{index}]"
 
 
+def about_object(reason: Reason, name: str, problem: str) -> InvalidInputError:
+    """Return an error about an object that is named as :func:`object_name` names it."""
+    path, _, label = name.partition(" ")
+    return InvalidInputError(reason, path, f"{label} {problem}".lstrip())
+
+
 def refuse_infinite(
     relations: IntArray, pairs: IntArray, r: float, name: Callable[[int], str]
 ) -> None:
@@ -109,12 +116,11 @@ def refuse_infinite(
         (found,) = np.nonzero(relations <= closest)
         if r >= least and found.size > 0:
             a, b = pairs[found[0]]
-            path, _, aside = name(int(a)).partition(" ")
-            raise InvalidInputError(
+            raise about_object(
                 Reason.INFINITE_FORCE,
-                path,
-                f"{aside} and {name(int(b))} {verb}, so forces with r = {r:g} between them are "
-                f"infinite; use the hybrid histogram, or r below {least}".lstrip(),
+                name(int(a)),
+                f"and {name(int(b))} {verb}, so forces with r = {r:g} between them are infinite; "
+                f"use the hybrid histogram, or r below {least}",
             )
 
 

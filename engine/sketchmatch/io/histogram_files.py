@@ -9,12 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io._targets import check_target, writing
 from sketchmatch.model import FloatArray
 
 __all__ = ["HistogramTable", "check_histogram_path", "save_histograms"]
-
-_ENDINGS = (".npz", ".csv")
 
 
 @dataclass(frozen=True)
@@ -57,17 +55,7 @@ def check_histogram_path(path: str | Path, field: str = "out") -> None:
     InvalidInputError
         If the name's ending is not .npz or .csv, or its folder does not exist.
     """
-    path = Path(path)
-    if path.suffix.lower() not in _ENDINGS:
-        raise InvalidInputError(
-            Reason.INVALID_FILE, field, f"is {str(path)!r}; let its name end in .npz or .csv"
-        )
-    if not path.parent.is_dir():
-        raise InvalidInputError(
-            Reason.INVALID_FILE,
-            field,
-            f"is {str(path)!r}, but there is no folder {str(path.parent)!r}; create it first",
-        )
+    check_target(path, field, (".npz", ".csv"), ".npz or .csv")
 
 
 def save_histograms(path: str | Path, table: HistogramTable, field: str = "out") -> None:
@@ -86,18 +74,11 @@ def save_histograms(path: str | Path, table: HistogramTable, field: str = "out")
     """
     check_histogram_path(path, field)
     path = Path(path)
-    try:
+    with writing(path, field):
         if path.suffix.lower() == ".csv":
             _write_csv(path, table)
         else:
             _write_npz(path, table)
-    except OSError as error:
-        why = error.strerror or "the disk refused it"
-        raise InvalidInputError(
-            Reason.INVALID_FILE,
-            field,
-            f"cannot be written to {str(path)!r} ({why}); name a file in a folder of yours",
-        ) from None
 
 
 def _write_npz(path: Path, table: HistogramTable) -> None:

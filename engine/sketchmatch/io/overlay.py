@@ -18,6 +18,7 @@ from sketchmatch.io._overlay.canvas import printable
 from sketchmatch.io._overlay.page import Entry, Page
 from sketchmatch.io._overlay.panel import Panel, badge_size
 from sketchmatch.io._overlay.relations import MOST_PLOTS, Plot, RelationsPage
+from sketchmatch.io._targets import check_target, writing
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene
 
 __all__ = [
@@ -261,19 +262,7 @@ def check_picture_path(path: str | Path, field: str = "overlay") -> None:
     InvalidInputError
         If the name's ending is no picture's, or its folder does not exist.
     """
-    path = Path(path)
-    if path.suffix.lower() not in _FORMATS:
-        raise InvalidInputError(
-            Reason.INVALID_FILE,
-            field,
-            f"is {str(path)!r}; let its name end in .png, .jpg or .webp",
-        )
-    if not path.parent.is_dir():
-        raise InvalidInputError(
-            Reason.INVALID_FILE,
-            field,
-            f"is {str(path)!r}, but there is no folder {str(path.parent)!r}; create it first",
-        )
+    check_target(path, field, _FORMATS, ".png, .jpg or .webp")
 
 
 def save_overlay(path: str | Path, image: Image.Image, field: str = "overlay") -> None:
@@ -292,15 +281,8 @@ def save_overlay(path: str | Path, image: Image.Image, field: str = "overlay") -
         If the name's ending is no picture's, or the file cannot be written.
     """
     check_picture_path(path, field)
-    try:
+    with writing(path, field):
         image.save(path, _FORMATS[Path(path).suffix.lower()], quality=92)
-    except OSError as error:
-        why = error.strerror or "the disk refused it"
-        raise InvalidInputError(
-            Reason.INVALID_FILE,
-            field,
-            f"cannot be written to {str(path)!r} ({why}); name a file in a folder of yours",
-        ) from None
 
 
 def _check_width(width: int) -> None:

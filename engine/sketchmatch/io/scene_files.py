@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io._targets import check_target, writing
 from sketchmatch.model import FloatArray, Scene, SceneObject
 
 __all__ = ["check_scene_path", "encode_geojson", "save_scene"]
@@ -45,17 +45,7 @@ def check_scene_path(path: str | Path, field: str = "out") -> None:
     InvalidInputError
         If the name's ending is not .geojson, or its folder does not exist.
     """
-    path = Path(path)
-    if path.suffix.lower() != ".geojson":
-        raise InvalidInputError(
-            Reason.INVALID_FILE, field, f"is {str(path)!r}; let its name end in .geojson"
-        )
-    if not path.parent.is_dir():
-        raise InvalidInputError(
-            Reason.INVALID_FILE,
-            field,
-            f"is {str(path)!r}, but there is no folder {str(path.parent)!r}; create it first",
-        )
+    check_target(path, field, (".geojson",), ".geojson")
 
 
 def save_scene(path: str | Path, scene: Scene, field: str = "out") -> None:
@@ -67,16 +57,9 @@ def save_scene(path: str | Path, scene: Scene, field: str = "out") -> None:
         If the name's ending is not .geojson, or the file cannot be written.
     """
     check_scene_path(path, field)
-    try:
+    with writing(path, field):
         # What UTF-8 cannot hold is escaped as JSON escapes it.
         Path(path).write_bytes(encode_geojson(scene).encode("utf-8", "backslashreplace"))
-    except OSError as error:
-        why = error.strerror or "the disk refused it"
-        raise InvalidInputError(
-            Reason.INVALID_FILE,
-            field,
-            f"cannot be written to {str(path)!r} ({why}); name a file in a folder of yours",
-        ) from None
 
 
 def _feature(item: SceneObject) -> dict[str, Any]:

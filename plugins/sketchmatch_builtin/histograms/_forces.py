@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from sketchmatch.api import Histogram
 from sketchmatch.api.forces import (
@@ -17,22 +19,33 @@ from sketchmatch.api.forces import (
 )
 from sketchmatch.model import FloatArray, IntArray, Scene
 
-__all__ = ["PowerForce", "two_squares"]
+__all__ = ["ForceHistogram", "PowerForce", "exponent_field"]
 
 
-def two_squares() -> Scene:
-    """Return the smallest scene, to compile kernels with."""
-    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    return Scene.from_polygons([square, square + np.array([2.0, 0.0])])
+def exponent_field(default: float) -> Any:
+    """Return the parameter r of forces d^−r, with its bounds and text."""
+    return Field(
+        default,
+        ge=-10.0,
+        le=10.0,
+        description="The force at distance d is d^-r; objects may overlap for r < 1 and "
+        "touch for r < 2.",
+    )
 
 
-class PowerForce(Histogram):
-    """A histogram of the forces d^−r between polygons."""
+class ForceHistogram(Histogram):
+    """A histogram of forces, whose kernel two squares compile."""
 
     @classmethod
     def warm_up(cls) -> None:
-        """Compile the kernel."""
-        cls().describe(two_squares(), np.array([[0, 1]]))
+        """Compile the kernels."""
+        square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+        scene = Scene.from_polygons([square, square + np.array([2.0, 0.0])])
+        cls().describe(scene, np.array([[0, 1]]))
+
+
+class PowerForce(ForceHistogram):
+    """A histogram of the forces d^−r between polygons."""
 
     def describe(self, scene: Scene, pairs: IntArray) -> FloatArray:
         """Return the histograms of pairs of objects, shape (k, directions).

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from pydantic import Field
-
 from sketchmatch.api import HistogramParams
-from sketchmatch_builtin.histograms._forces import PowerForce
+from sketchmatch_builtin.histograms._forces import PowerForce, exponent_field
 
 __all__ = ["Force"]
 
@@ -26,13 +24,7 @@ class Force(PowerForce):
     class Params(HistogramParams):
         """The number of directions, and the exponent."""
 
-        r: float = Field(
-            1.0,
-            ge=-10.0,
-            le=10.0,
-            description="The force at distance d is d^-r; objects may overlap for r < 1 and "
-            "touch for r < 2.",
-        )
+        r: float = exponent_field(1.0)
 
     params: Params
 

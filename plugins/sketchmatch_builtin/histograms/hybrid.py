@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from pydantic import Field
 
-from sketchmatch.api import Histogram, HistogramParams
+from sketchmatch.api import HistogramParams
 from sketchmatch.api.forces import (
     APART,
     OVERLAPPING,
@@ -14,12 +14,12 @@ from sketchmatch.api.forces import (
     scene_relations,
 )
 from sketchmatch.model import FloatArray, IntArray, Scene
-from sketchmatch_builtin.histograms._forces import two_squares
+from sketchmatch_builtin.histograms._forces import ForceHistogram
 
 __all__ = ["HybridForce"]
 
 
-class HybridForce(Histogram):
+class HybridForce(ForceHistogram):
     """Exact histogram of hybrid forces (F02) of polygons: constant up to a distance, 1/d² beyond.
 
     The distance Y is ``near`` times the diameter of the smaller object, or ``overlap`` times that
@@ -54,11 +54,6 @@ class HybridForce(Histogram):
         )
 
     params: Params
-
-    @classmethod
-    def warm_up(cls) -> None:
-        """Compile the kernel."""
-        cls().describe(two_squares(), np.array([[0, 1]]))
 
     def describe(self, scene: Scene, pairs: IntArray) -> FloatArray:
         """Return the histograms of pairs of objects, shape (k, directions)."""

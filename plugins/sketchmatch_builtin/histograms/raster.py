@@ -7,16 +7,16 @@ from functools import lru_cache, partial
 import numpy as np
 from pydantic import Field
 
-from sketchmatch.api import Histogram, HistogramParams, InvalidInputError, Reason
-from sketchmatch.api.forces import force_histograms, object_name, refuse_infinite
+from sketchmatch.api import HistogramParams, Reason
+from sketchmatch.api.forces import about_object, force_histograms, object_name, refuse_infinite
 from sketchmatch.api.pixels import PixelObject, outlines, pixel_relations, rasterised
 from sketchmatch.model import Edges, FloatArray, IntArray, Scene
-from sketchmatch_builtin.histograms._forces import two_squares
+from sketchmatch_builtin.histograms._forces import ForceHistogram, exponent_field
 
 __all__ = ["RasterForce"]
 
 
-class RasterForce(Histogram):
+class RasterForce(ForceHistogram):
     """Histogram of the forces d^−r of objects on a grid, exact for their pixels.
 
     The scene is laid on a grid of square pixels, and an object becomes the pixels whose centres it
@@ -33,13 +33,7 @@ class RasterForce(Histogram):
     class Params(HistogramParams):
         """The number of directions, the exponent, and the size of the grid."""
 
-        r: float = Field(
-            0.0,
-            ge=-10.0,
-            le=10.0,
-            description="The force at distance d is d^-r; objects may overlap for r < 1 and "
-            "touch for r < 2.",
-        )
+        r: float = exponent_field(0.0)
         pixels: int = Field(
             256, ge=8, le=4096, description="Pixels along the longer side of the scene."
         )
@@ -50,11 +44,6 @@ class RasterForce(Histogram):
     def exponent(self) -> float:
         """r."""
         return self.params.r
-
-    @classmethod
-    def warm_up(cls) -> None:
-        """Compile the kernels."""
-        cls().describe(two_squares(), np.array([[0, 1]]))
 
     def describe(self, scene: Scene, pairs: IntArray) -> FloatArray:
         """Return the histograms of pairs of objects, shape (k, directions).
@@ -86,12 +75,11 @@ def _rasterised(scene: Scene, pixels: int) -> tuple[float, tuple[PixelObject, ..
         own = slice(offsets[k], offsets[k + 1])
         found = rasterised((starts[own] - corner) / pixel, (ends[own] - corner) / pixel)
         if not found.mask.any():
-            path, _, aside = object_name(scene, k).partition(" ")
-            raise InvalidInputError(
+            raise about_object(
                 Reason.INVALID_PARAMETER,
-                path,
-                f"{aside} holds no pixel of a grid of {pixels}; "
-                "raise histogram.pixels or leave the object out".lstrip(),
+                object_name(scene, k),
+                f"holds no pixel of a grid of {pixels}; raise histogram.pixels or leave the "
+                "object out",
             )
         objects.append(found)
     return pixel, tuple(objects), outlines(objects)

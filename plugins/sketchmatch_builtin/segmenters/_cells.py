@@ -15,6 +15,7 @@ from sketchmatch.model import FloatArray, OccupancyGrid
 from sketchmatch_builtin.segmenters._border import outer_border
 
 __all__ = [
+    "TOLERANCE",
     "Mask",
     "closed",
     "components",
@@ -24,9 +25,13 @@ __all__ = [
     "joined_to_walls",
     "outline",
     "reading_order",
+    "refuse_more",
 ]
 
 Mask = NDArray[np.uint8]
+
+TOLERANCE = 0.75
+"""In cells: the steps of a slanted border leave the straight line by up to √½ of a cell."""
 
 
 def free_cells(grid: OccupancyGrid, threshold: int) -> tuple[Mask, tuple[int, int]]:
@@ -75,6 +80,22 @@ def closed(mask: Mask, gap: int) -> Mask:
     return result
 
 
+def refuse_more(count: int, most: int, remedy: str) -> None:
+    """Refuse more than ``most`` objects.
+
+    Raises
+    ------
+    InvalidInputError
+        With the path ``cells`` and the remedy.
+    """
+    if count > most:
+        raise InvalidInputError(
+            Reason.LIMIT_EXCEEDED,
+            "cells",
+            f"has {count} objects, more than the limit of {most}; {remedy}",
+        )
+
+
 def components(
     mask: Mask, least: float, most: int, remedy: str
 ) -> Iterator[tuple[Mask, tuple[int, int]]]:
@@ -87,12 +108,7 @@ def components(
     """
     count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     large = 1 + np.flatnonzero(statistics[1:count, cv2.CC_STAT_AREA] >= least)
-    if len(large) > most:
-        raise InvalidInputError(
-            Reason.LIMIT_EXCEEDED,
-            "cells",
-            f"has {len(large)} objects, more than the limit of {most}; {remedy}",
-        )
+    refuse_more(len(large), most, remedy)
     for k in large.tolist():
         x, y, width, height, _ = statistics[k].tolist()
         yield np.asarray(labels[y : y + height, x : x + width] == k, dtype=np.uint8), (x, y)

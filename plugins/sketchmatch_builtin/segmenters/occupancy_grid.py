@@ -16,6 +16,7 @@ from sketchmatch.api import InvalidInputError, Params, Reason, Segmentation, Seg
 from sketchmatch.model import IntArray, OccupancyGrid, Scene, SceneObject
 from sketchmatch.model.limits import source_limits
 from sketchmatch_builtin.segmenters._cells import (
+    TOLERANCE,
     Mask,
     closed,
     components,
@@ -25,13 +26,12 @@ from sketchmatch_builtin.segmenters._cells import (
     joined_to_walls,
     outline,
     reading_order,
+    refuse_more,
 )
 from sketchmatch_builtin.segmenters._merging import merged
 
 __all__ = ["OccupancyGridSegmenter"]
 
-# The steps of a slanted border leave the straight line by up to √½ of a cell.
-_CELLS_TOLERANCE = 0.75
 # As a share of an object's size: a tolerance beyond it would change the shape, not the noise.
 _COARSEST_TOLERANCE = 0.12
 # Legs, before they are merged to tables.
@@ -199,18 +199,12 @@ class OccupancyGridSegmenter(Segmenter):
             polygons = merged(polygons, self.params.merge_distance / cell, largest)
             least = (self.params.min_size / grid.resolution) ** 2
             polygons = polygons[shapely.area(polygons) >= least]
-        most = source_limits().max_objects
-        if len(polygons) > most:
-            raise InvalidInputError(
-                Reason.LIMIT_EXCEEDED,
-                "cells",
-                f"has {len(polygons)} objects, more than the limit of {most}; raise min_size",
-            )
+        refuse_more(len(polygons), source_limits().max_objects, "raise min_size")
         return sorted((self._simplified(p, grid) for p in polygons), key=reading_order)
 
     def _simplified(self, polygon: shapely.Polygon, grid: OccupancyGrid) -> shapely.Polygon:
         if self.params.tolerance is None:
-            tolerance = _CELLS_TOLERANCE
+            tolerance = TOLERANCE
         else:
             tolerance = self.params.tolerance / grid.resolution
         coarsest = _COARSEST_TOLERANCE * math.sqrt(polygon.area)

@@ -13,6 +13,7 @@ from sketchmatch.api import InvalidInputError, Params, Reason, Segmentation, Seg
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene, SceneObject
 from sketchmatch.model.limits import source_limits
 from sketchmatch_builtin.segmenters._cells import (
+    TOLERANCE,
     Mask,
     components,
     free_cells,
@@ -25,7 +26,6 @@ from sketchmatch_builtin.segmenters._doorways import divided
 
 __all__ = ["RoomSegmenter"]
 
-_CELLS_TOLERANCE = 0.75
 _MOST_HOLES = 1000
 
 
@@ -107,7 +107,7 @@ class RoomSegmenter(Segmenter):
         ]
         if len(outlines) < 2:
             raise _too_few(len(outlines), params)
-        tolerance = _CELLS_TOLERANCE if params.tolerance is None else params.tolerance / cell
+        tolerance = TOLERANCE if params.tolerance is None else params.tolerance / cell
         outlines = sorted(_simplified(outlines, tolerance), key=reading_order)
         scene = Scene(
             tuple(
