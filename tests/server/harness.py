@@ -13,9 +13,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from sketchmatch.api import Algorithm
+from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from sketchmatch.server.limits import Limits
 from sketchmatch.server.serve import ServerSettings, serve
+from sketchmatch.server.setup import Isolation, Setup
 from sketchmatch_client import ServerBusyError, sources
 from sketchmatch_proto.v1 import source_pb2
 
@@ -37,13 +39,13 @@ class Host:
     gRPC's asyncio serves several loops in one process, but not one that closes.
     """
 
-    def __init__(self, registry: Registry, settings: ServerSettings) -> None:
+    def __init__(self, setup: Setup, settings: ServerSettings) -> None:
         self.said: list[str] = []
         self.address = ""
         self.serving = threading.Event()
         self._listening = threading.Event()
         self._stop = asyncio.Event()
-        self._end = in_loop(serve(registry, settings, self._say, self._stop))
+        self._end = in_loop(serve(lambda: setup, settings, self._say, self._stop))
         self._end.add_done_callback(lambda _: self._listening.set())
 
     def wait_until_listening(self) -> None:
@@ -80,11 +82,27 @@ def _loop() -> asyncio.AbstractEventLoop:
 
 @contextmanager
 def serving(
-    *plugins: type[Algorithm], warm: bool = True, grace: float = 0.0, **limits: float
+    *plugins: type[Algorithm],
+    warm: bool = True,
+    grace: float = 0.0,
+    defaults: Defaults = UNCONFIGURED,
+    **limits: float,
 ) -> Iterator[Host]:
-    """Run a server that offers the built-in algorithms and ``plugins``."""
-    settings = ServerSettings("127.0.0.1:0", grace, Limits(**{**_LONGEST, **limits}))
-    host = Host(registry_with(*plugins), settings)
+    """Run a server that offers the built-in algorithms and ``plugins``, in its own process."""
+    setup = Setup(
+        registry_with(*plugins),
+        defaults,
+        limits=Limits(**{**_LONGEST, **limits}),
+        isolation=Isolation(trusted=frozenset("*")),
+    )
+    with hosting(setup, warm, grace) as host:
+        yield host
+
+
+@contextmanager
+def hosting(setup: Setup, warm: bool = True, grace: float = 0.0) -> Iterator[Host]:
+    """Run a server with a setup."""
+    host = Host(setup, ServerSettings("127.0.0.1:0", grace))
     try:
         host.wait_until_listening()
         if warm:

@@ -9,8 +9,7 @@ from grpc_reflection.v1alpha.proto_reflection_descriptor_database import (
 )
 
 import sketchmatch
-from sketchmatch.pipeline import warmup
-from sketchmatch.registry import Kind
+from sketchmatch.pipeline.selection import Choice, Defaults
 from sketchmatch.server import serve
 from sketchmatch_client import Client, ServerUnavailableError
 from sketchmatch_client.errors import CallCancelledError
@@ -30,17 +29,12 @@ def health(address: str, service: str = "") -> str:
     return health_pb2.HealthCheckResponse.ServingStatus.Name(status)
 
 
-@pytest.fixture
-def slow_default(monkeypatch):
-    """Make an algorithm that takes long to warm up one of the defaults."""
-    defaults = {**warmup.DEFAULTS, Kind.SEARCHER: ("slow-to-warm",)}
-    monkeypatch.setattr(warmup, "DEFAULTS", defaults)
+SLOW_DEFAULT = Defaults({"searcher": Choice("slow-to-warm")})
 
 
-@pytest.mark.usefixtures("slow_default")
 def test_health_is_not_serving_until_the_default_kernels_are_warm():
     SlowToWarm.may_finish.clear()
-    with serving(SlowToWarm, warm=False) as host:
+    with serving(SlowToWarm, warm=False, defaults=SLOW_DEFAULT) as host:
         assert health(host.address) == "NOT_SERVING"
         with Client(host.address) as client, pytest.raises(ServerUnavailableError, match="wait"):
             client.wait_until_serving(0.2)
@@ -50,10 +44,9 @@ def test_health_is_not_serving_until_the_default_kernels_are_warm():
         assert [health(host.address, name) for name in ("", *SERVICES)] == ["SERVING"] * 4
 
 
-@pytest.mark.usefixtures("slow_default")
 def test_a_server_that_is_stopped_while_it_warms_up_stops():
     SlowToWarm.may_finish.clear()
-    with serving(SlowToWarm, warm=False) as host:
+    with serving(SlowToWarm, warm=False, defaults=SLOW_DEFAULT) as host:
         host.stop()
         time.sleep(0.1)
         SlowToWarm.may_finish.set()

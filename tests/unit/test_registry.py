@@ -1,12 +1,13 @@
 """Plugins are loaded each alone, and what is wrong with one is said where it matters."""
 
 import itertools
-from importlib.metadata import DistributionFinder, MetadataPathFinder
+import sys
+from importlib.metadata import DistributionFinder, MetadataPathFinder, entry_points
 
 import pytest
 
-from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.registry import Kind, discover
+from sketchmatch.errors import InvalidInputError, PluginError, Reason
+from sketchmatch.registry import Kind, PluginRules, PluginState, discover
 
 HEADER = """
 from sketchmatch.api import Histogram, Params, Searcher, Similarity, hookimpl
@@ -71,7 +72,7 @@ def test_the_built_in_algorithms_are_found_like_any_others():
         ("searcher", "exact"),
     }
     (status,) = (s for s in registry.statuses if s.entry_point == "builtin")
-    assert (status.distribution, status.failure) == ("sketchmatch", "")
+    assert (status.distribution, status.state, status.reason) == ("sketchmatch", "ACTIVE", "")
 
 
 def test_every_built_in_algorithm_describes_itself_and_its_parameters():
@@ -120,8 +121,54 @@ def test_a_third_partys_plugin_is_found(install):
         (SEARCHER.replace('name = "{name}"', ""), "Lucky.name is not a string"),
         (SEARCHER.replace('summary = "Guesses."', "summary = 3"), "Lucky.summary is not a string"),
         (
-            SEARCHER.replace("    def search", "    class Params: pass\n\n    def search"),
+            SEARCHER.replace("    def search", "    class Params: pass\n\n    def search").format(
+                name="x"
+            ),
             "Lucky.Params does not derive from sketchmatch.api.Params",
+        ),
+        ("raise SystemExit(3)", "SystemExit: 3"),
+        ("", "it offers no algorithm"),
+        (SEARCHER.format(name="Lucky One"), "use small letters, digits and hyphens"),
+        (
+            SEARCHER.replace("return [Lucky]", "return [Lucky, Lucky]").format(name="x"),
+            "it offers 2 searchers named 'x'",
+        ),
+        (
+            SEARCHER.replace(
+                "    def search", "    class Params(Params):\n        tries: int\n\n    def search"
+            ).format(name="x"),
+            "Lucky.Params.tries has no default",
+        ),
+        (
+            HEADER
+            + """
+from sketchmatch.api import Segmenter
+
+class Finder(Segmenter):
+    name = "finder"
+    summary = "Finds."
+    sources = (str,)
+
+    def segment(self, source):
+        raise NotImplementedError
+
+@hookimpl
+def sketchmatch_register_segmenters():
+    return [Finder]
+""",
+            "Finder.sources is no tuple of some of StrokeSet, PolygonSet, OccupancyGrid, Image",
+        ),
+        (
+            "sketchmatch_api_version = 99\n" + SEARCHER.format(name="x"),
+            "it is written for version 99 of the plugin API, and this engine has 1; upgrade sketch",
+        ),
+        (
+            "sketchmatch_api_version = 0\n" + SEARCHER.format(name="x"),
+            "it is written for version 0 of the plugin API, and this engine has 1; upgrade the pl",
+        ),
+        (
+            "sketchmatch_api_version = '1'\n" + SEARCHER.format(name="x"),
+            "sketchmatch_api_version is '1', which is not a whole number",
         ),
     ],
 )
@@ -134,8 +181,14 @@ def test_a_broken_plugin_is_reported_and_stops_no_other(install, source, words):
         "acme-broken",
         "0.3",
     )
-    assert words in failed.failure
-    assert good.failure == ""
+    assert failed.state is PluginState.FAILED
+    assert words in failed.reason
+    assert (good.state, good.reason) == (PluginState.ACTIVE, "")
+    assert registry.problems == (
+        f"plugin acme-broken of acme-broken 0.3 failed to load: {failed.reason}",
+    )
+    with pytest.raises(PluginError, match=r"acme-broken 0\.3 failed to load: .*without strict"):
+        registry.refuse_problems()
     assert [item.name for item in registry.algorithms] == ["lucky"]
 
 
@@ -147,17 +200,88 @@ def test_a_request_for_what_a_broken_plugin_may_have_offered_tells_of_it(install
     assert caught.value.reason is Reason.UNKNOWN_ALGORITHM
     assert caught.value.field == "name"
     assert caught.value.problem == (
-        "is 'clever', which is no searcher; choose one of: lucky; plugin acme-broken of "
-        "acme-broken failed to load: RuntimeError: no licence"
+        "is 'clever', which is no searcher; plugin acme-broken of acme-broken failed to load: "
+        "RuntimeError: no licence; choose one of: lucky"
     )
 
 
 def test_of_two_with_the_same_name_neither_is_taken_and_both_are_named(install):
     source = SEARCHER.format(name="lucky")
     registry = discover([*install(source, "acme-one", "1.1"), *install(source, "acme-two", "2.2")])
-    with pytest.raises(InvalidInputError, match="uninstall one of them") as caught:
+    sentence = (
+        "is offered by acme-one 1.1 and acme-two 2.2{}; uninstall one or deny it in plugins.deny"
+    )
+    with pytest.raises(InvalidInputError) as caught:
         registry.find(Kind.SEARCHER, "lucky")
-    assert "both acme-one 1.1 and acme-two 2.2 offer" in caught.value.problem
+    assert caught.value.problem == "is 'lucky', which " + sentence.format("")
+    assert registry.of_kind(Kind.SEARCHER) == ()
+    told = "searcher 'lucky' " + sentence.format(": neither is taken")
+    assert registry.problems == (told,)
+    assert [(status.state, status.reason) for status in registry.statuses] == [
+        (PluginState.ACTIVE, told),
+        (PluginState.ACTIVE, told),
+    ]
+
+
+def test_a_plugin_cannot_take_the_name_of_a_built_in_algorithm_away(install):
+    own = next(point for point in entry_points(group="sketchmatch") if point.name == "builtin")
+    registry = discover([*install(SEARCHER.format(name="auto"), "acme-search", "2.1"), own])
+    assert registry.find(Kind.SEARCHER, "auto").distribution == "sketchmatch"
+    theirs, ours = registry.statuses
+    assert "that of sketchmatch is taken" in theirs.reason
+    assert ours.reason == ""
+    assert registry.problems == (theirs.reason,)
+
+
+def test_only_what_the_rules_let_in_is_loaded(install):
+    lucky = install(SEARCHER.format(name="lucky"), "Acme_Search", "2.1")
+    for rules, reason in [
+        (PluginRules.of(deny=["acme.search"]), "the configuration denies it (plugins.deny)"),
+        (PluginRules.of(allow=["other"]), "the configuration does not allow it (plugins.allow)"),
+        (PluginRules.of(allow=["acme-search"], deny=["acme-search"]), "the configuration denies"),
+    ]:
+        registry = discover(lucky, rules)
+        (status,) = registry.statuses
+        assert status.state is PluginState.DISABLED
+        assert status.reason.startswith(reason)
+        assert lucky[0].value not in sys.modules, "it was not even imported"
+        assert registry.problems == ()
+        with pytest.raises(InvalidInputError, match=r"plugin .* is disabled: the configuration"):
+            registry.find(Kind.SEARCHER, "lucky")
+    assert discover(lucky, PluginRules.of(allow=["ACME-search"])).find(Kind.SEARCHER, "lucky")
+
+
+def test_the_engines_own_algorithms_are_there_whatever_the_rules_say():
+    registry = discover(rules=PluginRules.of(allow=[], deny=["sketchmatch"]))
+    assert registry.find(Kind.SEARCHER, "auto")
+
+
+def test_a_plugin_that_takes_for_ever_to_load_is_left_behind(install):
+    endless = install("import time\nwhile True:\n    time.sleep(0.01)", "acme-endless")
+    good = install(SEARCHER.format(name="lucky"), "acme-good")
+    registry = discover([*endless, *good], loading_seconds=0.3)
+    assert [status.state for status in registry.statuses] == ["FAILED", "ACTIVE"]
+    assert registry.statuses[0].reason == (
+        "TimeoutError: it was not loaded after 0.3 s; do less at import"
+    )
+
+
+def test_the_source_of_an_algorithm_is_what_its_text_refers_to(install):
+    text = """Guesses.
+
+    References
+    ----------
+    .. [1] A. Author, "Luck", 1999.
+    B. Writer, "Chance",
+    2001.
+
+    Notes
+    -----
+    Nothing to add.
+    """
+    with_source = SEARCHER.replace("Guesses.", text, 1)
+    (item,) = discover(install(with_source.format(name="lucky"), "acme-search")).algorithms
+    assert item.source == '[1] A. Author, "Luck", 1999. B. Writer, "Chance", 2001.'
 
 
 def test_the_same_name_in_two_kinds_is_no_conflict(install):

@@ -13,7 +13,7 @@ API_VERSION = 1
 
 
 class Params(BaseModel):
-    """Parameters of one algorithm: frozen, nothing extra, bounds and text on every field.
+    """Parameters of one algorithm: frozen, nothing extra; default, bounds and text on every field.
 
     One definition serves validation, configuration, command line, catalogue and documentation.
 
@@ -21,7 +21,9 @@ class Params(BaseModel):
     --------
     >>> from pydantic import Field
     >>> class Tracing(Params):
-    ...     tolerance: float = Field(0.1, gt=0, description="Simplification, in metres.")
+    ...     tolerance: float = Field(
+    ...         0.1, gt=0, description="Simplification.", json_schema_extra={"unit": "m"}
+    ...     )
     >>> Tracing(tolerance=0.5)
     Tracing(tolerance=0.5)
     """

@@ -1,4 +1,36 @@
-"""Compiled functions that a plugin written with numba may call from its own compiled code."""
+"""Compiled functions that a plugin may call, from Python or from compiled code of its own.
+
+- :func:`kernel` compiles a function as the engine's own are compiled: without the GIL, cached on
+  disk, sums in the order in which they are written.
+- ζ of any FMAP: :func:`fmap_confidence`, and :func:`fmap_confidence_above`, which gives up where ζ
+  cannot exceed a floor.
+- ζ of object maps move by move: :func:`empty_map_state` makes room for a :class:`MapState`,
+  :func:`place_map` puts a map into it, :func:`confidence_after` weighs a move in O(N log N),
+  :func:`make_move` makes it in O(Q), :func:`map_confidence` says ζ. Search by moves needs no more.
+- Beneath these: :func:`map_entry` (σ, cos R, sin R and L̂ of one entry), :func:`total_distance` and
+  :func:`mean_absolute_difference` (ζL).
+- Rows of histograms: :func:`contrast_rows`, :func:`overlap_rows`.
+
+Generators of :mod:`numpy.random` may be handed to compiled code.
+
+Examples
+--------
+>>> import numpy as np
+>>> from sketchmatch.model import RelationTable
+>>> similarity = np.array([[0.9, 0.2, 0.3], [0.1, 0.8, 0.2], [0.3, 0.1, 0.7]])
+>>> table = RelationTable(similarity, np.zeros((3, 3)), np.ones((3, 3)), 3, 3)
+>>> state = empty_map_state(table, (1.0, 0.0, 0.0))
+>>> float(round(place_map(state, np.array([0, 1, 2])), 9))
+0.8
+>>> float(round(confidence_after(state, 0, 1), 9))  # objects 0 and 1 exchange their partners
+0.4
+>>> state.partners.tolist()
+[0, 1, 2]
+>>> bool(make_move(state, 0, 1) == map_confidence(state))
+True
+>>> state.partners.tolist()
+[1, 0, 2]
+"""
 
 from sketchmatch.kernels._jit import kernel
 from sketchmatch.kernels.confidence import (

@@ -62,7 +62,7 @@ class SearchProgress:
     evaluations
         FMAPs evaluated.
     upper_bound
-        A ζ that no legal FMAP exceeds, or None where the searcher proves nothing.
+        A ζ that no FMAP of an object map exceeds, or None where the searcher proves nothing.
     alternatives
         Good legal FMAPs beside the best, in any order; the host picks the best of them that lead
         to other object maps. Only those of the last progress count.

@@ -42,7 +42,7 @@ from sketchmatch.pipeline.correspond import (
 )
 from sketchmatch.pipeline.describe import describe
 from sketchmatch.pipeline.limits import check_comparisons, check_histograms
-from sketchmatch.pipeline.plugins import blaming, checked_progress, segmented
+from sketchmatch.pipeline.plugins import blaming, checked_progress, inspecting, segmented
 from sketchmatch.pipeline.relate import check_exponent, relate
 from sketchmatch.pipeline.result import (
     AlternativeMap,
@@ -50,7 +50,7 @@ from sketchmatch.pipeline.result import (
     ObjectMatch,
     Statistics,
 )
-from sketchmatch.pipeline.selection import Pipeline, Selection, resolve
+from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, Pipeline, Selection, resolve
 from sketchmatch.pipeline.words import nearest_relations
 from sketchmatch.registry import Registry
 
@@ -101,6 +101,8 @@ class MatchRequest:
     alternatives
         How many of the next best object maps the result shall hold; None for 3, or as many as
         there are.
+    profile
+        Name of the profile to take the rest from; empty for the default one.
     """
 
     sketch: Source | Scene
@@ -110,6 +112,7 @@ class MatchRequest:
     time_budget: float | None = None
     weights: Weights = (1.0, 1.0, 1.0)
     alternatives: int | None = None
+    profile: str = ""
 
     def __post_init__(self) -> None:
         if not (isinstance(self.seed, int) and 0 <= self.seed <= _MAX_SEED):
@@ -208,7 +211,9 @@ class Finished:
 MatchEvent = Accepted | Segmented | Progress | Finished
 
 
-def run_match(request: MatchRequest, registry: Registry) -> Generator[MatchEvent, None, None]:
+def run_match(
+    request: MatchRequest, registry: Registry, defaults: Defaults = UNCONFIGURED
+) -> Generator[MatchEvent, None, None]:
     """Match, yielding Accepted, Segmented, some Progress (at most 20 a second) and Finished.
 
     Closing the generator stops the work; between two events it works 50 ms or less, but for a
@@ -223,13 +228,13 @@ def run_match(request: MatchRequest, registry: Registry) -> Generator[MatchEvent
     PluginError
         If a plugin breaks its contract.
     """
-    return _Match(request, registry).run()
+    return _Match(request, registry, defaults).run()
 
 
 class _Match:
     """The state of one running match."""
 
-    def __init__(self, request: MatchRequest, registry: Registry) -> None:
+    def __init__(self, request: MatchRequest, registry: Registry, defaults: Defaults) -> None:
         self.request = request
         self.registry = registry
         self.match_id = uuid.uuid4().hex
@@ -242,6 +247,8 @@ class _Match:
                 request.selection,
                 None if isinstance(request.sketch, Scene) else request.sketch,
                 None if isinstance(request.map, Scene) else request.map,
+                defaults,
+                request.profile,
             )
         except InvalidInputError as error:
             raise error.within("pipeline") from None
@@ -278,7 +285,8 @@ class _Match:
         histogram = self.pipeline.histogram
         try:
             work = describe(scene, histogram)
-            return (yield from self.watched(Phase.DESCRIBE, histogram, work))
+            with inspecting(histogram, self.registry, scene):
+                return (yield from self.watched(Phase.DESCRIBE, histogram, work))
         except InvalidInputError as error:
             raise error.within(side) from None
 
@@ -318,7 +326,7 @@ class _Match:
             while True:
                 with blaming(searcher, self.registry):
                     try:
-                        best = checked_progress(next(work), table)
+                        best = checked_progress(next(work), problem, best)
                     except StopIteration as stop:
                         if best is None:
                             raise ValueError("it ended without any answer") from None
@@ -346,11 +354,12 @@ class _Match:
             work = searcher.search(problem, np.random.default_rng(self.request.seed))
             if not isinstance(work, Generator):
                 raise TypeError(f"its search is a {type(work).__name__}, not a generator")
-        try:
-            yield work
-        finally:
-            with blaming(searcher, self.registry):
-                work.close()
+        with inspecting(searcher, self.registry, problem.table):
+            try:
+                yield work
+            finally:
+                with blaming(searcher, self.registry):
+                    work.close()
 
     def result(
         self,

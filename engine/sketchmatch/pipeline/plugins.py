@@ -5,19 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import is_dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sketchmatch.api import Algorithm, SearchProgress, Segmentation, Segmenter
-from sketchmatch.errors import InvalidInputError, PluginError, SketchmatchError
-from sketchmatch.model import FloatArray, RelationTable, Scene, Source
+from sketchmatch.api import Algorithm, MatchProblem, SearchProgress, Segmentation, Segmenter
+from sketchmatch.errors import InvalidInputError, PluginError, SketchmatchError, quoted
+from sketchmatch.model import FloatArray, Fmap, RelationTable, Scene, Source
 from sketchmatch.model.limits import check_objects, check_source
 from sketchmatch.registry import Registry
 
-__all__ = ["blaming", "checked_array", "checked_progress", "segmented"]
+__all__ = ["blaming", "checked_array", "checked_progress", "inspecting", "segmented"]
 
 _LONGEST = 200
+_ROUNDING = 1e-9
+_DOUBT = 1e-6
+_COUNTABLE = 2**63
+_ROW = 4096
 
 
 @contextmanager
@@ -28,9 +34,9 @@ def blaming(algorithm: Algorithm | type[Algorithm], registry: Registry) -> Itera
     """
     try:
         yield
-    except SketchmatchError:
+    except (SketchmatchError, KeyboardInterrupt):
         raise
-    except Exception as error:  # a plugin may raise anything
+    except BaseException as error:  # a plugin may raise anything, and exit
         text = " ".join(f"{type(error).__name__}: {error}".split())
         cause = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
         raise PluginError(
@@ -38,28 +44,114 @@ def blaming(algorithm: Algorithm | type[Algorithm], registry: Registry) -> Itera
         ) from error
 
 
-def checked_array(values: Any, shape: tuple[int, ...]) -> FloatArray:
-    """Return what a plugin returned as an array, if it is one of that shape and finite."""
+def checked_array(values: Any, shape: tuple[int, ...], most: float = math.inf) -> FloatArray:
+    """Return what a plugin returned as an array, if it has that shape and is within 0 … most."""
     array = np.asarray(values, dtype=np.float64)
     if array.shape != shape:
         raise ValueError(f"it returned an array of shape {array.shape}, not {shape}")
     if not np.isfinite(array).all():
         raise ValueError("it returned values that are not finite")
+    unit = most if most < math.inf else abs(float(array.max(initial=0.0)))
+    if array.size and array.min() < -_ROUNDING * unit:
+        raise ValueError(f"it returned {array.min():g}, which is less than 0")
+    if array.size and array.max() > most + _ROUNDING:
+        raise ValueError(f"it returned {array.max():g}, which is more than {most:g}")
     return array
 
 
-def checked_progress(progress: Any, table: RelationTable) -> SearchProgress:
-    """Return what a search yielded, if it holds an FMAP into the table and its confidence."""
+def checked_progress(
+    progress: Any, problem: MatchProblem, former: SearchProgress | None
+) -> SearchProgress:
+    """Return what a search yielded, if it keeps to the contract of searchers.
+
+    Parameters
+    ----------
+    progress
+        What it yielded.
+    problem
+        What it was given.
+    former
+        What it yielded before, if it did.
+    """
     if not isinstance(progress, SearchProgress):
         raise TypeError(f"it yielded a {type(progress).__name__}, not a SearchProgress")
-    entries = progress.fmap.entries
+    if former is None or progress.fmap is not former.fmap:
+        _check_legal(progress.fmap, problem.table)
+    for fmap in progress.alternatives:
+        _check_legal(fmap, problem.table)
+    _check_confidence(progress, problem, former)
+    bound = progress.upper_bound
+    if bound is not None and not progress.confidence - _DOUBT <= bound < math.inf:
+        raise ValueError(f"its upper bound is {bound}, and its FMAP has ζ {progress.confidence:g}")
+    for name in ("iteration", "evaluations"):
+        count = getattr(progress, name)
+        if not (isinstance(count, int | np.integer) and 0 <= count < _COUNTABLE):
+            raise ValueError(f"its {name} is {quoted(count)}, not a count")
+    if not isinstance(progress.note, str):
+        raise TypeError(f"its note is a {type(progress.note).__name__}, not a string")
+    return progress
+
+
+def _check_legal(fmap: Any, table: RelationTable) -> None:
+    if not isinstance(fmap, Fmap):
+        raise TypeError(f"it yielded a {type(fmap).__name__}, not an Fmap")
+    entries = fmap.entries
     if entries.shape != (table.template_pairs,):
         raise ValueError(f"its FMAP has shape {entries.shape}, not ({table.template_pairs},)")
     if entries.min() < 0 or entries.max() >= 2 * table.argument_pairs:
         raise ValueError(f"its FMAP has an entry outside 0 … {2 * table.argument_pairs - 1}")
-    if not math.isfinite(progress.confidence):
-        raise ValueError(f"its confidence is {progress.confidence}")
-    return progress
+    if np.bincount(entries % table.argument_pairs).max() > 1:
+        raise ValueError("its FMAP takes a pair of objects twice, or a pair and its dual")
+
+
+def _check_confidence(
+    progress: SearchProgress, problem: MatchProblem, former: SearchProgress | None
+) -> None:
+    claimed = progress.confidence
+    if former is not None and progress.fmap is former.fmap and claimed == former.confidence:
+        return
+    # numba loads with it, and what only reads the configuration does without.
+    from sketchmatch.pipeline.correspond import fmap_confidence
+
+    confidence = fmap_confidence(progress.fmap, problem.table, problem.weights).total
+    if not abs(claimed - confidence) <= _DOUBT:  # nor NaN
+        raise ValueError(f"it says that its FMAP has ζ {claimed:g}, and it has {confidence:g}")
+    if former is not None and claimed < former.confidence - _DOUBT:
+        raise ValueError(f"its ζ fell from {former.confidence:g} to {claimed:g}")
+
+
+@contextmanager
+def inspecting(
+    algorithm: Algorithm, registry: Registry, value: RelationTable | Scene | Source
+) -> Iterator[None]:
+    """Blame an algorithm if its input, read-only as it is, changes within the block."""
+    before = dict(_checksums(value))
+    yield
+    with blaming(algorithm, registry):
+        after = dict(_checksums(value))
+        changed = [name for name, checksum in before.items() if after.get(name) != checksum]
+        if changed:
+            raise ValueError(f"it changed its input: {', '.join(changed[:3])}")
+
+
+def _checksums(value: Any, name: str = "") -> Iterator[tuple[str, int]]:
+    """Yield a checksum for each array within a value, by its path."""
+    if isinstance(value, np.ndarray):
+        yield name, _checksum(value)
+    elif isinstance(value, tuple):
+        for index, item in enumerate(value):
+            yield from _checksums(item, f"{name}[{index}]")
+    elif is_dataclass(value):
+        for field, item in vars(value).items():
+            yield from _checksums(item, f"{name}.{field}" if name else field)
+
+
+def _checksum(array: NDArray[Any]) -> int:
+    """Return a number that changes with almost any change: as fast as memory, for large tables."""
+    octets = np.ascontiguousarray(array).reshape(-1).view(np.uint8)
+    whole = len(octets) - len(octets) % _ROW
+    sums = octets[:whole].view(np.uint64).reshape(-1, _ROW // 8).sum(axis=0, dtype=np.uint64)
+    return hash((sums.tobytes(), octets[whole:].tobytes()))
 
 
 def segmented(source: Source, segmenter: Segmenter, registry: Registry, field: str) -> Segmentation:
@@ -75,7 +167,8 @@ def segmented(source: Source, segmenter: Segmenter, registry: Registry, field: s
     check_source(source, field)
     with blaming(segmenter, registry):
         try:
-            found = segmenter.segment(source)
+            with inspecting(segmenter, registry, source):
+                found = segmenter.segment(source)
         except InvalidInputError as error:
             raise error.within(field) from None
         if not isinstance(found, Segmentation):
@@ -83,6 +176,14 @@ def segmented(source: Source, segmenter: Segmenter, registry: Registry, field: s
         if not isinstance(found.scene, Scene):
             raise TypeError(f"it found a {type(found.scene).__name__}, not a Scene")
         if found.route is not None:
-            checked_array(found.route, (len(found.route), 2))
+            _check_route(found.route)
+        if not all(isinstance(warning, str) for warning in found.warnings):
+            raise TypeError("its warnings are not all strings")
     check_objects(len(found.scene), field)
     return found
+
+
+def _check_route(route: Any) -> None:
+    points = np.asarray(route, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+        raise ValueError(f"its route has shape {points.shape}, not (k, 2), or is not finite")

@@ -152,13 +152,14 @@ def _compared(
         squares *= -2.0 * template.roughness[rows, None]
         squares += template.squares[rows, None]
         sigma = similarity.combine(product, squares, argument.squares[columns])
-        return checked_array(sigma, product.shape), whole, rest
+        return checked_array(sigma, product.shape, most=1.0), whole, rest
     whole, rest = turns.alone(rows, columns)
     sigma = np.empty(rest.shape)
     others = argument.values[columns]
     for k, histogram in enumerate(template.values[rows]):
         aligned = turned_rows(histogram, whole[k], rest[k])
-        sigma[k] = checked_array(similarity.compare(aligned, others), (len(others),))
+        found = similarity.compare(aligned, others)
+        sigma[k] = checked_array(found, (len(others),), most=1.0)
     return sigma, whole, rest
 
 

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import cast
 
 import numpy as np
 
+from sketchmatch.api import Similarity
 from sketchmatch.kernels._jit import on_compile
 from sketchmatch.model import Fmap, RelationTable, SceneDescriptor
 from sketchmatch.pipeline.alternatives import exchange_confidences
 from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
 from sketchmatch.pipeline.relate import relate
-from sketchmatch.pipeline.selection import DEFAULTS, resolve
+from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, default_names
 from sketchmatch.pipeline.slices import finish
-from sketchmatch.registry import Kind, Registry
+from sketchmatch.registry import Kind, Registered, Registry
 
 __all__ = ["COMPILING", "announcing_compilation", "warm_up", "warm_up_others"]
 
@@ -40,44 +41,54 @@ def announcing_compilation(say: Callable[[str], None]) -> Iterator[None]:
         yield
 
 
-def warm_up(registry: Registry, unwanted: Callable[[], bool] = lambda: False) -> None:
-    """Load the kernels of the default pipeline, or compile them.
+def warm_up(
+    registry: Registry,
+    defaults: Defaults = UNCONFIGURED,
+    unwanted: Callable[[], bool] = lambda: False,
+) -> None:
+    """Load the kernels of what requests use that choose nothing, or compile them.
 
     Parameters
     ----------
     registry
         The algorithms.
+    defaults
+        What the configuration chooses.
     unwanted
         Asked before each algorithm; once it says so, the rest is left out.
     """
-    pipeline = resolve(registry, {})
-    table = _relate_one(pipeline.similarity)
+    table = RelationTable(np.ones((1, 1)), np.zeros((1, 1)), np.ones((1, 1)), 2, 2)
     fmap = Fmap(np.array([0]))
     fmap_confidence(fmap, table)
     exchange_confidences(object_map(occm(fmap, table)), table, (1.0, 1.0, 1.0))
-    _warm_up(registry, unwanted, default=True)
+    _warm_up([item for item, default in _split(registry, defaults) if default], unwanted)
 
 
-def warm_up_others(registry: Registry, unwanted: Callable[[], bool] = lambda: False) -> None:
+def warm_up_others(
+    registry: Registry,
+    defaults: Defaults = UNCONFIGURED,
+    unwanted: Callable[[], bool] = lambda: False,
+) -> None:
     """Load or compile the kernels of the algorithms that :func:`warm_up` leaves out."""
-    _warm_up(registry, unwanted, default=False)
+    _warm_up([item for item, default in _split(registry, defaults) if not default], unwanted)
 
 
-def _relate_one(similarity: Any) -> RelationTable:
-    """Compare one histogram with itself, which takes what aligns histograms for the measure."""
-    one = SceneDescriptor(np.array([[1.0, 0.0, 0.0, 0.0]]), 2, 0.0)
-    return finish(relate(one, one, similarity))
-
-
-def _warm_up(registry: Registry, unwanted: Callable[[], bool], *, default: bool) -> None:
+def _split(registry: Registry, defaults: Defaults) -> Iterator[tuple[Registered, bool]]:
+    """Yield each algorithm, and whether requests use it that choose nothing."""
+    names = default_names(registry, defaults)
     for item in registry.algorithms:
-        if (item.algorithm.name in DEFAULTS[item.kind]) is not default:
-            continue
+        yield item, item.name in names[item.kind]
+
+
+def _warm_up(algorithms: Iterable[Registered], unwanted: Callable[[], bool]) -> None:
+    for item in algorithms:
         if unwanted():
             return
         try:
             item.algorithm.warm_up()
             if item.kind is Kind.SIMILARITY:
-                _relate_one(item.algorithm())
+                # With it comes what aligns histograms for the measure.
+                one = SceneDescriptor(np.array([[1.0, 0.0, 0.0, 0.0]]), 2, 0.0)
+                finish(relate(one, one, cast(Similarity, item.algorithm())))
         except Exception:  # a plugin may raise anything; it will fail again when it is asked for
-            _log.exception("%s failed to warm up", registry.whose(item.algorithm))
+            _log.exception("%s failed to warm up", item.origin)

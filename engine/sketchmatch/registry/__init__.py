@@ -1,16 +1,33 @@
 """Finding plugins and picking algorithms from them by name."""
 
+from functools import cache
+
 from sketchmatch.registry.discovery import discover
-from sketchmatch.registry.registry import Kind, PluginStatus, Registered, Registry
+from sketchmatch.registry.plugins import (
+    EVERY_PLUGIN,
+    OWN_DISTRIBUTION,
+    PluginRules,
+    PluginState,
+    PluginStatus,
+)
+from sketchmatch.registry.registry import Conflict, Kind, Registered, Registry
 
-__all__ = ["Kind", "PluginStatus", "Registered", "Registry", "default_registry", "discover"]
+__all__ = [
+    "EVERY_PLUGIN",
+    "OWN_DISTRIBUTION",
+    "Conflict",
+    "Kind",
+    "PluginRules",
+    "PluginState",
+    "PluginStatus",
+    "Registered",
+    "Registry",
+    "default_registry",
+    "discover",
+]
 
-_default: Registry | None = None
 
-
-def default_registry() -> Registry:
-    """Return the registry of all installed plugins, discovered once a process."""
-    global _default  # noqa: PLW0603
-    if _default is None:
-        _default = discover()
-    return _default
+@cache
+def default_registry(rules: PluginRules = EVERY_PLUGIN) -> Registry:
+    """Return the registry of the installed plugins that rules let in, discovered once a process."""
+    return discover(rules=rules)

@@ -3,28 +3,45 @@
 from __future__ import annotations
 
 import inspect
+import re
+import threading
+from collections import Counter
 from collections.abc import Iterable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 import pluggy
 
-from sketchmatch.api import Algorithm, Params
+from sketchmatch.api import API_VERSION, Algorithm, Params, Segmenter
+from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
 from sketchmatch.registry import hookspecs
-from sketchmatch.registry.registry import Kind, PluginStatus, Registered, Registry
+from sketchmatch.registry.plugins import EVERY_PLUGIN, PluginRules, PluginState, PluginStatus
+from sketchmatch.registry.registry import Kind, Registered, Registry
 
 __all__ = ["ENTRY_POINT_GROUP", "discover"]
 
 ENTRY_POINT_GROUP = "sketchmatch"
+_LOADING_SECONDS = 30.0
+_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+_SOURCES = (StrokeSet, PolygonSet, OccupancyGrid, Image)
+_Offered = list[tuple[Kind, type[Algorithm]]]
 
 
-def discover(points: Iterable[EntryPoint] | None = None) -> Registry:
+def discover(
+    points: Iterable[EntryPoint] | None = None,
+    rules: PluginRules = EVERY_PLUGIN,
+    loading_seconds: float = _LOADING_SECONDS,
+) -> Registry:
     """Load plugins and return what they offer.
 
     Parameters
     ----------
     points
         The plugins; all installed ones when left out.
+    rules
+        Which distributions may offer something. Nothing of the others is imported.
+    loading_seconds
+        How long one plugin may take to load.
 
     Returns
     -------
@@ -38,26 +55,74 @@ def discover(points: Iterable[EntryPoint] | None = None) -> Registry:
             point.dist.name if point.dist else "unknown distribution",
             point.dist.version if point.dist else "",
         )
+        if objection := rules.objection(origin[0]):
+            statuses.append(PluginStatus(point.name, *origin, PluginState.DISABLED, objection))
+            continue
         try:
-            algorithms += [Registered(kind, algorithm, *origin) for kind, algorithm in _load(point)]
-            failure = ""
-        except Exception as error:  # a plugin may raise anything
-            failure = f"{type(error).__name__}: {error}"
-        statuses.append(PluginStatus(point.name, *origin, failure))
+            offered = _loaded_in_time(point, loading_seconds)
+        except (Exception, SystemExit) as error:  # a plugin may raise anything
+            reason = f"{type(error).__name__}: {error}"
+            statuses.append(PluginStatus(point.name, *origin, PluginState.FAILED, reason))
+        else:
+            statuses.append(PluginStatus(point.name, *origin))
+            algorithms += [Registered(kind, algorithm, *origin) for kind, algorithm in offered]
     return Registry(algorithms, statuses)
 
 
-def _load(point: EntryPoint) -> list[tuple[Kind, type[Algorithm]]]:
+def _loaded_in_time(point: EntryPoint, seconds: float) -> _Offered:
+    """Load a plugin in a thread of its own, which is left behind if it takes too long."""
+    outcome: list[_Offered | BaseException] = []
+
+    def load() -> None:
+        try:
+            outcome.append(_load(point))
+        except BaseException as error:
+            outcome.append(error)
+
+    loading = threading.Thread(target=load, name=f"sketchmatch-load-{point.name}", daemon=True)
+    loading.start()
+    loading.join(seconds)
+    if not outcome:
+        raise TimeoutError(f"it was not loaded after {seconds:g} s; do less at import")
+    if isinstance(outcome[0], BaseException):
+        raise outcome[0]
+    return outcome[0]
+
+
+def _load(point: EntryPoint) -> _Offered:
+    module = point.load()
+    _check_version(getattr(module, "sketchmatch_api_version", 1))
     manager = pluggy.PluginManager("sketchmatch")
     manager.add_hookspecs(hookspecs)
-    manager.register(point.load(), name=point.name)
+    manager.register(module, name=point.name)
     manager.check_pending()
-    return [
+    found = [
         (kind, _checked(kind, offered))
         for kind in Kind
         for classes in getattr(manager.hook, kind.hook)()
         for offered in classes
     ]
+    if not found:
+        raise ValueError("it offers no algorithm")
+    for (kind, name), times in Counter((kind, item.name) for kind, item in found).items():
+        if times > 1:
+            raise ValueError(f"it offers {times} {kind.plural} named {name!r}")
+    return found
+
+
+def _check_version(version: Any) -> None:
+    if not isinstance(version, int) or isinstance(version, bool):
+        raise TypeError(f"sketchmatch_api_version is {version!r}, which is not a whole number")
+    if version > API_VERSION:
+        raise ValueError(
+            f"it is written for version {version} of the plugin API, and this engine has "
+            f"{API_VERSION}; upgrade sketchmatch"
+        )
+    if version < API_VERSION:
+        raise ValueError(
+            f"it is written for version {version} of the plugin API, and this engine has "
+            f"{API_VERSION}; upgrade the plugin"
+        )
 
 
 def _checked(kind: Kind, offered: Any) -> type[Algorithm]:
@@ -70,6 +135,28 @@ def _checked(kind: Kind, offered: Any) -> type[Algorithm]:
     for attribute in ("name", "summary"):
         if not isinstance(getattr(offered, attribute, None), str):
             raise TypeError(f"{offered.__name__}.{attribute} is not a string")
-    if not issubclass(offered.Params, Params):
-        raise TypeError(f"{offered.__name__}.Params does not derive from sketchmatch.api.Params")
+    if not _NAME.fullmatch(offered.name):
+        raise ValueError(
+            f"{offered.__name__}.name is {offered.name!r}; use small letters, digits and hyphens"
+        )
+    _check_params(offered)
+    if issubclass(offered, Segmenter):
+        _check_sources(offered)
     return offered
+
+
+def _check_params(offered: type[Algorithm]) -> None:
+    params = offered.Params
+    if not (isinstance(params, type) and issubclass(params, Params)):
+        raise TypeError(f"{offered.__name__}.Params does not derive from sketchmatch.api.Params")
+    for name, field in params.model_fields.items():
+        if field.is_required():
+            raise ValueError(f"{offered.__name__}.Params.{name} has no default")
+    params.model_json_schema()
+
+
+def _check_sources(offered: type[Segmenter]) -> None:
+    sources = getattr(offered, "sources", None)
+    if not (isinstance(sources, tuple) and sources and set(sources) <= set(_SOURCES)):
+        known = ", ".join(source.__name__ for source in _SOURCES)
+        raise TypeError(f"{offered.__name__}.sources is no tuple of some of {known}")

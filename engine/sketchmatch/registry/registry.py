@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 from sketchmatch.api import Algorithm, Histogram, Searcher, Segmenter, Similarity
-from sketchmatch.errors import InvalidInputError, Reason, quoted
+from sketchmatch.errors import InvalidInputError, PluginError, Reason, quoted
+from sketchmatch.registry.plugins import OWN_DISTRIBUTION, PluginState, PluginStatus
 
-__all__ = ["Kind", "PluginStatus", "Registered", "Registry"]
+__all__ = ["Conflict", "Kind", "Registered", "Registry"]
 
 
 class Kind(StrEnum):
@@ -28,9 +30,14 @@ class Kind(StrEnum):
         return _INTERFACES[self]
 
     @property
+    def plural(self) -> str:
+        """The name of several of the kind."""
+        return _PLURALS[self]
+
+    @property
     def hook(self) -> str:
         """The hook that offers algorithms of the kind."""
-        return f"sketchmatch_register_{_PLURALS[self]}"
+        return f"sketchmatch_register_{self.plural}"
 
 
 _INTERFACES: dict[Kind, type[Algorithm]] = {
@@ -62,9 +69,21 @@ class Registered:
         return self.algorithm.name
 
     @property
+    def origin(self) -> str:
+        """What it is and where it comes from, to begin a sentence with."""
+        return f"{self.kind} {self.name} of {self.distribution} {self.version}".rstrip()
+
+    @property
     def description(self) -> str:
         """The text of the class, with its source."""
-        return inspect.getdoc(self.algorithm) or self.algorithm.summary
+        return inspect.cleandoc(self.algorithm.__doc__ or self.algorithm.summary)
+
+    @property
+    def source(self) -> str:
+        """The publications that it is from: the section References of its text, in one line."""
+        _, _, after = self.description.partition("\nReferences\n----------\n")
+        section = re.split(r"\n\S[^\n]*\n-{3,}\n", after)[0]
+        return " ".join(section.replace(".. ", "").split())
 
     @property
     def schema(self) -> dict[str, Any]:
@@ -73,23 +92,36 @@ class Registered:
 
 
 @dataclass(frozen=True)
-class PluginStatus:
-    """What became of one plugin.
+class Conflict:
+    """A name that several distributions offer an algorithm of one kind under.
 
     Attributes
     ----------
-    entry_point
-        Its name in the distribution's entry points.
-    distribution, version
-        Where it comes from.
-    failure
-        Why it could not be used, empty if it could.
+    kind, name
+        What is offered.
+    owners
+        Each distribution with its version.
+    taken
+        The engine's own distribution if it is among them, whose algorithm the name selects;
+        otherwise empty, and the name selects nothing.
     """
 
-    entry_point: str
-    distribution: str
-    version: str
-    failure: str = ""
+    kind: Kind
+    name: str
+    owners: tuple[str, ...]
+    taken: str = ""
+
+    def __str__(self) -> str:
+        effect = f"that of {self.taken} is taken" if self.taken else "neither is taken"
+        return f"{self.kind} {self.name!r} {self.offered}: {effect}; {_REMEDY}"
+
+    @property
+    def offered(self) -> str:
+        """Who offers it, to follow its name."""
+        return f"is offered by {' and '.join(self.owners)}"
+
+
+_REMEDY = "uninstall one or deny it in plugins.deny"
 
 
 class Registry:
@@ -98,16 +130,30 @@ class Registry:
     Parameters
     ----------
     algorithms
-        All that were offered. Of two with the same kind and name neither can be selected.
+        All that were offered. Of several with the same kind and name, that of the engine's own
+        distribution is selected, and otherwise none.
     statuses
         What became of each plugin.
+
+    Attributes
+    ----------
+    algorithms
+        All that a name selects.
+    conflicts
+        The names that several distributions offer.
+    statuses
+        What became of each plugin, and of its names.
     """
 
     def __init__(
         self, algorithms: Iterable[Registered], statuses: Iterable[PluginStatus] = ()
     ) -> None:
-        self.algorithms = tuple(algorithms)
-        self.statuses = tuple(statuses)
+        offered: dict[tuple[Kind, str], list[Registered]] = {}
+        for item in algorithms:
+            offered.setdefault((item.kind, item.name), []).append(item)
+        self.algorithms = tuple(item for items in offered.values() for item in _selectable(items))
+        self.conflicts = tuple(_conflict(items) for items in offered.values() if len(items) > 1)
+        self.statuses = tuple(self._with_conflicts(status) for status in statuses)
 
     def of_kind(self, kind: Kind) -> tuple[Registered, ...]:
         """Return the algorithms of a kind, by name."""
@@ -119,8 +165,39 @@ class Registry:
         """Return an algorithm's kind, name and distribution, to begin a sentence with."""
         for item in self.algorithms:
             if item.algorithm in (algorithm, type(algorithm)):
-                return f"{item.kind} {item.name} of {item.distribution} {item.version}".rstrip()
+                return item.origin
         return f"algorithm {algorithm.name}"
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """A sentence for each plugin that failed and each name in conflict."""
+        failed = (
+            f"plugin {status.entry_point} of {status.distribution} {status.version} "
+            f"failed to load: {status.reason}"
+            for status in self.statuses
+            if status.state is PluginState.FAILED
+        )
+        return (*failed, *map(str, self.conflicts))
+
+    def refuse_problems(self) -> None:
+        """Accept no plugin that failed and no name in conflict.
+
+        Raises
+        ------
+        PluginError
+            If there is one, with the first of them and how many there are.
+        """
+        if self.problems:
+            first, *others = self.problems
+            more = f" (and {len(others)} more problems)" if others else ""
+            raise PluginError(f"{first}{more}; mend it, or do without strict plugins")
+
+    def without(self, *distributions: str) -> Registry:
+        """Return a registry that leaves out what some distributions offer."""
+        return Registry(
+            (item for item in self.algorithms if item.distribution not in distributions),
+            (status for status in self.statuses if status.distribution not in distributions),
+        )
 
     def find(self, kind: Kind, name: str) -> Registered:
         """Return the algorithm that a name selects.
@@ -130,24 +207,48 @@ class Registry:
         InvalidInputError
             If there is none, or more than one plugin offers it; its path is ``name``.
         """
-        found = [item for item in self.of_kind(kind) if item.name == name]
-        if len(found) == 1:
-            return found[0]
-        if not found:
-            known = ", ".join(dict.fromkeys(item.name for item in self.of_kind(kind)))
-            failed = "".join(
-                f"; plugin {s.entry_point} of {s.distribution} failed to load: {s.failure}"
-                for s in self.statuses
-                if s.failure
-            )
-            raise InvalidInputError(
-                Reason.UNKNOWN_ALGORITHM,
-                "name",
-                f"is {quoted(name)}, which is no {kind}; choose one of: {known or 'none'}{failed}",
-            )
-        owners = " and ".join(f"{item.distribution} {item.version}" for item in found)
-        raise InvalidInputError(
-            Reason.UNKNOWN_ALGORITHM,
-            "name",
-            f"is {name!r}, which both {owners} offer; uninstall one of them",
+        for item in self.of_kind(kind):
+            if item.name == name:
+                return item
+        for conflict in self.conflicts:
+            if (conflict.kind, conflict.name) == (kind, name):
+                problem = f"is {name!r}, which {conflict.offered}; {_REMEDY}"
+                raise InvalidInputError(Reason.UNKNOWN_ALGORITHM, "name", problem)
+        problem = f"is {quoted(name)}, which is no {kind}; {self._known(kind)}"
+        raise InvalidInputError(Reason.UNKNOWN_ALGORITHM, "name", problem)
+
+    def _with_conflicts(self, status: PluginStatus) -> PluginStatus:
+        """Return a status that tells which names of the plugin cannot be selected."""
+        origin = f"{status.distribution} {status.version}".rstrip()
+        lost = [
+            str(conflict)
+            for conflict in self.conflicts
+            if origin in conflict.owners and status.distribution != conflict.taken
+        ]
+        return replace(status, reason="; ".join(lost)) if lost else status
+
+    def _known(self, kind: Kind) -> str:
+        """Say which plugins might have offered more, and what can be chosen."""
+        missing = "".join(
+            f"plugin {status.entry_point} of {status.distribution} "
+            f"{_MISSING[status.state]}: {status.reason}; "
+            for status in self.statuses
+            if status.state is not PluginState.ACTIVE
         )
+        known = ", ".join(item.name for item in self.of_kind(kind)) or "none"
+        return f"{missing}choose one of: {known}"
+
+
+_MISSING = {PluginState.FAILED: "failed to load", PluginState.DISABLED: "is disabled"}
+
+
+def _selectable(items: Sequence[Registered]) -> Sequence[Registered]:
+    """Return which of the algorithms with one kind and name the name selects, if any."""
+    own = [item for item in items if item.distribution == OWN_DISTRIBUTION]
+    return items if len(items) == 1 else own
+
+
+def _conflict(items: Sequence[Registered]) -> Conflict:
+    owners = tuple(f"{item.distribution} {item.version}".rstrip() for item in items)
+    own = any(item.distribution == OWN_DISTRIBUTION for item in items)
+    return Conflict(items[0].kind, items[0].name, owners, OWN_DISTRIBUTION if own else "")

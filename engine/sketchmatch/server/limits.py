@@ -29,7 +29,7 @@ class Limits:
     max_request_bytes: int = 64 * 1024 * 1024
     max_concurrent_matches: int = 4 * (os.cpu_count() or 1)
     max_time_budget: float | None = None
-    sources: SourceLimits = field(default_factory=SourceLimits.from_environment)
+    sources: SourceLimits = field(default_factory=SourceLimits)
 
     @property
     def transport_bytes(self) -> int:

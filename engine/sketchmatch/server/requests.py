@@ -60,6 +60,7 @@ def match_request(
             weights.dilation if weights.HasField("dilation") else 1.0,
         ),
         alternatives=request.alternatives if request.HasField("alternatives") else None,
+        profile=request.pipeline.profile,
     )
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from google.protobuf.duration_pb2 import Duration
 
@@ -25,7 +26,14 @@ from sketchmatch.pipeline.match import (
     Segmented,
 )
 from sketchmatch.pipeline.result import Correspondence, MatchResult, ObjectMatch, ObjectRelation
-from sketchmatch.pipeline.selection import DEFAULTS
+from sketchmatch.pipeline.selection import (
+    UNCONFIGURED,
+    Choice,
+    Defaults,
+    Profile,
+    default_names,
+    default_parameters,
+)
 from sketchmatch.registry import Kind, PluginStatus, Registered, Registry
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
@@ -91,7 +99,7 @@ class ResponseWriter:
         return match_pb2.MatchAccepted(
             match_id=event.match_id,
             seed=event.seed,
-            pipeline=pipeline_pb2.Pipeline(**stages),
+            pipeline=pipeline_pb2.Pipeline(**stages, profile=event.pipeline.profile),
             weights=match_pb2.ConfidenceWeights(
                 similarity=similarity, rotation=rotation, dilation=dilation
             ),
@@ -190,11 +198,20 @@ def segmented(found: Segmentation, segmenter: Segmenter) -> scene_service_pb2.Se
     )
 
 
-def catalogue(registry: Registry) -> catalog_service_pb2.ListAlgorithmsResponse:
-    """Return what a registry holds as a message."""
+def catalogue(
+    registry: Registry, defaults: Defaults = UNCONFIGURED
+) -> catalog_service_pb2.ListAlgorithmsResponse:
+    """Return what a registry holds, with the defaults in force, as a message."""
+    names = default_names(registry, defaults)
+    profiles = sorted(defaults.profiles, key=lambda profile: profile.name)
     return catalog_service_pb2.ListAlgorithmsResponse(
-        algorithms=[_algorithm(item) for kind in Kind for item in registry.of_kind(kind)],
+        algorithms=[
+            _algorithm(item, default_parameters(registry, defaults, item), item.name in names[kind])
+            for kind in Kind
+            for item in registry.of_kind(kind)
+        ],
         plugins=[_plugin(status) for status in registry.statuses],
+        profiles=[_profile(profile, profile.name == defaults.profile) for profile in profiles],
     )
 
 
@@ -254,7 +271,26 @@ def _duration(seconds: float) -> Duration:
     return duration
 
 
-def _algorithm(item: Registered) -> catalog_service_pb2.Algorithm:
+def _profile(profile: Profile, is_default: bool) -> catalog_service_pb2.Profile:
+    stages: dict[str, Any] = {stage: _choice(choice) for stage, choice in profile.stages.items()}
+    return catalog_service_pb2.Profile(
+        name=profile.name,
+        summary=profile.summary,
+        pipeline=pipeline_pb2.Pipeline(**stages),
+        is_default=is_default,
+    )
+
+
+def _choice(choice: Choice) -> pipeline_pb2.AlgorithmSelection:
+    message = pipeline_pb2.AlgorithmSelection(name=choice.name)
+    if choice.parameters:
+        message.parameters.update(choice.parameters)
+    return message
+
+
+def _algorithm(
+    item: Registered, parameters: Mapping[str, Any], is_default: bool
+) -> catalog_service_pb2.Algorithm:
     message = catalog_service_pb2.Algorithm(
         kind=catalog_service_pb2.AlgorithmKind.Value(f"ALGORITHM_KIND_{item.kind.upper()}"),
         name=item.name,
@@ -262,9 +298,13 @@ def _algorithm(item: Registered) -> catalog_service_pb2.Algorithm:
         description=item.description,
         distribution=item.distribution,
         distribution_version=item.version,
-        is_default=item.name in DEFAULTS[item.kind],
+        is_default=is_default,
+        source=item.source,
     )
-    message.parameters_schema.update(item.schema)
+    schema = item.schema
+    for name, field in schema.get("properties", {}).items():
+        field["default"] = parameters.get(name, field["default"])
+    message.parameters_schema.update(schema)
     if issubclass(item.algorithm, Segmenter):
         for kind in item.algorithm.sources:
             message.source_kinds.extend(_SOURCE_KINDS[kind])
@@ -272,10 +312,9 @@ def _algorithm(item: Registered) -> catalog_service_pb2.Algorithm:
 
 
 def _plugin(status: PluginStatus) -> catalog_service_pb2.Plugin:
-    state = "PLUGIN_STATE_FAILED" if status.failure else "PLUGIN_STATE_ACTIVE"
     return catalog_service_pb2.Plugin(
         distribution=status.distribution,
         version=status.version,
-        state=catalog_service_pb2.PluginState.Value(state),
-        reason=status.failure,
+        state=catalog_service_pb2.PluginState.Value(f"PLUGIN_STATE_{status.state}"),
+        reason=status.reason,
     )

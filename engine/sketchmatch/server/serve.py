@@ -6,19 +6,22 @@ import asyncio
 import logging
 import signal
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from threading import Event
 from typing import Any
 
 import grpc
 from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
 from sketchmatch.pipeline.warmup import announcing_compilation, warm_up, warm_up_others
 from sketchmatch.registry import Registry
-from sketchmatch.server.limits import Limits
+from sketchmatch.server.child import Job, Method
+from sketchmatch.server.isolation import Children, Watch
 from sketchmatch.server.services import CatalogService, MatchService, SceneService, Workers
+from sketchmatch.server.setup import Current, Setup
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
@@ -32,6 +35,7 @@ __all__ = ["ServerSettings", "serve"]
 
 _QUIET = 1.0
 _LOOK = 0.05
+_WARMING = 120.0
 
 _log = logging.getLogger(__name__)
 _SERVICES = (
@@ -43,7 +47,7 @@ _SERVICES = (
 
 @dataclass(frozen=True)
 class ServerSettings:
-    """How to serve.
+    """How to serve; what cannot be exchanged while the server runs.
 
     Attributes
     ----------
@@ -51,17 +55,14 @@ class ServerSettings:
         Host and port to listen on; port 0 picks a free one.
     grace
         Seconds that running matches are given when the server is asked to stop.
-    limits
-        What requests may ask for.
     """
 
     address: str = "127.0.0.1:50051"
     grace: float = 5.0
-    limits: Limits = field(default_factory=Limits)
 
 
 async def serve(
-    registry: Registry,
+    load: Callable[[], Setup],
     settings: ServerSettings,
     say: Callable[[str], None],
     stop: asyncio.Event | None = None,
@@ -70,8 +71,10 @@ async def serve(
 
     Parameters
     ----------
-    registry
-        The algorithms to offer.
+    load
+        Returns what requests are answered with. It is called again, in a thread, at each SIGHUP;
+        what it raises then is said, and the former setup stays. Requests under way end with
+        theirs.
     settings
         How to serve.
     say
@@ -81,13 +84,16 @@ async def serve(
 
     Raises
     ------
+    SketchmatchError
+        If there is no setup to begin with.
     InvalidInputError
         If the address cannot be listened on.
     """
-    workers = Workers(settings.limits)
+    current = Current(load())
+    workers, children = Workers(current.setup.limits), Children()
     server = grpc.aio.server(
         options=[
-            ("grpc.max_receive_message_length", settings.limits.transport_bytes),
+            ("grpc.max_receive_message_length", current.setup.limits.transport_bytes),
             ("grpc.max_send_message_length", -1),
             # Clients ping every 30 s; by default the server would hang up on them.
             ("grpc.http2.min_ping_interval_without_data_ms", 20_000),
@@ -95,45 +101,114 @@ async def serve(
             ("grpc.so_reuseport", 0),
         ]
     )
-    checks = _add_services(server, registry, workers)
+    checks = _add_services(server, current, workers, children)
     port = _listen(server, settings.address)
     await checks.set("", health_pb2.HealthCheckResponse.NOT_SERVING)
     await server.start()
-    stopping = stop or asyncio.Event()
-    _stop_on_signals(stopping)
+    stopping, ended = stop or asyncio.Event(), Event()
+    reloading = _Reloading(load, current, workers, say)
+    _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
     host = settings.address.rpartition(":")[0]
     say(f"listening on {host}:{port}")
+    for problem in current.setup.registry.problems:
+        say(problem)
     try:
         with announcing_compilation(say):
-            warming = asyncio.to_thread(warm_up, registry, stopping.is_set)
+            warming = asyncio.to_thread(_warm_up, current.setup, stopping.is_set)
             await _first(asyncio.ensure_future(warming), stopping)
         if not stopping.is_set():
             for name in ("", *_SERVICES):
                 await checks.set(name, health_pb2.HealthCheckResponse.SERVING)
             say("serving")
-            others = asyncio.to_thread(warm_up_others, registry, _unless_quiet(workers, stopping))
+            wanted = _unless_quiet(workers, stopping)
+            others = asyncio.to_thread(_warm_up_others, current.setup, children, wanted, ended)
             await _first(asyncio.ensure_future(others), stopping)
         await stopping.wait()
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
+        ended.set()
         await checks.enter_graceful_shutdown()
         await server.stop(settings.grace)
         await workers.close()
+        await asyncio.to_thread(children.close)
     say("stopped")
 
 
+class _Reloading:
+    """Exchanges the setup, one load at a time."""
+
+    def __init__(
+        self,
+        load: Callable[[], Setup],
+        current: Current,
+        workers: Workers,
+        say: Callable[[str], None],
+    ) -> None:
+        self._load = load
+        self._current = current
+        self._workers = workers
+        self._say = say
+        self._one_at_a_time = asyncio.Lock()
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def start(self) -> None:
+        task = asyncio.create_task(self._reload())
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _reload(self) -> None:
+        async with self._one_at_a_time:
+            try:
+                setup = await asyncio.to_thread(self._load)
+            except SketchmatchError as error:
+                self._say(f"the configuration stays as it is: {error}")
+                return
+            self._current.setup = setup
+            self._workers.change_limits(setup.limits)
+            for problem in setup.registry.problems:
+                self._say(problem)
+            self._say("the configuration is reloaded")
+
+
+def _warm_up(setup: Setup, unwanted: Callable[[], bool]) -> None:
+    """Compile what the default pipeline needs in this process."""
+    warm_up(_inside(setup), setup.defaults, unwanted)
+
+
+def _warm_up_others(
+    setup: Setup, children: Children, unwanted: Callable[[], bool], ended: Event
+) -> None:
+    """Compile the rest, strangers' algorithms in processes of their own."""
+    warm_up_others(_inside(setup), setup.defaults, unwanted)
+    strangers = setup.isolation.strangers(setup.registry.algorithms)
+    job = Job(Method.WARM_UP, b"", setup.defaults, setup.limits, _WARMING)
+    for distribution in sorted({item.distribution for item in strangers}):
+        if unwanted():
+            return
+        watch = Watch(tuple(s for s in strangers if s.distribution == distribution), _WARMING)
+        try:
+            for _ in children.answer(job, watch, ended):
+                pass
+        except Exception:  # it will fail again, and be blamed, when a request asks for it
+            _log.exception("the plugins of %s failed to warm up", distribution)
+
+
+def _inside(setup: Setup) -> Registry:
+    """Return the algorithms that run in this process."""
+    strangers = setup.isolation.strangers(setup.registry.algorithms)
+    return setup.registry.without(*(item.distribution for item in strangers))
+
+
 def _add_services(
-    server: grpc.aio.Server, registry: Registry, workers: Workers
+    server: grpc.aio.Server, current: Current, workers: Workers, children: Children
 ) -> health.aio.HealthServicer:
     match_service_pb2_grpc.add_MatchServiceServicer_to_server(
-        MatchService(registry, workers), server
+        MatchService(current, workers, children), server
     )
     scene_service_pb2_grpc.add_SceneServiceServicer_to_server(
-        SceneService(registry, workers), server
+        SceneService(current, workers, children), server
     )
-    catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(
-        CatalogService(registry, workers.limits), server
-    )
+    catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(current), server)
     checks = health.aio.HealthServicer()
     health_pb2_grpc.add_HealthServicer_to_server(checks, server)
     reflection.enable_server_reflection(
@@ -156,14 +231,15 @@ def _listen(server: grpc.aio.Server, address: str) -> int:
     return port
 
 
-def _stop_on_signals(stopping: asyncio.Event) -> None:
+def _on_signals(actions: Mapping[str, Callable[[], None]]) -> None:
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGINT):
+    for name, action in actions.items():
         try:
-            loop.add_signal_handler(number, stopping.set)
-        except (NotImplementedError, RuntimeError, ValueError):
-            # Not the main thread, or a system without signals: whoever embeds the server stops it.
-            return
+            loop.add_signal_handler(signal.Signals[name], action)
+        except (KeyError, NotImplementedError, RuntimeError, ValueError):
+            # Not the main thread, or a system without the signal: whoever embeds the server
+            # stops it.
+            continue
 
 
 def _unless_quiet(workers: Workers, stopping: asyncio.Event) -> Callable[[], bool]:

@@ -8,9 +8,15 @@ import grpc
 from google.protobuf import any_pb2, duration_pb2
 from google.rpc import code_pb2, error_details_pb2, status_pb2
 
-from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError, Reason
+from sketchmatch.errors import (
+    AnswerUnavailableError,
+    InvalidInputError,
+    PluginError,
+    Reason,
+    SketchmatchError,
+)
 
-__all__ = ["Refusal", "refusal", "too_busy"]
+__all__ = ["Refusal", "is_fault", "refusal", "too_busy"]
 
 _DOMAIN = "sketchmatch"
 _RETRY_SECONDS = 1
@@ -43,6 +49,11 @@ def refusal(error: BaseException) -> Refusal:
         grpc.StatusCode.INTERNAL,
         "the server failed in a way nobody foresaw; its log has the details, please report them",
     )
+
+
+def is_fault(error: BaseException) -> bool:
+    """Whether an error is the server's or a plugin's, so that its operator should hear of it."""
+    return isinstance(error, PluginError) or not isinstance(error, SketchmatchError)
 
 
 def too_busy(running: int) -> Refusal:

@@ -1,0 +1,248 @@
+"""Running other people's plugins in processes of their own, so that they can be stopped.
+
+A thread cannot be stopped from outside, a loop in plain Python holds up all threads of its
+process, and a crash ends them. So a request that uses an algorithm of a distribution which is not
+the engine's own is answered in a child process: it reads the request, runs the very same pipeline,
+and sends the responses, serialised, through a pipe. A child that gives no sign of life for too
+long, or does not end when its time is over, is killed, and the request fails with the names of
+plugin and distribution. A child that behaved is kept for the next request.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing.connection import wait
+from typing import TYPE_CHECKING
+
+from sketchmatch.errors import PluginError
+from sketchmatch.server.child import STOP, Answer, Ended, Failed, Job, Ready, live
+
+if TYPE_CHECKING:
+    from multiprocessing.context import SpawnProcess
+
+    from sketchmatch.registry import Registered
+
+__all__ = ["Children", "IsolatedFailureError", "Watch"]
+
+_LOOK = 0.05
+_STOPPING = 0.5
+_OVERTIME = 2.0
+_STARTING = 60.0
+_IDLE = 2
+_NAMED = 5
+_REMEDY = "tell its author or choose another"
+_Key = frozenset[str]
+
+_spawning = multiprocessing.get_context("spawn")
+
+
+class IsolatedFailureError(Exception):
+    """A request failed in a child process.
+
+    Parameters
+    ----------
+    failed
+        What it ends with.
+    """
+
+    def __init__(self, failed: Failed) -> None:
+        super().__init__(failed.refusal.message)
+        self.refusal = failed.refusal
+        self.log = failed.log
+
+
+@dataclass(frozen=True)
+class Watch:
+    """How a child is watched while it answers.
+
+    Attributes
+    ----------
+    strangers
+        The algorithms that it is started for, which are to blame if it fails.
+    patience
+        Seconds without a sign of life.
+    time_budget
+        Seconds for the whole request, or None for no limit.
+    """
+
+    strangers: tuple[Registered, ...]
+    patience: float
+    time_budget: float | None = None
+
+    @property
+    def distributions(self) -> _Key:
+        """What the child loads beside the engine's own."""
+        return frozenset(item.distribution for item in self.strangers)
+
+    @property
+    def culprits(self) -> str:
+        """Who is to blame, to begin a sentence with."""
+        if len(self.strangers) > _NAMED:
+            return f"an algorithm of {' or '.join(sorted(self.distributions))}"
+        return " or ".join(dict.fromkeys(item.origin for item in self.strangers))
+
+
+class Children:
+    """The child processes of a server, by the distributions that they load."""
+
+    def __init__(self) -> None:
+        self._idle: dict[_Key, list[_Child]] = {}
+        self._lock = threading.Lock()
+        self._closed = False
+
+    def answer(self, job: Job, watch: Watch, stop: threading.Event) -> Iterator[bytes]:
+        """Let a child do a job, and yield its responses.
+
+        Parameters
+        ----------
+        job
+            What it does.
+        watch
+            How it is watched.
+        stop
+            Ends the job from another thread.
+
+        Raises
+        ------
+        IsolatedFailureError
+            If the request fails as it would in this process.
+        PluginError
+            If the child crashes, or has to be killed.
+        """
+        with self._child(watch, stop) as child:
+            yield from child.answer(job, watch, stop)
+
+    def close(self) -> None:
+        """End the children that wait; those at work end with their requests."""
+        with self._lock:
+            self._closed = True
+            waiting = [child for children in self._idle.values() for child in children]
+            self._idle.clear()
+        for child in waiting:
+            child.kill()
+
+    @contextmanager
+    def _child(self, watch: Watch, stop: threading.Event) -> Iterator[_Child]:
+        """Lend a child; one that is not done in the end is killed."""
+        child = self._waiting(watch.distributions) or _Child(watch.distributions)
+        try:
+            child.wait_until_ready(watch, stop)
+            yield child
+        finally:
+            if not (child.done and self._keep(watch.distributions, child)):
+                child.kill()
+
+    def _waiting(self, distributions: _Key) -> _Child | None:
+        with self._lock:
+            children = self._idle.get(distributions, [])
+            while children:
+                child = children.pop()
+                if child.alive:
+                    return child
+                child.kill()
+        return None
+
+    def _keep(self, distributions: _Key, child: _Child) -> bool:
+        with self._lock:
+            children = self._idle.setdefault(distributions, [])
+            if self._closed or len(children) >= _IDLE:
+                return False
+            children.append(child)
+            return True
+
+
+class _Child:
+    """One child process and the pipe to it."""
+
+    def __init__(self, distributions: _Key) -> None:
+        self.done = False
+        self._ready = False
+        self._connection, theirs = _spawning.Pipe()
+        self._process: SpawnProcess = _spawning.Process(
+            target=live,
+            args=(theirs, tuple(sorted(distributions))),
+            name=f"sketchmatch-plugins-{'-'.join(sorted(distributions))}",
+            daemon=True,
+        )
+        self._process.start()
+        theirs.close()
+
+    @property
+    def alive(self) -> bool:
+        return self._process.is_alive()
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.join()
+        self._connection.close()
+
+    def wait_until_ready(self, watch: Watch, stop: threading.Event) -> None:
+        """Wait until it has loaded its plugins, or is no longer wanted."""
+        deadline = time.monotonic() + _STARTING + watch.patience
+        while not (self._ready or stop.is_set()):
+            self._ready = self.done = isinstance(self._received(watch), Ready)
+            if time.monotonic() > deadline:
+                raise _silent(watch, "did not load in its own process")
+
+    def answer(self, job: Job, watch: Watch, stop: threading.Event) -> Iterator[bytes]:
+        if stop.is_set():
+            return
+        self.done = False
+        self._connection.send(job)
+        started = heard = time.monotonic()
+        while not stop.is_set():
+            message = self._received(watch)
+            now = time.monotonic()
+            match message:
+                case Answer(response):
+                    heard = now
+                    yield response
+                case Ended():
+                    self.done = True
+                    return
+                case Failed():
+                    self.done = True
+                    raise IsolatedFailureError(message)
+            if now - heard > watch.patience:
+                raise _silent(watch, f"gave no sign of life for {watch.patience:g} s")
+            if watch.time_budget is not None and now - started > watch.time_budget + _OVERTIME:
+                raise _silent(
+                    watch,
+                    f"did not end {_OVERTIME:g} s after its time budget of {watch.time_budget:g} s",
+                )
+        self._stop(watch)
+
+    def _stop(self, watch: Watch) -> None:
+        """Ask it to stop; it is done if it does so in time."""
+        self._connection.send(STOP)
+        deadline = time.monotonic() + _STOPPING
+        while not self.done and time.monotonic() < deadline:
+            self.done = isinstance(self._received(watch), Ended | Failed)
+
+    def _received(self, watch: Watch) -> object:
+        """Return the next message, or None if there is none for a moment."""
+        ready = wait([self._connection, self._process.sentinel], _LOOK)
+        if self._connection in ready:
+            try:
+                return self._connection.recv()
+            except (EOFError, OSError):
+                pass
+        elif not ready:
+            return None
+        self._process.join()
+        raise PluginError(
+            f"{watch.culprits} ended its process ({_ending(self._process.exitcode)}); {_REMEDY}"
+        )
+
+
+def _silent(watch: Watch, what: str) -> PluginError:
+    return PluginError(f"{watch.culprits} {what} and was stopped; {_REMEDY}")
+
+
+def _ending(code: int | None) -> str:
+    return f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"

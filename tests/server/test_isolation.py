@@ -1,0 +1,219 @@
+"""A stranger's plugin runs in a process of its own, and harms no request but its own."""
+
+import multiprocessing
+import os
+import re
+import statistics
+import threading
+import time
+
+import pytest
+
+from sketchmatch.registry import discover
+from sketchmatch.server.setup import Isolation, Setup
+from sketchmatch_client import Client, InvalidRequestError, ServerFailedError
+from sketchmatch_proto.v1.catalog_service_pb2 import PluginState
+from sketchmatch_proto.v1.match_pb2 import Outcome
+from tests.server.harness import hosting, scene
+from tests.server.misbehaving import BROKEN, UNSTOPPABLE
+
+PATIENCE = 1.0
+PLUGINS = {
+    "acme-misbehaving": "tests.server.misbehaving",
+    "acme-well-behaved": "tests.server.well_behaved",
+    "acme-unimportable": "tests.server.surely_not_there",
+    "acme-rubbish": "tests.server.harness:shapes",
+}
+
+
+@pytest.fixture(scope="module")
+def host(tmp_path_factory):
+    """Yield a server with the plugins of several distributions, installed as pip would."""
+    folder = tmp_path_factory.mktemp("site")
+    for distribution, entry in PLUGINS.items():
+        info = folder / f"{distribution.replace('-', '_')}-1.2.dist-info"
+        info.mkdir()
+        metadata = f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.2\n"
+        (info / "METADATA").write_text(metadata, encoding="utf-8")
+        points = f"[sketchmatch]\n{distribution} = {entry}\n"
+        (info / "entry_points.txt").write_text(points, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        setup = Setup(discover(), isolation=Isolation(patience=PATIENCE))
+        with hosting(setup) as running:
+            yield running
+
+
+@pytest.fixture(scope="module")
+def client(host):
+    with Client(host.address) as connected:
+        connected.match(scene(4), scene(4), searcher="guessing")  # starts a process
+        yield connected
+
+
+def process_of(match) -> int:
+    return int(match.result.search_note.removeprefix("process "))
+
+
+def test_a_strangers_search_runs_in_another_process_and_finds_the_same(client):
+    asked = {"searcher": "guessing", "params": {"searcher": {"tries": 50}}, "seed": 3}
+    first, again = (client.match(scene(4), scene(5, 1), **asked) for _ in range(2))
+    assert process_of(first) != os.getpid()
+    assert process_of(first) == process_of(again), "a process that behaved is used again"
+    trusting = Setup(discover(), isolation=Isolation(trusted=frozenset({"acme-well-behaved"})))
+    with hosting(trusting, warm=False) as host, Client(host.address) as inside:
+        trusted = inside.match(scene(4), scene(5, 1), **asked)
+    assert process_of(trusted) == os.getpid()
+    for one in (first, again, trusted):
+        one.result.ClearField("statistics")
+        one.result.ClearField("match_id")
+        one.result.ClearField("search_note")
+    assert first.result == again.result == trusted.result
+
+
+def test_its_events_come_one_by_one_and_it_is_stopped_when_the_caller_goes(client):
+    slow = {"searcher": "guessing", "params": {"searcher": {"tries": 10_000, "pause": 0.01}}}
+    before = process_of(client.match(scene(4), scene(4), searcher="guessing"))
+    events = client.events(scene(4), scene(4), **slow)
+    seen = [next(events).WhichOneof("event") for _ in range(6)]
+    assert seen[0] == "accepted"
+    assert seen[-1] == "progress"
+    events.close()
+    time.sleep(1.0)
+    after = client.match(scene(4), scene(4), searcher="guessing")
+    assert process_of(after) == before, "it stopped when it was asked to, and is used again"
+
+
+def test_its_time_budget_ends_it_with_an_answer(client):
+    slow = {"searcher": "guessing", "params": {"searcher": {"tries": 10_000, "pause": 0.01}}}
+    found = client.match(scene(4), scene(4), **slow, time_budget=0.5)
+    assert Outcome.Name(found.result.outcome) == "OUTCOME_TIME_BUDGET"
+
+
+def test_a_bad_parameter_of_a_strangers_algorithm_is_refused_as_any_other(client):
+    with pytest.raises(InvalidRequestError, match=r"searcher\.parameters\.tries is 0") as no:
+        client.match(scene(4), scene(4), searcher="guessing", params={"searcher": {"tries": 0}})
+    assert no.value.reason == "INVALID_PARAMETER"
+
+
+def test_segment_uses_strangers_too_and_keeps_the_paths_of_their_refusals(client):
+    assert len(client.segment(scene(4), segmenter="same-polygons").scene.objects) == 4
+    with pytest.raises(InvalidRequestError, match=r"source.polygon_set.polygons\[0\] is not to my"):
+        client.segment(scene(4), segmenter="refusing")
+
+
+@pytest.mark.parametrize(
+    ("distribution", "words"),
+    [
+        ("acme-unimportable", "ModuleNotFoundError: No module named"),
+        ("acme-rubbish", "ValueError: it offers no algorithm"),
+    ],
+)
+def test_what_cannot_be_loaded_is_listed_and_named_to_whoever_asks_for_it(
+    client, distribution, words
+):
+    (plugin,) = (p for p in client.algorithms().plugins if p.distribution == distribution)
+    assert PluginState.Name(plugin.state) == "PLUGIN_STATE_FAILED"
+    assert re.search(words, plugin.reason)
+    with pytest.raises(InvalidRequestError, match=f"plugin .* of {distribution} failed to load"):
+        client.match(scene(4), scene(4), searcher="what-it-might-have-offered")
+
+
+class Others:
+    """Requests that have nothing to do with a plugin, one after the other."""
+
+    def __init__(self, address: str) -> None:
+        self.seconds: list[float] = []
+        self._stop = threading.Event()
+        self._failure: BaseException | None = None
+        self._client = Client(address)
+        self._thread = threading.Thread(target=self._ask, daemon=True)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._stop.set()
+        self._thread.join(30)
+        self._client.close()
+        if self._failure is not None:
+            raise self._failure
+
+    def median_of(self, count: int, at_least_while=lambda: False) -> float:
+        """Return the median time of the requests to come."""
+        first = len(self.seconds)
+        while len(self.seconds) < first + count or at_least_while():
+            assert self._thread.is_alive(), "a request failed that had nothing to do with it"
+            time.sleep(0.005)
+        return statistics.median(self.seconds[first:])
+
+    def _ask(self) -> None:
+        try:
+            while not self._stop.is_set():
+                began = time.perf_counter()
+                found = self._client.match(scene(8), scene(8))
+                self.seconds.append(time.perf_counter() - began)
+                assert found.object_map == {k: k for k in range(8)}
+        except BaseException as error:
+            self._failure = error
+
+
+def slowdown(host, misbehave) -> float:
+    """Return how many times longer other requests take while something misbehaves."""
+    with Others(host.address) as others:
+        quiet = others.median_of(20)
+        misbehaving = threading.Thread(target=misbehave, daemon=True)
+        misbehaving.start()
+        busy = others.median_of(20, at_least_while=misbehaving.is_alive)
+        misbehaving.join()
+    return busy / quiet
+
+
+def fails(client, plugin) -> None:
+    """Ask for an algorithm that misbehaves, and check that it is blamed."""
+    stage, words = {**BROKEN, **UNSTOPPABLE}[plugin]
+    with pytest.raises(ServerFailedError, match=words) as raised:
+        client.match(scene(4), scene(4), **{stage: plugin.name}, time_budget=4.0)
+    kind = stage.removeprefix("map_")
+    assert raised.value.reason == "PLUGIN_FAILED"
+    assert str(raised.value).startswith(f"{kind} {plugin.name} of acme-misbehaving 1.2 ")
+    assert str(raised.value).endswith("; tell its author or choose another")
+
+
+@pytest.mark.parametrize(
+    "plugins",
+    [tuple(BROKEN), *((plugin,) for plugin in UNSTOPPABLE)],
+    ids=lambda plugins: "+".join(plugin.__name__ for plugin in plugins)[:40],
+)
+def test_plugins_that_misbehave_harm_no_other_request(host, client, plugins):
+    blamed = []
+
+    def misbehave():
+        for plugin in plugins:
+            fails(client, plugin)
+            blamed.append(plugin)
+
+    # The machine may be busy with something else: that is no fault of the plugins.
+    assert any(slowdown(host, misbehave) < 2.0 for _ in range(3))
+    assert set(blamed) == set(plugins)
+
+
+def test_a_search_that_ignores_its_time_budget_is_stopped(host):
+    del host
+    patient = Setup(discover(), isolation=Isolation(patience=60.0))
+    words = r"did not end 2 s after its time budget of 0\.5 s and was stopped"
+    with (
+        hosting(patient, warm=False) as other,
+        Client(other.address) as connected,
+        pytest.raises(ServerFailedError, match=words),
+    ):
+        connected.match(scene(4), scene(4), searcher="sleepingsearcher", time_budget=0.5)
+
+
+def test_no_process_outlives_its_server(host):
+    del host
+    with hosting(Setup(discover()), warm=False) as other, Client(other.address) as connected:
+        found = connected.match(scene(4), scene(4), searcher="guessing")
+        assert process_of(found) in {child.pid for child in multiprocessing.active_children()}
+    assert process_of(found) not in {child.pid for child in multiprocessing.active_children()}
