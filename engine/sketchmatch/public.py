@@ -10,6 +10,7 @@ import numpy as np
 
 from sketchmatch.api.forces import force_histograms, refuse_infinite, scene_relations
 from sketchmatch.api.pixels import PixelObject, outlines, pixel_object, pixel_relations
+from sketchmatch.config import load, open_registry
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import (
@@ -21,6 +22,7 @@ from sketchmatch.model import (
     Weights,
     object_pairs,
 )
+from sketchmatch.model.limits import limited_to, source_limits
 from sketchmatch.pipeline.match import Finished, MatchRequest, Progress, run_match
 from sketchmatch.pipeline.plugins import segmented
 from sketchmatch.pipeline.result import MatchResult
@@ -34,15 +36,17 @@ def match(
     sketch: Scene | Source | str | Path,
     map: Scene | Source | str | Path,  # noqa: A002
     *,
-    searcher: str = "auto",
-    histogram: str = "constant",
-    similarity: str = "cross-correlation",
+    profile: str | None = None,
+    searcher: str | None = None,
+    histogram: str | None = None,
+    similarity: str | None = None,
     params: Mapping[str, Mapping[str, Any]] | None = None,
     seed: int = 0,
     time_budget: float | None = None,
     weights: Weights = (1.0, 1.0, 1.0),
     alternatives: int | None = None,
     on_progress: Callable[[Progress], None] | None = None,
+    config: str | Path | None = None,
 ) -> MatchResult:
     """Find which sketched object is which mapped object.
 
@@ -51,8 +55,11 @@ def match(
     sketch, map
         Scenes, sources, or paths of files that hold them: SVG or stroke JSON sketches, GeoJSON
         polygons, ROS map YAML, images.
+    profile
+        A pipeline to start from, e.g. ``"fast"`` or ``"proof"``; what is said beside it wins.
     searcher, histogram, similarity
-        Names of the algorithms.
+        Names of the algorithms. Left out, the profile decides, or else the configuration, or else
+        they are ``"auto"``, ``"constant"`` and ``"cross-correlation"``.
     params
         Parameters by stage, e.g. ``{"searcher": {"population": 400}}``; beside the three above
         ``"sketch_segmenter"`` and ``"map_segmenter"``.
@@ -67,6 +74,9 @@ def match(
         there are.
     on_progress
         Called with the state of the match, at most 20 times a second.
+    config
+        A configuration file. Without it none is read, wherever one may lie; environment variables
+        and the built-in profiles count in any case.
 
     Returns
     -------
@@ -89,36 +99,45 @@ def match(
     >>> match(scene, turned).object_map
     {0: 1, 1: 2, 2: 0}
     """
+    configuration = load(config, search=False)
+    registry = open_registry(configuration)
     names = {"searcher": searcher, "histogram": histogram, "similarity": similarity}
-    request = MatchRequest(
-        sketch=_loaded("sketch", sketch),
-        map=_loaded("map", map),
-        selection=_selection(names, params or {}),
-        seed=seed,
-        time_budget=time_budget,
-        weights=weights,
-        alternatives=alternatives,
-    )
-    for event in run_match(request, default_registry()):
-        if isinstance(event, Finished):
-            return event.result
-        if isinstance(event, Progress) and on_progress is not None:
-            on_progress(event)
+    with limited_to(source_limits(configuration.limits)):
+        request = MatchRequest(
+            sketch=_loaded("sketch", sketch),
+            map=_loaded("map", map),
+            selection=_selection(names, params or {}),
+            seed=seed,
+            time_budget=time_budget,
+            weights=weights,
+            alternatives=alternatives,
+            profile=profile or "",
+        )
+        for event in run_match(request, registry, configuration.defaults):
+            if isinstance(event, Finished):
+                return event.result
+            if isinstance(event, Progress) and on_progress is not None:
+                on_progress(event)
     raise AssertionError("a match ends with a result or an error")
 
 
 def read_scene(path: str | Path) -> Scene:
     """Read the scene in a file, segmented as its kind is by default.
 
+    Environment variables can say which segmenter that is, and how large the file may be; a
+    configuration file is not read.
+
     Raises
     ------
     InvalidInputError
         If the file cannot be read or holds fewer than two objects.
     """
-    source = read_source(Path(path))
-    registry = default_registry()
-    segmenter = resolve_segmenter(registry, Choice(), source)
-    return segmented(source, segmenter, registry, f"{path}: {source.field}").scene
+    configuration = load(search=False)
+    registry = open_registry(configuration)
+    with limited_to(source_limits(configuration.limits)):
+        source = read_source(Path(path))
+        segmenter = resolve_segmenter(registry, Choice(), source, configuration.defaults)
+        return segmented(source, segmenter, registry, f"{path}: {source.field}").scene
 
 
 def force_histogram(a: Any, b: Any, *, r: float = 0.0, directions: int = 180) -> FloatArray:
@@ -280,7 +299,9 @@ def _loaded(side: str, given: Scene | Source | str | Path) -> Scene | Source:
         raise error.within(side) from None
 
 
-def _selection(names: Mapping[str, str], params: Mapping[str, Mapping[str, Any]]) -> Selection:
+def _selection(
+    names: Mapping[str, str | None], params: Mapping[str, Mapping[str, Any]]
+) -> Selection:
     for stage in params:
         if stage not in STAGES:
             raise InvalidInputError(
@@ -289,5 +310,5 @@ def _selection(names: Mapping[str, str], params: Mapping[str, Mapping[str, Any]]
                 f"is no stage; choose one of: {', '.join(STAGES)}",
             )
     return {
-        stage: Choice(names.get(stage, ""), params.get(stage, {})) for stage in {*names, *params}
+        stage: Choice(names.get(stage) or "", params.get(stage, {})) for stage in {*names, *params}
     }

@@ -76,6 +76,7 @@ class TestRequest:
             seed=2**64 - 1,
             time_budget=2.5,
             weights=(1, 0, 0.5),
+            profile="proof",
         )
         (request,) = server.requests
         pipeline = request.pipeline
@@ -85,6 +86,7 @@ class TestRequest:
         assert pipeline.histogram.name == ""
         assert pipeline.histogram.parameters["directions"] == 90
         assert not pipeline.HasField("similarity")
+        assert pipeline.profile == "proof"
         assert request.seed == 2**64 - 1
         assert request.time_budget.ToTimedelta() == timedelta(seconds=2.5)
         weights = request.weights
@@ -182,6 +184,10 @@ class TestOtherCalls:
         assert request.source == MAP
         assert answer.segmenter.name == "polygons"
         assert answer.segmenter.parameters["tolerance"] == 0.1
+
+    def test_segment_names_a_profile(self, call, server):
+        call(server.address, "segment", MAP, profile="mine")
+        assert server.requests[0].profile == "mine"
 
     def test_segment_leaves_the_segmenter_to_the_server(self, call, server):
         call(server.address, "segment", MAP)

@@ -73,20 +73,24 @@ def test_a_bag_is_read_here_and_sent_to_a_server(command_line, where, tmp_path):
 
 
 def test_the_environment_limits_files_in_process(command_line, monkeypatch):
-    monkeypatch.setenv("SKETCHMATCH_MAX_PIXELS", "1000")
+    monkeypatch.setenv("SKETCHMATCH_LIMITS__MAX_PIXELS", "1000")
     done = command_line("segment", LIVING_ROOM_MAP)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    assert "pixels, more than the limit of 1000 pixels; scale it down, or raise max_pixels" in line
+    assert (
+        "pixels, more than the limit of 1000 pixels; scale it down, or raise limits.max_pixels"
+        in line
+    )
 
 
 @pytest.mark.parametrize("command", [["segment", LIVING_ROOM_MAP], ["serve"]])
 def test_a_bad_value_in_the_environment_is_one_sentence(command_line, monkeypatch, command):
-    monkeypatch.setenv("SKETCHMATCH_MAX_OBJECTS", "few")
+    monkeypatch.setenv("SKETCHMATCH_LIMITS__MAX_OBJECTS", "few")
     done = command_line(*command)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
-        "sketchmatch: SKETCHMATCH_MAX_OBJECTS is 'few'; give a whole number of at least 2\n"
+        "sketchmatch: SKETCHMATCH_LIMITS__MAX_OBJECTS is 'few'; it should be a valid integer, "
+        "unable to parse string as an integer\n"
     )
 
 

@@ -1,4 +1,4 @@
-"""How large sources may be: by environment, by server, in files, requests and values."""
+"""How large sources may be: by configuration, by server, in files, requests and values."""
 
 import io
 import json
@@ -25,28 +25,8 @@ def refused(call, **limits):
         call()
     assert caught.value.reason == Reason.LIMIT_EXCEEDED
     (name,) = limits
-    assert f"or raise {name} (SKETCHMATCH_{name.upper()})" in caught.value.problem
+    assert f"or raise limits.{name} (SKETCHMATCH_LIMITS__{name.upper()})" in caught.value.problem
     return caught.value
-
-
-def test_the_environment_sets_them():
-    chosen = SourceLimits.from_environment(
-        {
-            "SKETCHMATCH_MAX_BYTES": "1",
-            "SKETCHMATCH_MAX_PIXELS": " 2 ",
-            "SKETCHMATCH_MAX_VERTICES": "",
-        }
-    )
-    assert chosen == SourceLimits(max_bytes=1, max_pixels=2)
-
-
-@pytest.mark.parametrize("value", ["many", "0", "-3", "1.5", "1" * 5000])
-def test_a_bad_value_in_the_environment_is_one_sentence(monkeypatch, value):
-    monkeypatch.setenv("SKETCHMATCH_MAX_PIXELS", value)
-    with pytest.raises(InvalidInputError) as caught:
-        source_limits()
-    assert caught.value.field == "SKETCHMATCH_MAX_PIXELS"
-    assert caught.value.problem.endswith("; give a whole number of at least 1")
 
 
 @pytest.mark.parametrize("value", [0, -1, 1.5, True, "9", None])
@@ -132,7 +112,7 @@ def test_a_drawing_of_too_many_vertices_is_refused(body):
     with limited_to(SourceLimits(max_vertices=400)), pytest.raises(InvalidInputError) as caught:
         decode_svg(f"<svg>{body}</svg>".encode())
     assert caught.value.reason == Reason.LIMIT_EXCEEDED
-    assert "(SKETCHMATCH_MAX_VERTICES)" in caught.value.problem
+    assert "(SKETCHMATCH_LIMITS__MAX_VERTICES)" in caught.value.problem
 
 
 def png(width, height):
@@ -173,7 +153,7 @@ def test_a_small_header_cannot_announce_a_huge_picture(made, size):
     width, height = size
     assert caught.value.problem == (
         f"has {width} × {height} pixels, more than the limit of 64 million pixels; scale it down, "
-        "or raise max_pixels (SKETCHMATCH_MAX_PIXELS)"
+        "or raise limits.max_pixels (SKETCHMATCH_LIMITS__MAX_PIXELS)"
     )
 
 
@@ -183,7 +163,7 @@ def test_a_sliver_is_refused():
     assert (caught.value.field, caught.value.reason) == ("data", Reason.LIMIT_EXCEEDED)
     assert caught.value.problem == (
         "has 5063184 × 12 pixels, more than the limit of 65535 pixels along a side; scale it "
-        "down, or raise max_side (SKETCHMATCH_MAX_SIDE)"
+        "down, or raise limits.max_side (SKETCHMATCH_LIMITS__MAX_SIDE)"
     )
 
 

@@ -2,11 +2,24 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import Image, LabelledPolygon, OccupancyGrid, PolygonSet, Stroke, StrokeSet
-from sketchmatch.pipeline.selection import STAGES, Choice, resolve, resolve_segmenter
-from sketchmatch.registry import default_registry
+from sketchmatch.pipeline.selection import (
+    STAGES,
+    Choice,
+    Defaults,
+    Profile,
+    chosen_algorithms,
+    default_names,
+    default_parameters,
+    profile_faults,
+    resolve,
+    resolve_segmenter,
+)
+from sketchmatch.registry import Kind, default_registry
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 SOURCES = {
@@ -112,3 +125,152 @@ def test_the_first_of_several_faults_is_told_in_one_sentence():
     error = refused({"searcher": Choice("easm", {"population": 1, "patience": 0})})
     assert error.field == "searcher.parameters.population"
     assert "\n" not in str(error)
+
+
+# What configuration and profiles say ------------------------------------------------------------
+
+# Searchers with parameters in common, so that those of another could be taken over by mistake.
+_SETTABLE = {
+    "easm": ("patience", "population", "exchange_rate"),
+    "direct": ("patience", "population", "exchange_rate"),
+    "nn-pso": ("patience", "particles"),
+    "auto": ("proof_nodes",),
+}
+_VALUES = {"exchange_rate": st.floats(0, 1)}
+
+
+def _parameters(name):
+    values = {key: _VALUES.get(key, st.integers(2, 50)) for key in _SETTABLE[name]}
+    return st.fixed_dictionaries({}, optional=values)
+
+
+@st.composite
+def levels(draw):
+    """Return three levels that choose searchers, each sound upon those below."""
+    found, current = [], "auto"
+    for _ in range(3):
+        name = draw(st.sampled_from(["", *_SETTABLE]))
+        current = name or current
+        found.append(Choice(name, draw(_parameters(current))))
+    return found
+
+
+def oracle(chosen, parameters):
+    """Return name and parameters: a level counts if all names from its own upwards agree."""
+    name = next((level.name for level in reversed(chosen) if level.name), "auto")
+    counted = dict(parameters.get(name, {}))
+    for k, level in enumerate(chosen):
+        names = [upper.name for upper in chosen[k + 1 :] if upper.name]
+        own = next((lower.name for lower in reversed(chosen[: k + 1]) if lower.name), "auto")
+        if own == name and all(upper == name for upper in names):
+            counted.update(level.parameters)
+    return name, counted
+
+
+@given(levels(), st.fixed_dictionaries({name: _parameters(name) for name in _SETTABLE}))
+def test_levels_are_laid_over_each_other_as_the_oracle_does(chosen, parameters):
+    pipeline, profile, request = chosen
+    defaults = Defaults(
+        {"searcher": pipeline},
+        {Kind.SEARCHER: parameters},
+        (Profile("mine", "", {"searcher": profile}),),
+        "mine",
+    )
+    found = resolve(default_registry(), {"searcher": request}, defaults=defaults)
+    name, expected = oracle(chosen, parameters)
+    assert found.profile == "mine"
+    assert found.searcher.name == name
+    assert found.searcher.params.model_dump(exclude_unset=True) == expected
+
+
+MAPS = Defaults({"map_segmenter": Choice("rooms", {"min_area": 2.0})})
+
+
+def test_a_configured_segmenter_is_used_for_the_sources_that_it_reads():
+    registry, grid = default_registry(), SOURCES["occupancy-grid"]
+    pipeline = resolve(registry, {}, SOURCES["strokes"], grid, MAPS)
+    assert pipeline.map_segmenter.name == "rooms"
+    assert pipeline.map_segmenter.params.min_area == 2.0
+    assert resolve(registry, {}, None, SOURCES["polygons"], MAPS).map_segmenter.name == "polygons"
+    assert resolve(registry, {}, None, None, MAPS).map_segmenter is None
+    assert resolve(registry, {}, grid, None, MAPS).sketch_segmenter.name == "occupancy-grid"
+    named = {"map_segmenter": Choice("occupancy-grid")}
+    assert resolve(registry, named, None, grid, MAPS).map_segmenter.name == "occupancy-grid"
+
+
+def test_a_segmenter_in_the_request_stays_strict():
+    with pytest.raises(InvalidInputError, match="cannot read source polygon_set"):
+        resolve(
+            default_registry(), {"map_segmenter": Choice("rooms")}, None, SOURCES["polygons"], MAPS
+        )
+
+
+def test_a_source_alone_takes_what_holds_for_its_side_of_a_match():
+    registry = default_registry()
+    for name, expected in [("occupancy-grid", "rooms"), ("image", "image"), ("strokes", "strokes")]:
+        found = resolve_segmenter(registry, Choice(), SOURCES[name], MAPS)
+        assert found.name == expected
+    mine = Defaults(profiles=(Profile("mine", "", MAPS.pipeline),))
+    found = resolve_segmenter(registry, Choice(), SOURCES["occupancy-grid"], mine, "mine")
+    assert found.name == "rooms"
+
+
+def test_an_unknown_profile_is_refused_with_the_choices():
+    defaults = Defaults(profiles=(Profile("fast"), Profile("mine")))
+    for call in (
+        lambda: resolve(default_registry(), {}, defaults=defaults, profile="best"),
+        lambda: chosen_algorithms(default_registry(), {}, {}, defaults, "best"),
+    ):
+        with pytest.raises(InvalidInputError) as caught:
+            call()
+        assert caught.value.reason is Reason.UNKNOWN_PROFILE
+        assert str(caught.value) == (
+            "profile is 'best', which is no profile; choose one of: fast, mine"
+        )
+
+
+def test_a_profile_of_no_use_is_refused_and_says_why():
+    stages = {"searcher": Choice("annealing"), "histogram": Choice("", {"directions": 3})}
+    defaults = Defaults(profiles=(Profile("mine", "", stages),))
+    registry = default_registry()
+    assert [fault.field for fault in profile_faults(registry, defaults, "mine")] == [
+        "searcher.name",
+        "histogram.parameters.directions",
+    ]
+    words = "profile is 'mine', whose searcher.name is 'annealing', which is no searcher"
+    with pytest.raises(InvalidInputError, match=words):
+        resolve(registry, {"searcher": Choice("easm")}, defaults=defaults, profile="mine")
+    with pytest.raises(InvalidInputError, match=words):
+        chosen_algorithms(registry, {"searcher": Choice()}, {}, defaults, "mine")
+    resolve(registry, {}, defaults=defaults)
+
+
+def test_the_algorithms_of_a_request_are_told_without_setting_them_up():
+    defaults = Defaults({"searcher": Choice("easm", {"no": "such parameter"}), **MAPS.pipeline})
+    found = chosen_algorithms(
+        default_registry(),
+        {"map_segmenter": Choice(), "searcher": Choice(), "histogram": Choice("hybrid")},
+        {"map_segmenter": SOURCES["occupancy-grid"]},
+        defaults,
+    )
+    assert [item.name for item in found] == ["rooms", "easm", "hybrid"]
+
+
+def test_the_catalogue_knows_what_holds_where_a_request_says_nothing():
+    registry = default_registry()
+    defaults = Defaults(
+        {"searcher": Choice("easm", {"patience": 9}), **MAPS.pipeline},
+        {Kind.SEARCHER: {"easm": {"population": 7}, "nn": {"seed_points": 5}}},
+    )
+    names = default_names(registry, defaults)
+    assert names[Kind.SEARCHER] == ("easm",)
+    assert names[Kind.HISTOGRAM] == ("constant",)
+    assert "rooms" in names[Kind.SEGMENTER]
+
+    def parameters(kind, name):
+        return default_parameters(registry, defaults, registry.find(kind, name))
+
+    assert parameters(Kind.SEARCHER, "easm") == {"population": 7, "patience": 9}
+    assert parameters(Kind.SEARCHER, "nn") == {"seed_points": 5}
+    assert parameters(Kind.SEGMENTER, "rooms") == {"min_area": 2.0}
+    assert parameters(Kind.SEGMENTER, "occupancy-grid") == {}

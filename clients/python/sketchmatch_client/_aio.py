@@ -136,16 +136,17 @@ class AsyncClient:
         *,
         segmenter: str | None = None,
         params: Mapping[str, Any] | None = None,
+        profile: str | None = None,
         timeout: float | None = None,
     ) -> SegmentResponse:
         """Find the objects of one source, without a match; see :meth:`Client.segment`."""
-        request = segment_request(source, segmenter, params)
+        request = segment_request(source, segmenter, params, profile)
         stub = cast("SceneServiceAsyncStub", SceneServiceStub(self._channel))
         with translated_errors(self._address):
             return await stub.Segment(request, timeout=self._limit(timeout))
 
     async def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
-        """Return the algorithms that the server offers, and its plugins."""
+        """Return the algorithms that the server offers, its profiles and its plugins."""
         stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
         with translated_errors(self._address):
             return await stub.ListAlgorithms(ListAlgorithmsRequest(), timeout=self._limit(timeout))

@@ -40,6 +40,9 @@ class MatchOptions(TypedDict, total=False):
     alternatives
         How many of the next best object maps the result shall hold. Left out: 3, or as many as
         there are.
+    profile
+        Name of one of the server's pipelines, e.g. ``"fast"`` or ``"proof"``, to start from; what
+        the options above say wins. Left out: the server's default one.
     """
 
     sketch_segmenter: str | None
@@ -52,6 +55,7 @@ class MatchOptions(TypedDict, total=False):
     time_budget: float | timedelta | None
     weights: tuple[float, float, float] | None
     alternatives: int | None
+    profile: str | None
 
 
 def match_request(
@@ -63,6 +67,7 @@ def match_request(
     time_budget: float | timedelta | None = None,
     weights: tuple[float, float, float] | None = None,
     alternatives: int | None = None,
+    profile: str | None = None,
     **names: str | None,
 ) -> MatchRequest:
     """Return the request for a match; see :class:`MatchOptions`.
@@ -73,6 +78,8 @@ def match_request(
     'easm'
     """
     request = MatchRequest(sketch=sketch, map=map, pipeline=_pipeline(names, params or {}))
+    if profile:
+        request.pipeline.profile = profile
     if seed is not None:
         with refused_as("INVALID_FIELD", "seed", "is not a whole number from 0 to 2**64 − 1"):
             request.seed = seed
@@ -94,10 +101,13 @@ def match_request(
 
 
 def segment_request(
-    source: Source, segmenter: str | None, params: Mapping[str, Any] | None
+    source: Source,
+    segmenter: str | None,
+    params: Mapping[str, Any] | None,
+    profile: str | None = None,
 ) -> SegmentRequest:
     """Return the request for the objects of one source."""
-    request = SegmentRequest(source=source)
+    request = SegmentRequest(source=source, profile=profile or "")
     if segmenter or params:
         request.segmenter.CopyFrom(_selection("segmenter", segmenter or "", params or {}))
     return request
@@ -112,13 +122,12 @@ def _pipeline(names: Mapping[str, str | None], params: Mapping[str, Mapping[str,
             "INVALID_FIELD",
             "pipeline",
         )
-    return Pipeline(
-        **{
-            stage: _selection(f"pipeline.{stage}", names.get(stage) or "", params.get(stage, {}))
-            for stage in _STAGES
-            if names.get(stage) or params.get(stage)
-        }
-    )
+    stages: dict[str, Any] = {
+        stage: _selection(f"pipeline.{stage}", names.get(stage) or "", params.get(stage, {}))
+        for stage in _STAGES
+        if names.get(stage) or params.get(stage)
+    }
+    return Pipeline(**stages)
 
 
 def _selection(field: str, name: str, params: Mapping[str, Any]) -> AlgorithmSelection:

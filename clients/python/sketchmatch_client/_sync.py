@@ -117,7 +117,7 @@ class Client:
             Seconds after which the call fails. To have the best match until then, give a
             ``time_budget`` instead.
         **options
-            Algorithms, parameters, seed, time budget and weights: :class:`MatchOptions`.
+            Profile, algorithms, parameters, seed, time budget …: :class:`MatchOptions`.
 
         Returns
         -------
@@ -162,6 +162,7 @@ class Client:
         *,
         segmenter: str | None = None,
         params: Mapping[str, Any] | None = None,
+        profile: str | None = None,
         timeout: float | None = None,
     ) -> SegmentResponse:
         """Find the objects of one source, without a match.
@@ -174,6 +175,8 @@ class Client:
             Name of the algorithm; the server's choice when left out.
         params
             Its parameters.
+        profile
+            The server's pipeline that decides what is left out.
         timeout
             Seconds after which the call fails.
 
@@ -182,12 +185,12 @@ class Client:
         SegmentResponse
             The scene, warnings, and the segmenter as it ran.
         """
-        request = segment_request(source, segmenter, params)
+        request = segment_request(source, segmenter, params, profile)
         with translated_errors(self._address):
             return SceneServiceStub(self._channel).Segment(request, timeout=self._limit(timeout))
 
     def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
-        """Return the algorithms that the server offers, and its plugins."""
+        """Return the algorithms that the server offers, its profiles and its plugins."""
         with translated_errors(self._address):
             return CatalogServiceStub(self._channel).ListAlgorithms(
                 ListAlgorithmsRequest(), timeout=self._limit(timeout)

@@ -12,7 +12,7 @@ from typing import Annotated, NoReturn
 import typer
 
 import sketchmatch
-from sketchmatch.cli import demo, describe, match, plugins, relate, segment, serve
+from sketchmatch.cli import config, demo, describe, match, plugins, relate, segment, serve
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError
 
 __all__ = ["ExitCode", "main"]
@@ -31,6 +31,7 @@ app.command("relate")(relate.relate)
 app.command("serve")(serve.serve)
 app.command("demo")(demo.demo)
 app.add_typer(plugins.app, name="plugins")
+app.add_typer(config.app, name="config")
 
 
 class ExitCode(IntEnum):

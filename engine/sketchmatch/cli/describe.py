@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sketchmatch.cli.options import Histogram, JsonDocument, Settings, parse_pairs, parse_settings
+from sketchmatch.cli.options import (
+    Config,
+    Histogram,
+    JsonDocument,
+    Profile,
+    Settings,
+    parse_pairs,
+    parse_settings,
+)
 
 if TYPE_CHECKING:
     from sketchmatch.cli.relations import Description
@@ -20,6 +28,8 @@ def describe(
     scene: Annotated[
         Path, typer.Argument(metavar="SCENE", help="A sketch or a map, as `match` takes them.")
     ],
+    config: Config = None,
+    profile: Profile = "",
     segmenter: Annotated[str, typer.Option(help="Segmenter; the file's kind decides.")] = "",
     histogram: Histogram = "",
     settings: Settings = None,
@@ -65,7 +75,7 @@ def describe(
 
     with places.places_in(scene=scene):
         found = relations.described(
-            scene, {"segmenter": segmenter, "histogram": histogram}, params, pairs
+            scene, {"segmenter": segmenter, "histogram": histogram}, params, pairs, profile, config
         )
     if json:
         display.print_document(_document(found))

@@ -9,7 +9,17 @@ from typing import Annotated
 import typer
 from google.protobuf.json_format import MessageToJson
 
-from sketchmatch.cli.options import Json, MatchSettings, Overlay, Server, Settings, parse_settings
+from sketchmatch.cli.options import (
+    Config,
+    Json,
+    MatchSettings,
+    Overlay,
+    Profile,
+    Server,
+    Settings,
+    parse_settings,
+    refuse_config,
+)
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
@@ -25,6 +35,8 @@ def match(
         Path, typer.Argument(metavar="MAP", help="Map: ROS map .yaml, .geojson, .svg, image.")
     ],
     server: Server = None,
+    config: Config = None,
+    profile: Profile = "",
     searcher: Annotated[str | None, typer.Option(help="Searcher.")] = None,
     histogram: Annotated[str | None, typer.Option(help="Histogram.")] = None,
     similarity: Annotated[str | None, typer.Option(help="Similarity measure.")] = None,
@@ -54,6 +66,7 @@ def match(
     """
     from sketchmatch.cli import display, pictures, places
 
+    refuse_config(config, server)
     if overlay is not None:
         pictures.check_path(overlay)
     chosen = {
@@ -70,9 +83,10 @@ def match(
         time_budget=time_budget,
         weights=_weights(weights),
         alternatives=alternatives,
+        profile=profile,
     )
     with places.places_in(sketch=sketch, map=map_):
-        answer = display.watch(_events(server, sketch, map_, how))
+        answer = display.watch(_events(server, config, sketch, map_, how))
     if json:
         typer.echo(MessageToJson(answer.result, **display.JSON_STYLE))
     else:
@@ -82,7 +96,7 @@ def match(
 
 
 def _events(
-    server: str | None, sketch: Path, map_: Path, how: MatchSettings
+    server: str | None, config: Path | None, sketch: Path, map_: Path, how: MatchSettings
 ) -> Generator[MatchResponse, None, None]:
     if server:
         from sketchmatch.cli import remote
@@ -90,7 +104,7 @@ def _events(
         return remote.match_events(server, sketch, map_, how)
     from sketchmatch.cli import local
 
-    return local.match_events(sketch, map_, how)
+    return local.match_events(sketch, map_, how, config)
 
 
 def _weights(text: str) -> tuple[float, float, float]:

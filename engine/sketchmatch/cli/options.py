@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,15 +13,18 @@ import typer
 from sketchmatch.errors import InvalidInputError, Reason
 
 __all__ = [
+    "Config",
     "Histogram",
     "Json",
     "JsonDocument",
     "MatchSettings",
     "Overlay",
+    "Profile",
     "Server",
     "Settings",
     "parse_pairs",
     "parse_settings",
+    "refuse_config",
     "say",
 ]
 
@@ -30,6 +32,22 @@ Server = Annotated[
     str | None,
     typer.Option(
         "--server", metavar="HOST:PORT", help="Ask this server instead of computing here."
+    ),
+]
+Config = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        metavar="FILE",
+        help="Configuration; sketchmatch.toml here or in your configuration folder by default.",
+    ),
+]
+Profile = Annotated[
+    str,
+    typer.Option(
+        "--profile",
+        metavar="NAME",
+        help="Start from this pipeline: fast, proof, thesis-easm, thesis-fsnn or one of your own.",
     ),
 ]
 Settings = Annotated[
@@ -47,7 +65,9 @@ Json = Annotated[
 JsonDocument = Annotated[
     bool, typer.Option("--json", help="Print one JSON document, which counts objects from 0.")
 ]
-Histogram = Annotated[str, typer.Option(help="Histogram; `constant` by default.")]
+Histogram = Annotated[
+    str, typer.Option(help="Histogram; `constant` unless the configuration names another.")
+]
 Overlay = Annotated[
     Path | None, typer.Option("--overlay", metavar="FILE", help="Draw the answer into a picture.")
 ]
@@ -65,6 +85,8 @@ class MatchSettings:
         Parameters by stage, where some were set.
     seed, time_budget, weights, alternatives
         As in :class:`sketchmatch.pipeline.match.MatchRequest`.
+    profile
+        The pipeline to start from; empty for the default one.
     """
 
     names: Mapping[str, str] = field(default_factory=dict)
@@ -73,6 +95,7 @@ class MatchSettings:
     time_budget: float | None = None
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
     alternatives: int | None = None
+    profile: str = ""
 
 
 def parse_settings(
@@ -97,6 +120,8 @@ def parse_settings(
     >>> parse_settings(["searcher.population=400", "searcher.consistency=pairwise"])
     {'searcher': {'population': 400, 'consistency': 'pairwise'}}
     """
+    from sketchmatch.config import value_of
+
     stages: dict[str, dict[str, Any]] = {}
     for setting in settings or ():
         name, equals, text = setting.partition("=")
@@ -108,17 +133,26 @@ def parse_settings(
                 f"{setting!r} has another form than STAGE.PARAMETER=VALUE, "
                 "as in searcher.population=400",
             )
-        try:
-            value = json.loads(text)
-        except ValueError:
-            value = text
         if allowed and stage not in allowed:
             known = " or ".join(f"{name}.…" for name in allowed)
             raise InvalidInputError(
                 Reason.INVALID_PARAMETER, "--set", f"{stage!r} is no stage here; use {known}"
             )
-        stages.setdefault(stage, {})[parameter] = value
+        stages.setdefault(stage, {})[parameter] = value_of(text)
     return stages
+
+
+def refuse_config(config: Path | None, server: str | None) -> None:
+    """Refuse a configuration for an answer that is another's.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is one, and a server.
+    """
+    if config is not None and server:
+        problem = "is for computing here, and the server has one of its own; drop one of the two"
+        raise InvalidInputError(Reason.INVALID_FIELD, "--config", problem)
 
 
 def parse_pairs(texts: Iterable[str] | None, option: str) -> list[tuple[int, int]]:

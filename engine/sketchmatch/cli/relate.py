@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sketchmatch.cli.options import Histogram, JsonDocument, Settings, parse_pairs, parse_settings
+from sketchmatch.cli.options import (
+    Config,
+    Histogram,
+    JsonDocument,
+    Profile,
+    Settings,
+    parse_pairs,
+    parse_settings,
+)
 
 if TYPE_CHECKING:
     from sketchmatch.cli.relations import Comparison
@@ -36,9 +44,14 @@ def relate(
         list[str] | None,
         typer.Option("--map-pair", metavar="C,D", help="The same on the map."),
     ] = None,
+    config: Config = None,
+    profile: Profile = "",
     histogram: Histogram = "",
     similarity: Annotated[
-        str, typer.Option(help="Similarity measure; `cross-correlation` by default.")
+        str,
+        typer.Option(
+            help="Similarity measure; `cross-correlation` unless the configuration names another."
+        ),
     ] = "",
     segmenter_sketch: Annotated[str, typer.Option(help="Segmenter of the sketch.")] = "",
     segmenter_map: Annotated[str, typer.Option(help="Segmenter of the map.")] = "",
@@ -67,7 +80,7 @@ def relate(
     from sketchmatch.cli import display, relations
 
     with places.places_in(sketch=sketch, map=map_):
-        found = relations.compared(sketch, map_, names, params, *pairs, limit)
+        found = relations.compared(sketch, map_, names, params, *pairs, limit, profile, config)
     if json:
         display.print_document(_document(found))
     elif sys.stdout.isatty():

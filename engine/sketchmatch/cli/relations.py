@@ -16,9 +16,11 @@ import numpy as np
 from sketchmatch.api import Algorithm, Histogram, Segmentation, Segmenter, Similarity
 from sketchmatch.cli import display
 from sketchmatch.cli.options import say
+from sketchmatch.config import load, open_registry
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import FloatArray, Scene, SceneDescriptor, Source, object_pairs, pair_index
+from sketchmatch.model.limits import limited_to
 from sketchmatch.pipeline.describe import describe
 from sketchmatch.pipeline.limits import check_comparisons, check_histograms
 from sketchmatch.pipeline.plugins import blaming, segmented
@@ -28,7 +30,7 @@ from sketchmatch.pipeline.result import Correspondence
 from sketchmatch.pipeline.selection import Choice, resolve, resolve_segmenter
 from sketchmatch.pipeline.warmup import announcing_compilation
 from sketchmatch.pipeline.words import DirectionalRelation, directional_relations
-from sketchmatch.registry import default_registry
+from sketchmatch.registry import Registry
 
 __all__ = ["Comparison", "Description", "compared", "described"]
 
@@ -90,7 +92,12 @@ class Comparison:
 
 
 def described(
-    file: Path, names: Mapping[str, str], params: Mapping[str, Any], pairs: Pairs
+    file: Path,
+    names: Mapping[str, str],
+    params: Mapping[str, Any],
+    pairs: Pairs,
+    profile: str = "",
+    config: Path | None = None,
 ) -> Description:
     """Describe pairs of the objects in a file, all pairs a < b if none are chosen.
 
@@ -99,15 +106,18 @@ def described(
     InvalidInputError
         If the file, an algorithm, a parameter or a pair cannot be used.
     """
-    registry, source = default_registry(), read_source(file)
+    configuration = load(config)
+    registry, defaults = open_registry(configuration), configuration.defaults
     chosen = _choices(("segmenter", "histogram"), names, params)
-    segmenter = resolve_segmenter(registry, chosen["segmenter"], source)
-    histogram = resolve(registry, {"histogram": chosen["histogram"]}).histogram
-    with announcing_compilation(say):
-        scene = _found(source, segmenter, "scene", "").scene
+    with limited_to(configuration.limits), announcing_compilation(say):
+        source = read_source(file)
+        segmenter = resolve_segmenter(registry, chosen["segmenter"], source, defaults, profile)
+        selection = {"histogram": chosen["histogram"]}
+        histogram = resolve(registry, selection, defaults=defaults, profile=profile).histogram
+        scene = _found(registry, source, segmenter, "scene", "").scene
         _check_pairs(pairs, scene, "--pair", "scene")
         check_histograms("scene", scene, histogram)
-        descriptor = _described(scene, histogram, "", "describing relations")
+        descriptor = _described(registry, scene, histogram, "", "describing relations")
     pairs = pairs or _all_pairs(scene)
     rows = _rows(descriptor, pairs)
     turns = np.exp(2j * np.pi * np.arange(rows.shape[1]) / rows.shape[1])
@@ -130,6 +140,8 @@ def compared(
     sketch_pairs: Pairs,
     map_pairs: Pairs,
     limit: int,
+    profile: str = "",
+    config: Path | None = None,
 ) -> Comparison:
     """Compare pairs of a sketch with pairs of a map, all pairs a < b where none are chosen.
 
@@ -140,26 +152,29 @@ def compared(
     InvalidInputError
         If a file, an algorithm, a parameter or a pair cannot be used.
     """
-    registry, sources = default_registry(), (read_source(sketch), read_source(map_))
+    configuration = load(config)
+    registry = open_registry(configuration)
     stages = ("sketch_segmenter", "map_segmenter", "histogram", "similarity")
-    pipeline = resolve(registry, _choices(stages, names, params), *sources)
-    assert pipeline.sketch_segmenter is not None
-    assert pipeline.map_segmenter is not None
-    histogram, similarity = pipeline.histogram, pipeline.similarity
-    with announcing_compilation(say):
-        drawn = _found(sources[0], pipeline.sketch_segmenter, "sketch", "sketch").scene
-        mapped = _found(sources[1], pipeline.map_segmenter, "map", "map").scene
+    chosen = _choices(stages, names, params)
+    with limited_to(configuration.limits), announcing_compilation(say):
+        sources = (read_source(sketch), read_source(map_))
+        pipeline = resolve(registry, chosen, *sources, configuration.defaults, profile)
+        assert pipeline.sketch_segmenter is not None
+        assert pipeline.map_segmenter is not None
+        histogram, similarity = pipeline.histogram, pipeline.similarity
+        drawn = _found(registry, sources[0], pipeline.sketch_segmenter, "sketch", "sketch").scene
+        mapped = _found(registry, sources[1], pipeline.map_segmenter, "map", "map").scene
         _check_pairs(sketch_pairs, drawn, "--sketch-pair", "sketch")
         _check_pairs(map_pairs, mapped, "--map-pair", "map")
         for side, scene in (("sketch", drawn), ("map", mapped)):
             check_histograms(side, scene, histogram)
         check_comparisons(drawn, mapped)
-        first = _described(drawn, histogram, "sketch", "describing the sketch")
-        second = _described(mapped, histogram, "map", "describing the map")
+        first = _described(registry, drawn, histogram, "sketch", "describing the sketch")
+        second = _described(registry, mapped, histogram, "map", "describing the map")
         exchanged = len(drawn) > len(mapped)
         template, argument = (second, first) if exchanged else (first, second)
         work = relate(template, argument, similarity)
-        table = _watched(similarity, work, "comparing relations")
+        table = _watched(registry, similarity, work, "comparing relations")
     values = [table.similarity, table.rotation, table.dilation]
     if exchanged:
         values = [table.similarity.T, -table.rotation.T, 1.0 / table.dilation.T]
@@ -184,23 +199,29 @@ def _choices(
     return {stage: Choice(names.get(stage, ""), params.get(stage, {})) for stage in stages}
 
 
-def _found(source: Source, segmenter: Segmenter, field: str, side: str) -> Segmentation:
+def _found(
+    registry: Registry, source: Source, segmenter: Segmenter, field: str, side: str
+) -> Segmentation:
     """Find the objects of a source and tell what was left out."""
-    found = segmented(source, segmenter, default_registry(), f"{field}.{source.field}")
+    found = segmented(source, segmenter, registry, f"{field}.{source.field}")
     display.say_warnings(side, found.warnings)
     return found
 
 
-def _described(scene: Scene, histogram: Histogram, side: str, what: str) -> SceneDescriptor:
+def _described(
+    registry: Registry, scene: Scene, histogram: Histogram, side: str, what: str
+) -> SceneDescriptor:
     try:
-        return _watched(histogram, describe(scene, histogram), what)
+        return _watched(registry, histogram, describe(scene, histogram), what)
     except InvalidInputError as error:
         raise error.within(side) from None
 
 
-def _watched(algorithm: Algorithm, work: Generator[float, None, _Value], what: str) -> _Value:
+def _watched(
+    registry: Registry, algorithm: Algorithm, work: Generator[float, None, _Value], what: str
+) -> _Value:
     """Run an algorithm's stage to its end, showing how far it is."""
-    with blaming(algorithm, default_registry()):
+    with blaming(algorithm, registry):
         return display.follow(work, what)
 
 

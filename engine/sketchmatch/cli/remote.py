@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from sketchmatch.cli.options import MatchSettings
+from sketchmatch.config import load
 from sketchmatch.io import read_source
 from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
+from sketchmatch.model.limits import limited_to
 from sketchmatch_client import Client, sources
 from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsResponse
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
@@ -37,14 +39,19 @@ def match_events(
             time_budget=settings.time_budget,
             weights=settings.weights,
             alternatives=settings.alternatives,
+            profile=settings.profile or None,
         )
 
 
-def segmented(server: str, path: Path, name: str, parameters: dict[str, Any]) -> SegmentResponse:
+def segmented(
+    server: str, path: Path, name: str, parameters: dict[str, Any], profile: str
+) -> SegmentResponse:
     """Let a server find the objects in a file."""
     message = _message(path)
     with Client(server) as client:
-        return client.segment(message, segmenter=name or None, params=parameters)
+        return client.segment(
+            message, segmenter=name or None, params=parameters, profile=profile or None
+        )
 
 
 def algorithms(server: str) -> ListAlgorithmsResponse:
@@ -59,7 +66,9 @@ def _message(path: Path) -> Source:
     It is read in any case, so that a file of no use is refused here, in the same words as without
     a server.
     """
-    match read_source(path):
+    with limited_to(load().limits):
+        source = read_source(path)
+    match source:
         case OccupancyGrid() if path.suffix.lower() in (".yaml", ".yml"):
             return sources.map_server_map(path)
         case OccupancyGrid(cells, resolution, origin):

@@ -8,7 +8,16 @@ from typing import Annotated
 import typer
 from google.protobuf.json_format import MessageToJson
 
-from sketchmatch.cli.options import Json, Overlay, Server, Settings, parse_settings
+from sketchmatch.cli.options import (
+    Config,
+    Json,
+    Overlay,
+    Profile,
+    Server,
+    Settings,
+    parse_settings,
+    refuse_config,
+)
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 
 __all__ = ["segment"]
@@ -19,6 +28,8 @@ def segment(
         Path, typer.Argument(metavar="FILE", help="A sketch or a map, as `match` takes them.")
     ],
     server: Server = None,
+    config: Config = None,
+    profile: Profile = "",
     segmenter: Annotated[str, typer.Option(help="Segmenter; the file's kind decides.")] = "",
     settings: Settings = None,
     json: Json = False,
@@ -36,12 +47,13 @@ def segment(
     from sketchmatch.cli import display, pictures, places
     from sketchmatch.io import scene_files
 
+    refuse_config(config, server)
     if overlay is not None:
         pictures.check_path(overlay)
     if out is not None:
         scene_files.check_scene_path(out, "--out")
     with places.places_in(source=file):
-        found = _segmented(server, file, segmenter, settings)
+        found = _segmented(server, config, file, segmenter, settings, profile)
     if json:
         typer.echo(MessageToJson(found, **display.JSON_STYLE))
     else:
@@ -53,13 +65,18 @@ def segment(
 
 
 def _segmented(
-    server: str | None, file: Path, segmenter: str, settings: list[str] | None
+    server: str | None,
+    config: Path | None,
+    file: Path,
+    segmenter: str,
+    settings: list[str] | None,
+    profile: str,
 ) -> SegmentResponse:
     parameters = parse_settings(settings, ("segmenter",)).get("segmenter", {})
     if server:
         from sketchmatch.cli import remote
 
-        return remote.segmented(server, file, segmenter, parameters)
+        return remote.segmented(server, file, segmenter, parameters, profile)
     from sketchmatch.cli import local
 
-    return local.segmented(file, segmenter, parameters)
+    return local.segmented(file, segmenter, parameters, profile, config)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sketchmatch.cli.options import say
+from sketchmatch.cli.options import Config, say
+
+if TYPE_CHECKING:
+    from sketchmatch.config import Configuration
+    from sketchmatch.server.setup import Setup
 
 __all__ = ["serve"]
 
@@ -14,74 +18,110 @@ _MIB = 1024 * 1024
 
 
 def serve(
+    config: Config = None,
+    profile: Annotated[
+        str | None,
+        typer.Option("--profile", metavar="NAME", help="Profile for requests that name none."),
+    ] = None,
     address: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="Where to listen; port 0 picks a free one.")
-    ] = "127.0.0.1:50051",
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Where to listen, 127.0.0.1:50051 by default; port 0 picks a free one.",
+        ),
+    ] = None,
     max_request_mib: Annotated[
-        int, typer.Option(min=1, max=500, help="Largest request, in MiB.")
-    ] = 64,
+        int | None, typer.Option(help="Largest request, in MiB; 64 by default.")
+    ] = None,
     max_matches: Annotated[
         int | None,
-        typer.Option(min=1, max=1000, help="Requests at the same time; 4 a processor by default."),
+        typer.Option(help="Requests at the same time; 4 a processor by default."),
     ] = None,
     max_time_budget: Annotated[
-        float | None,
-        typer.Option(min=0.001, metavar="SECONDS", help="Longest match; no limit by default."),
+        float | None, typer.Option(metavar="SECONDS", help="Longest match; no limit by default.")
     ] = None,
     grace: Annotated[
-        float,
-        typer.Option(min=0, metavar="SECONDS", help="Time for running matches when stopped."),
-    ] = 5.0,
+        float | None,
+        typer.Option(
+            metavar="SECONDS", help="Time for running matches when stopped; 5 by default."
+        ),
+    ] = None,
     max_bytes: Annotated[
         int | None,
-        typer.Option(min=1, help="Bytes of one picture in a request; 256 MiB by default."),
+        typer.Option(help="Bytes of one picture in a request; 256 MiB by default."),
     ] = None,
     max_pixels: Annotated[
-        int | None,
-        typer.Option(min=1, help="Pixels of a picture or grid; 64 million by default."),
+        int | None, typer.Option(help="Pixels of a picture or grid; 64 million by default.")
     ] = None,
     max_side: Annotated[
         int | None,
-        typer.Option(min=1, help="Pixels along a side of a picture or grid; 65535 by default."),
+        typer.Option(help="Pixels along a side of a picture or grid; 65535 by default."),
     ] = None,
     max_vertices: Annotated[
-        int | None,
-        typer.Option(min=1, help="Vertices of a sketch or map; 1 million by default."),
+        int | None, typer.Option(help="Vertices of a sketch or map; 1 million by default.")
     ] = None,
     max_objects: Annotated[
-        int | None, typer.Option(min=2, help="Objects of a scene; 1000 by default.")
+        int | None, typer.Option(help="Objects of a scene; 1000 by default.")
     ] = None,
+    strict_plugins: Annotated[
+        bool,
+        typer.Option(
+            "--strict-plugins", help="Do not start while a plugin fails or a name is taken twice."
+        ),
+    ] = False,
 ) -> None:
     """Serve the gRPC API until SIGTERM or Ctrl-C.
 
-    Health is NOT_SERVING until the kernels are compiled or loaded. There is no encryption and no
-    authentication yet: listen on addresses that only trusted programs reach. Where no option says
-    how large a source may be, SKETCHMATCH_MAX_BYTES, …_PIXELS, …_SIDE, …_VERTICES and …_OBJECTS
-    do.
+    Where no option says it, the configuration does. SIGHUP reads the configuration again, but for
+    address and grace; requests under way keep the one that they began with. Health is NOT_SERVING
+    until the kernels are compiled or loaded. There is no encryption and no authentication yet:
+    listen on addresses that only trusted programs reach.
     """
     import asyncio
-    from dataclasses import replace
 
-    from sketchmatch.model.limits import SourceLimits
-    from sketchmatch.registry import default_registry
-    from sketchmatch.server.limits import Limits
+    from sketchmatch.config import load
     from sketchmatch.server.serve import ServerSettings
     from sketchmatch.server.serve import serve as serve_forever
 
-    defaults = Limits()
-    sizes = {
-        "max_bytes": max_bytes,
-        "max_pixels": max_pixels,
-        "max_side": max_side,
-        "max_vertices": max_vertices,
-        "max_objects": max_objects,
+    flags = {
+        "profile": profile,
+        "plugins.strict": strict_plugins or None,
+        "server.address": address,
+        "server.grace_seconds": grace,
+        "server.max_request_mib": max_request_mib,
+        "server.max_matches": max_matches,
+        "server.max_time_budget_seconds": max_time_budget,
+        "limits.max_bytes": max_bytes,
+        "limits.max_pixels": max_pixels,
+        "limits.max_side": max_side,
+        "limits.max_vertices": max_vertices,
+        "limits.max_objects": max_objects,
     }
-    chosen = {name: value for name, value in sizes.items() if value is not None}
-    limits = Limits(
-        max_request_bytes=max_request_mib * _MIB,
-        max_concurrent_matches=max_matches or defaults.max_concurrent_matches,
-        max_time_budget=max_time_budget,
-        sources=replace(SourceLimits.from_environment(), **chosen),
+    server = load(config, flags).settings.server
+    settings = ServerSettings(server.address, server.grace_seconds)
+    asyncio.run(serve_forever(lambda: _setup(load(config, flags)), settings, say))
+
+
+def _setup(configuration: Configuration) -> Setup:
+    """Return what requests are answered with; plugins are looked for anew."""
+    from sketchmatch.config import refuse_faults
+    from sketchmatch.registry import discover
+    from sketchmatch.server.limits import Limits
+    from sketchmatch.server.setup import Isolation, Setup
+
+    registry = discover(rules=configuration.rules)
+    if configuration.strict:
+        registry.refuse_problems()
+    refuse_faults(configuration, registry)
+    server = configuration.settings.server
+    return Setup(
+        registry=registry,
+        defaults=configuration.defaults,
+        limits=Limits(
+            max_request_bytes=server.max_request_mib * _MIB,
+            max_concurrent_matches=server.max_matches or Limits.max_concurrent_matches,
+            max_time_budget=server.max_time_budget_seconds,
+            sources=configuration.limits,
+        ),
+        isolation=Isolation(configuration.trusted, configuration.patience),
     )
-    settings = ServerSettings(address=address, grace=grace, limits=limits)
-    asyncio.run(serve_forever(default_registry(), settings, say))

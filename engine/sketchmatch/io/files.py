@@ -41,7 +41,6 @@ def read_source(path: str | Path) -> Source:
         too large, or its contents cannot be used.
     """
     path = Path(path)
-    source_limits()  # what is wrong with them is not wrong with the file
     try:
         source = _decoded(path)
         check_source(source)

@@ -170,7 +170,7 @@ def _check_elements(count: int) -> None:
             Reason.LIMIT_EXCEEDED,
             "",
             f"draws more than the limit of {limit} elements, a tenth of the vertices; simplify it, "
-            "or raise max_vertices (SKETCHMATCH_MAX_VERTICES)",
+            "or raise limits.max_vertices (SKETCHMATCH_LIMITS__MAX_VERTICES)",
         )
 
 

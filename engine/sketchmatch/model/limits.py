@@ -1,18 +1,16 @@
 """How large a source may be: the one home of these limits.
 
 They hold for files, for requests and for values made in Python alike, and are checked before the
-memory is spent. The defaults are for one machine; the environment variables
-``SKETCHMATCH_MAX_BYTES``, ``…_PIXELS``, ``…_SIDE``, ``…_VERTICES`` and ``…_OBJECTS`` change them,
-and so do the options of ``sketchmatch serve``.
+memory is spent. The defaults are for one machine; the section ``[limits]`` of the configuration
+changes them.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model.sources import Image, OccupancyGrid, PolygonSet, Source, StrokeSet
@@ -56,7 +54,7 @@ class SourceLimits:
 
     Examples
     --------
-    >>> SourceLimits.from_environment({"SKETCHMATCH_MAX_OBJECTS": "50"}).max_objects
+    >>> SourceLimits(max_objects=50).max_objects
     50
     """
 
@@ -70,28 +68,6 @@ class SourceLimits:
         for name, least in _LEAST.items():
             _check_limit(name, getattr(self, name), least)
 
-    @classmethod
-    def from_environment(cls, environment: Mapping[str, str] = os.environ) -> SourceLimits:
-        """Return the limits that the environment variables set, the defaults for the rest.
-
-        Raises
-        ------
-        InvalidInputError
-            With the variable's name as its path, if its value is of no use.
-        """
-        chosen = {}
-        for item in fields(cls):
-            variable = f"SKETCHMATCH_{item.name.upper()}"
-            text = environment.get(variable, "").strip()
-            if not text:
-                continue
-            try:
-                chosen[item.name] = int(text)
-            except ValueError:
-                raise _bad_limit(variable, text, _LEAST[item.name]) from None
-            _check_limit(variable, chosen[item.name], _LEAST[item.name])
-        return cls(**chosen)
-
     @property
     def max_elements(self) -> int:
         """Elements of a drawing, counting every repetition: one for every ten vertices."""
@@ -103,15 +79,9 @@ _LEAST = {"max_bytes": 1, "max_pixels": 1, "max_side": 1, "max_vertices": 1, "ma
 _in_force: ContextVar[SourceLimits | None] = ContextVar("source_limits", default=None)
 
 
-def source_limits() -> SourceLimits:
-    """Return the limits in force: a server's own, or else those of the environment.
-
-    Raises
-    ------
-    InvalidInputError
-        If an environment variable's value is of no use.
-    """
-    return _in_force.get() or SourceLimits.from_environment()
+def source_limits(otherwise: SourceLimits | None = None) -> SourceLimits:
+    """Return the limits in force; where nobody put any in force ``otherwise``, or the defaults."""
+    return _in_force.get() or otherwise or SourceLimits()
 
 
 @contextmanager
@@ -207,15 +177,8 @@ def check_source(source: Source, field: str = "") -> None:
 
 def _check_limit(name: str, value: object, least: int) -> None:
     if not isinstance(value, int) or isinstance(value, bool) or value < least:
-        raise _bad_limit(name, value, least)
-
-
-def _bad_limit(name: str, value: object, least: int) -> InvalidInputError:
-    return InvalidInputError(
-        Reason.INVALID_PARAMETER,
-        name,
-        f"is {quoted(value)}; give a whole number of at least {least}",
-    )
+        problem = f"is {quoted(value)}; give a whole number of at least {least}"
+        raise InvalidInputError(Reason.INVALID_PARAMETER, name, problem)
 
 
 def _counted(number: int) -> str:
@@ -226,6 +189,6 @@ def _beyond(field: str, given: str, limit: str, name: str, remedy: str) -> Inval
     return InvalidInputError(
         Reason.LIMIT_EXCEEDED,
         field,
-        f"{given}, more than the limit of {limit}; {remedy}, or raise {name} "
-        f"(SKETCHMATCH_{name.upper()})",
+        f"{given}, more than the limit of {limit}; {remedy}, or raise limits.{name} "
+        f"(SKETCHMATCH_LIMITS__{name.upper()})",
     )

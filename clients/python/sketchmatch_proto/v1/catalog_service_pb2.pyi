@@ -11,6 +11,7 @@ import google.protobuf.internal.containers
 import google.protobuf.internal.enum_type_wrapper
 import google.protobuf.message
 import google.protobuf.struct_pb2
+import sketchmatch_proto.v1.pipeline_pb2
 import sys
 import typing
 
@@ -137,6 +138,7 @@ class ListAlgorithmsResponse(google.protobuf.message.Message):
 
     ALGORITHMS_FIELD_NUMBER: builtins.int
     PLUGINS_FIELD_NUMBER: builtins.int
+    PROFILES_FIELD_NUMBER: builtins.int
     @property
     def algorithms(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Algorithm]:
         """Algorithms of all active plugins, by kind and name."""
@@ -145,15 +147,53 @@ class ListAlgorithmsResponse(google.protobuf.message.Message):
     def plugins(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Plugin]:
         """All plugins found, whether they could be used or not."""
 
+    @property
+    def profiles(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Profile]:
+        """The pipelines that requests can name, by name."""
+
     def __init__(
         self,
         *,
         algorithms: collections.abc.Iterable[global___Algorithm] | None = ...,
         plugins: collections.abc.Iterable[global___Plugin] | None = ...,
+        profiles: collections.abc.Iterable[global___Profile] | None = ...,
     ) -> None: ...
-    def ClearField(self, field_name: typing.Literal["algorithms", b"algorithms", "plugins", b"plugins"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["algorithms", b"algorithms", "plugins", b"plugins", "profiles", b"profiles"]) -> None: ...
 
 global___ListAlgorithmsResponse = ListAlgorithmsResponse
+
+@typing.final
+class Profile(google.protobuf.message.Message):
+    """A pipeline that a request can name."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: builtins.int
+    SUMMARY_FIELD_NUMBER: builtins.int
+    PIPELINE_FIELD_NUMBER: builtins.int
+    IS_DEFAULT_FIELD_NUMBER: builtins.int
+    name: builtins.str
+    """What `Pipeline.profile` selects it by."""
+    summary: builtins.str
+    """One line for lists."""
+    is_default: builtins.bool
+    """Whether the server takes it where a request names none."""
+    @property
+    def pipeline(self) -> sketchmatch_proto.v1.pipeline_pb2.Pipeline:
+        """What it chooses: the stages that it leaves out are the server's defaults."""
+
+    def __init__(
+        self,
+        *,
+        name: builtins.str = ...,
+        summary: builtins.str = ...,
+        pipeline: sketchmatch_proto.v1.pipeline_pb2.Pipeline | None = ...,
+        is_default: builtins.bool = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["pipeline", b"pipeline"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["is_default", b"is_default", "name", b"name", "pipeline", b"pipeline", "summary", b"summary"]) -> None: ...
+
+global___Profile = Profile
 
 @typing.final
 class Algorithm(google.protobuf.message.Message):
@@ -170,6 +210,7 @@ class Algorithm(google.protobuf.message.Message):
     PARAMETERS_SCHEMA_FIELD_NUMBER: builtins.int
     IS_DEFAULT_FIELD_NUMBER: builtins.int
     SOURCE_KINDS_FIELD_NUMBER: builtins.int
+    SOURCE_FIELD_NUMBER: builtins.int
     kind: global___AlgorithmKind.ValueType
     """What it does in a match."""
     name: builtins.str
@@ -186,10 +227,12 @@ class Algorithm(google.protobuf.message.Message):
     """Whether the server takes it where a request names no algorithm for the stage; a segmenter,
     where it can read the source.
     """
+    source: builtins.str
+    """The publications it is from, in one line; empty if there are none."""
     @property
     def parameters_schema(self) -> google.protobuf.struct_pb2.Struct:
-        """Its parameters as a JSON Schema (draft 2020-12) of type object: type, default, bounds and
-        description of each.
+        """Its parameters as a JSON Schema (draft 2020-12) of type object: type, default, bounds, unit and
+        description of each. The defaults are those that the server's configuration sets.
         """
 
     @property
@@ -208,9 +251,10 @@ class Algorithm(google.protobuf.message.Message):
         parameters_schema: google.protobuf.struct_pb2.Struct | None = ...,
         is_default: builtins.bool = ...,
         source_kinds: collections.abc.Iterable[global___SourceKind.ValueType] | None = ...,
+        source: builtins.str = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["parameters_schema", b"parameters_schema"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["description", b"description", "distribution", b"distribution", "distribution_version", b"distribution_version", "is_default", b"is_default", "kind", b"kind", "name", b"name", "parameters_schema", b"parameters_schema", "source_kinds", b"source_kinds", "summary", b"summary"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["description", b"description", "distribution", b"distribution", "distribution_version", b"distribution_version", "is_default", b"is_default", "kind", b"kind", "name", b"name", "parameters_schema", b"parameters_schema", "source", b"source", "source_kinds", b"source_kinds", "summary", b"summary"]) -> None: ...
 
 global___Algorithm = Algorithm
 

@@ -60,6 +60,10 @@ class _ErrorReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._En
     """INTERNAL: an algorithm raised an error or broke its contract."""
     ERROR_REASON_INFINITE_FORCE: _ErrorReason.ValueType  # 16
     """INVALID_ARGUMENT: two objects overlap or touch, which makes the chosen forces infinite."""
+    ERROR_REASON_UNKNOWN_PROFILE: _ErrorReason.ValueType  # 17
+    """INVALID_ARGUMENT: the server's configuration has no profile of this name; the message names
+    those there are.
+    """
 
 class ErrorReason(_ErrorReason, metaclass=_ErrorReasonEnumTypeWrapper):
     """Why a request was refused, for programs. People read the status message.
@@ -113,4 +117,8 @@ ERROR_REASON_PLUGIN_FAILED: ErrorReason.ValueType  # 15
 """INTERNAL: an algorithm raised an error or broke its contract."""
 ERROR_REASON_INFINITE_FORCE: ErrorReason.ValueType  # 16
 """INVALID_ARGUMENT: two objects overlap or touch, which makes the chosen forces infinite."""
+ERROR_REASON_UNKNOWN_PROFILE: ErrorReason.ValueType  # 17
+"""INVALID_ARGUMENT: the server's configuration has no profile of this name; the message names
+those there are.
+"""
 global___ErrorReason = ErrorReason

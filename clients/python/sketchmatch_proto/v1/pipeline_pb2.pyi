@@ -15,8 +15,10 @@ DESCRIPTOR: google.protobuf.descriptor.FileDescriptor
 class Pipeline(google.protobuf.message.Message):
     """Which algorithm does each stage of a match, and with which parameters.
 
-    Every stage may be left out: the server's configuration then decides, and `MatchAccepted` tells
-    what it decided. `CatalogService.ListAlgorithms` lists what there is to choose from.
+    Every stage may be left out: the profile then decides, or else the server's configuration, and
+    `MatchAccepted` tells what was decided. A stage that names another algorithm than these drops their
+    parameters for it, one with parameters alone is laid over them.
+    `CatalogService.ListAlgorithms` lists what there is to choose from.
     """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
@@ -26,6 +28,12 @@ class Pipeline(google.protobuf.message.Message):
     HISTOGRAM_FIELD_NUMBER: builtins.int
     SIMILARITY_FIELD_NUMBER: builtins.int
     SEARCHER_FIELD_NUMBER: builtins.int
+    PROFILE_FIELD_NUMBER: builtins.int
+    profile: builtins.str
+    """Name of the profile, a pipeline of the server's configuration such as "fast" or "proof", that
+    decides what is left out here. Empty: the server's default one, if it has one.
+    An unknown one is INVALID_ARGUMENT with UNKNOWN_PROFILE.
+    """
     @property
     def sketch_segmenter(self) -> global___AlgorithmSelection:
         """Finds the objects in the sketch. Left out: the default for the form of the sketch."""
@@ -54,9 +62,10 @@ class Pipeline(google.protobuf.message.Message):
         histogram: global___AlgorithmSelection | None = ...,
         similarity: global___AlgorithmSelection | None = ...,
         searcher: global___AlgorithmSelection | None = ...,
+        profile: builtins.str = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["histogram", b"histogram", "map_segmenter", b"map_segmenter", "searcher", b"searcher", "similarity", b"similarity", "sketch_segmenter", b"sketch_segmenter"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["histogram", b"histogram", "map_segmenter", b"map_segmenter", "searcher", b"searcher", "similarity", b"similarity", "sketch_segmenter", b"sketch_segmenter"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["histogram", b"histogram", "map_segmenter", b"map_segmenter", "profile", b"profile", "searcher", b"searcher", "similarity", b"similarity", "sketch_segmenter", b"sketch_segmenter"]) -> None: ...
 
 global___Pipeline = Pipeline
 

@@ -17,17 +17,17 @@ from sketchmatch_proto.v1 import scene_pb2 as sketchmatch_dot_v1_dot_scene__pb2
 from sketchmatch_proto.v1 import source_pb2 as sketchmatch_dot_v1_dot_source__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"sketchmatch/v1/scene_service.proto\x12\x0esketchmatch.v1\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1asketchmatch/v1/scene.proto\x1a\x1bsketchmatch/v1/source.proto\"o\n\x0eSegmentRequest\x12&\n\x06source\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12\x35\n\tsegmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\"\xa6\x01\n\x0fSegmentResponse\x12$\n\x05scene\x18\x01 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x10\n\x08warnings\x18\x02 \x03(\t\x12\x35\n\tsegmenter\x18\x03 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12$\n\x05route\x18\x04 \x03(\x0b\x32\x15.sketchmatch.v1.Point2Z\n\x0cSceneService\x12J\n\x07Segment\x12\x1e.sketchmatch.v1.SegmentRequest\x1a\x1f.sketchmatch.v1.SegmentResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"sketchmatch/v1/scene_service.proto\x12\x0esketchmatch.v1\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1asketchmatch/v1/scene.proto\x1a\x1bsketchmatch/v1/source.proto\"\x80\x01\n\x0eSegmentRequest\x12&\n\x06source\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12\x35\n\tsegmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x0f\n\x07profile\x18\x03 \x01(\t\"\xa6\x01\n\x0fSegmentResponse\x12$\n\x05scene\x18\x01 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x10\n\x08warnings\x18\x02 \x03(\t\x12\x35\n\tsegmenter\x18\x03 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12$\n\x05route\x18\x04 \x03(\x0b\x32\x15.sketchmatch.v1.Point2Z\n\x0cSceneService\x12J\n\x07Segment\x12\x1e.sketchmatch.v1.SegmentRequest\x1a\x1f.sketchmatch.v1.SegmentResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'sketchmatch_proto.v1.scene_service_pb2', _globals)
 if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
-  _globals['_SEGMENTREQUEST']._serialized_start=142
-  _globals['_SEGMENTREQUEST']._serialized_end=253
-  _globals['_SEGMENTRESPONSE']._serialized_start=256
-  _globals['_SEGMENTRESPONSE']._serialized_end=422
-  _globals['_SCENESERVICE']._serialized_start=424
-  _globals['_SCENESERVICE']._serialized_end=514
+  _globals['_SEGMENTREQUEST']._serialized_start=143
+  _globals['_SEGMENTREQUEST']._serialized_end=271
+  _globals['_SEGMENTRESPONSE']._serialized_start=274
+  _globals['_SEGMENTRESPONSE']._serialized_end=440
+  _globals['_SCENESERVICE']._serialized_start=442
+  _globals['_SCENESERVICE']._serialized_end=532
 # @@protoc_insertion_point(module_scope)

@@ -23,6 +23,11 @@ class SegmentRequest(google.protobuf.message.Message):
 
     SOURCE_FIELD_NUMBER: builtins.int
     SEGMENTER_FIELD_NUMBER: builtins.int
+    PROFILE_FIELD_NUMBER: builtins.int
+    profile: builtins.str
+    """Name of the profile that decides what is left out; see `Pipeline.profile`. Its sketch segmenter
+    holds for strokes and images, its map segmenter for polygons and grids, each where it reads them.
+    """
     @property
     def source(self) -> sketchmatch_proto.v1.source_pb2.Source:
         """The sketch or map. Required."""
@@ -36,9 +41,10 @@ class SegmentRequest(google.protobuf.message.Message):
         *,
         source: sketchmatch_proto.v1.source_pb2.Source | None = ...,
         segmenter: sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection | None = ...,
+        profile: builtins.str = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["segmenter", b"segmenter", "source", b"source"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["segmenter", b"segmenter", "source", b"source"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["profile", b"profile", "segmenter", b"segmenter", "source", b"source"]) -> None: ...
 
 global___SegmentRequest = SegmentRequest
 

@@ -1,0 +1,91 @@
+"""``sketchmatch config``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sketchmatch.cli.options import Config, say
+from sketchmatch.errors import InvalidInputError, Reason
+
+__all__ = ["app"]
+
+app = typer.Typer(help="Show, check and write the configuration.")
+
+
+@app.callback()
+def config() -> None:
+    """Show, check and write the configuration."""
+
+
+@app.command("show")
+def show(
+    config: Config = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
+) -> None:
+    """Show what is in force, and where each value comes from.
+
+    What it prints is a configuration file that says the same.
+    """
+    from sketchmatch.cli import display
+    from sketchmatch.config import entries, load, shown_file
+    from sketchmatch.registry import default_registry
+
+    configuration = load(config)
+    registry = default_registry(configuration.rules)
+    if not json:
+        typer.echo(shown_file(configuration, registry), nl=False)
+        return
+    settings = {
+        ".".join(entry.path): {
+            "value": entry.value,
+            "origin": str(entry.origin),
+            "place": entry.place,
+        }
+        for entry in entries(configuration, registry)
+    }
+    display.print_document({"file": configuration.file, "settings": settings})
+
+
+@app.command("check")
+def check(
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="[FILE]", help="The file; left out, the one that would be read."),
+    ] = None,
+) -> None:
+    """Check a configuration, with every profile and the environment, against what is installed."""
+    from sketchmatch.config import check as find_faults
+
+    path, faults = find_faults(file)
+    for fault in faults:
+        say(str(fault))
+    if faults:
+        raise typer.Exit(2)
+    typer.echo(f"{path or 'the configuration (without a file)'} is sound")
+
+
+@app.command("init")
+def init(
+    file: Annotated[Path, typer.Argument(metavar="[FILE]", help="Where to write it.")] = Path(
+        "sketchmatch.toml"
+    ),
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+) -> None:
+    """Write a file with every setting and its default, commented out."""
+    from sketchmatch.config import builtin, template
+    from sketchmatch.registry import default_registry
+
+    text = template(default_registry(builtin().rules))
+    try:
+        with file.open("w" if force else "x", encoding="utf-8") as opened:
+            opened.write(text)
+    except FileExistsError:
+        problem = "exists already; choose another name, or replace it with --force"
+        raise InvalidInputError(Reason.INVALID_FILE, str(file), problem) from None
+    except OSError as error:
+        problem = f"cannot be written ({(error.strerror or str(error)).lower()}); check the path"
+        raise InvalidInputError(Reason.INVALID_FILE, str(file), problem) from None
+    say(f"wrote {file}")

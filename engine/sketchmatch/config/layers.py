@@ -1,0 +1,270 @@
+"""The layers of a configuration: what is built in, a file, the environment, flags."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from enum import StrEnum
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from sketchmatch.config.settings import annotation_of, static_paths
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.pipeline.selection import DEFAULTS
+
+__all__ = [
+    "Layer",
+    "Origin",
+    "builtin_layer",
+    "environment_layer",
+    "file_layer",
+    "flag_layer",
+    "found_file",
+    "leaves_of",
+    "value_of",
+    "variable_of",
+    "without_overruled",
+]
+
+FILE_NAME = "sketchmatch.toml"
+_PREFIX = "SKETCHMATCH_"
+_NAMING_FILE = "SKETCHMATCH_CONFIG"
+_NO_SETTINGS = (_NAMING_FILE, "SKETCHMATCH_DEBUG")
+_SECTION = "__"
+_BUILT_IN = {str(kind): names[0] for kind, names in DEFAULTS.items() if len(names) == 1}
+_BUILTIN = Path(__file__).with_name("builtin.toml")
+
+
+class Origin(StrEnum):
+    """Where a value comes from, the weakest first."""
+
+    DEFAULT = "default"
+    FILE = "file"
+    ENVIRONMENT = "environment"
+    FLAG = "flag"
+
+
+@dataclass(frozen=True)
+class Layer:
+    """What one place says.
+
+    Attributes
+    ----------
+    origin
+        What kind of place it is.
+    values
+        Nested as in the file.
+    labels
+        The variable or the option of each value, by its path.
+    name
+        Of the file.
+    """
+
+    origin: Origin
+    values: Mapping[str, Any]
+    labels: Mapping[tuple[str, ...], str] = field(default_factory=dict)
+    name: str = ""
+
+
+def value_of(text: str) -> Any:
+    """Return what a text on the command line or in the environment stands for: JSON, or itself.
+
+    Examples
+    --------
+    >>> value_of("400"), value_of("pairwise")
+    (400, 'pairwise')
+    """
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
+def found_file(named: str | Path | None) -> Path | None:
+    """Return the file to read: the one named, or else the one that lies in its place, if any.
+
+    Raises
+    ------
+    InvalidInputError
+        If one is named, by the argument or by ``SKETCHMATCH_CONFIG``, and does not exist.
+    """
+    if variable := "" if named else os.environ.get(_NAMING_FILE, ""):
+        named = variable
+    if named:
+        path = Path(named)
+        if not path.exists():
+            place = f"{_NAMING_FILE} names {path}, which" if variable else str(path)
+            problem = f"does not exist; write one with `sketchmatch config init {path}`"
+            raise InvalidInputError(Reason.INVALID_FILE, place, problem)
+        return path
+    return next((path for path in _usual_places() if path.is_file()), None)
+
+
+@cache
+def builtin_layer() -> Layer:
+    """Return the profiles that come with the engine."""
+    return Layer(Origin.DEFAULT, _parsed(_BUILTIN))
+
+
+def file_layer(path: Path) -> Layer:
+    """Return what a file says.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be read or is no TOML, with line and column.
+    """
+    values = _parsed(path)
+    return Layer(Origin.FILE, values, {leaf: "" for leaf, _ in leaves_of(values)}, str(path))
+
+
+def environment_layer(environment: Mapping[str, str]) -> Layer:
+    """Return what environment variables say.
+
+    Raises
+    ------
+    InvalidInputError
+        If a variable looks like a setting and is none.
+    """
+    values: dict[str, Any] = {}
+    labels = {}
+    for variable, text in sorted(environment.items()):
+        if not variable.startswith(_PREFIX) or variable in _NO_SETTINGS or not text.strip():
+            continue
+        path = _path_of(variable)
+        if path is not None:
+            _put(values, path, text if annotation_of(path) is str else value_of(text), variable)
+            labels[path] = variable
+    return Layer(Origin.ENVIRONMENT, values, labels)
+
+
+def flag_layer(flags: Mapping[str, Any]) -> Layer:
+    """Return what flags say, by dotted path; None is not given."""
+    values: dict[str, Any] = {}
+    labels = {}
+    for dotted, value in flags.items():
+        if value is not None:
+            path = tuple(dotted.split("."))
+            option = f"--{path[-1].removesuffix('_seconds').replace('_', '-')}"
+            _put(values, path, value, option)
+            labels[path] = option
+    return Layer(Origin.FLAG, values, labels)
+
+
+def without_overruled(layers: Sequence[Layer]) -> list[dict[str, Any]]:
+    """Return the values of layers, the strongest first, fit to be merged.
+
+    Where a stronger layer names another algorithm for a stage, what weaker ones say of the stage
+    is dropped: their parameters are those of another algorithm.
+    """
+    fit = [_copied(layer.values) for layer in layers]
+    for path in {path for values in fit for path in _stages_in(values)}:
+        built_in = _BUILT_IN.get(path[-1], "")
+        name, weaker = built_in if path[0] == "pipeline" else "", list[dict[str, Any]]()
+        for values in reversed(fit):
+            table = _at(values, path)
+            if not isinstance(table, dict):
+                continue
+            if table.get("name", "") not in ("", name):
+                name = table["name"]
+                for overruled in weaker:
+                    overruled.clear()
+            weaker.append(table)
+    return fit
+
+
+def leaves_of(values: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield every value that is no table, with its path."""
+    if isinstance(values, dict) and (values or not path):
+        for key, value in values.items():
+            yield from leaves_of(value, (*path, key))
+    else:
+        yield path, values
+
+
+def variable_of(path: Sequence[str]) -> str:
+    """Return the environment variable that sets what is at a path.
+
+    Examples
+    --------
+    >>> variable_of(("algorithms", "searcher", "fsnn-pso", "particles"))
+    'SKETCHMATCH_ALGORITHMS__SEARCHER__FSNN_PSO__PARTICLES'
+    """
+    return _PREFIX + _SECTION.join(path).replace("-", "_").upper()
+
+
+def _usual_places() -> tuple[Path, ...]:
+    from platformdirs import user_config_path
+
+    return (Path(FILE_NAME), user_config_path("sketchmatch") / FILE_NAME)
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except tomllib.TOMLDecodeError as error:
+        what, _, place = str(error).partition(" (at ")
+        where = place.rstrip(")").replace("end of document", "its end")
+        problem = f"is no TOML at {where} ({what[:1].lower()}{what[1:]}); correct it"
+    except UnicodeDecodeError:
+        problem = "is not UTF-8 text; save it as UTF-8"
+    except IsADirectoryError:
+        problem = "is a directory; give a file in it"
+    except OSError as error:
+        problem = f"cannot be read ({(error.strerror or str(error)).lower()}); check the path"
+    raise InvalidInputError(Reason.INVALID_FILE, str(path), problem)
+
+
+def _path_of(variable: str) -> tuple[str, ...] | None:
+    """Return the path that a variable sets, or None for one that is somebody else's."""
+    path = variable.removeprefix(_PREFIX).lower().split(_SECTION)
+    known = {variable_of(static): static for static in static_paths()}
+    if variable in known:
+        return known[variable]
+    if len(path) == 1:
+        # Others have variables of this prefix too, Kubernetes for a service of this name.
+        near = [name for name in known if name.endswith(_SECTION + path[0].upper())]
+        near += get_close_matches(variable, known, 1, 0.9)
+        if not near:
+            return None
+        problem = f"is no setting; did you mean {near[0]}?"
+        raise InvalidInputError(Reason.INVALID_PARAMETER, variable, problem)
+    named = {"algorithms": 2, "profiles": 1}.get(path[0], len(path))
+    return tuple(part.replace("_", "-") if k == named else part for k, part in enumerate(path))
+
+
+def _put(values: dict[str, Any], path: Sequence[str], value: Any, label: str) -> None:
+    *above, last = path
+    for part in above:
+        values = values.setdefault(part, {})
+        if not isinstance(values, dict):
+            problem = f"is set beside {variable_of(path[: path.index(part) + 1])}; drop one of them"
+            raise InvalidInputError(Reason.INVALID_PARAMETER, label, problem)
+    values[last] = value
+
+
+def _stages_in(values: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    """Yield the paths of the tables that choose an algorithm for a stage."""
+    tables: list[tuple[str, ...]] = [("pipeline",)]
+    if isinstance(profiles := values.get("profiles"), dict):
+        tables += [("profiles", name) for name in profiles]
+    for path in tables:
+        if isinstance(table := _at(values, path), dict):
+            yield from ((*path, key) for key, value in table.items() if isinstance(value, dict))
+
+
+def _at(values: Any, path: Sequence[str]) -> Any:
+    for part in path:
+        values = values.get(part) if isinstance(values, dict) else None
+    return values
+
+
+def _copied(values: Any) -> Any:
+    if isinstance(values, Mapping):
+        return {key: _copied(value) for key, value in values.items()}
+    return values

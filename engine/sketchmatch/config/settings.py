@@ -1,0 +1,220 @@
+"""All settings there are, with their defaults, bounds and meanings: the one list of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Any, Self, get_args, get_origin
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_settings import (
+    BaseSettings,
+    InitSettingsSource,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+)
+
+from sketchmatch.model.limits import SourceLimits
+
+__all__ = ["Settings", "annotation_of", "keys_of", "static_paths"]
+
+Path = tuple[str, ...]
+"""Where a setting is, e.g. ``("server", "address")``."""
+
+
+def _listed(value: Any) -> Any:
+    """Take ``a,b`` for a list, which is easier to write into an environment variable."""
+    if isinstance(value, str):
+        return [part.strip() for part in value.split(",") if part.strip()]
+    return value
+
+
+_Names = Annotated[tuple[str, ...], BeforeValidator(_listed)]
+_Parameters = dict[str, Any]
+_Named = dict[str, _Parameters]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class _Stage(_Section):
+    """The algorithm of one stage."""
+
+    name: str = Field("", description="Name of the algorithm.")
+    parameters: _Parameters = Field({}, description="Values of some of its parameters.")
+
+
+class _Stages(_Section):
+    sketch_segmenter: _Stage = _Stage()
+    map_segmenter: _Stage = _Stage()
+    histogram: _Stage = _Stage()
+    similarity: _Stage = _Stage()
+    searcher: _Stage = _Stage()
+
+
+class _Pipeline(_Stages):
+    """What does each stage of a match, where neither request nor profile says it."""
+
+
+class _Profile(_Stages):
+    """A pipeline that a request can name."""
+
+    summary: str = Field("", description="One line for lists.")
+
+
+class _Algorithms(_Section):
+    """Parameters of an algorithm, wherever it is chosen."""
+
+    segmenter: _Named = {}
+    histogram: _Named = {}
+    similarity: _Named = {}
+    searcher: _Named = {}
+
+
+class _Plugins(_Section):
+    """Which plugins may be used, and how far they are trusted. All are named by distribution."""
+
+    allow: _Names | None = Field(
+        None,
+        description="Distributions whose plugins may be used, beside the engine's own; "
+        "all, when left out.",
+        examples=[["acme-search"]],
+    )
+    deny: _Names = Field((), description="Distributions whose plugins may not be used.")
+    strict: bool = Field(
+        False,
+        description="Do not start a server while a plugin has failed or a name is taken twice.",
+    )
+    trusted: _Names = Field(
+        (),
+        description="Distributions whose algorithms run in the server's own process, not in one of "
+        'their own; "*" for all.',
+    )
+    patience_seconds: float = Field(
+        30.0,
+        gt=0,
+        description="How long an algorithm in a process of its own may go without a sign of life.",
+    )
+
+
+class _Server(_Section):
+    """What `sketchmatch serve` listens on and lets requests ask for."""
+
+    address: str = Field(
+        "127.0.0.1:50051", description="Host and port to listen on; port 0 picks a free one."
+    )
+    grace_seconds: float = Field(
+        5.0, ge=0, description="Time for running matches when the server is stopped."
+    )
+    max_request_mib: int = Field(64, ge=1, le=500, description="Largest request, in MiB.")
+    max_matches: int | None = Field(
+        None,
+        ge=1,
+        le=1000,
+        description="Requests at the same time; when left out, 4 for each processor.",
+        examples=[8],
+    )
+    max_time_budget_seconds: float | None = Field(
+        None,
+        ge=0.001,
+        description="Longest match; no limit, when left out.",
+        examples=[60.0],
+    )
+
+
+class _Limits(_Section):
+    """How large one sketch or one map may be, in a file or in a request."""
+
+    max_bytes: int = Field(
+        SourceLimits.max_bytes, ge=1, description="Bytes of a file, or of a picture in a request."
+    )
+    max_pixels: int = Field(
+        SourceLimits.max_pixels, ge=1, description="Pixels of a picture, cells of a grid."
+    )
+    max_side: int = Field(
+        SourceLimits.max_side, ge=1, description="Pixels along a side of a picture or grid."
+    )
+    max_vertices: int = Field(
+        SourceLimits.max_vertices, ge=1, description="Points of all strokes or polygons together."
+    )
+    max_objects: int = Field(SourceLimits.max_objects, ge=2, description="Objects of a scene.")
+
+
+class Settings(BaseSettings):
+    """A configuration as a file spells it, with all layers merged."""
+
+    model_config = SettingsConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    profile: str = Field(
+        "", description="Profile for requests that name none; empty for none.", examples=["fast"]
+    )
+    pipeline: _Pipeline = _Pipeline()
+    algorithms: _Algorithms = _Algorithms()
+    profiles: dict[Annotated[str, Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")], _Profile] = {}
+    plugins: _Plugins = _Plugins()
+    server: _Server = _Server()
+    limits: _Limits = _Limits()
+
+    @classmethod
+    def of(cls, layers: Iterable[Mapping[str, Any]]) -> Self:
+        """Merge layers of values, the strongest first.
+
+        Raises
+        ------
+        ValidationError
+            If there are unknown keys or values of no use.
+        """
+        return cls(layers=tuple(layers))  # type: ignore[call-arg]
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """Take the layers that :meth:`of` was given, and nothing else."""
+        del env_settings, dotenv_settings, file_secret_settings
+        assert isinstance(init_settings, InitSettingsSource)
+        layers = init_settings.init_kwargs["layers"]
+        return tuple(InitSettingsSource(settings_cls, layer) for layer in layers)
+
+
+def annotation_of(path: Path) -> Any:
+    """Return the type of what is at a path, or None where there can be nothing.
+
+    Examples
+    --------
+    >>> annotation_of(("server", "address")), annotation_of(("server", "adress"))
+    (<class 'str'>, None)
+    """
+    found: Any = Settings
+    for part in path:
+        if isinstance(found, type) and issubclass(found, BaseModel):
+            field = found.model_fields.get(part)
+            found = None if field is None else field.annotation
+        elif get_origin(found) is dict:
+            found = get_args(found)[1]
+        else:
+            return Any if found is Any else None
+    return found
+
+
+def keys_of(path: Path) -> tuple[str, ...]:
+    """Return the keys that the table at a path can have; none where they are free."""
+    found = annotation_of(path)
+    if isinstance(found, type) and issubclass(found, BaseModel):
+        return tuple(found.model_fields)
+    return ()
+
+
+def static_paths(path: Path = ()) -> Iterator[Path]:
+    """Yield the paths of all settings below a path that need no free names."""
+    for key in keys_of(path):
+        below = (*path, key)
+        if keys_of(below):
+            yield from static_paths(below)
+        elif get_origin(annotation_of(below)) is not dict:
+            yield below

@@ -1,0 +1,399 @@
+"""Configuration: file, environment and flags, what each says, and every way to say it wrongly."""
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+from sketchmatch import Scene, match
+from sketchmatch.config import Origin, builtin, check, entries, load, open_registry, template
+from sketchmatch.config.settings import static_paths
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.pipeline.match import MatchRequest, run_match
+from sketchmatch.pipeline.selection import Choice, resolve
+from sketchmatch.registry import Kind, default_registry
+from tests.tools import ROOT
+
+SCENE = Scene.from_polygons(
+    [[[0, 0], [2, 0], [2, 1]], [[5, 1], [6, 1], [6, 4]], [[1, 5], [2, 5], [2, 7]]]
+)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_around(monkeypatch, tmp_path):
+    """Keep the files and variables of whoever runs the tests out of them."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
+
+
+@pytest.fixture
+def file(tmp_path):
+    def write(text, name="sketchmatch.toml"):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def refused(call, *arguments, **options):
+    with pytest.raises(InvalidInputError) as caught:
+        call(*arguments, **options)
+    assert "\n" not in str(caught.value)
+    return caught.value
+
+
+def searcher_of(configuration, **selection):
+    return resolve(
+        open_registry(configuration), selection, defaults=configuration.defaults
+    ).searcher
+
+
+# Where it comes from ----------------------------------------------------------------------------
+
+
+def test_without_file_and_variables_the_built_in_values_hold():
+    configuration = load()
+    assert configuration == builtin()
+    assert configuration.file == ""
+    assert searcher_of(configuration).name == "auto"
+    assert configuration.limits.max_objects == 1000
+    assert configuration.rules.objection("acme") == ""
+
+
+def test_flags_are_stronger_than_variables_and_these_than_the_file(file, monkeypatch):
+    path = file("[limits]\nmax_objects = 10\nmax_side = 20\nmax_bytes = 30\n")
+    monkeypatch.setenv("SKETCHMATCH_LIMITS__MAX_SIDE", "21")
+    monkeypatch.setenv("SKETCHMATCH_LIMITS__MAX_BYTES", "31")
+    found = load(path, {"limits.max_bytes": 32, "limits.max_pixels": None})
+    limits = found.limits
+    assert (limits.max_objects, limits.max_side, limits.max_bytes) == (10, 21, 32)
+    assert limits.max_pixels == 64_000_000
+    assert found.origin(("limits", "max_objects")) == (
+        Origin.FILE,
+        f"{path}: limits.max_objects",
+    )
+    assert found.origin(("limits", "max_side")) == (
+        Origin.ENVIRONMENT,
+        "SKETCHMATCH_LIMITS__MAX_SIDE",
+    )
+    assert found.origin(("limits", "max_bytes")) == (Origin.FLAG, "--max-bytes")
+    assert found.origin(("limits", "max_pixels")) == (Origin.DEFAULT, "")
+
+
+def test_the_file_is_looked_for_here_and_then_in_the_users_folder(file, monkeypatch):
+    file('profile = "proof"', "home/sketchmatch/sketchmatch.toml")
+    if sys.platform == "linux":
+        assert load().defaults.profile == "proof"
+    file('profile = "fast"')
+    assert load().defaults.profile == "fast"
+    monkeypatch.setenv("SKETCHMATCH_CONFIG", str(file('profile = "thesis-easm"', "named.toml")))
+    assert load().defaults.profile == "thesis-easm"
+    assert load(file("", "empty.toml")).defaults.profile == ""
+    assert load(search=False).defaults.profile == ""
+
+
+def test_a_named_file_that_is_missing_is_refused(monkeypatch):
+    error = refused(load, "away.toml")
+    assert str(error) == (
+        "away.toml does not exist; write one with `sketchmatch config init away.toml`"
+    )
+    monkeypatch.setenv("SKETCHMATCH_CONFIG", "gone.toml")
+    assert str(refused(load)).startswith("SKETCHMATCH_CONFIG names gone.toml, which does not exist")
+
+
+@pytest.mark.parametrize(
+    "variable",
+    ["SKETCHMATCH_DEBUG", "SKETCHMATCH_PORT", "SKETCHMATCH_SERVICE_HOST", "SKETCHMATCH_PORT_1_TCP"],
+)
+def test_variables_of_others_are_left_alone(monkeypatch, variable):
+    monkeypatch.setenv(variable, "tcp://10.0.0.1:50051")
+    assert load() == builtin()
+
+
+def test_an_empty_variable_is_not_set(monkeypatch):
+    monkeypatch.setenv("SKETCHMATCH_LIMITS__MAX_OBJECTS", " ")
+    assert load() == builtin()
+
+
+def test_variables_say_whatever_a_file_can(monkeypatch):
+    monkeypatch.setenv("SKETCHMATCH_PROFILE", "12")
+    monkeypatch.setenv("SKETCHMATCH_PROFILES__12__SEARCHER__NAME", "fsnn-pso")
+    monkeypatch.setenv("SKETCHMATCH_ALGORITHMS__SEARCHER__FSNN_PSO__PARTICLES", "7")
+    monkeypatch.setenv("SKETCHMATCH_PIPELINE__HISTOGRAM", '{"name": "hybrid"}')
+    monkeypatch.setenv("SKETCHMATCH_PLUGINS__DENY", "Acme_Search, other")
+    monkeypatch.setenv("SKETCHMATCH_PLUGINS__TRUSTED", '["Mine"]')
+    configuration = load()
+    searcher = searcher_of(configuration)
+    assert (searcher.name, searcher.params.particles) == ("fsnn-pso", 7)
+    assert configuration.defaults.pipeline["histogram"] == Choice("hybrid")
+    assert configuration.rules.objection("acme-search")
+    assert configuration.trusted == {"mine"}
+
+
+def test_a_stronger_place_that_names_another_algorithm_drops_the_parameters(file, monkeypatch):
+    path = file("[pipeline.searcher]\nname = 'easm'\nparameters = {population = 9}\n")
+    assert searcher_of(load(path)).params.population == 9
+    monkeypatch.setenv("SKETCHMATCH_PIPELINE__SEARCHER__NAME", "easm")
+    assert searcher_of(load(path)).params.population == 9
+    monkeypatch.setenv("SKETCHMATCH_PIPELINE__SEARCHER__NAME", "direct")
+    assert searcher_of(load(path)).params.population is None
+
+
+def test_a_profile_of_ones_own_changes_the_built_in_one(file):
+    path = file("profile = 'fast'\n[profiles.fast.searcher]\nname = 'exact'\n")
+    configuration = load(path)
+    pipeline = resolve(open_registry(configuration), {}, defaults=configuration.defaults)
+    assert pipeline.searcher.name == "exact"
+    assert pipeline.histogram.params.directions == 90, "the other stages stay"
+
+
+# What is wrong with it --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("[server\naddress = 1", "{file} is no TOML at line 1, column 8 (expected ']' at the end"),
+        ("a = 'b", "{file} is no TOML at its end ("),
+        ("[server]\nadress = 'x'", "{file}: server.adress is no setting; did you mean server.addr"),
+        ("sever = 1", "{file}: sever is no setting; did you mean server?"),
+        ("[server]\nx = 1", "{file}: server.x is no setting; server has: address, grace_seconds"),
+        ("[limits]\nmax_objects = 'few'", "{file}: limits.max_objects is 'few'; it should be a"),
+        ("[limits]\nmax_objects = 1", "{file}: limits.max_objects is 1; it should be greater"),
+        ("[server]\ngrace_seconds = inf", "{file}: server.grace_seconds is inf; it should be a f"),
+        ("profile = 'best'", "{file}: profile is 'best', which is no profile; choose one of: fast"),
+        (
+            "[pipeline.searcher]\nname = 'best'",
+            "{file}: pipeline.searcher.name is 'best', which is no searcher; choose one of: auto",
+        ),
+        (
+            "[algorithms.searcher.easm]\ncolour = 1",
+            "{file}: algorithms.searcher.easm.colour is no parameter of easm; it has: consistency",
+        ),
+        (
+            "[pipeline.map_segmenter.parameters]\nmin_size = 1",
+            "{file}: pipeline.map_segmenter.parameters.min_size is set for no segmenter; give its",
+        ),
+        ("[profiles.'My Own']", "{file}: profiles.My Own is no name for a profile; use small let"),
+    ],
+)
+def test_a_fault_is_one_sentence_with_its_place(file, text, sentence):
+    path = file(text)
+    error = refused(lambda: open_registry(load(path)))
+    assert str(error).startswith(sentence.format(file=path))
+    _, faults = check(path)
+    assert str(error) in map(str, faults), "and `config check` says the same"
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "sentence"),
+    [
+        ("SERVER__ADRESS", "x", "is no setting; did you mean SKETCHMATCH_SERVER__ADDRESS?"),
+        ("FOO__BAR", "x", "is no setting; a configuration has: profile, pipeline,"),
+        ("MAX_BYTES", "1", "is no setting; did you mean SKETCHMATCH_LIMITS__MAX_BYTES?"),
+        ("LIMITS_MAX_BYTES", "1", "is no setting; did you mean SKETCHMATCH_LIMITS__MAX_BYTES?"),
+        ("LIMITS__MAX_BYTES", "0", "is 0; it should be greater than or equal to 1"),
+        ("LIMITS__MAX_BYTES", "1" * 5000, "is '1111111111111111111111111111111111111111111111"),
+        ("PROFILE", "best", "is 'best', which is no profile; choose one of: fast, proof,"),
+        ("PIPELINE__SEARCHER", '{"nmae": 1}', ": nmae is no setting; did you mean SKETCHMATCH_PIP"),
+    ],
+)
+def test_a_bad_variable_is_named(monkeypatch, variable, value, sentence):
+    monkeypatch.setenv(f"SKETCHMATCH_{variable}", value)
+    error = refused(lambda: open_registry(load()))
+    joint = "" if sentence.startswith(":") else " "
+    assert str(error).startswith(f"SKETCHMATCH_{variable}{joint}{sentence}")
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda path: path.write_bytes(b"\xff"), "is not UTF-8 text; save it as UTF-8"),
+        (lambda path: path.mkdir(), "is a directory; give a file in it"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_refused(tmp_path, make, sentence):
+    path = tmp_path / "odd.toml"
+    make(path)
+    assert str(refused(load, path)) == f"{path} {sentence}"
+
+
+BAD = ("population", 1, "is 1; it should be greater than or equal to 2")
+
+
+def test_one_bad_parameter_is_told_in_the_same_words_wherever_it_is_set(file, monkeypatch):
+    name, value, words = BAD
+    path = file(f"[pipeline.searcher]\nname = 'easm'\nparameters = {{{name} = {value}}}\n")
+    said = [refused(lambda: open_registry(load(path)))]
+    monkeypatch.setenv("SKETCHMATCH_PIPELINE__SEARCHER__NAME", "easm")
+    monkeypatch.setenv("SKETCHMATCH_PIPELINE__SEARCHER__PARAMETERS__POPULATION", str(value))
+    said.append(refused(lambda: open_registry(load())))
+    monkeypatch.undo()
+    flag = {"pipeline.searcher.name": "easm", f"pipeline.searcher.parameters.{name}": value}
+    said.append(refused(lambda: open_registry(load(flags=flag, search=False))))
+    said.append(refused(match, SCENE, SCENE, searcher="easm", params={"searcher": {name: value}}))
+    request = MatchRequest(SCENE, SCENE, {"searcher": Choice("easm", {name: value})})
+    said.append(refused(run_match, request, default_registry()))
+    assert {(error.reason, error.problem) for error in said} == {(Reason.INVALID_PARAMETER, words)}
+    assert [error.field for error in said] == [
+        f"{path}: pipeline.searcher.parameters.population",
+        "SKETCHMATCH_PIPELINE__SEARCHER__PARAMETERS__POPULATION",
+        "--population",
+        "pipeline.searcher.parameters.population",
+        "pipeline.searcher.parameters.population",
+    ]
+
+
+def test_a_profile_of_no_use_harms_only_those_who_name_it(file):
+    path = file(
+        "[profiles.mine.searcher]\nname = 'annealing'\n[algorithms.searcher.annealing]\nt = 1"
+    )
+    configuration = load(path)
+    registry = open_registry(configuration)
+    request = MatchRequest(SCENE, SCENE, profile="mine")
+    error = refused(run_match, request, registry, configuration.defaults)
+    assert error.field == "pipeline.profile"
+    assert error.problem.startswith(
+        "is 'mine', whose searcher.name is 'annealing', which is no sea"
+    )
+    _, faults = check(path)
+    assert [fault.field for fault in faults] == [
+        f"{path}: algorithms.searcher.annealing",
+        f"{path}: profiles.mine.searcher.name",
+    ]
+    named = load(path, {"profile": "mine"})
+    assert refused(open_registry, named).field == f"{path}: profiles.mine.searcher.name"
+
+
+def test_check_finds_every_fault(file):
+    path = file(
+        "[pipeline.histogram]\nparameters = {directions = 3}\n"
+        "[algorithms.searcher.nn]\nseed_points = 0\n"
+        "[profiles.a.similarity]\nname = 'x'\n[profiles.b.searcher.parameters]\ny = 1\n"
+    )
+    found, faults = check(path)
+    assert found == path
+    assert [str(fault).removeprefix(f"{path}: ").split(" is ")[0] for fault in faults] == [
+        "pipeline.histogram.parameters.directions",
+        "algorithms.searcher.nn.seed_points",
+        "profiles.a.similarity.name",
+        "profiles.b.searcher.parameters.y",
+    ]
+    assert check(file("[server]\na = 1\nb = 2\n"))[1][1].field.endswith("server.b")
+
+
+# Profiles ---------------------------------------------------------------------------------------
+
+
+def test_the_built_in_profiles_are_sound_and_as_the_thesis_has_it():
+    path, faults = check()
+    assert (path, faults) == (None, [])
+    profiles = {profile.name: profile for profile in builtin().defaults.profiles}
+    assert list(profiles) == ["fast", "proof", "thesis-easm", "thesis-fsnn"]
+    assert all(profile.summary for profile in profiles.values())
+    easm = profiles["thesis-easm"].stages["searcher"].parameters
+    assert (easm["crossover_rate"], easm["exchange_rate"]) == (0.7, 0.5)
+    assert (easm["mutation_rate"], easm["patience"]) == (0.3, 400)
+    fsnn = profiles["thesis-fsnn"].stages["searcher"].parameters
+    assert fsnn == {"alpha": 10.0, "k": 1.0, "velocity_limit": 0.2, "patience": 30}
+
+
+def test_python_takes_profiles_and_files_but_reads_none_that_lies_around(file, monkeypatch):
+    assert match(SCENE, SCENE, profile="proof").outcome == "OPTIMAL"
+    path = file("[pipeline.searcher]\nname = 'nn'\nparameters = {seed_points = 3}\n")
+    assert match(SCENE, SCENE).statistics.iterations != 3
+    assert match(SCENE, SCENE, config=path).statistics.iterations == 3
+    assert match(SCENE, SCENE, config=path, searcher="auto").outcome == "OPTIMAL"
+    assert refused(match, SCENE, SCENE, profile="best").reason is Reason.UNKNOWN_PROFILE
+    monkeypatch.setenv("SKETCHMATCH_PIPELINE__SEARCHER__NAME", "nn")
+    monkeypatch.setenv("SKETCHMATCH_ALGORITHMS__SEARCHER__NN__SEED_POINTS", "4")
+    assert match(SCENE, SCENE).statistics.iterations == 4
+
+
+def test_python_keeps_to_the_limits_of_the_environment(monkeypatch, tmp_path):
+    ring = [[0, 0], [1, 0], [0, 1], [0, 0]]
+    shapes = [
+        {"type": "Polygon", "coordinates": [[[x + 3 * k, y] for x, y in ring]]} for k in (0, 1, 2)
+    ]
+    path = tmp_path / "map.geojson"
+    path.write_text(json.dumps({"type": "GeometryCollection", "geometries": shapes}))
+    assert len(Scene.from_file(path)) == 3
+    monkeypatch.setenv("SKETCHMATCH_LIMITS__MAX_OBJECTS", "2")
+    for call in (Scene.from_file, lambda path: match(path, SCENE)):
+        error = refused(call, path)
+        assert "or raise limits.max_objects (SKETCHMATCH_LIMITS__MAX_OBJECTS)" in error.problem
+
+
+# Files to begin with ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("uncommented", [False, True])
+def test_the_file_to_begin_with_is_sound_and_changes_nothing(file, uncommented):
+    text = template(default_registry())
+    if uncommented:
+        text = re.sub(r"^# ", "", text, flags=re.M)
+    path = file(text)
+    assert check(path) == (path, [])
+    found, expected = load(path), builtin()
+    assert found.limits == expected.limits
+    assert found.settings.server == expected.settings.server
+    for kind in (Kind.HISTOGRAM, Kind.SIMILARITY, Kind.SEARCHER):
+        for item in default_registry().of_kind(kind):
+            one, other = (
+                getattr(resolve(default_registry(), {kind: Choice(item.name)}, defaults=d), kind)
+                for d in (found.defaults, expected.defaults)
+            )
+            assert one.params == other.params
+
+
+def test_the_file_to_begin_with_has_every_setting():
+    text = template(default_registry())
+    set_ = {path[-1] for path in static_paths()} - {"summary"}
+    set_ |= {
+        name
+        for item in default_registry().algorithms
+        for name in item.algorithm.Params.model_fields
+    }
+    for name in set_:
+        assert re.search(rf"^#+ {name} (= |is left out)", text, re.M), name
+    uncommented = tomllib.loads(re.sub(r"^# ", "", text, flags=re.M))
+    assert uncommented["algorithms"]["searcher"]["easm"]["patience"] == 400
+
+
+def test_the_file_in_the_readme_is_sound(file):
+    (text,) = re.findall(r"```toml\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.S)
+    path = file(text)
+    assert check(path) == (path, [])
+    assert searcher_of(load(path)).name == "exact"
+
+
+def test_every_entry_tells_where_it_comes_from(file, monkeypatch):
+    path = file("[algorithms.searcher.easm]\npatience = 9\n[server]\nmax_matches = 3\n")
+    monkeypatch.setenv("SKETCHMATCH_PIPELINE__SEARCHER__NAME", "easm")
+    configuration = load(path, {"server.address": "127.0.0.1:0"})
+    found = {entry.path: entry for entry in entries(configuration, default_registry())}
+    for dotted, value, origin in [
+        ("algorithms.searcher.easm.patience", 9, Origin.FILE),
+        ("algorithms.searcher.easm.mutation_rate", 0.3, Origin.DEFAULT),
+        ("server.max_matches", 3, Origin.FILE),
+        ("server.grace_seconds", 5.0, Origin.DEFAULT),
+        ("server.address", "127.0.0.1:0", Origin.FLAG),
+        ("pipeline.searcher.name", "easm", Origin.ENVIRONMENT),
+        ("pipeline.histogram.name", "constant", Origin.DEFAULT),
+    ]:
+        entry = found[tuple(dotted.split("."))]
+        assert (entry.value, entry.origin) == (value, origin), dotted
+
+
+def test_help_starts_without_what_reads_the_configuration():
+    code = (
+        "import sys, sketchmatch, sketchmatch.cli.app; "
+        "print([name for name in ('pydantic_settings', 'numba') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
