@@ -4,14 +4,8 @@ import math
 
 import numpy as np
 
+from sketchmatch.testing.oracle import correspondence
 from tests.oracle.forces import force_histogram
-
-
-def correspondence(a, b, objects):
-    """Return the index of the ordered pair (a, b) of ``objects`` objects, all counted from 1."""
-    if a > b:
-        return correspondence(b, a, objects) + objects * (objects - 1) // 2
-    return (b - 1) + (a - 1) * objects - sum(k + 1 for k in range(a))
 
 
 def descriptor(scene, directions):
