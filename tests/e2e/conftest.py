@@ -1,3 +1,4 @@
+import re
 import subprocess
 import sys
 
@@ -5,6 +6,8 @@ import pytest
 
 from sketchmatch.cli import main
 from tests import processes
+from tests.shell import Shell, install
+from tests.tools import ROOT
 
 
 @pytest.fixture(scope="session")
@@ -28,3 +31,16 @@ def command_line(monkeypatch, capfd):
         return subprocess.CompletedProcess(command, left.value.code, *capfd.readouterr())
 
     return run
+
+
+@pytest.fixture(scope="session")
+def clean_shell(tmp_path_factory):
+    """Yield a shell beside a copy of the checkout, with the tutorial's environment active."""
+    tutorial = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    first = re.search(r"^```console\n(\$ python3 -m venv .*?)^```", tutorial, re.S | re.M)[1]
+    shell = Shell(tmp_path_factory.mktemp("clean"))
+    try:
+        install(shell, first)
+        yield shell
+    finally:
+        shell.close()

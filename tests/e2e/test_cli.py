@@ -1,4 +1,5 @@
 import json
+import os
 import re
 import shlex
 import signal
@@ -17,7 +18,7 @@ from sketchmatch.cli.app import ExitCode
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 from sketchmatch_client import Client
 from sketchmatch_proto.v1 import match_pb2
-from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsResponse
+from sketchmatch_proto.v1.catalog_service_pb2 import Algorithm, ListAlgorithmsResponse
 from sketchmatch_proto.v1.match_pb2 import MatchResult
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 from tests import processes
@@ -61,6 +62,13 @@ def uneven(tmp_path):
         [[8, 9], [11, 9], [9, 12]],
     ]
     return geojson(tmp_path / "four.geojson", *four), geojson(tmp_path / "three.geojson", *four[:3])
+
+
+def tables(done) -> list[list[list[str]]]:
+    """Return the cells of the tables that a pipe gets, one for each block of lines."""
+    assert (done.returncode, done.stderr) == (0, "")
+    blocks = done.stdout.rstrip("\n").split("\n\n")
+    return [[line.split("\t") for line in block.splitlines()] for block in blocks]
 
 
 def result(done) -> MatchResult:
@@ -260,15 +268,124 @@ def test_plugins_list_says_the_same_here_and_of_a_server(command_line, address):
     assert catalogue == Parse(there.stdout, ListAlgorithmsResponse())
     here, there = (command_line("plugins", "list", *where) for where in everywhere)
     assert here.stdout == there.stdout
-    lines = [line.split("\t") for line in here.stdout.splitlines()]
-    assert lines[0] == ["kind", "name", "default", "distribution", "version", "summary"]
-    assert ["searcher", "auto", "true", "sketchmatch"] in [line[:4] for line in lines]
+    algorithms, profiles, plugins = tables(here)
+    head = ["kind", "name", "default", "distribution", "version", "summary", "source"]
+    assert algorithms[0] == head
+    assert ["searcher", "auto", "true", "sketchmatch"] in [line[:4] for line in algorithms]
+    assert len(algorithms) == 1 + len(catalogue.algorithms)
+    assert profiles[0] == ["profile", "default", "summary"]
+    assert plugins[0] == ["plugin", "version", "state", "reason"]
+    assert ["sketchmatch", sketchmatch.__version__, "active", ""] in plugins
+
+
+def test_plugins_list_takes_one_kind(command_line, where):
+    algorithms, *_ = tables(command_line("plugins", "list", *where, "--kind", "similarity"))
+    assert {line[0] for line in algorithms} == {"kind", "similarity"}
+    assert len(algorithms) == 6
 
 
 def test_plugins_list_shows_parameters_on_a_terminal():
     terminal = Terminal("plugins", "list")
     assert terminal.end()[0] == 0
-    assert "mutation_rate = 0.3: Pm, probability" in terminal.shown
+    assert "mutation_rate = 0.3" in terminal.shown
+    assert "cell_angle = 24 °" in terminal.shown
+
+
+def test_plugins_show_is_what_the_catalogue_says_of_one(command_line, where):
+    shown = Parse(command_line("plugins", "show", "rooms", *where, "--json").stdout, Algorithm())
+    listed = Parse(
+        command_line("plugins", "list", *where, "--json").stdout, ListAlgorithmsResponse()
+    )
+    assert shown == next(item for item in listed.algorithms if item.name == "rooms")
+    done = command_line("plugins", "show", "rooms", *where)
+    lines = [line.split("\t") for line in done.stdout.splitlines()]
+    assert lines[:2] == [["kind", "segmenter"], ["name", "rooms"]]
+    assert ["reads", "occupancy_grid", "map_server_map"] in lines
+    assert next(line for line in lines if line[:2] == ["parameter", "door_width"]) == [
+        *("parameter", "door_width", "number", "1.2", "> 0, ≤ 100", "m"),
+        "Passages up to this wide are doorways.",
+    ]
+
+
+def test_plugins_show_is_readable_on_a_terminal():
+    terminal = Terminal("plugins", "show", "exact")
+    assert terminal.end()[0] == 0
+    for text in (
+        f"exact, a searcher of sketchmatch {sketchmatch.__version__}",
+        "as those of direct do",
+        "[3] P. Hahn, T. Grant",
+        "integer | null",
+        "2 … 360",
+    ):
+        assert text in terminal.shown
+
+
+@pytest.fixture
+def strangers(tmp_path):
+    """Return the environment of processes in which others' plugins are installed."""
+    install(
+        tmp_path,
+        "acme-plugins",
+        "from sketchmatch.api import Similarity, hookimpl\n"
+        "class Mine(Similarity):\n"
+        "    name, summary = 'exact', 'A [b]name[/b] of another kind.'\n"
+        "    def compare(self, aligned, argument): ...\n"
+        "@hookimpl\n"
+        "def sketchmatch_register_similarities(): return [Mine]\n",
+    )
+    install(tmp_path, "broken-plugins", "raise OSError('no licence')")
+    return {**os.environ, "PYTHONPATH": str(tmp_path)}
+
+
+def install(folder, distribution, code):
+    """Write what pip would leave of a plugin of one module."""
+    module = distribution.replace("-", "_")
+    (folder / f"{module}.py").write_text(code)
+    about = folder / f"{module}-1.2.dist-info"
+    about.mkdir()
+    about.joinpath("METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.2\n"
+    )
+    about.joinpath("entry_points.txt").write_text(f"[sketchmatch]\nmine = {module}\n")
+
+
+def test_plugins_list_says_what_became_of_each_plugin(strangers):
+    algorithms, _, plugins = tables(run("plugins", "list", env=strangers))
+    origins = {(line[1], line[3]) for line in algorithms}
+    assert {("exact", "acme-plugins"), ("exact", "sketchmatch")} <= origins
+    states = {line[0]: line[1:] for line in plugins}
+    assert states["acme-plugins"] == ["1.2", "active", ""]
+    assert states["broken-plugins"][:2] == ["1.2", "failed"]
+    assert "no licence" in states["broken-plugins"][2]
+
+
+def test_the_configuration_shows_in_the_lists(strangers, tmp_path):
+    file = tmp_path / "sketchmatch.toml"
+    file.write_text(
+        "[pipeline.searcher]\nname = 'easm'\nparameters = { population = 77 }\n"
+        "[plugins]\ndeny = ['acme-plugins']\n"
+    )
+    algorithms, _, plugins = tables(run("plugins", "list", "--config", file, env=strangers))
+    assert {line[1] for line in algorithms if line[:3:2] == ["searcher", "true"]} == {"easm"}
+    assert "acme-plugins" not in {line[3] for line in algorithms}
+    states = {line[0]: line[2:] for line in plugins}
+    assert states["acme-plugins"] == ["disabled", "the configuration denies it (plugins.deny)"]
+    shown = run("plugins", "show", "easm", "--config", file, env=strangers).stdout
+    assert "parameter\tpopulation\tinteger | null\t77\t" in shown
+
+
+def test_a_name_in_two_kinds_needs_the_kind(strangers):
+    done = run("plugins", "show", "exact", env=strangers)
+    assert_one_line(done, ExitCode.INVALID_INPUT, "'exact'", "searcher and a similarity", "--kind")
+    done = run("plugins", "show", "exact", "--kind", "similarity", env=strangers)
+    assert "A [b]name[/b] of another kind." in done.stdout
+
+
+def test_plugins_reference_writes_the_page_of_any_distribution(strangers):
+    page = run("plugins", "reference", "--distribution", "acme-plugins", env=strangers).stdout
+    assert page.startswith("# Algorithms of acme-plugins\n")
+    assert "### `exact`" in page
+    assert "Branch and bound" not in page
 
 
 # serve ------------------------------------------------------------------------------------------
@@ -326,6 +443,12 @@ def assert_one_line(done, code, *words):
         (["match", LIVING_ROOM_SKETCH, "."], [". is of no known kind", "give a file"]),
         (["segment", __file__], ["is of no known kind", ".yaml"]),
         (["plugins", "lits"], ["lits", "--help"]),
+        (["plugins", "list", "--kind", "serch"], ["--kind", "'serch'", "searcher"]),
+        (["plugins", "show", "eams"], ["'eams' is no algorithm", "easm"]),
+        (["plugins", "show", "zzz"], ["'zzz' is no algorithm", "choose one of", "easm"]),
+        (["plugins", "show", "easm", "--kind", "histogram"], ["'easm' is no histogram"]),
+        (["plugins", "reference", "--distribution", "zzz"], ["'zzz'", "sketchmatch"]),
+        (["plugins", "list", "--config", "x.toml", "--server", "localhost:1"], ["--config"]),
     ],
     ids=lambda value: " ".join(str(part) for part in value[:4])[-40:],
 )
