@@ -6,7 +6,7 @@ PIP := -m pip --disable-pip-version-check install --quiet
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 OURS := engine plugins clients/python proto tests
 
-.PHONY: demo test lint proto bench bench-histograms bench-searchers fuzz serve clean
+.PHONY: demo test lint proto bench bench-histograms bench-searchers bench-startup fuzz reference serve clean
 
 demo: .venv/runtime
 	@$(BIN)/sketchmatch demo
@@ -33,6 +33,13 @@ bench-histograms: .venv/dev
 
 bench-searchers: .venv/bench
 	@$(BIN)/python -m tests.benchmarks.searchers $(ARGS)
+
+bench-startup: .venv/dev
+	@$(BIN)/python -m tests.benchmarks.startup
+
+reference: .venv/runtime
+	$(BIN)/sketchmatch plugins reference > plugins/REFERENCE.md.new
+	mv plugins/REFERENCE.md.new plugins/REFERENCE.md
 
 MINUTES ?= 10
 fuzz: .venv/dev

@@ -1,22 +1,15 @@
 """What the documents show is what the program does."""
 
 import re
-import sys
-from importlib.metadata import EntryPoint
-from importlib.util import module_from_spec, spec_from_file_location
-
-import numpy as np
 
 import sketchmatch
 from sketchmatch.model import Scene
-from sketchmatch.pipeline.match import Finished, MatchRequest, run_match
-from sketchmatch.pipeline.selection import Choice
-from sketchmatch.registry import Registry, default_registry, discover
-from sketchmatch.testing import simulate_sketch
+from sketchmatch.registry import OWN_DISTRIBUTION, default_registry
 from tests.tools import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+BUILT_IN = [item for item in default_registry().algorithms if item.distribution == OWN_DISTRIBUTION]
 SCENE = Scene.from_polygons(
     [
         [[0, 0], [2, 0], [2, 1], [0, 1]],
@@ -27,16 +20,22 @@ SCENE = Scene.from_polygons(
 )
 
 
-def python_blocks(text):
-    return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-
-
 def test_the_readme_lists_exactly_the_algorithms_there_are():
     listed = set(
         re.findall(r"^\| (segmenter|histogram|similarity|searcher) \| `([^`]+)`", README, re.M)
     )
-    registered = {(str(item.kind), item.name) for item in default_registry().algorithms}
+    registered = {(str(item.kind), item.name) for item in BUILT_IN}
     assert listed == registered
+
+
+def test_the_readme_gives_each_algorithm_the_source_that_it_names_itself():
+    cells = re.findall(r"^\| \w+ \| `([^`]+)` \| .*? \| (?:([^|]*) )?\|$", README, re.M)
+    sources = {item.name: item.source for item in BUILT_IN}
+    assert len(cells) == len(sources)
+    for name, short in cells:
+        assert bool(short) == bool(sources[name]), name
+        for word in set(re.findall(r"[\w.]+", short)) - {"et", "al."}:
+            assert word in sources[name], f"{name}: {word}"
 
 
 def test_the_readme_names_only_attributes_that_a_result_has():
@@ -47,23 +46,14 @@ def test_the_readme_names_only_attributes_that_a_result_has():
         assert hasattr(result, name), name
 
 
-def test_the_plugin_of_contributing_works_as_it_stands(tmp_path, monkeypatch):
-    (code,) = python_blocks(CONTRIBUTING)
-    path = tmp_path / "random_maps.py"
-    path.write_text(code, encoding="utf-8")
-    spec = spec_from_file_location("random_maps", path)
-    monkeypatch.setitem(sys.modules, "random_maps", module := module_from_spec(spec))
-    spec.loader.exec_module(module)
-    plugin = discover([EntryPoint("random-maps", "random_maps", "sketchmatch")])
-    assert [status.failure for status in plugin.statuses] == [""]
-    registry = Registry([*default_registry().algorithms, *plugin.algorithms])
-    sketch = simulate_sketch(SCENE, np.random.default_rng(5))
-    request = MatchRequest(
-        sketch.scene, SCENE, {"searcher": Choice("random-maps", {"tries": 300})}, seed=1
-    )
-    *_, last = run_match(request, registry)
-    assert isinstance(last, Finished)
-    assert last.result.object_map == dict(enumerate(sketch.partners.tolist()))
+def test_the_code_of_the_tutorial_is_that_of_the_example():
+    source = ROOT / "plugins/sketchmatch-example-searcher/src"
+    files = [path.read_text(encoding="utf-8") for path in source.rglob("*.py")]
+    tutorial = CONTRIBUTING.split("\n## Adding an algorithm\n")[1].split("\n## ")[0]
+    blocks = re.findall(r"```python\n(.*?)```", tutorial, flags=re.DOTALL)
+    assert blocks
+    for block in blocks:
+        assert any(block in file for file in files), block
 
 
 def test_every_file_that_the_documents_link_to_exists():

@@ -2,93 +2,154 @@
 
 from __future__ import annotations
 
-import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from google.protobuf.json_format import MessageToDict, MessageToJson
 
-from sketchmatch.cli.options import Json, Server, say
-from sketchmatch_proto.v1.catalog_service_pb2 import (
-    PLUGIN_STATE_FAILED,
-    Algorithm,
-    AlgorithmKind,
-    ListAlgorithmsResponse,
-)
+from sketchmatch.cli import new
+from sketchmatch.cli.options import Config, Json, Server, refuse_config
+from sketchmatch.errors import InvalidInputError, Reason, quoted
+
+if TYPE_CHECKING:
+    from sketchmatch_proto.v1.catalog_service_pb2 import Algorithm, ListAlgorithmsResponse
 
 __all__ = ["app"]
 
-app = typer.Typer(help="List what there is to choose from.")
+app = typer.Typer(help="List and describe what there is to choose from, or begin a plugin.")
+app.command("new")(new.new)
+
+_Kind = Annotated[
+    str,
+    typer.Option(
+        "--kind", metavar="KIND", help="Only segmenter, histogram, similarity or searcher."
+    ),
+]
 
 
 @app.callback()
 def plugins() -> None:
-    """List what there is to choose from."""
+    """List and describe what there is to choose from, or begin a plugin."""
 
 
 @app.command("list")
-def list_(server: Server = None, json: Json = False) -> None:
-    """List the algorithms, their parameters and where they come from."""
-    from sketchmatch.cli import display
+def list_(
+    kind: _Kind = "", server: Server = None, config: Config = None, json: Json = False
+) -> None:
+    """List the algorithms, the profiles, and what became of each plugin.
 
-    catalogue = _catalogue(server)
+    In a pipe these are three tables of tab-separated lines, with an empty line between them.
+    """
+    from sketchmatch.cli import listing
+
+    found = _catalogue(kind, server, config)
     if json:
-        typer.echo(MessageToJson(catalogue, **display.JSON_STYLE))
-    elif sys.stdout.isatty():
-        _show_table(catalogue)
+        _print_json(found)
     else:
-        _print_lines(catalogue)
-    for plugin in catalogue.plugins:
-        if plugin.state == PLUGIN_STATE_FAILED:
-            say(f"plugin of {plugin.distribution} {plugin.version} failed: {plugin.reason}")
+        listing.show_catalogue(found)
 
 
-def _catalogue(server: str | None) -> ListAlgorithmsResponse:
+@app.command("show")
+def show(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of an algorithm.")],
+    kind: _Kind = "",
+    server: Server = None,
+    config: Config = None,
+    json: Json = False,
+) -> None:
+    """Describe one algorithm: what it does, its source, and its parameters."""
+    from sketchmatch.cli import listing
+
+    item = _named(_catalogue(kind, server, config), name, kind)
+    if json:
+        _print_json(item)
+    else:
+        listing.show_algorithm(item)
+
+
+@app.command("reference")
+def reference(
+    distribution: Annotated[
+        str, typer.Option(metavar="NAME", help="The Python distribution that offers them.")
+    ] = "sketchmatch",
+) -> None:
+    """Write the reference page of a distribution's algorithms, in Markdown."""
+    from sketchmatch.cli import reference
+    from sketchmatch.registry import discover
+    from sketchmatch.server import responses
+
+    # Whatever the configuration says, the page tells what the classes say.
+    print(reference.page(responses.catalogue(discover()), distribution), end="")
+
+
+def _catalogue(kind: str, server: str | None, config: Path | None) -> ListAlgorithmsResponse:
+    """Return what there is here or on a server, of one kind or of all."""
+    from sketchmatch.cli import catalogue
+
+    if kind and kind not in catalogue.KINDS:
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "--kind",
+            f"is {quoted(kind)}; choose one of: {', '.join(catalogue.KINDS)}",
+        )
+    found = _everything(server, config)
+    if kind:
+        kept = [item for item in found.algorithms if catalogue.kind(item) == kind]
+        del found.algorithms[:]
+        found.algorithms.extend(kept)
+    return found
+
+
+def _everything(server: str | None, config: Path | None) -> ListAlgorithmsResponse:
+    refuse_config(config, server)
     if server:
         from sketchmatch.cli import remote
 
         return remote.algorithms(server)
     from sketchmatch.cli import local
 
-    return local.algorithms()
+    return local.algorithms(config)
 
 
-def _show_table(catalogue: ListAlgorithmsResponse) -> None:
-    from rich.console import Console
-    from rich.table import Table
+def _named(found: ListAlgorithmsResponse, name: str, kind: str) -> Algorithm:
+    """Return the algorithm of a name.
 
-    table = Table()
-    for column in ("kind", "name", "from", "summary and parameters"):
-        table.add_column(column, no_wrap=column in ("kind", "name"))
-    for item in catalogue.algorithms:
-        name = f"{item.name} [dim](default)[/dim]" if item.is_default else item.name
-        origin = f"{item.distribution} {item.distribution_version}"
-        parameters = "\n".join(f"  [dim]{line}[/dim]" for line in _parameters(item))
-        text = f"{item.summary}\n{parameters}" if parameters else item.summary
-        table.add_row(_kind(item), name, origin, text)
-    Console().print(table)
+    Raises
+    ------
+    InvalidInputError
+        If there is none, or if there are several.
+    """
+    from sketchmatch.cli import catalogue
+    from sketchmatch.registry import OWN_DISTRIBUTION
 
-
-def _print_lines(catalogue: ListAlgorithmsResponse) -> None:
-    print("kind", "name", "default", "distribution", "version", "summary", sep="\t")
-    for item in catalogue.algorithms:
-        origin = (item.distribution, item.distribution_version)
-        print(_kind(item), item.name, str(item.is_default).lower(), *origin, item.summary, sep="\t")
-
-
-def _parameters(item: Algorithm) -> list[str]:
-    properties = MessageToDict(item.parameters_schema).get("properties", {})
-    return [
-        f"{name} = {_plain(schema['default'])}: {schema['description']}"
-        for name, schema in sorted(properties.items())
-        if "default" in schema
-    ]
+    items = [item for item in found.algorithms if item.name == name]
+    own = [item for item in items if item.distribution == OWN_DISTRIBUTION]
+    kinds = {catalogue.kind(item) for item in items}
+    if not items:
+        problem = f"is no {kind or 'algorithm'}; {_nearest(found, name)}"
+    elif len(kinds) > 1:
+        problem = f"is a {' and a '.join(sorted(kinds))}; say which with --kind"
+    elif len(items) > 1 and not own:
+        owners = " and ".join(map(catalogue.origin, items))
+        problem = f"is offered by {owners}, and cannot be selected; uninstall one of them"
+    else:
+        return (own or items)[0]
+    raise InvalidInputError(Reason.UNKNOWN_ALGORITHM, quoted(name), problem)
 
 
-def _plain(value: object) -> str:
-    if isinstance(value, float) and value.is_integer():
-        return str(int(value))
-    return "automatic" if value is None else str(value)
+def _nearest(found: ListAlgorithmsResponse, name: str) -> str:
+    from difflib import get_close_matches
+
+    known = dict.fromkeys(item.name for item in found.algorithms)
+    close = get_close_matches(name, known, cutoff=0.5)
+    if close:
+        return f"the nearest names are: {', '.join(close)}"
+    return f"choose one of: {', '.join(known) or 'none'}"
 
 
-def _kind(item: Algorithm) -> str:
-    return AlgorithmKind.Name(item.kind).removeprefix("ALGORITHM_KIND_").lower()
+def _print_json(message: ListAlgorithmsResponse | Algorithm) -> None:
+    from google.protobuf.json_format import MessageToJson
+
+    from sketchmatch.cli.display import JSON_STYLE
+
+    typer.echo(MessageToJson(message, **JSON_STYLE))

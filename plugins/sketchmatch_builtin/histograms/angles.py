@@ -14,7 +14,9 @@ class Angles(PowerForce):
     da = ρ dρ dθ. The density of the angle θ over all pairs of points is therefore the histogram of
     the forces φ(d) = d, r = −1; its integral over the full turn is the product of the areas.
 
-    Source: K. Miyajima, A. Ralescu, "Spatial organization in 2D segmented images: representation
+    References
+    ----------
+    K. Miyajima, A. Ralescu, "Spatial organization in 2D segmented images: representation
     and recognition of primitive spatial relations", Fuzzy Sets and Systems 65(2–3), 1994.
     """
 

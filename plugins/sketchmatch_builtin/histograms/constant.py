@@ -8,10 +8,16 @@ __all__ = ["ConstantForce"]
 
 
 class ConstantForce(PowerForce):
-    """Exact histogram of constant forces, r = 0, of polygons with holes, overlap allowed.
+    """Exact histogram of constant forces [1]_, r = 0, of polygons with holes, overlap allowed.
 
-    Source: P. Matsakis, L. Wendling, "A new way to represent the relative position between areal
-    objects", IEEE TPAMI 21(7), 1999; thesis, section 3.1.
+    It is what scenes are described by in [2]_.
+
+    References
+    ----------
+    .. [1] P. Matsakis, L. Wendling, "A new way to represent the relative position between areal
+       objects", IEEE TPAMI 21(7), 1999.
+    .. [2] "Scene Matching Between a Quantitative Map and a Qualitative Hand Drawn Sketch", thesis,
+       section 3.1.
     """
 
     name = "constant"

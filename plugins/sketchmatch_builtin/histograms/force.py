@@ -14,7 +14,9 @@ class Force(PowerForce):
     Objects may overlap for r < 1 and touch for r < 2. For a match r must not be near 3, where a
     histogram does not change with the size of its objects.
 
-    Source: P. Matsakis, L. Wendling, "A new way to represent the relative position between areal
+    References
+    ----------
+    P. Matsakis, L. Wendling, "A new way to represent the relative position between areal
     objects", IEEE TPAMI 21(7), 1999.
     """
 

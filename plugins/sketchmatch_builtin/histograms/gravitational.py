@@ -12,7 +12,9 @@ class GravitationalForce(PowerForce):
 
     It tells more of the parts of two objects that are near each other than of the others.
 
-    Source: P. Matsakis, L. Wendling, "A new way to represent the relative position between areal
+    References
+    ----------
+    P. Matsakis, L. Wendling, "A new way to represent the relative position between areal
     objects", IEEE TPAMI 21(7), 1999.
     """
 

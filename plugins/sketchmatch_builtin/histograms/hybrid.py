@@ -24,12 +24,14 @@ class HybridForce(ForceHistogram):
 
     The distance Y is ``near`` times the diameter of the smaller object, or ``overlap`` times that
     of what the two have in common, if that is more; the diameter of a shape is that of the disc
-    of equal area. Objects that are further apart than Y have the gravitational histogram; others
-    may touch and overlap, as the force never exceeds 1/Y².
+    of equal area. This Y is that of the program which L. Wendling and P. Matsakis published with
+    [1]_, where the two are p0 and p1. Objects that are further apart than Y have the gravitational
+    histogram; others may touch and overlap, as the force never exceeds 1/Y².
 
-    Source: P. Matsakis, "Relations spatiales structurelles et interprétation d'images", thesis,
-    Université Paul Sabatier, Toulouse, 1998; Y as in the program that L. Wendling and P. Matsakis
-    published with it, whose p0 and p1 are ``near`` and ``overlap``.
+    References
+    ----------
+    .. [1] P. Matsakis, "Relations spatiales structurelles et interprétation d'images", thesis,
+       Université Paul Sabatier, Toulouse, 1998.
     """
 
     name = "hybrid"

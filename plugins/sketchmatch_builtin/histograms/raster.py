@@ -23,7 +23,9 @@ class RasterForce(ForceHistogram):
     holds. The forces are those between these sets of pixels, not between digital lines, so the
     pixels alone make it an approximation.
 
-    Source: P. Matsakis, L. Wendling, "A new way to represent the relative position between areal
+    References
+    ----------
+    P. Matsakis, L. Wendling, "A new way to represent the relative position between areal
     objects", IEEE TPAMI 21(7), 1999.
     """
 
@@ -35,7 +37,11 @@ class RasterForce(ForceHistogram):
 
         r: float = exponent_field(0.0)
         pixels: int = Field(
-            256, ge=8, le=4096, description="Pixels along the longer side of the scene."
+            256,
+            ge=8,
+            le=4096,
+            description="How long the longer side of the scene is on the grid.",
+            json_schema_extra={"unit": "px"},
         )
 
     params: Params

@@ -29,8 +29,6 @@ class Auto(Searcher):
     tries to prove that there is none better, or finds it: for as long as the time budget lasts,
     or for ``proof_nodes`` where there is none. Beyond, ``direct`` is all. The result's note says
     what was done.
-
-    Source: none; this is how the two others are best used.
     """
 
     name = "auto"

@@ -36,19 +36,26 @@ _ENTRIES = 1_000_000
 class Direct(Searcher):
     """Matches the objects themselves: evolution of object maps, each one a local optimum.
 
+    Matching objects instead of histograms is the thesis's closing idea [1]_, evolution with local
+    search a memetic algorithm [2]_.
+
     The first maps are made for global rotations all around and any dilation: each object takes a
     partner that lies in the same direction of all others, as far away, and is as similar, on
     average. Then the better of the population cross with each other, or with a new map for their
     own rotation and dilation. Every map climbs to a local optimum under two moves, exchange of
     the partners of two objects and move of one object to an unused partner, before it competes.
-    All moves of a map are weighed at once, each in constant time, and ζ is exact.
+    All moves of a map are weighed at once, each in constant time [3]_, and ζ is exact.
 
     The alternatives are the best other maps met, completed by all single moves from them.
 
-    Sources: thesis, section 5 (its closing idea: matching objects instead of histograms);
-    P. Moscato, "On evolution, search, optimization, genetic algorithms and martial arts: towards
-    memetic algorithms", 1989; É. Taillard, "Robust taboo search for the quadratic assignment
-    problem", Parallel Computing 17, 1991 (moves weighed in constant time).
+    References
+    ----------
+    .. [1] "Scene Matching Between a Quantitative Map and a Qualitative Hand Drawn Sketch", thesis,
+       section 5.
+    .. [2] P. Moscato, "On evolution, search, optimization, genetic algorithms and martial arts:
+       towards memetic algorithms", 1989.
+    .. [3] É. Taillard, "Robust taboo search for the quadratic assignment problem", Parallel
+       Computing 17, 1991.
     """
 
     name = "direct"

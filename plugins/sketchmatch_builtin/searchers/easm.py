@@ -51,7 +51,12 @@ class Easm(Searcher):
     random order and those that agree with the ones kept before are kept, so that the child mixes
     histogram correspondences of both parents and still follows from one object map.
 
-    Source: thesis, section 3.8. The thesis leaves the size of the population open.
+    The thesis leaves the size of the population open.
+
+    References
+    ----------
+    "Scene Matching Between a Quantitative Map and a Qualitative Hand Drawn Sketch", thesis,
+    section 3.8.
     """
 
     name = "easm"

@@ -61,13 +61,21 @@ class Exact(Searcher):
     """Finds the object map with the highest ζ and proves that there is none better.
 
     A few maps that climb as those of ``direct`` do are the start. Then cells of rotation and
-    dilation are bounded and halved; those that may hold something better than the best map so far
-    are searched depth first, under bounds by dual ascent. The upper bound is true at every moment,
-    and in the end is ζ itself: nothing is better by more than 1e-9. The alternatives are the best
-    other maps met on the way, and not proved to be the next best.
+    dilation are bounded [1]_ [2]_ and halved; those that may hold something better than the best
+    map so far are searched depth first, under bounds by dual ascent [3]_ over linear assignments
+    [4]_. The upper bound is true at every moment, and in the end is ζ itself: nothing is better by
+    more than 1e-9. The alternatives are the best other maps met on the way, and not proved to be
+    the next best.
 
-    Sources: Gilmore 1962, Lawler 1963, Jonker and Volgenant 1987, Hahn and Grant 1998; the
-    modules beside this one say what comes from which.
+    References
+    ----------
+    .. [1] P. C. Gilmore, "Optimal and suboptimal algorithms for the quadratic assignment problem",
+       J. SIAM 10, 1962.
+    .. [2] E. L. Lawler, "The quadratic assignment problem", Management Science 9, 1963.
+    .. [3] P. Hahn, T. Grant, "Lower bounds for the quadratic assignment problem based upon a dual
+       formulation", Operations Research 46(6), 1998.
+    .. [4] R. Jonker, A. Volgenant, "A shortest augmenting path algorithm for dense and sparse
+       linear assignment problems", Computing 38, 1987.
     """
 
     name = "exact"
@@ -87,8 +95,9 @@ class Exact(Searcher):
             24.0,
             ge=2.0,
             le=360.0,
-            description="Width in degrees that cells of rotation are halved down to; up to four "
-            "times as wide where there are few maps.",
+            description="Width that cells of rotation are halved down to; up to four times as "
+            "wide where there are few maps.",
+            json_schema_extra={"unit": "°"},
         )
         cell_dilation: float = Field(
             0.22,

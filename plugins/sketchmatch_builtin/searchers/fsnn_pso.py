@@ -37,7 +37,10 @@ class FsnnPso(Searcher):
     13 × 13 objects and estimated from 2²⁰ random pairs beyond. The search begins with a random
     FMAP and one grown by distance alone, so that there is an answer while it prepares.
 
-    Source: thesis, sections 3.6 and 3.7.1, after Sjahputera and Keller (2006).
+    References
+    ----------
+    "Scene Matching Between a Quantitative Map and a Qualitative Hand Drawn Sketch", thesis,
+    sections 3.6 and 3.7.1, after Sjahputera and Keller (2006).
     """
 
     name = "fsnn-pso"

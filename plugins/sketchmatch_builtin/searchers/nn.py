@@ -23,15 +23,19 @@ __all__ = ["Nn"]
 
 
 class Nn(Searcher):
-    """Grows one FMAP from each of several random seed points and keeps the best.
+    """Grows one FMAP from each of several random seed points and keeps the best [1]_.
 
     Histogram correspondences enter the FMAP in the order of their Euclidean distance from the
     seed point in (σ̂, R̂, L̂), unless they conflict with one that is in it: it is one-to-one and
     holds no histogram beside its dual, but need not lead to a consistent object map. A random
     FMAP is what the search begins with.
 
-    Source: thesis, section 3.5, after Sjahputera and Keller (2005). The thesis leaves the number
-    of seed points open.
+    The thesis leaves the number of seed points open.
+
+    References
+    ----------
+    .. [1] "Scene Matching Between a Quantitative Map and a Qualitative Hand Drawn Sketch", thesis,
+       section 3.5, after Sjahputera and Keller (2005).
     """
 
     name = "nn"

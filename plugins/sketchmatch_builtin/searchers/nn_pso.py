@@ -27,7 +27,10 @@ class NnPso(Searcher):
     The swarm has a star neighbourhood and ζ as its fitness. A random FMAP is what the search
     begins with.
 
-    Source: thesis, sections 3.5 and 3.7.1, after Sjahputera and Keller (2005).
+    References
+    ----------
+    "Scene Matching Between a Quantitative Map and a Qualitative Hand Drawn Sketch", thesis,
+    sections 3.5 and 3.7.1, after Sjahputera and Keller (2005).
     """
 
     name = "nn-pso"

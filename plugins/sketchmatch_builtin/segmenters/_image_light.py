@@ -129,7 +129,12 @@ def continued(picture: Mask, sheet: Mask) -> Mask:
 def is_light_on_dark(small: Mask) -> bool:
     """Return whether the ink is the lighter of the two; the negative gives the opposite answer.
 
-    What lies along the border is paper. Where the border has both, ink is what is rare nearby.
+    The two are parted at Otsu's threshold [1]_, and what lies along the border is paper. Where the
+    border has both, ink is what is rare nearby.
+
+    References
+    ----------
+    .. [1] N. Otsu, "A threshold selection method from gray-level histograms", IEEE TSMC 9(1), 1979.
     """
     level = small.astype(np.float64) - _slope(small)
     levels = np.zeros(small.shape, np.uint8)

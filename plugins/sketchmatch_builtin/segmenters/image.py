@@ -29,18 +29,20 @@ _FRAMED = (
 class ImageSegmenter(Segmenter):
     """Takes dark or coloured shapes as objects, filled or outlined, scanned or photographed.
 
-    The light on the paper is divided out and ink parted from paper halfway between them [1]_; each
-    shape is then traced around its outside [2]_, so that an outline counts as what it encloses,
-    and nothing within an object is looked at. Gaps in outlines are closed, lines that enclose
-    nothing are left out, and so are ruled lines and a table around the sheet. Outlines that touch
-    or overlap are parted where that gives the fewest convex shapes. One shape around most of the
-    drawing is a frame and left out. Coordinates are pixels from the lower left corner. Objects come
-    in reading order: by their highest point from the top down, then from the left.
+    The light on the paper is found [1]_ and divided out, and ink parted from paper halfway between
+    them [2]_; each shape is then traced around its outside [3]_, so that an outline counts as what
+    it encloses, and nothing within an object is looked at. Gaps in outlines are closed, lines that
+    enclose nothing are left out, and so are ruled lines and a table around the sheet. Outlines that
+    touch or overlap are parted where that gives the fewest convex shapes. One shape around most of
+    the drawing is a frame and left out. Coordinates are pixels from the lower left corner. Objects
+    come in reading order: by their highest point from the top down, then from the left.
 
     References
     ----------
-    .. [1] J. Bernsen, "Dynamic thresholding of gray-level images", ICPR 1986.
-    .. [2] S. Suzuki, K. Abe, "Topological structural analysis of digitized binary images by
+    .. [1] L. Vincent, "Morphological grayscale reconstruction in image analysis", IEEE
+       Transactions on Image Processing 2(2), 1993.
+    .. [2] J. Bernsen, "Dynamic thresholding of gray-level images", ICPR 1986.
+    .. [3] S. Suzuki, K. Abe, "Topological structural analysis of digitized binary images by
        border following", Computer Vision, Graphics, and Image Processing 30(1), 1985.
     """
 
@@ -56,9 +58,10 @@ class ImageSegmenter(Segmenter):
             ge=0.0,
             le=50.0,
             description=(
-                "Standard deviation of the Gaussian that evens out noise before the threshold, "
-                "in pixels; 0 for none."
+                "Standard deviation of the Gaussian that evens out noise before the threshold; "
+                "0 for none."
             ),
+            json_schema_extra={"unit": "px"},
         )
         min_size: float = Field(
             0.02,

@@ -70,25 +70,28 @@ class OccupancyGridSegmenter(Segmenter):
             25,
             ge=1,
             le=100,
-            description="Known cells whose occupancy is below this are free, in percent.",
+            description="Known cells whose occupancy is below this are free.",
+            json_schema_extra={"unit": "%"},
         )
         min_size: float = Field(
             0.2,
             ge=0.0,
             le=1000.0,
             description=(
-                "Objects smaller than a square with this side are left out, in metres. The "
-                "default keeps posts and drops table legs and speckle."
+                "Objects smaller than a square with this side are left out. The default keeps "
+                "posts and drops table legs and speckle."
             ),
+            json_schema_extra={"unit": "m"},
         )
         close_gaps: float = Field(
             0.1,
             ge=0.0,
             le=1.0,
             description=(
-                "Gaps up to this wide are closed, in metres, in an object's outline and between "
-                "objects, which then are one; 0 closes none."
+                "Gaps up to this wide are closed, in an object's outline and between objects, "
+                "which then are one; 0 closes none."
             ),
+            json_schema_extra={"unit": "m"},
         )
         merge_distance: float = Field(
             0.0,
@@ -96,17 +99,19 @@ class OccupancyGridSegmenter(Segmenter):
             le=100.0,
             description=(
                 "Small things that are at most this far apart become one with the outline around "
-                "all, in metres: 1 makes four legs a table; 0 is off."
+                "all: 1 makes four legs a table; 0 is off."
             ),
+            json_schema_extra={"unit": "m"},
         )
         leg_size: float = Field(
             0.25,
             ge=0.0,
             le=100.0,
             description=(
-                "Small things are those no larger than a square with this side, in metres; it "
-                "matters with merge_distance alone."
+                "Small things are those no larger than a square with this side; it matters with "
+                "merge_distance alone."
             ),
+            json_schema_extra={"unit": "m"},
         )
         attached: float = Field(
             0.0,
@@ -114,8 +119,9 @@ class OccupancyGridSegmenter(Segmenter):
             le=100.0,
             description=(
                 "Objects that touch a wall, or whose back was not seen, count if they are no "
-                "wider than this, in metres: 2 keeps cupboards and beds; 0 leaves all out."
+                "wider than this: 2 keeps cupboards and beds; 0 leaves all out."
             ),
+            json_schema_extra={"unit": "m"},
         )
         wall_thickness: float = Field(
             0.3,
@@ -123,8 +129,9 @@ class OccupancyGridSegmenter(Segmenter):
             le=10.0,
             description=(
                 "What touches a wall and is no thicker than this is a partition or a bump of "
-                "the wall and no object, in metres; it matters with attached alone."
+                "the wall and no object; it matters with attached alone."
             ),
+            json_schema_extra={"unit": "m"},
         )
         region_share: float = Field(
             0.1,
@@ -140,9 +147,10 @@ class OccupancyGridSegmenter(Segmenter):
             ge=0.0,
             le=10.0,
             description=(
-                "How far a simplified outline may leave the cells' borders, in metres, but never "
-                "more than 12 % of the object's size; three quarters of a cell when left out."
+                "How far a simplified outline may leave the cells' borders, but never more than "
+                "12 % of the object's size; three quarters of a cell when left out."
             ),
+            json_schema_extra={"unit": "m"},
         )
 
     params: Params

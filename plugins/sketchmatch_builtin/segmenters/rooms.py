@@ -58,19 +58,22 @@ class RoomSegmenter(Segmenter):
             25,
             ge=1,
             le=100,
-            description="Known cells whose occupancy is below this are free, in percent.",
+            description="Known cells whose occupancy is below this are free.",
+            json_schema_extra={"unit": "%"},
         )
         door_width: float = Field(
             1.2,
             gt=0.0,
             le=100.0,
-            description="Passages up to this wide are doorways, in metres.",
+            description="Passages up to this wide are doorways.",
+            json_schema_extra={"unit": "m"},
         )
         min_area: float = Field(
             2.0,
             ge=0.0,
             le=1e6,
-            description="Rooms smaller than this are left out, in m².",
+            description="Rooms smaller than this are left out.",
+            json_schema_extra={"unit": "m²"},
         )
         furniture: float = Field(
             2.0,
@@ -78,17 +81,19 @@ class RoomSegmenter(Segmenter):
             le=1000.0,
             description=(
                 "Things that stand free and are at most this long are furniture and belong to "
-                "the room around them, in metres; longer ones are walls that may part rooms."
+                "the room around them; longer ones are walls that may part rooms."
             ),
+            json_schema_extra={"unit": "m"},
         )
         tolerance: float | None = Field(
             None,
             ge=0.0,
             le=10.0,
             description=(
-                "How far a simplified outline may leave the cells' borders, in metres; three "
-                "quarters of a cell when left out."
+                "How far a simplified outline may leave the cells' borders; three quarters of a "
+                "cell when left out."
             ),
+            json_schema_extra={"unit": "m"},
         )
 
     params: Params

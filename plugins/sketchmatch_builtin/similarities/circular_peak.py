@@ -14,7 +14,9 @@ class CircularPeak(CrossCorrelation):
     R is where it lies, so histograms without a clear main direction are aligned well, too. Where
     two rotations fit equally, as for symmetric histograms, R is the smaller.
 
-    Source: P. Matsakis, J. M. Keller, O. Sjahputera, J. Marjamaa, "The use of force histograms for
+    References
+    ----------
+    P. Matsakis, J. M. Keller, O. Sjahputera, J. Marjamaa, "The use of force histograms for
     affine-invariant relative position description", IEEE TPAMI 26(1), 2004.
     """
 

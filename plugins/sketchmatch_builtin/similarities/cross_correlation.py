@@ -11,10 +11,14 @@ __all__ = ["CrossCorrelation"]
 
 
 class CrossCorrelation(ProductSimilarity):
-    """Normalised cross-correlation, Σ h₂h' / (‖h₂‖‖h'‖).
+    """Normalised cross-correlation, Σ h₂h' / (‖h₂‖‖h'‖) [1]_, as the thesis [2]_ takes it.
 
-    Source: P. Matsakis, J. M. Keller, O. Sjahputera, J. Marjamaa, "The use of force histograms for
-    affine-invariant relative position description", IEEE TPAMI 26(1), 2004; thesis, section 3.2.
+    References
+    ----------
+    .. [1] P. Matsakis, J. M. Keller, O. Sjahputera, J. Marjamaa, "The use of force histograms for
+       affine-invariant relative position description", IEEE TPAMI 26(1), 2004.
+    .. [2] "Scene Matching Between a Quantitative Map and a Qualitative Hand Drawn Sketch", thesis,
+       section 3.2.
     """
 
     name = "cross-correlation"

@@ -19,7 +19,9 @@ class Overlap(Similarity):
     empty and would make all pairs alike. A direction is empty where both histograms are below
     1e-9 of the larger one's peak.
 
-    Source: W.-J. Wang, "New similarity measures on fuzzy sets and on elements", Fuzzy Sets and
+    References
+    ----------
+    W.-J. Wang, "New similarity measures on fuzzy sets and on elements", Fuzzy Sets and
     Systems 85(3), 1997.
     """
 

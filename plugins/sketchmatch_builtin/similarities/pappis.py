@@ -1,4 +1,4 @@
-"""The measure of Pappis and Karacapidilis."""
+"""The measure of Pappis and Karacapilidis."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ __all__ = ["Pappis"]
 class Pappis(Similarity):
     """What two histograms have in common, in proportion to what they cover: Σ min / Σ max.
 
-    Source: C. P. Pappis, N. I. Karacapilidis, "A comparative assessment of measures of similarity
+    References
+    ----------
+    C. P. Pappis, N. I. Karacapilidis, "A comparative assessment of measures of similarity
     of fuzzy values", Fuzzy Sets and Systems 56(2), 1993.
     """
 

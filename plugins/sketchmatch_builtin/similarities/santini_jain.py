@@ -15,14 +15,16 @@ __all__ = ["SantiniJain"]
 
 
 class SantiniJain(Similarity):
-    """Fuzzy feature contrast in Tversky's ratio form, c / (c + αa + βb).
+    """Fuzzy feature contrast [1]_ in Tversky's ratio form [2]_, c / (c + αa + βb).
 
     c = Σ min(h₂, h') is what the histograms have in common, a = Σ max(h₂ − h', 0) what only the
     template has and b = Σ max(h' − h₂, 0) what only the argument has. The histograms have equal
     means, so a = b and only α + β counts: 1 is Dice's coefficient, 2 is ``pappis``.
 
-    Source: S. Santini, R. Jain, "Similarity measures", IEEE TPAMI 21(9), 1999; A. Tversky,
-    "Features of similarity", Psychological Review 84(4), 1977.
+    References
+    ----------
+    .. [1] S. Santini, R. Jain, "Similarity measures", IEEE TPAMI 21(9), 1999.
+    .. [2] A. Tversky, "Features of similarity", Psychological Review 84(4), 1977.
     """
 
     name = "santini-jain"
