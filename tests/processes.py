@@ -9,6 +9,9 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
 
 _ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 COMMAND = [sys.executable, "-m", "sketchmatch"]
@@ -25,6 +28,23 @@ def sketchmatch(*arguments, timeout=60, **options) -> subprocess.CompletedProces
         check=False,
         **options,
     )
+
+
+def children_of(pid: int) -> list[int]:
+    """Return the processes that a process has started and that still run."""
+    folder = Path(f"/proc/{pid}/task")
+    if not folder.is_dir():
+        pytest.skip("this system does not tell which processes a process has started")
+    lists = ((thread / "children").read_text(encoding="ascii") for thread in folder.iterdir())
+    return [int(child) for children in lists for child in children.split()]
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process runs; one that has ended and nobody asks about does not."""
+    try:
+        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    except OSError:
+        return False
 
 
 class Server:

@@ -6,6 +6,7 @@ import re
 import statistics
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -14,10 +15,13 @@ from sketchmatch.server.setup import Isolation, Setup
 from sketchmatch_client import Client, InvalidRequestError, ServerFailedError
 from sketchmatch_proto.v1.catalog_service_pb2 import PluginState
 from sketchmatch_proto.v1.match_pb2 import Outcome
+from tests.processes import children_of, is_alive, server
 from tests.server.harness import hosting, scene
 from tests.server.misbehaving import BROKEN, UNSTOPPABLE
 
 PATIENCE = 1.0
+ENDLESS = {"guessing": {"tries": 100_000, "pause": 0.01}, "lockingsearcher": {}}
+"""Parameters with which a searcher goes on until it is stopped."""
 PLUGINS = {
     "acme-misbehaving": "tests.server.misbehaving",
     "acme-well-behaved": "tests.server.well_behaved",
@@ -27,8 +31,8 @@ PLUGINS = {
 
 
 @pytest.fixture(scope="module")
-def host(tmp_path_factory):
-    """Yield a server with the plugins of several distributions, installed as pip would."""
+def site(tmp_path_factory):
+    """Return a folder with several distributions, installed as pip would."""
     folder = tmp_path_factory.mktemp("site")
     for distribution, entry in PLUGINS.items():
         info = folder / f"{distribution.replace('-', '_')}-1.2.dist-info"
@@ -37,8 +41,14 @@ def host(tmp_path_factory):
         (info / "METADATA").write_text(metadata, encoding="utf-8")
         points = f"[sketchmatch]\n{distribution} = {entry}\n"
         (info / "entry_points.txt").write_text(points, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def host(site):
+    """Yield a server that finds the distributions."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(folder)
+        patch.syspath_prepend(site)
         setup = Setup(discover(), isolation=Isolation(patience=PATIENCE))
         with hosting(setup) as running:
             yield running
@@ -72,7 +82,7 @@ def test_a_strangers_search_runs_in_another_process_and_finds_the_same(client):
 
 
 def test_its_events_come_one_by_one_and_it_is_stopped_when_the_caller_goes(client):
-    slow = {"searcher": "guessing", "params": {"searcher": {"tries": 10_000, "pause": 0.01}}}
+    slow = {"searcher": "guessing", "params": {"searcher": ENDLESS["guessing"]}}
     before = process_of(client.match(scene(4), scene(4), searcher="guessing"))
     events = client.events(scene(4), scene(4), **slow)
     seen = [next(events).WhichOneof("event") for _ in range(6)]
@@ -85,7 +95,7 @@ def test_its_events_come_one_by_one_and_it_is_stopped_when_the_caller_goes(clien
 
 
 def test_its_time_budget_ends_it_with_an_answer(client):
-    slow = {"searcher": "guessing", "params": {"searcher": {"tries": 10_000, "pause": 0.01}}}
+    slow = {"searcher": "guessing", "params": {"searcher": ENDLESS["guessing"]}}
     found = client.match(scene(4), scene(4), **slow, time_budget=0.5)
     assert Outcome.Name(found.result.outcome) == "OUTCOME_TIME_BUDGET"
 
@@ -217,3 +227,26 @@ def test_no_process_outlives_its_server(host):
         found = connected.match(scene(4), scene(4), searcher="guessing")
         assert process_of(found) in {child.pid for child in multiprocessing.active_children()}
     assert process_of(found) not in {child.pid for child in multiprocessing.active_children()}
+
+
+@pytest.mark.parametrize("searcher", ["guessing", "lockingsearcher"])
+def test_no_process_outlives_a_server_that_is_killed(site, tmp_path, monkeypatch, searcher):
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(site), str(Path.cwd()))))
+    file = tmp_path / "sketchmatch.toml"
+    file.write_text("[plugins]\npatience_seconds = 2\n", encoding="utf-8")
+    with server("--config", str(file)) as running, Client(running.address) as connected:
+        connected.wait_until_serving(60)
+        found = connected.match(scene(4), scene(4), searcher="guessing")
+        events = connected.events(
+            scene(4), scene(4), searcher=searcher, params={"searcher": ENDLESS[searcher]}
+        )
+        while next(events).WhichOneof("event") != "progress":
+            pass
+        children = children_of(running.process.pid)
+        assert process_of(found) in children
+        running.process.kill()
+        running.process.wait(10)
+        deadline = time.monotonic() + 20
+        while any(map(is_alive, children)) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert not any(map(is_alive, children))
