@@ -11,8 +11,9 @@ OURS := engine plugins clients/python proto tests
 demo: .venv/runtime
 	@$(BIN)/sketchmatch demo
 
+# Two at a time, each file by one of them: the servers of a file are started once.
 test: lint
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 lint: .venv/dev .venv-proto/tools
 	$(BIN)/ruff check $(OURS)
