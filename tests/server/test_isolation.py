@@ -15,7 +15,7 @@ from sketchmatch.server.setup import Isolation, Setup
 from sketchmatch_client import Client, InvalidRequestError, ServerFailedError
 from sketchmatch_proto.v1.catalog_service_pb2 import PluginState
 from sketchmatch_proto.v1.match_pb2 import Outcome
-from tests.processes import children_of, is_alive, server
+from tests.processes import children_of, is_alive, server, sketchmatch
 from tests.server.harness import hosting, scene
 from tests.server.misbehaving import BROKEN, UNSTOPPABLE
 
@@ -250,3 +250,28 @@ def test_no_process_outlives_a_server_that_is_killed(site, tmp_path, monkeypatch
         while any(map(is_alive, children)) and time.monotonic() < deadline:
             time.sleep(0.05)
         assert not any(map(is_alive, children))
+
+
+def test_strict_plugins_keep_a_server_from_starting_and_a_denied_one_is_no_problem(
+    site, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(site), str(Path.cwd()))))
+    refused = sketchmatch("serve", "--address", "127.0.0.1:0", "--strict-plugins")
+    assert refused.returncode == 5
+    assert re.fullmatch(
+        r"sketchmatch: plugin acme-\S+ of acme-\S+ 1\.2 failed to load: .* "
+        r"\(and 1 more\); mend it, or do without strict plugins\n",
+        refused.stderr,
+    )
+    file = tmp_path / "sketchmatch.toml"
+    file.write_text(
+        '[plugins]\nstrict = true\ndeny = ["acme-rubbish", "Acme_Unimportable"]\n', encoding="utf-8"
+    )
+    with server("--config", str(file)) as running, Client(running.address) as connected:
+        states = {
+            plugin.distribution: (PluginState.Name(plugin.state), plugin.reason)
+            for plugin in connected.algorithms().plugins
+        }
+    denied = ("PLUGIN_STATE_DISABLED", "the configuration denies it (plugins.deny)")
+    assert states["acme-rubbish"] == states["acme-unimportable"] == denied
+    assert states["acme-well-behaved"] == ("PLUGIN_STATE_ACTIVE", "")

@@ -189,7 +189,7 @@ class Registry:
         """
         if self.problems:
             first, *others = self.problems
-            more = f" (and {len(others)} more problems)" if others else ""
+            more = f" (and {len(others)} more)" if others else ""
             raise PluginError(f"{first}{more}; mend it, or do without strict plugins")
 
     def without(self, *distributions: str) -> Registry:
