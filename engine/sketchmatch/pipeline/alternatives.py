@@ -58,7 +58,7 @@ def exchange_confidences(
     if count * table.template_pairs > _MAX_EXCHANGED_ENTRIES:
         return None
     relations = (
-        table.similarity,
+        table.entry_evidence,
         table.cosine,
         table.sine,
         table.normalized_dilation,
