@@ -12,9 +12,9 @@
   :func:`mean_absolute_difference` (ζL).
 - Rows of histograms: :func:`contrast_rows`, :func:`overlap_rows`.
 
-Evidence is what an entry counts for in ζσ: σ, or more where a request weighs the shapes and sizes of
-objects. All of these take it from ``RelationTable.entry_evidence``, and so does a searcher that reads
-the table itself.
+Evidence is what an entry counts for beside rotation and dilation: σ, or more where a request weighs
+the shapes and sizes of objects. A searcher that reads the table itself takes it, as these do, from
+``RelationTable.entry_evidence``.
 
 Generators of :mod:`numpy.random` may be handed to compiled code.
 

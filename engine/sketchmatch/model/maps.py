@@ -10,10 +10,21 @@ import numpy as np
 from sketchmatch.model.arrays import FloatArray, IntArray, frozen, frozen_floats
 from sketchmatch.model.relations import object_pairs, pair_index
 
-__all__ = ["Confidence", "ConfidenceWeights", "Fmap", "ObjectMap", "Occm", "Weights"]
+__all__ = [
+    "Confidence",
+    "ConfidenceWeights",
+    "Fmap",
+    "ObjectMap",
+    "Occm",
+    "RequestWeights",
+    "Weights",
+]
 
 Weights = tuple[float, float, float]
 """Weights of ζσ, ζR and ζL; where a table holds evidence, its mean takes the place of ζσ."""
+
+RequestWeights = Weights | tuple[float, float, float, float, float]
+"""Weights of ζσ, ζR and ζL, and perhaps of ζS and ζM."""
 
 
 class ConfidenceWeights(NamedTuple):
@@ -37,6 +48,11 @@ class ConfidenceWeights(NamedTuple):
     def of_entries(self) -> float:
         """w₁ + w₄ + w₅, the weight of all parts that are means over the entries of an FMAP."""
         return self.similarity + self.shape + self.size
+
+    @property
+    def of_objects(self) -> float:
+        """w₄ + w₅; above 0 objects are compared beside their relations."""
+        return self.shape + self.size
 
     @property
     def searched(self) -> Weights:
@@ -108,7 +124,7 @@ class Confidence:
     similarity, rotation, dilation
         ζσ, ζR and ζL.
     shape, size
-        ζS and ζM; None where they were not asked for.
+        ζS and ζM; None where objects were not compared, because neither counts.
     """
 
     total: float

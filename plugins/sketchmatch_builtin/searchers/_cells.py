@@ -20,8 +20,9 @@ least a base of w3 (1 − 2^{−d})/W and the sum of
 
     w1 (1 − e)/(W P) + w2 (1 − cosmax)/(W P) + w3 s·φ(L̂)/(W (P − 1))
 
-over its entries, e being their evidence, σ or more: a quadratic assignment problem. Every θ and all quantiles are covered, so a bound
-for every cell is a bound for every map. With P = 1, ζR = ζL = 1 and the first term is all.
+over its entries, where e is σ or the evidence in its place: a quadratic assignment problem. Every
+θ and all quantiles are covered, so a bound for every cell is a bound for every map. With P = 1,
+ζR = ζL = 1 and the first term is all.
 
 A first bound for a cell gives half of the least cost of each entry (a, b) → (c, d) to a → c and
 half to b → d, and solves the linear assignment problem of these (P. C. Gilmore, "Optimal and

@@ -48,9 +48,9 @@ class Moves(NamedTuple):
     directed
         Whether a dual has evidence of its own, which need not be that of its column.
     relations
-        float32, shape (Q, N', N', 4): evidence, cos R, sin R and L̂ of the entries (a, b) → (c, d), a < b,
-        by d and then c. This lies as it is read. Its precision is enough to propose moves and, with
-        a margin, to exclude them; that c and d come in both orders makes up for its size.
+        float32, shape (Q, N', N', 4): evidence, cos R, sin R and L̂ of the entries (a, b) → (c, d),
+        a < b, by d and then c. This lies as it is read. Its precision is enough to propose moves
+        and, with a margin, to exclude them; that c and d come in both orders makes up for its size.
     sums
         Shape (N, N', 4): sums of σ, cos R, sin R and of a bound of f over the entries that each
         template object would have with each partner, without the entry with its holder.
@@ -345,9 +345,7 @@ def _estimate(
     spread = sums[a, c, _L] - sums[a, old, _L]
     if b >= 0:
         # The entry (a, b) is in both sums that go, in neither that comes, and turns round.
-        similar += sums[b, old, _S] - sums[b, c, _S] + (
-            entries[a, b, _S] + entries[a, b, _TURNED]
-        )
+        similar += sums[b, old, _S] - sums[b, c, _S] + (entries[a, b, _S] + entries[a, b, _TURNED])
         x += sums[b, old, _X] - sums[b, c, _X]
         y += sums[b, old, _Y] - sums[b, c, _Y]
         spread += sums[b, old, _L] - sums[b, c, _L] + 2.0 * _line(lines, entries[a, b, _L])

@@ -101,6 +101,11 @@ class Easm(Searcher):
 
     params: Params
 
+    @property
+    def object_consistent(self) -> bool:
+        """Whether that is what makes an FMAP legal."""
+        return self.params.consistency == "object"
+
     @classmethod
     def warm_up(cls) -> None:
         """Compile the kernels for both meanings of a legal FMAP."""
