@@ -6,7 +6,7 @@ PIP := -m pip --disable-pip-version-check install --quiet
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 OURS := engine plugins clients/python proto tests
 
-.PHONY: demo test lint proto bench bench-histograms bench-searchers bench-startup fuzz reference serve clean
+.PHONY: demo test lint proto bench bench-histograms bench-searchers bench-startup experiments fuzz reference serve clean
 
 demo: .venv/runtime
 	@$(BIN)/sketchmatch demo
@@ -37,6 +37,9 @@ bench-searchers: .venv/bench
 
 bench-startup: .venv/dev
 	@$(BIN)/python -m tests.benchmarks.startup
+
+experiments: .venv/dev
+	@$(BIN)/python -m tests.experiments $(ARGS)
 
 reference: .venv/runtime
 	$(BIN)/sketchmatch plugins reference > plugins/REFERENCE.md.new

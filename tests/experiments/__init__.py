@@ -1,0 +1,12 @@
+"""The thesis's experiments on scenes and a simulated user study of our own.
+
+The thesis's figures, and so its scenes and sketches, are not available. What stands in for them:
+
+- ``scenes``: two furnished rooms, A with 8 objects and B with 7, as maps to scale and as occupancy
+  grids that a simulated robot makes;
+- ``people``: a model of how people draw, calibrated once by ``calibrate``;
+- ``study``: the sketches, which go through the real segmenter as pen strokes;
+- ``cases``: what is matched with what, and what came of it;
+- ``runs``: many cases in two processes;
+- ``thesis``: the numbers that the thesis printed.
+"""

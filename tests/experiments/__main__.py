@@ -1,0 +1,77 @@
+"""The thesis's experiments: ``python -m tests.experiments`` runs them and writes a report."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from tests.experiments.cases import Record
+from tests.experiments.document import save
+from tests.experiments.methods import METHODS
+from tests.experiments.protocol import PARTS, SKETCHES, experiments, times
+from tests.experiments.records import Results
+from tests.experiments.report import report
+from tests.experiments.runs import PROCESSES, run_all
+
+METHODS_COMPARED = ("fsnn-pso", "easm", "auto")
+
+_TIMES = "times"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the experiments and write the report."""
+    options = _options(arguments)
+    started = time.perf_counter()
+    results = Results(_records(options), options.methods, options.sketches)
+    save(options.out, report(results))
+    seconds = time.perf_counter() - started
+    print(f"{options.out / 'report.html'} and {options.out / 'report.md'}: {seconds:.0f} s")
+
+
+def _records(options: argparse.Namespace) -> dict[str, list[Record]]:
+    parts = options.only or (*PARTS, _TIMES)
+    wanted = [part for part in parts if part != _TIMES]
+    records: dict[str, list[Record]] = {}
+    if wanted:
+        works = experiments(options.methods, options.sketches, wanted)
+        records |= run_all(works, processes=options.processes)
+    if _TIMES in parts:
+        records |= run_all(times(options.sketches), processes=1)
+    return records
+
+
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.experiments", description=(__doc__ or "").partition(": ")[0]
+    )
+    known = (*PARTS, _TIMES)
+    parser.add_argument("--sketches", type=int, default=SKETCHES, help="of each scene")
+    parser.add_argument("--only", type=_listed, default=(), help=f"some of {','.join(known)}")
+    parser.add_argument(
+        "--methods",
+        type=_listed,
+        default=METHODS_COMPARED,
+        help=f"some of {','.join(METHODS)}",
+    )
+    parser.add_argument("--out", type=Path, default=Path("experiments-report"), help="a folder")
+    parser.add_argument("--processes", type=int, default=PROCESSES)
+    options = parser.parse_args(arguments)
+    for given, names, what in (
+        (options.methods, METHODS, "method"),
+        (options.only, known, "experiment"),
+    ):
+        if unknown := [name for name in given if name not in names]:
+            parser.error(f"no {what} is called {', '.join(unknown)}; there are {', '.join(names)}")
+    if options.sketches < 1 or options.processes < 1:
+        parser.error("--sketches and --processes must be 1 or more")
+    return options
+
+
+def _listed(text: str) -> tuple[str, ...]:
+    return tuple(text.split(","))
+
+
+if __name__ == "__main__":
+    main()

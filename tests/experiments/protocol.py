@@ -1,0 +1,221 @@
+"""The thesis's five experiments, and sweeps beside them, as work.
+
+Each is what is matched with what: which sketches, what is removed, on which map, and by whom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+import numpy as np
+
+from tests.experiments.cases import NOTHING, Removal
+from tests.experiments.people import Person, Shapes
+from tests.experiments.runs import Work
+from tests.experiments.scenes import DRIVES, PLACES
+from tests.experiments.study import STRENGTH, Style
+
+__all__ = [
+    "LETTERS",
+    "MAPS",
+    "PARTS",
+    "SKETCHES",
+    "STRENGTHS",
+    "STRONGER",
+    "UNEQUAL",
+    "experiments",
+    "one_missing",
+    "times",
+]
+
+SKETCHES = 200
+"""Of each scene; the thesis has nine that show all objects."""
+
+LETTERS = "bcdefghij"
+"""The thesis's sketches with all objects. Ours with these letters are the first nine."""
+
+MAPS: Mapping[str, bool] = {"map": False, "grid": True}
+"""Whether the map is an occupancy grid."""
+
+UNEQUAL = {
+    "A": {"k": Style(missing=2), "l": Style(missing=1), "m": Style(missing=1)},
+    "B": {"k": Style(extra=1), "l": Style(extra=1), "m": Style(missing=2)},
+}
+"""What is missing or extra in the thesis's sketches (k) to (m)."""
+
+STRENGTHS = (0.5, 0.7, 0.85, 0.95, 1.05, 1.25, 1.5, 2.0)
+"""Of the sweep over how far drawings leave the truth."""
+
+STRONGER = 1.05
+"""Gives sketches (b) to (j) alone the thesis's mean ζ, without case (a); see ``calibrate``."""
+
+_PAPERS = range(0, 360, 30)
+_LARGE = {10: 10, 12: 5, 16: 3, 20: 3, 30: 2}
+_FEWEST = 3
+_SLOW = ("fsnn-pso",)
+_SEARCH_LONG = ("fsnn-pso", "easm")
+
+
+def experiments(
+    methods: tuple[str, ...], count: int = SKETCHES, only: Iterable[str] = ()
+) -> dict[str, list[Work]]:
+    """Return the work of the experiments, by title.
+
+    Parameters
+    ----------
+    methods
+        Names of methods. Where objects are missing or extra, ``fsnn-pso`` gets a quarter of the
+        sketches; the thesis did not try it there.
+    count
+        Sketches of each scene.
+    only
+        Some of :data:`PARTS`; all when left out.
+    """
+    chosen = set(only) or set(PARTS)
+    return {
+        title: works
+        for part, make in PARTS.items()
+        if part in chosen
+        for title, works in make(methods, count).items()
+    }
+
+
+def times(count: int = SKETCHES) -> dict[str, list[Work]]:
+    """Return what times are measured on, Table 4.5 and beyond: to be done in one process."""
+    small = [
+        Work("A", number, Style(), _smaller(number), methods=("fsnn-pso", "easm", "auto", "exact"))
+        for number in range(max(1, count // 8))
+    ]
+    large = [
+        Work(f"{objects}", number, Style(), methods=("easm", "auto", "direct"))
+        for objects, most in _LARGE.items()
+        for number in range(min(most, count))
+    ]
+    return {"times, 3 to 8 objects": small, "times, 10 to 30 objects": large}
+
+
+def one_missing(place: str) -> tuple[Removal, ...]:
+    """Return the removals of each object of a scene in turn."""
+    return tuple(Removal((k,)) for k in range(len(PLACES[place].furniture)))
+
+
+def _equal(map_: str, methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
+    """Return experiments 1 and 2 (4.1 to 4.4) or 3 (4.6, 4.7): case (a), then all objects."""
+    grids = (MAPS[map_],)
+    own = [
+        Work(place, drive, Style(traced=True), grids=grids, methods=methods)
+        for place in PLACES
+        for drive in range(min(count, DRIVES) if MAPS[map_] else 1)
+    ]
+    drawn = [
+        Work(place, number, Style(), grids=grids, methods=methods)
+        for place in PLACES
+        for number in range(count)
+    ]
+    return {f"case (a), {map_}": own, f"all objects, {map_}": drawn}
+
+
+def _missing(map_: str, methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
+    """Return experiments 4 or 5: every object removed in turn, and sketches (k) to (m)."""
+    grids = (MAPS[map_],)
+    sweep = [
+        Work(place, number, Style(), one_missing(place), grids, _affordable(methods, number, count))
+        for place in PLACES
+        for number in range(count)
+    ]
+    few = max(1, count // 2)
+    unequal = {
+        f"sketches like ({letter}), {map_}": [
+            Work(place, index * count + number, styles[letter], grids=grids, methods=those)
+            for place, styles in UNEQUAL.items()
+            for number in range(few)
+            for those in [_affordable(methods, number, few)]
+        ]
+        for index, letter in enumerate("klm")
+    }
+    return {f"one missing, {map_}": sweep, **unequal}
+
+
+def _several(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
+    """Return more and more objects missing, in an order by chance, down to three: 4.12, 4.13."""
+    works = []
+    for place in PLACES:
+        objects = len(PLACES[place].furniture)
+        for number in range(count):
+            order = np.random.default_rng((number, ord(place))).permutation(objects).tolist()
+            removals = tuple(Removal(tuple(order[:k])) for k in range(1, objects - _FEWEST + 1))
+            those = _affordable(methods, number, count)
+            works.append(Work(place, number, Style(), removals, methods=those))
+    return {"several missing": works}
+
+
+def _strength(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
+    """Return the sweep over strength, and many sketches at one that is a little stronger."""
+    swift = tuple(method for method in methods if method not in _SEARCH_LONG)
+    sweep = []
+    for strength in STRENGTHS:
+        style = Style(Person(strength))
+        for place in PLACES:
+            for number in range(max(1, count // 4)):
+                sweep.append(Work(place, number, style, methods=methods))
+                sweep.append(Work(place, number, style, one_missing(place), methods=swift))
+    those = tuple(method for method in methods if method not in _SLOW)
+    stronger = [
+        Work(place, number, Style(Person(STRONGER)), (NOTHING, *one_missing(place)), methods=those)
+        for place in PLACES
+        for number in range(max(1, count // 2))
+    ]
+    return {"strength": sweep, f"strength {STRONGER:g}": stronger}
+
+
+def _shapes(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
+    """Return people who draw outlines, and others who draw a box or an ellipse for everything."""
+    swift = tuple(method for method in methods if method not in _SEARCH_LONG)
+    works = [
+        Work(place, number, Style(Person(STRENGTH, shapes=shapes)), removals, methods=swift)
+        for shapes in Shapes
+        for place in PLACES
+        for removals in [(NOTHING, *one_missing(place))]
+        for number in range(max(1, count // 4))
+    ]
+    return {"shapes": works}
+
+
+def _rotation(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
+    """Return sketches with all objects and with one missing on paper turned all the way round."""
+    those = tuple(method for method in methods if method not in _SLOW)
+    works = []
+    for place in PLACES:
+        for number in range(max(1, count // 8)):
+            removals = (NOTHING, one_missing(place)[number % len(PLACES[place].furniture)])
+            for paper in _PAPERS:
+                style = Style(paper=float(paper))
+                works.append(Work(place, number, style, removals, methods=those))
+    return {"rotation": works}
+
+
+PARTS: Mapping[str, Callable[[tuple[str, ...], int], dict[str, list[Work]]]] = {
+    "1": lambda methods, count: _equal("map", methods, count),
+    "2": lambda methods, count: _equal("map", methods, count),
+    "3": lambda methods, count: _equal("grid", methods, count),
+    "4": lambda methods, count: _missing("map", methods, count) | _several(methods, count),
+    "5": lambda methods, count: _missing("grid", methods, count),
+    "strength": _strength,
+    "rotation": _rotation,
+    "shapes": _shapes,
+}
+"""The thesis's experiments by number, and the sweeps beside them. 1 and 2 are done together."""
+
+
+def _affordable(methods: tuple[str, ...], number: int, count: int) -> tuple[str, ...]:
+    """Return the methods for a sketch: slow ones get the first quarter, nine at least."""
+    if number < max(len(LETTERS), count // 4):
+        return methods
+    return tuple(method for method in methods if method not in _SLOW)
+
+
+def _smaller(number: int) -> tuple[Removal, ...]:
+    """Return what turns scene A into scenes of 3 to 8 objects."""
+    objects = len(PLACES["A"].furniture)
+    order = np.random.default_rng(number).permutation(objects).tolist()
+    return tuple(Removal(both=tuple(order[k:])) for k in range(_FEWEST, objects + 1))
