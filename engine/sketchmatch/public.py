@@ -16,10 +16,10 @@ from sketchmatch.io import read_source
 from sketchmatch.model import (
     BoolArray,
     FloatArray,
+    RequestWeights,
     Scene,
     SceneObject,
     Source,
-    Weights,
     object_pairs,
 )
 from sketchmatch.model.limits import limited_to, source_limits
@@ -43,7 +43,7 @@ def match(
     params: Mapping[str, Mapping[str, Any]] | None = None,
     seed: int = 0,
     time_budget: float | None = None,
-    weights: Weights = (1.0, 1.0, 1.0),
+    weights: RequestWeights = (1.0, 1.0, 1.0),
     alternatives: int | None = None,
     on_progress: Callable[[Progress], None] | None = None,
     config: str | Path | None = None,
@@ -68,7 +68,8 @@ def match(
     time_budget
         Seconds after which the best answer so far is given, or None for no limit.
     weights
-        Of ζσ, ζR and ζL in ζ.
+        Of ζσ, ζR and ζL in ζ; with two numbers more, of ζS and ζM, which compare each object with
+        its partner in shape and in size.
     alternatives
         How many of the next best object maps the result shall hold; None for 3, or as many as
         there are.

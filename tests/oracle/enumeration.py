@@ -22,7 +22,7 @@ def every_confidence(table, weights=(1.0, 1.0, 1.0)):
 def best_of_all(table, weights=(1.0, 1.0, 1.0)):
     """Return the highest ζ of all object maps, the first map that has it, and how many maps."""
     partners = np.empty(table.template_objects, dtype=np.int64)
-    relations = (table.similarity, table.cosine, table.sine, table.normalized_dilation)
+    relations = (table.entry_evidence, table.cosine, table.sine, table.normalized_dilation)
     value, count = _enumerate(
         object_pairs(table.template_objects),
         correspondences(table.argument_objects),
@@ -34,7 +34,7 @@ def best_of_all(table, weights=(1.0, 1.0, 1.0)):
 
 
 @kernel
-def _enumerate(pairs, columns, similarity, cosine, sine, dilation, weights, best):
+def _enumerate(pairs, columns, evidence, cosine, sine, dilation, weights, best):
     objects, others = best.size, columns.shape[0]
     entries = np.empty(pairs.shape[0], dtype=np.int64)
     scratch = np.empty(pairs.shape[0])
@@ -45,9 +45,7 @@ def _enumerate(pairs, columns, similarity, cosine, sine, dilation, weights, best
         if a == objects:
             for i in range(entries.size):
                 entries[i] = columns[partners[pairs[i, 0]], partners[pairs[i, 1]]]
-            value = fmap_confidence(entries, scratch, similarity, cosine, sine, dilation, weights)[
-                0
-            ]
+            value = fmap_confidence(entries, scratch, evidence, cosine, sine, dilation, weights)[0]
             count += 1
             if value > highest:
                 highest = value

@@ -18,6 +18,9 @@ from sketchmatch_proto.v1.source_pb2 import Source
 
 __all__ = ["MatchOptions", "match_request", "segment_request"]
 
+Weights = tuple[float, float, float] | tuple[float, float, float, float, float]
+"""Of similarity, rotation and dilation in ζ, and perhaps of shape and size."""
+
 _STAGES = ("sketch_segmenter", "map_segmenter", "histogram", "similarity", "searcher")
 
 
@@ -36,7 +39,8 @@ class MatchOptions(TypedDict, total=False):
     time_budget
         Seconds, or a timedelta, after which the best match so far is the result.
     weights
-        Weights of similarity, rotation and dilation in ζ. Left out: 1, 1, 1.
+        Weights of similarity, rotation and dilation in ζ, and with two numbers more of the
+        objects' own shape and size. Left out: 1, 1, 1, 0, 0.
     alternatives
         How many of the next best object maps the result shall hold. Left out: 3, or as many as
         there are.
@@ -53,7 +57,7 @@ class MatchOptions(TypedDict, total=False):
     params: Mapping[str, Mapping[str, Any]] | None
     seed: int | None
     time_budget: float | timedelta | None
-    weights: tuple[float, float, float] | None
+    weights: Weights | None
     alternatives: int | None
     profile: str | None
 
@@ -65,7 +69,7 @@ def match_request(
     params: Mapping[str, Mapping[str, Any]] | None = None,
     seed: int | None = None,
     time_budget: float | timedelta | None = None,
-    weights: tuple[float, float, float] | None = None,
+    weights: Weights | None = None,
     alternatives: int | None = None,
     profile: str | None = None,
     **names: str | None,
@@ -88,12 +92,11 @@ def match_request(
             request.time_budget.CopyFrom(_duration(time_budget))
     if weights is not None:
         with refused_as(
-            "INVALID_FIELD", "weights", "is not three numbers: similarity, rotation, dilation"
+            "INVALID_FIELD",
+            "weights",
+            "is not three numbers, similarity, rotation, dilation, or five, with shape and size",
         ):
-            similarity, rotation, dilation = weights
-            request.weights.CopyFrom(
-                ConfidenceWeights(similarity=similarity, rotation=rotation, dilation=dilation)
-            )
+            request.weights.CopyFrom(_weights(*weights))
     if alternatives is not None:
         with refused_as("INVALID_FIELD", "alternatives", "is not a whole number from 0 to 100"):
             request.alternatives = alternatives
@@ -138,6 +141,13 @@ def _selection(field: str, name: str, params: Mapping[str, Any]) -> AlgorithmSel
             struct.update(params)
         selection.parameters.CopyFrom(struct)
     return selection
+
+
+def _weights(similarity: float, rotation: float, dilation: float, *own: float) -> ConfidenceWeights:
+    shape, size = own or (None, None)
+    return ConfidenceWeights(
+        similarity=similarity, rotation=rotation, dilation=dilation, shape=shape, size=size
+    )
 
 
 def _duration(value: float | timedelta) -> Duration:

@@ -7,9 +7,14 @@
 - ζ of object maps move by move: :func:`empty_map_state` makes room for a :class:`MapState`,
   :func:`place_map` puts a map into it, :func:`confidence_after` weighs a move in O(N log N),
   :func:`make_move` makes it in O(Q), :func:`map_confidence` says ζ. Search by moves needs no more.
-- Beneath these: :func:`map_entry` (σ, cos R, sin R and L̂ of one entry), :func:`total_distance` and
+- Beneath these: :func:`map_entry` (evidence, cos R, sin R and L̂ of one entry) and
+  :func:`map_evidence` (the first alone), :func:`total_distance` and
   :func:`mean_absolute_difference` (ζL).
 - Rows of histograms: :func:`contrast_rows`, :func:`overlap_rows`.
+
+Evidence is what an entry counts for beside rotation and dilation: σ, or more where a request weighs
+the shapes and sizes of objects. A searcher that reads the table itself takes it, as these do, from
+``RelationTable.entry_evidence``.
 
 Generators of :mod:`numpy.random` may be handed to compiled code.
 
@@ -45,6 +50,7 @@ from sketchmatch.kernels.incremental import (
     make_move,
     map_confidence,
     map_entry,
+    map_evidence,
     place_map,
     total_distance,
 )
@@ -61,6 +67,7 @@ __all__ = [
     "make_move",
     "map_confidence",
     "map_entry",
+    "map_evidence",
     "mean_absolute_difference",
     "overlap_rows",
     "place_map",

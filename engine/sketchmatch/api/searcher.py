@@ -34,7 +34,8 @@ class MatchProblem:
         Similarity, rotation and dilation of every histogram correspondence. The template has at
         most as many objects as the argument.
     weights
-        Weights of the three parts of ζ.
+        Weights of the three parts of ζ: of ζσ, or the mean of the evidence in its place where the
+        table holds any, ζR and ζL.
     alternatives
         How many object maps beside the best the caller wants to see.
     time_budget
@@ -80,7 +81,21 @@ class SearchProgress:
 
 
 class Searcher(Algorithm, ABC):
-    """Looks for the FMAP with the highest confidence ζ."""
+    """Looks for the FMAP with the highest confidence ζ.
+
+    What speaks for an entry beside rotation and dilation is σ, unless the request weighs shapes and
+    sizes of objects; a searcher reads it from ``table.entry_evidence``, as all of
+    :mod:`sketchmatch.api.kernels` does.
+    """
+
+    @property
+    def object_consistent(self) -> bool:
+        """Whether each FMAP that it yields follows from one object map.
+
+        Where it is False, ``object_consistent = False`` in the class or a property that looks at
+        the parameters, the host refuses requests that weigh shapes and sizes of objects.
+        """
+        return True
 
     @abstractmethod
     def search(

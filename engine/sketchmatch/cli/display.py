@@ -219,6 +219,8 @@ def _match_table(match: Match) -> RenderableType:
         f"ζ {parts.total:.3f} of relations {parts.similarity:.3f}, "
         f"rotations {parts.rotation:.3f}, dilations {parts.dilation:.3f}"
     )
+    if parts.HasField("shape"):
+        detail += f", shapes {parts.shape:.3f}, sizes {parts.size:.3f}"
     lines = [summary, detail, _effort(result), *filter(None, [result.search_note])]
     return Group(table, *map(Text, lines), *_alternatives(result))
 

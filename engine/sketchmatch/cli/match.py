@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from google.protobuf.json_format import MessageToJson
@@ -22,6 +22,9 @@ from sketchmatch.cli.options import (
 )
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+
+if TYPE_CHECKING:
+    from sketchmatch.model import RequestWeights
 
 __all__ = ["match"]
 
@@ -49,7 +52,11 @@ def match(
         typer.Option(metavar="SECONDS", help="Give the best answer so far after this time."),
     ] = None,
     weights: Annotated[
-        str, typer.Option(metavar="W1,W2,W3", help="Weights of ζσ, ζR and ζL in ζ.")
+        str,
+        typer.Option(
+            metavar="W1,W2,W3[,W4,W5]",
+            help="Weights of ζσ, ζR and ζL in ζ, and of the objects' shapes and sizes.",
+        ),
     ] = "1,1,1",
     alternatives: Annotated[
         int | None, typer.Option(metavar="K", help="How many of the next best maps; 3 by default.")
@@ -107,11 +114,16 @@ def _events(
     return local.match_events(sketch, map_, how, config)
 
 
-def _weights(text: str) -> tuple[float, float, float]:
+def _weights(text: str) -> RequestWeights:
     try:
-        similarity, rotation, dilation = (float(part) for part in text.split(","))
+        similarity, rotation, dilation, *own = (float(part) for part in text.split(","))
+        if own:
+            shape, size = own
+            return (similarity, rotation, dilation, shape, size)
     except ValueError:
         raise InvalidInputError(
-            Reason.INVALID_FIELD, "--weights", f"{text!r} is not three numbers, as in 1,1,1"
+            Reason.INVALID_FIELD,
+            "--weights",
+            f"{text!r} is not three or five numbers, as in 1,1,1 or 1,1,1,0.5,0.5",
         ) from None
     return (similarity, rotation, dilation)

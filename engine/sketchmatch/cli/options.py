@@ -6,11 +6,14 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from sketchmatch.errors import InvalidInputError, Reason
+
+if TYPE_CHECKING:
+    from sketchmatch.model import RequestWeights
 
 __all__ = [
     "Config",
@@ -93,7 +96,7 @@ class MatchSettings:
     params: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     seed: int = 0
     time_budget: float | None = None
-    weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    weights: RequestWeights = (1.0, 1.0, 1.0)
     alternatives: int | None = None
     profile: str = ""
 

@@ -16,7 +16,7 @@ _INSERTION_LIMIT = 64
 def fmap_confidence(
     entries: IntArray,
     scratch: FloatArray,
-    similarity: FloatArray,
+    evidence: FloatArray,
     cosine: FloatArray,
     sine: FloatArray,
     normalized_dilation: FloatArray,
@@ -30,8 +30,11 @@ def fmap_confidence(
         int64, shape (Q,), each within [0, Q').
     scratch
         Shape (Q,), overwritten.
-    similarity, cosine, sine, normalized_dilation
-        Shape (Q, Q'/2): σ, cos R, sin R and L̂ of the relation table; a dual, entry j ≥ Q'/2, has
+    evidence
+        Shape (Q, Q'/2): σ of the relation table, a dual having that of its column; or shape
+        (Q, Q'): the evidence of every entry, and ζσ is its mean.
+    cosine, sine, normalized_dilation
+        Shape (Q, Q'/2): cos R, sin R and L̂ of the relation table; a dual, entry j ≥ Q'/2, has
         the cosine and the sine of column j − Q'/2 negated.
     weights
         Shape (3,), of ζσ, ζR and ζL.
@@ -42,7 +45,7 @@ def fmap_confidence(
         ζ = (w1 ζσ + w2 ζR + w3 ζL) / (w1 + w2 + w3) and its three parts.
     """
     return fmap_confidence_above(
-        -np.inf, entries, scratch, similarity, cosine, sine, normalized_dilation, weights
+        -np.inf, entries, scratch, evidence, cosine, sine, normalized_dilation, weights
     )
 
 
@@ -51,7 +54,7 @@ def fmap_confidence_above(
     floor: float,
     entries: IntArray,
     scratch: FloatArray,
-    similarity: FloatArray,
+    evidence: FloatArray,
     cosine: FloatArray,
     sine: FloatArray,
     normalized_dilation: FloatArray,
@@ -62,15 +65,17 @@ def fmap_confidence_above(
     ζL, which costs most, is at most 1. Where ζ would not be above ``floor`` even so, that upper
     bound of ζ is returned with ζL = 1.
     """
-    count, half = entries.size, similarity.shape[1]
+    count, half = entries.size, cosine.shape[1]
+    folded = 2 * half - evidence.shape[1]
     similar = x = y = 0.0
     for i in range(count):
-        column = entries[i]
+        own = column = entries[i]
         turned = 1.0
         if column >= half:
+            own -= folded
             column -= half
             turned = -1.0
-        similar += similarity[i, column]
+        similar += evidence[i, own]
         x += turned * cosine[i, column]
         y += turned * sine[i, column]
         scratch[i] = normalized_dilation[i, column]

@@ -29,7 +29,7 @@ def exchange_confidences(
     columns
         Shape (N', N'): the histogram correspondence of each ordered argument pair.
     relations
-        σ, cos R, sin R, L̂ and the weights, as :func:`fmap_confidence` takes them.
+        The evidence, cos R, sin R, L̂ and the weights, as :func:`fmap_confidence` takes them.
 
     Returns
     -------

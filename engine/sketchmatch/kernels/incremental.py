@@ -26,11 +26,12 @@ __all__ = [
     "make_move",
     "map_confidence",
     "map_entry",
+    "map_evidence",
     "place_map",
     "total_distance",
 ]
 
-SIMILARITY, COSINE, SINE, DILATION = range(4)
+EVIDENCE, COSINE, SINE, DILATION, TURNED = range(5)
 
 
 class MapState(NamedTuple):
@@ -38,17 +39,20 @@ class MapState(NamedTuple):
 
     Attributes
     ----------
-    similarity, rotation, dilation
-        Shape (Q, Q'/2): σ, R and L of the relation table, read only.
+    evidence
+        Shape (Q, Q'/2) or (Q, Q'): of each entry, or for both an entry and its dual; read only.
+    rotation, dilation
+        Shape (Q, Q'/2): R and L of the relation table, read only.
     weights
         Shape (3,), of ζσ, ζR and ζL; their sum is 1.
     partners, holders
         int64, shapes (N,) and (N',): the partner of each template object, and the template object
         that has each argument object, or −1.
     entries
-        Shape (N, N, 4): σ, cos R, sin R and L̂ of the entry of each template pair, in either order.
+        Shape (N, N, 5): the evidence, cos R, sin R and L̂ of the entry of each template pair, and
+        the evidence of its dual, in either order.
     sums
-        Shape (4,): Σσ, Σ cos R, Σ sin R, and Σ|x − y| over all pairs of L̂.
+        Shape (4,): the sum of the evidence, Σ cos R, Σ sin R, and Σ|x − y| over all pairs of L̂.
     levels, prefix
         Shapes (Q,) and (Q+1,): all L̂ in order, and the sums of the first k of them.
     buckets
@@ -57,7 +61,7 @@ class MapState(NamedTuple):
         Shape (2, 2N), for the L̂ that leave and come with a move.
     """
 
-    similarity: FloatArray
+    evidence: FloatArray
     rotation: FloatArray
     dilation: FloatArray
     weights: FloatArray
@@ -75,13 +79,13 @@ def empty_map_state(table: RelationTable, weights: Weights) -> MapState:
     """Return room for an object map; :func:`place_map` fills it."""
     objects, pairs = table.template_objects, table.template_pairs
     return MapState(
-        similarity=table.similarity,
+        evidence=table.entry_evidence,
         rotation=table.rotation,
         dilation=table.dilation,
         weights=np.array(weights, dtype=np.float64) / sum(weights),
         partners=np.zeros(objects, dtype=np.int64),
         holders=np.full(table.argument_objects, -1, dtype=np.int64),
-        entries=np.zeros((objects, objects, 4)),
+        entries=np.zeros((objects, objects, 5)),
         sums=np.zeros(4),
         levels=np.zeros(pairs),
         prefix=np.zeros(pairs + 1),
@@ -114,7 +118,7 @@ def map_confidence(state: MapState) -> float:
     return _confidence(
         state.weights,
         state.levels.size,
-        sums[SIMILARITY],
+        sums[EVIDENCE],
         sums[COSINE],
         sums[SINE],
         sums[DILATION],
@@ -152,7 +156,7 @@ def confidence_after(state: MapState, a: int, c: int) -> float:
         if first < 0 or other in (a, b):
             continue
         sigma, cosine, sine, level = map_entry(state, first, other, partner, partners[other])
-        similar += sigma - entries[first, other, SIMILARITY]
+        similar += sigma - entries[first, other, EVIDENCE]
         x += cosine - entries[first, other, COSINE]
         y += sine - entries[first, other, SINE]
         leaving[count], coming[count] = entries[first, other, DILATION], level
@@ -160,6 +164,7 @@ def confidence_after(state: MapState, a: int, c: int) -> float:
         spread -= total_distance(state.levels, state.prefix, state.buckets, leaving[count])
         count += 1
     if b >= 0:
+        similar += entries[a, b, TURNED] - entries[a, b, EVIDENCE]
         x -= 2.0 * entries[a, b, COSINE]
         y -= 2.0 * entries[a, b, SINE]
     _sort(leaving, count)
@@ -197,20 +202,18 @@ def make_move(state: MapState, a: int, c: int) -> float:
 
 @kernel
 def map_entry(state: MapState, a: int, b: int, c: int, d: int) -> tuple[float, float, float, float]:
-    """Return σ, cos R, sin R and L̂ of the entry (a, b) → (c, d), in any order of the objects."""
-    n, m = state.partners.size, state.holders.size
-    sign = 1.0
-    if a > b:
-        a, b = b, a
-        sign = -sign
-    if c > d:
-        c, d = d, c
-        sign = -sign
-    i = a * n - a * (a + 3) // 2 + b - 1
-    j = c * m - c * (c + 3) // 2 + d - 1
+    """Return evidence, cos R, sin R and L̂ of the entry (a, b) → (c, d), objects in any order."""
+    i, j, sign = _place(state, a, b, c, d)
     rotation = state.rotation[i, j]
     level = DILATION_SCALE * np.log(state.dilation[i, j])
-    return state.similarity[i, j], sign * np.cos(rotation), sign * np.sin(rotation), level
+    return _evidence(state, i, j, sign), sign * np.cos(rotation), sign * np.sin(rotation), level
+
+
+@kernel
+def map_evidence(state: MapState, a: int, b: int, c: int, d: int) -> float:
+    """Return the evidence of the entry (a, b) → (c, d) alone."""
+    i, j, sign = _place(state, a, b, c, d)
+    return _evidence(state, i, j, sign)
 
 
 @kernel
@@ -242,12 +245,35 @@ def _confidence(
 
 
 @kernel
+def _place(state: MapState, a: int, b: int, c: int, d: int) -> tuple[int, int, float]:
+    """Return row and column of the entry (a, b) → (c, d), and −1.0 if it is a dual, else 1.0."""
+    n, m = state.partners.size, state.holders.size
+    sign = 1.0
+    if a > b:
+        a, b = b, a
+        sign = -sign
+    if c > d:
+        c, d = d, c
+        sign = -sign
+    return a * n - a * (a + 3) // 2 + b - 1, c * m - c * (c + 3) // 2 + d - 1, sign
+
+
+@kernel
+def _evidence(state: MapState, i: int, j: int, sign: float) -> float:
+    """Return the evidence of the entry in a place that :func:`_place` returned."""
+    own = j if sign > 0.0 else j + state.evidence.shape[1] - state.rotation.shape[1]
+    return float(state.evidence[i, own])
+
+
+@kernel
 def _set_entry(state: MapState, a: int, b: int) -> None:
     """Look up the entry of a template pair under the current partners."""
-    values = map_entry(state, a, b, state.partners[a], state.partners[b])
+    c, d = state.partners[a], state.partners[b]
+    values = map_entry(state, a, b, c, d)
     for part in range(4):
         state.entries[a, b, part] = values[part]
         state.entries[b, a, part] = values[part]
+    state.entries[a, b, TURNED] = state.entries[b, a, TURNED] = map_evidence(state, a, b, d, c)
 
 
 @kernel
@@ -326,7 +352,7 @@ def _settle(state: MapState) -> float:
     similar = x = y = spread = total = 0.0
     for a in range(state.partners.size):
         for b in range(a):
-            similar += entries[a, b, SIMILARITY]
+            similar += entries[a, b, EVIDENCE]
             x += entries[a, b, COSINE]
             y += entries[a, b, SINE]
     for k in range(values.size + 1):
@@ -338,5 +364,5 @@ def _settle(state: MapState) -> float:
         buckets[_bucket(values, values[k]) + 1] += 1
     for k in range(values.size):
         buckets[k + 1] += buckets[k]
-    sums[SIMILARITY], sums[COSINE], sums[SINE], sums[DILATION] = similar, x, y, spread
+    sums[EVIDENCE], sums[COSINE], sums[SINE], sums[DILATION] = similar, x, y, spread
     return map_confidence(state)

@@ -1,7 +1,15 @@
 """The values that flow through a match: immutable, and easy to build by hand in a test."""
 
 from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray
-from sketchmatch.model.maps import Confidence, Fmap, ObjectMap, Occm, Weights
+from sketchmatch.model.maps import (
+    Confidence,
+    ConfidenceWeights,
+    Fmap,
+    ObjectMap,
+    Occm,
+    RequestWeights,
+    Weights,
+)
 from sketchmatch.model.relations import (
     DILATION_SCALE,
     RelationTable,
@@ -26,6 +34,7 @@ __all__ = [
     "DILATION_SCALE",
     "BoolArray",
     "Confidence",
+    "ConfidenceWeights",
     "Edges",
     "FloatArray",
     "Fmap",
@@ -37,6 +46,7 @@ __all__ = [
     "OccupancyGrid",
     "PolygonSet",
     "RelationTable",
+    "RequestWeights",
     "Scene",
     "SceneDescriptor",
     "SceneObject",

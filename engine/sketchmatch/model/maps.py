@@ -3,16 +3,67 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from sketchmatch.model.arrays import FloatArray, IntArray, frozen, frozen_floats
 from sketchmatch.model.relations import object_pairs, pair_index
 
-__all__ = ["Confidence", "Fmap", "ObjectMap", "Occm", "Weights"]
+__all__ = [
+    "Confidence",
+    "ConfidenceWeights",
+    "Fmap",
+    "ObjectMap",
+    "Occm",
+    "RequestWeights",
+    "Weights",
+]
 
 Weights = tuple[float, float, float]
-"""Weights of ζσ, ζR and ζL."""
+"""Weights of ζσ, ζR and ζL; where a table holds evidence, its mean takes the place of ζσ."""
+
+RequestWeights = Weights | tuple[float, float, float, float, float]
+"""Weights of ζσ, ζR and ζL, and perhaps of ζS and ζM."""
+
+
+class ConfidenceWeights(NamedTuple):
+    """What each part of ζ counts for: ζ = (w₁ζσ + w₂ζR + w₃ζL + w₄ζS + w₅ζM) / Σw.
+
+    Attributes
+    ----------
+    similarity, rotation, dilation
+        Of ζσ, ζR and ζL, which see relations of objects alone; the thesis's ζ.
+    shape, size
+        Of ζS and ζM, which compare each object with its partner.
+    """
+
+    similarity: float = 1.0
+    rotation: float = 1.0
+    dilation: float = 1.0
+    shape: float = 0.0
+    size: float = 0.0
+
+    @property
+    def of_entries(self) -> float:
+        """w₁ + w₄ + w₅, the weight of all parts that are means over the entries of an FMAP."""
+        return self.similarity + self.shape + self.size
+
+    @property
+    def of_objects(self) -> float:
+        """w₄ + w₅; above 0 objects are compared beside their relations."""
+        return self.shape + self.size
+
+    @property
+    def searched(self) -> Weights:
+        """The weights of a search, whose evidence holds shapes and sizes.
+
+        Examples
+        --------
+        >>> ConfidenceWeights(1, 2, 3, 0.5, 0.5).searched
+        (2.0, 2, 3)
+        """
+        return (self.of_entries, self.rotation, self.dilation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +115,7 @@ class Fmap:
 
 @dataclass(frozen=True)
 class Confidence:
-    """ζ of an FMAP and its three parts.
+    """ζ of an FMAP and its parts.
 
     Attributes
     ----------
@@ -72,12 +123,16 @@ class Confidence:
         ζ, the weighted mean of the parts.
     similarity, rotation, dilation
         ζσ, ζR and ζL.
+    shape, size
+        ζS and ζM; None where objects were not compared, because neither counts.
     """
 
     total: float
     similarity: float
     rotation: float
     dilation: float
+    shape: float | None = None
+    size: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

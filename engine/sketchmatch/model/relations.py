@@ -132,6 +132,9 @@ class RelationTable:
         L > 0, the size of the argument relative to the template, shape (Q, Q'/2).
     template_objects, argument_objects
         N ≤ N'.
+    evidence
+        Shape (Q, Q'), within [0, 1]: what speaks for every correspondence, duals included, where
+        that is more than σ; None where it is σ.
     """
 
     similarity: FloatArray
@@ -139,6 +142,7 @@ class RelationTable:
     dilation: FloatArray
     template_objects: int
     argument_objects: int
+    evidence: FloatArray | None = None
 
     def __post_init__(self) -> None:
         if not 2 <= self.template_objects <= self.argument_objects:
@@ -149,6 +153,21 @@ class RelationTable:
             if array.shape != shape:
                 raise ValueError(f"{name} has shape {array.shape}, not {shape}")
             object.__setattr__(self, name, array)
+        if self.evidence is not None:
+            evidence = frozen_floats(self.evidence)
+            if evidence.shape != (shape[0], 2 * shape[1]):
+                wanted = (shape[0], 2 * shape[1])
+                raise ValueError(f"evidence has shape {evidence.shape}, not {wanted}")
+            object.__setattr__(self, "evidence", evidence)
+
+    @property
+    def entry_evidence(self) -> FloatArray:
+        """What an entry counts for in ζ, as kernels read it.
+
+        Shape (Q, Q'): the evidence; or, where there is none, shape (Q, Q'/2): σ, and a dual has
+        that of its column.
+        """
+        return self.similarity if self.evidence is None else self.evidence
 
     @property
     def template_pairs(self) -> int:

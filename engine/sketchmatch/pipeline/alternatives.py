@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sketchmatch.kernels import exchange
+from sketchmatch.kernels.evidence import SelfRelations
 from sketchmatch.model import (
     Confidence,
     FloatArray,
@@ -58,7 +59,7 @@ def exchange_confidences(
     if count * table.template_pairs > _MAX_EXCHANGED_ENTRIES:
         return None
     relations = (
-        table.similarity,
+        table.entry_evidence,
         table.cosine,
         table.sine,
         table.normalized_dilation,
@@ -79,6 +80,7 @@ def best_others(
     table: RelationTable,
     weights: Weights,
     count: int,
+    own: SelfRelations | None = None,
 ) -> tuple[Alternative, ...]:
     """Return the best other object maps among those that are known.
 
@@ -94,6 +96,8 @@ def best_others(
         What was searched.
     count
         How many are wanted.
+    own
+        How the objects compare, for ζS and ζM of each.
 
     Returns
     -------
@@ -110,7 +114,8 @@ def best_others(
                 fmaps.append(Fmap.from_object_map(partners, table.argument_objects))
     found: dict[tuple[int, ...], Alternative] = {}
     for fmap in fmaps:
-        other = Alternative(object_map(occm(fmap, table)), fmap_confidence(fmap, table, weights))
+        confidence = fmap_confidence(fmap, table, weights, own)
+        other = Alternative(object_map(occm(fmap, table)), confidence)
         key = tuple(other.mapped.partners.tolist())
         if key not in found or found[key].confidence.total < other.confidence.total:
             found[key] = other

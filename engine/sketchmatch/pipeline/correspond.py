@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from sketchmatch.kernels import confidence as kernels
+from sketchmatch.kernels.evidence import SelfRelations, mean_parts
 from sketchmatch.model import (
     Confidence,
     FloatArray,
@@ -18,16 +19,37 @@ from sketchmatch.model import (
     object_pairs,
 )
 
-__all__ = ["fmap_confidence", "global_dilation", "global_rotation", "object_map", "occm"]
+__all__ = [
+    "fmap_confidence",
+    "global_dilation",
+    "global_rotation",
+    "object_map",
+    "occm",
+    "own_confidence",
+]
 
 # Sums of the same similarities in another order differ by less than this.
 _TIE = 1e-12
 
 
 def fmap_confidence(
-    fmap: Fmap, table: RelationTable, weights: Weights = (1.0, 1.0, 1.0)
+    fmap: Fmap,
+    table: RelationTable,
+    weights: Weights = (1.0, 1.0, 1.0),
+    own: SelfRelations | None = None,
 ) -> Confidence:
-    """Return ζ of a histogram map and its parts ζσ, ζR and ζL.
+    """Return ζ of a histogram map and its parts.
+
+    Parameters
+    ----------
+    fmap
+        Any FMAP into the table.
+    table
+        The relations. Where they hold evidence, its mean takes the place of ζσ in ζ.
+    weights
+        Of ζσ, ζR and ζL.
+    own
+        How the objects compare, for ζS and ζM beside the others.
 
     Examples
     --------
@@ -35,19 +57,31 @@ def fmap_confidence(
 
     >>> table = RelationTable([[1.0]], [[math.pi / 2]], [[2.0]], 2, 2)
     >>> fmap_confidence(Fmap([0]), table)
-    Confidence(total=1.0, similarity=1.0, rotation=1.0, dilation=1.0)
+    Confidence(total=1.0, similarity=1.0, rotation=1.0, dilation=1.0, shape=None, size=None)
     """
     scratch = np.empty(table.template_pairs)
-    values = kernels.fmap_confidence(
+    total, similarity, rotation, dilation = kernels.fmap_confidence(
         fmap.entries,
         scratch,
-        table.similarity,
+        table.entry_evidence,
         table.cosine,
         table.sine,
         table.normalized_dilation,
         np.array(weights, dtype=np.float64),
     )
-    return Confidence(*(float(value) for value in values))
+    if table.evidence is not None:
+        similarity = _entry_similarity(fmap, table).mean()
+    shape, size = (None, None) if own is None else own_confidence(fmap, table, own)
+    return Confidence(
+        float(total), float(similarity), float(rotation), float(dilation), shape, size
+    )
+
+
+def own_confidence(fmap: Fmap, table: RelationTable, own: SelfRelations) -> tuple[float, float]:
+    """Return ζS and ζM of a histogram map."""
+    pairs = object_pairs(table.template_objects), object_pairs(table.argument_objects)
+    shape, size = mean_parts(fmap.entries, pairs, table.rotation, table.dilation, own)
+    return float(shape), float(size)
 
 
 def occm(fmap: Fmap, table: RelationTable) -> Occm:
@@ -56,8 +90,8 @@ def occm(fmap: Fmap, table: RelationTable) -> Occm:
     An entry (a, b) → (c, d) adds its σ to the pairings a→c and b→d, which its order implies, and
     to a→d and b→c.
     """
-    rows, columns = np.arange(table.template_pairs), fmap.entries % table.argument_pairs
-    sigma = table.similarity[rows, columns]
+    columns = fmap.entries % table.argument_pairs
+    sigma = _entry_similarity(fmap, table)
     a, b = object_pairs(table.template_objects).T
     low, high = object_pairs(table.argument_objects)[columns].T
     dual = fmap.entries >= table.argument_pairs
@@ -99,6 +133,13 @@ def global_dilation(fmap: Fmap, table: RelationTable) -> float:
     """Return the median size of the argument relative to the template."""
     columns = fmap.entries % table.argument_pairs
     return float(np.median(table.dilation[np.arange(len(columns)), columns]))
+
+
+def _entry_similarity(fmap: Fmap, table: RelationTable) -> FloatArray:
+    """Return σ of each entry."""
+    rows = np.arange(table.template_pairs)
+    sigma: FloatArray = table.similarity[rows, fmap.entries % table.argument_pairs]
+    return sigma
 
 
 def _turned(fmap: Fmap, table: RelationTable, values: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ import math
 import time
 import uuid
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
@@ -24,12 +24,14 @@ from sketchmatch.api import (
     Segmenter,
 )
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, Reason
+from sketchmatch.kernels.evidence import SelfRelations
 from sketchmatch.model import (
+    ConfidenceWeights,
     RelationTable,
+    RequestWeights,
     Scene,
     SceneDescriptor,
     Source,
-    Weights,
 )
 from sketchmatch.pipeline import reading
 from sketchmatch.pipeline.alternatives import best_others, exchange_confidences, partner_margins
@@ -41,6 +43,7 @@ from sketchmatch.pipeline.correspond import (
     occm,
 )
 from sketchmatch.pipeline.describe import describe
+from sketchmatch.pipeline.evidence import compare_objects, weigh_objects
 from sketchmatch.pipeline.limits import check_comparisons, check_histograms
 from sketchmatch.pipeline.plugins import blaming, checked_progress, inspecting, segmented
 from sketchmatch.pipeline.relate import check_exponent, relate
@@ -97,7 +100,7 @@ class MatchRequest:
     time_budget
         Seconds after which the best answer so far is given, or None for no limit.
     weights
-        Of ζσ, ζR and ζL in ζ.
+        Of ζσ, ζR and ζL in ζ, and of ζS and ζM where there are five.
     alternatives
         How many of the next best object maps the result shall hold; None for 3, or as many as
         there are.
@@ -110,7 +113,7 @@ class MatchRequest:
     selection: Selection = field(default_factory=lambda: MappingProxyType({}))
     seed: int = 0
     time_budget: float | None = None
-    weights: Weights = (1.0, 1.0, 1.0)
+    weights: RequestWeights = (1.0, 1.0, 1.0)
     alternatives: int | None = None
     profile: str = ""
 
@@ -125,14 +128,15 @@ class MatchRequest:
                 "time_budget",
                 f"is {self.time_budget:g} s; give a positive time or none at all",
             )
-        names = ("similarity", "rotation", "dilation")
-        if len(self.weights) != len(names):
+        names = ConfidenceWeights._fields
+        if len(self.weights) not in (3, len(names)):
             raise InvalidInputError(
                 Reason.INVALID_FIELD,
                 "weights",
-                f"are {len(self.weights)} numbers; give three: {', '.join(names)}",
+                f"are {len(self.weights)} numbers; give three, {', '.join(names[:3])}, "
+                f"or five, with {' and '.join(names[3:])}",
             )
-        for name, weight in zip(names, self.weights, strict=True):
+        for name, weight in zip(names, self.weights, strict=False):
             if not 0 <= weight <= _MAX_WEIGHT:
                 raise InvalidInputError(
                     Reason.INVALID_FIELD,
@@ -149,6 +153,11 @@ class MatchRequest:
             raise InvalidInputError(
                 Reason.INVALID_FIELD, "weights", "are all zero; give at least one above zero"
             )
+
+    @property
+    def confidence_weights(self) -> ConfidenceWeights:
+        """The weights by name, all five."""
+        return ConfidenceWeights(*self.weights)
 
 
 @dataclass(frozen=True)
@@ -252,6 +261,9 @@ class _Match:
             )
         except InvalidInputError as error:
             raise error.within("pipeline") from None
+        self.weights = request.confidence_weights
+        _check_weights(self.weights, self.pipeline.searcher)
+        self.own: SelfRelations | None = None
 
     def run(self) -> Generator[MatchEvent, None, None]:
         yield Accepted(self.match_id, self.request.seed, self.pipeline)
@@ -268,14 +280,14 @@ class _Match:
         yield Segmented(sketch, map_)
         count = _alternatives_wanted(self.request.alternatives, sketch.scene, map_.scene)
         exchanged = len(sketch.scene) > len(map_.scene)
-        similarity = self.pipeline.similarity
         with self.timed("describe"):
             drawn = yield from self.described("sketch", sketch.scene)
             mapped = yield from self.described("map", map_.scene)
-        first, second = (mapped, drawn) if exchanged else (drawn, mapped)
+        scenes, descriptors = (sketch.scene, map_.scene), (drawn, mapped)
         with self.timed("relate"):
-            comparing = relate(first, second, similarity)
-            table = yield from self.watched(Phase.RELATE, similarity, comparing)
+            if exchanged:
+                scenes, descriptors = scenes[::-1], descriptors[::-1]
+            table = yield from self.related(scenes, descriptors)
         with self.timed("search"):
             found, outcome = yield from self.search(table, exchanged, count)
         yield Finished(self.result(sketch, map_, drawn, table, exchanged, found, outcome, count))
@@ -290,6 +302,21 @@ class _Match:
         except InvalidInputError as error:
             raise error.within(side) from None
 
+    def related(
+        self, scenes: tuple[Scene, Scene], descriptors: tuple[SceneDescriptor, SceneDescriptor]
+    ) -> Generator[MatchEvent, None, RelationTable]:
+        """Return the relations of template and argument, and the evidence that is asked for."""
+        similarity = self.pipeline.similarity
+        comparing = relate(*descriptors, similarity)
+        if not self.weights.of_objects:
+            return (yield from self.watched(Phase.RELATE, similarity, comparing))
+        table = yield from self.watched(Phase.RELATE, similarity, comparing, (0.0, 0.4))
+        directions = self.pipeline.histogram.params.directions
+        work = compare_objects(*scenes, directions)
+        self.own = yield from self.watched(Phase.RELATE, None, work, (0.4, 0.5))
+        weighing = weigh_objects(table, self.own, self.weights)
+        return (yield from self.watched(Phase.RELATE, None, weighing, (0.5, 1.0)))
+
     def segmented(
         self, side: str, source: Source | Scene, segmenter: Segmenter | None
     ) -> Segmentation:
@@ -300,18 +327,24 @@ class _Match:
         return segmented(source, segmenter, self.registry, f"{side}.{source.field}")
 
     def watched(
-        self, phase: Phase, algorithm: Algorithm, work: Generator[float, None, _Value]
+        self,
+        phase: Phase,
+        algorithm: Algorithm | None,
+        work: Generator[float, None, _Value],
+        part: tuple[float, float] = (0.0, 1.0),
     ) -> Generator[MatchEvent, None, _Value]:
-        """Run an algorithm's stage to its end, passing its progress on."""
+        """Run a part of a phase, maybe an algorithm's, to its end, passing its progress on."""
+        begin, end = part
         while True:
             self.check_budget(phase)
-            with blaming(algorithm, self.registry):
+            with blaming(algorithm, self.registry) if algorithm else nullcontext():
                 try:
                     fraction = next(work)
                 except StopIteration as stop:
                     return stop.value  # type: ignore[no-any-return]
             if self.may_report():
-                yield Progress(phase, self.reported - self.started, fraction)
+                done = begin + (end - begin) * fraction
+                yield Progress(phase, self.reported - self.started, done)
 
     def search(
         self, table: RelationTable, exchanged: bool, count: int
@@ -320,7 +353,7 @@ class _Match:
         searcher = self.pipeline.searcher
         budget = self.request.time_budget
         left = None if budget is None else max(0.0, budget - self.elapsed())
-        problem = MatchProblem(table, self.request.weights, count, left)
+        problem = MatchProblem(table, self.weights.searched, count, left)
         best: SearchProgress | None = None
         with self.searching(searcher, problem) as work:
             while True:
@@ -373,11 +406,11 @@ class _Match:
         count: int,
     ) -> MatchResult:
         """Read what was found from sketch to map; ``drawn`` describes the sketch."""
-        weights = self.request.weights
+        weights = self.weights.searched
         mapped = object_map(occm(found.fmap, table))
-        best = fmap_confidence(found.fmap, table, weights)
+        best = fmap_confidence(found.fmap, table, weights, self.own)
         exchanges = exchange_confidences(mapped, table, weights)
-        others = best_others(mapped, found.alternatives, exchanges, table, weights, count)
+        others = best_others(mapped, found.alternatives, exchanges, table, weights, count, self.own)
         margins = partner_margins(mapped, best.total, others, exchanges)
         matched = mapped.partners.tolist() if exchanged else range(len(mapped.partners))
         relations = nearest_relations(sketch.scene, drawn, matched)
@@ -447,6 +480,18 @@ class _Match:
         started = time.monotonic()
         yield
         self.seconds[stage] = time.monotonic() - started
+
+
+def _check_weights(weights: ConfidenceWeights, searcher: Searcher) -> None:
+    """Refuse to compare objects where the search compares nothing but pairs."""
+    if weights.of_objects and not searcher.object_consistent:
+        name = "shape" if weights.shape > 0 else "size"
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            f"weights.{name}",
+            f"compares objects, and the searcher {searcher.name!r}, as it is set here, maps pairs "
+            "that need not lead to one map of objects; choose another, such as 'auto', or weight 0",
+        )
 
 
 def _alternatives_wanted(requested: int | None, sketch: Scene, map_: Scene) -> int:

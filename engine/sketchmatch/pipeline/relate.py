@@ -30,7 +30,7 @@ from sketchmatch.pipeline.slices import in_slices
 
 ComplexArray = np.ndarray[Any, np.dtype[np.complex128]]
 
-__all__ = ["check_exponent", "relate"]
+__all__ = ["Histograms", "check_exponent", "relate"]
 
 _LEAST_POWER = 0.5
 _MOST_LOG_DILATION = 700.0
@@ -87,13 +87,13 @@ def relate(
         If no dilation follows from forces of this exponent.
     """
     check_exponent(template.exponent)
-    rows = _Histograms.of(template.histograms)
+    rows = Histograms.of(template.histograms)
     shape = (len(rows), len(argument.histograms))
     sigma, rotation, dilation = (np.empty(shape) for _ in range(3))
     panel = max(1, _PANEL_VALUES // rows.bins)
     for first in range(0, shape[1], panel):
         columns = slice(first, min(first + panel, shape[1]))
-        others = _Histograms.of(argument.histograms[columns])
+        others = Histograms.of(argument.histograms[columns])
         entries = tuple(array[:, columns] for array in (sigma, rotation, dilation))
         for share in _fill(rows, others, similarity, template.exponent, *entries):
             yield (first + share * len(others)) / shape[1]
@@ -103,8 +103,8 @@ def relate(
 
 
 def _fill(
-    template: _Histograms,
-    argument: _Histograms,
+    template: Histograms,
+    argument: Histograms,
     similarity: Similarity,
     exponent: float,
     sigma: FloatArray,
@@ -138,8 +138,8 @@ def _fill(
 
 
 def _compared(
-    template: _Histograms,
-    argument: _Histograms,
+    template: Histograms,
+    argument: Histograms,
     turns: _Turns,
     similarity: Similarity,
     rows: slice,
@@ -193,7 +193,7 @@ class _Tiles:
 
 
 @dataclass(frozen=True)
-class _Histograms:
+class Histograms:
     """The histograms of one scene in units of their mean, which dilates each to every other.
 
     Attributes
@@ -209,7 +209,8 @@ class _Histograms:
     absent: np.ndarray[Any, np.dtype[np.bool_]]
 
     @classmethod
-    def of(cls, histograms: FloatArray) -> _Histograms:
+    def of(cls, histograms: FloatArray) -> Histograms:
+        """Take histograms of shape (k, n), none of them negative."""
         largest = histograms.max(axis=1)
         absent = largest <= 0.0
         largest[absent] = 1.0
@@ -274,7 +275,7 @@ class _MainTurns:
     one are −1, 0 and 1 for all pairs, and each makes C a product of two matrices.
     """
 
-    def __init__(self, template: _Histograms, argument: _Histograms) -> None:
+    def __init__(self, template: Histograms, argument: Histograms) -> None:
         self.template, self.argument = template, argument
         bins = template.bins
         block = max(1, _BLAS_MULTIPLICATIONS // (3 * _BLAS_ROWS * bins))
@@ -301,7 +302,7 @@ class _MainTurns:
 class _PeakTurns:
     """Turns to the peak of the circular cross-correlation, which is a product of spectra."""
 
-    def __init__(self, template: _Histograms, argument: _Histograms) -> None:
+    def __init__(self, template: Histograms, argument: Histograms) -> None:
         self.template, self.argument = template, argument
         self.tile_shape = (1, max(1, _TILE_VALUES // template.bins))
 
@@ -315,6 +316,6 @@ class _PeakTurns:
         return peak_turns(products, self.template.squares[rows], self.template.roughness[rows])
 
 
-_ALIGNMENTS: Mapping[Alignment, Callable[[_Histograms, _Histograms], _Turns]] = MappingProxyType(
+_ALIGNMENTS: Mapping[Alignment, Callable[[Histograms, Histograms], _Turns]] = MappingProxyType(
     {Alignment.MAIN_DIRECTION: _MainTurns, Alignment.PEAK: _PeakTurns}
 )

@@ -11,9 +11,10 @@ import numpy as np
 
 from sketchmatch.api import Similarity
 from sketchmatch.kernels._jit import on_compile
-from sketchmatch.model import Fmap, RelationTable, SceneDescriptor
+from sketchmatch.model import ConfidenceWeights, Fmap, RelationTable, Scene, SceneDescriptor
 from sketchmatch.pipeline.alternatives import exchange_confidences
-from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
+from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm, own_confidence
+from sketchmatch.pipeline.evidence import compare_objects, weigh_objects
 from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, default_names
 from sketchmatch.pipeline.slices import finish
@@ -61,6 +62,11 @@ def warm_up(
     fmap = Fmap(np.array([0]))
     fmap_confidence(fmap, table)
     exchange_confidences(object_map(occm(fmap, table)), table, (1.0, 1.0, 1.0))
+    corner = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    scene = Scene.from_polygons([corner, corner + 2.0])
+    own = finish(compare_objects(scene, scene, 4))
+    finish(weigh_objects(table, own, ConfidenceWeights(shape=1.0, size=1.0)))
+    own_confidence(fmap, table, own)
     _warm_up([item for item, default in _split(registry, defaults) if default], unwanted)
 
 

@@ -58,6 +58,8 @@ def match_request(
             weights.similarity if weights.HasField("similarity") else 1.0,
             weights.rotation if weights.HasField("rotation") else 1.0,
             weights.dilation if weights.HasField("dilation") else 1.0,
+            weights.shape,
+            weights.size,
         ),
         alternatives=request.alternatives if request.HasField("alternatives") else None,
         profile=request.pipeline.profile,

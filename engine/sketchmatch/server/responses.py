@@ -93,16 +93,13 @@ class ResponseWriter:
                 return match_service_pb2.MatchResponse(result=result(event.result))
 
     def _accepted(self, event: Accepted) -> match_pb2.MatchAccepted:
-        similarity, rotation, dilation = self._request.weights
         stages = {stage: selection(item) for stage, item in event.pipeline.stages().items()}
         budget = self._request.time_budget
         return match_pb2.MatchAccepted(
             match_id=event.match_id,
             seed=event.seed,
             pipeline=pipeline_pb2.Pipeline(**stages, profile=event.pipeline.profile),
-            weights=match_pb2.ConfidenceWeights(
-                similarity=similarity, rotation=rotation, dilation=dilation
-            ),
+            weights=match_pb2.ConfidenceWeights(**self._request.confidence_weights._asdict()),
             time_budget=None if budget is None else _duration(budget),
         )
 
@@ -262,6 +259,8 @@ def _fmap_confidence(confidence: Confidence) -> match_pb2.FmapConfidence:
         similarity=confidence.similarity,
         rotation=confidence.rotation,
         dilation=confidence.dilation,
+        shape=confidence.shape,
+        size=confidence.size,
     )
 
 

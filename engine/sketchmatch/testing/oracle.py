@@ -35,8 +35,8 @@ def score_fmap(fmap: Fmap, table: RelationTable, weights: Weights = _EQUAL) -> C
     Two equal objects onto two that are turned by a quarter:
 
     >>> table = RelationTable([[0.5]], [[math.pi / 2]], [[2.0]], 2, 2)
-    >>> score_fmap(Fmap([0]), table, weights=(2, 1, 1))
-    Confidence(total=0.75, similarity=0.5, rotation=1.0, dilation=1.0)
+    >>> score_fmap(Fmap([0]), table, weights=(2, 1, 1)).total
+    0.75
     """
     return Confidence(*score_pairs(table, mapped_pairs(fmap, table), weights))
 
@@ -82,16 +82,20 @@ def is_object_consistent(fmap: Fmap, table: RelationTable) -> bool:
 def score_pairs(
     table: RelationTable, mapped: Pairs, weights: Weights = _EQUAL
 ) -> tuple[float, float, float, float]:
-    """Return ζ, ζσ, ζR and ζL of an FMAP given as ordered argument pairs."""
+    """Return ζ, ζσ, ζR and ζL of an FMAP given as ordered argument pairs.
+
+    Where the table holds evidence, its mean takes the place of ζσ in ζ.
+    """
     entries = [look_up(table, i, pair) for i, pair in enumerate(mapped)]
     count = len(entries)
     zeta_s = sum(sigma for sigma, _, _ in entries) / count
+    speaks = sum(evidence(table, i, pair) for i, pair in enumerate(mapped)) / count
     zeta_r = abs(sum(complex(math.cos(r), math.sin(r)) for _, r, _ in entries)) / count
     levels = [1.5 / math.log(2) * math.log(dilation) for _, _, dilation in entries]
     gaps = [abs(x - y) for k, x in enumerate(levels) for y in levels[k + 1 :]]
     zeta_l = math.exp(-math.log(2) * (sum(gaps) / len(gaps) if gaps else 0.0))
     w1, w2, w3 = (weight / sum(weights) for weight in weights)
-    return w1 * zeta_s + w2 * zeta_r + w3 * zeta_l, zeta_s, zeta_r, zeta_l
+    return w1 * speaks + w2 * zeta_r + w3 * zeta_l, zeta_s, zeta_r, zeta_l
 
 
 def look_up(table: RelationTable, i: int, pair: tuple[int, int]) -> tuple[float, float, float]:
@@ -104,6 +108,14 @@ def look_up(table: RelationTable, i: int, pair: tuple[int, int]) -> tuple[float,
         float(table.rotation[i, column]) + turn,
         float(table.dilation[i, column]),
     )
+
+
+def evidence(table: RelationTable, i: int, pair: tuple[int, int]) -> float:
+    """Return what template pair i on an ordered argument pair counts for beside R and L."""
+    if table.evidence is None:
+        return look_up(table, i, pair)[0]
+    c, d = pair
+    return float(table.evidence[i, correspondence(c + 1, d + 1, table.argument_objects)])
 
 
 def correspondence(a: int, b: int, objects: int) -> int:

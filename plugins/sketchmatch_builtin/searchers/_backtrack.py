@@ -2,7 +2,8 @@
 
 With f of P entries fixed and g = P − f left, for any map that completes them
 
-- Σσ is at most Σσ over the fixed entries, and for each other pair the greatest σ of its row,
+- Σe, of the evidence, is at most Σe over the fixed entries, and for each other pair the greatest
+  e of its row,
 - |Σ e^{iR}| at most the length of that sum over the fixed entries, and g,
 - Σ|x − y| over all pairs of L̂ at least that sum over the fixed entries, and g times the sum of
   their distances to their median: nothing is nearer to all of them.
@@ -34,25 +35,25 @@ class Path(NamedTuple):
     ----------
     order
         Shape (N,): the template objects in the order in which they are fixed.
-    similarity, cosine, sine, dilation
-        Shape (Q, Q'/2): the relations, the pairs of the second object with the first in front,
-        then those of the third with the first and the second, and so on.
+    evidence, cosine, sine, dilation
+        Shape (Q, Q'/2), the evidence also (Q, Q'): the relations, the pairs of the second object
+        with the first in front, then those of the third with the first and the second, and so on.
     partners
         Shape (N,): in that order; at the present depth the last that was tried, −1 for none.
     used
         Shape (N',): which partners are taken.
     sums
-        Shape (N + 1, 4): Σσ, Σ cos R and Σ sin R over the fixed entries, and a bound of ζL.
+        Shape (N + 1, 4): Σe, Σ cos R and Σ sin R over the fixed entries, and a bound of ζL.
     levels
         Shape (N + 1, P): their L̂ in order.
     rest
-        Shape (N + 1,): the sum of the greatest σ of all other pairs.
+        Shape (N + 1,): the sum of the greatest e of all other pairs.
     place
         Shape (3,): DEPTH, STEPS and LEAVES.
     """
 
     order: IntArray
-    similarity: FloatArray
+    evidence: FloatArray
     cosine: FloatArray
     sine: FloatArray
     dilation: FloatArray
@@ -88,11 +89,13 @@ def first_path(relations: Relations, argument_objects: int, evaluations: int) ->
     rows = row[order[later], order[earlier]]
     # An entry's dual has the opposite direction.
     turned = np.where(order[later] > order[earlier], 1.0, -1.0)[:, None]
-    similarity = relations.similarity[rows]
-    rest = np.bincount(later, similarity.max(axis=1), objects + 1)
+    evidence, half = relations.evidence[rows], relations.cosine.shape[1]
+    if evidence.shape[1] > half:
+        evidence = np.where(turned > 0.0, evidence, np.roll(evidence, half, axis=1))
+    rest = np.bincount(later, evidence.max(axis=1), objects + 1)
     return Path(
         order=order,
-        similarity=similarity,
+        evidence=evidence,
         cosine=relations.cosine[rows] * turned,
         sine=relations.sine[rows] * turned,
         dilation=relations.dilation[rows],
@@ -118,14 +121,15 @@ def backtrack(  # noqa: PLR0912, PLR0915
         better than the last of them.
     """
     # All arrays are taken out of their tuples first: in the loop that would take half of the time.
-    similarity, cosine, sine, dilation = path.similarity, path.cosine, path.sine, path.dilation
+    evidence, cosine, sine, dilation = path.evidence, path.cosine, path.sine, path.dilation
     columns = relations.columns
     w_s, w_r, w_l = relations.weights[0], relations.weights[1], relations.weights[2]
     order, partners, used = path.order, path.partners, path.used
     sums, levels, rest, place = path.sums, path.levels, path.rest, path.place
     objects, others = partners.size, used.size
     whole = np.empty(objects, dtype=np.int64)
-    pairs, half = similarity.shape
+    pairs, half = cosine.shape
+    folded = 2 * half - evidence.shape[1]
     scale = 2.0 / max(1.0, pairs * (pairs - 1.0))
     total = w_s + w_r + w_l
     depth, steps = place[DEPTH], 0
@@ -148,12 +152,13 @@ def backtrack(  # noqa: PLR0912, PLR0915
         left = pairs - count
         similar, x, y = sums[depth, 0], sums[depth, 1], sums[depth, 2]
         for k in range(depth):
-            j = columns[partners[k], c]
+            own = j = columns[partners[k], c]
             sign = 1.0
             if j >= half:
+                own -= folded
                 j -= half
                 sign = -1.0
-            similar += similarity[old + k, j]
+            similar += evidence[old + k, own]
             x += sign * cosine[old + k, j]
             y += sign * sine[old + k, j]
         most = w_s * (similar + rest[below]) + w_r * (np.sqrt(x * x + y * y) + left)

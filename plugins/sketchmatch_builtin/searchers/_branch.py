@@ -73,7 +73,7 @@ def search_cells(  # noqa: PLR0912, PLR0915
                 fixed.turn[:] = terms.turn
                 place[LEVEL], place[SWEEPS] = 0, _ROOT_SWEEPS
                 place[NODES] += 1
-                work += relations.similarity.size + tree.ends[0]
+                work += relations.cosine.size + tree.ends[0]
         elif place[SWEEPS] > 0:  # a node to tighten
             before = tree.bounds[level]
             if tree.counts[level] > 1:

@@ -18,10 +18,11 @@ Let P be the number of template pairs, W = w1 + w2 + w3, and call 1 − ζ the l
 So every map that is better than the incumbent and whose θ and quantiles lie in the cell loses at
 least a base of w3 (1 − 2^{−d})/W and the sum of
 
-    w1 (1 − σ)/(W P) + w2 (1 − cosmax)/(W P) + w3 s·φ(L̂)/(W (P − 1))
+    w1 (1 − e)/(W P) + w2 (1 − cosmax)/(W P) + w3 s·φ(L̂)/(W (P − 1))
 
-over its entries: a quadratic assignment problem. Every θ and all quantiles are covered, so a bound
-for every cell is a bound for every map. With P = 1, ζR = ζL = 1 and the first term is all.
+over its entries, where e is σ or the evidence in its place: a quadratic assignment problem. Every
+θ and all quantiles are covered, so a bound for every cell is a bound for every map. With P = 1,
+ζR = ζL = 1 and the first term is all.
 
 A first bound for a cell gives half of the least cost of each entry (a, b) → (c, d) to a → c and
 half to b → d, and solves the linear assignment problem of these (P. C. Gilmore, "Optimal and
@@ -84,7 +85,7 @@ class CellTerms(NamedTuple):
     Attributes
     ----------
     rates
-        Shape (3,): what an entry loses for 1 − σ, 1 − cosmax and a unit of φ.
+        Shape (3,): what an entry loses for 1 − e, 1 − cosmax and a unit of φ.
     turn
         Shape (4,): cosine and sine of the middle of θ and of half its width.
     base
@@ -210,13 +211,14 @@ def pair_costs(
     """
     rate_s, rate_r, rate_l = terms.rates
     turn_c, turn_s, half_c, half_s = terms.turn
-    hinges, half = terms.hinges, relations.similarity.shape[1]
+    hinges, half = terms.hinges, relations.cosine.shape[1]
+    directed = relations.evidence.shape[1] > half
     for row in range(last - first):
-        similarity, dilation = relations.similarity[first + row], relations.dilation[first + row]
+        evidence, dilation = relations.evidence[first + row], relations.dilation[first + row]
         cosine, sine = relations.cosine[first + row], relations.sine[first + row]
         loss = costs[row, :half]
         for j in range(half):
-            loss[j] = rate_s * (1.0 - similarity[j])
+            loss[j] = rate_s * (1.0 - evidence[j])
         for k in range(hinges.shape[1]):
             place, slope = hinges[0, k, 0], rate_l * hinges[0, k, 1]
             if slope > 0.0:
@@ -235,12 +237,16 @@ def pair_costs(
             nearest_dual = 1.0 if -along >= half_c else across - along * half_c
             costs[row, half + j] = loss[j] + rate_r * (1.0 - nearest_dual)
             costs[row, j] = loss[j] + rate_r * (1.0 - nearest)
+        if directed:
+            for j in range(half):
+                cost = costs[row, half + j] + rate_s * (evidence[j] - evidence[half + j])
+                costs[row, half + j] = cost if cost > 0.0 else 0.0
 
 
 @kernel
 def room_for_costs(relations: Relations) -> FloatArray:
     """Return room for the costs of as many pairs as one should ask for at once."""
-    entries = 2 * relations.similarity.shape[1]
+    entries = 2 * relations.cosine.shape[1]
     return np.empty((min(relations.pairs.shape[0], 1 + 4096 // entries), entries))
 
 

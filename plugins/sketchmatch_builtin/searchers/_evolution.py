@@ -34,7 +34,7 @@ class Evolution(NamedTuple):
     pairs, columns
         Shapes (Q, 2) and (N', N'): the template pairs, and the histogram correspondence of each
         ordered argument pair.
-    similarity, cosine, sine, dilation, weights
+    evidence, cosine, sine, dilation, weights
         As :func:`~sketchmatch.api.kernels.fmap_confidence` takes them.
     individuals
         Shape (3p, N) or (3p, Q): the population, its offspring and room for more, in any order.
@@ -65,7 +65,7 @@ class Evolution(NamedTuple):
     rates: FloatArray
     pairs: IntArray
     columns: IntArray
-    similarity: FloatArray
+    evidence: FloatArray
     cosine: FloatArray
     sine: FloatArray
     dilation: FloatArray
@@ -181,7 +181,7 @@ def _judge(evolution: Evolution, k: int) -> None:
         floor,
         entries,
         evolution.scratch,
-        evolution.similarity,
+        evolution.evidence,
         evolution.cosine,
         evolution.sine,
         evolution.dilation,

@@ -92,7 +92,7 @@ def _entry(relations: Relations, a: int, b: int, c: int, d: int) -> tuple[int, i
     objects = 1 + int(np.sqrt(2.0 * relations.pairs.shape[0]))
     i = a * objects - a * (a + 1) // 2 + b - a - 1
     j = relations.columns[c, d]
-    half = relations.similarity.shape[1]
+    half = relations.cosine.shape[1]
     if j >= half:
         return i, j - half, -1.0
     return i, j, 1.0

@@ -23,6 +23,7 @@ from sketchmatch.api.kernels import (
     make_move,
     map_confidence,
     map_entry,
+    map_evidence,
     total_distance,
 )
 from sketchmatch.model import FloatArray, IntArray
@@ -35,7 +36,7 @@ GAIN = 1e-12
 _MARGIN = 1e-6
 """Above what float32 may do to an estimate of ζ, for L̂ up to 1."""
 
-_S, _X, _Y, _L = range(4)
+_S, _X, _Y, _L, _TURNED = range(5)
 _BEGIN, _GUESS, _CHECK, _END = range(4)
 
 
@@ -44,10 +45,12 @@ class Moves(NamedTuple):
 
     Attributes
     ----------
+    directed
+        Whether a dual has evidence of its own, which need not be that of its column.
     relations
-        float32, shape (Q, N', N', 4): σ, cos R, sin R and L̂ of the entries (a, b) → (c, d), a < b,
-        by d and then c. This lies as it is read. Its precision is enough to propose moves and, with
-        a margin, to exclude them; that c and d come in both orders makes up for its size.
+        float32, shape (Q, N', N', 4): evidence, cos R, sin R and L̂ of the entries (a, b) → (c, d),
+        a < b, by d and then c. This lies as it is read. Its precision is enough to propose moves
+        and, with a margin, to exclude them; that c and d come in both orders makes up for its size.
     sums
         Shape (N, N', 4): sums of σ, cos R, sin R and of a bound of f over the entries that each
         template object would have with each partner, without the entry with its holder.
@@ -67,6 +70,7 @@ class Moves(NamedTuple):
         int64, shape (1,): maps evaluated so far.
     """
 
+    directed: bool
     relations: NDArray[np.float32]
     sums: FloatArray
     slack: FloatArray
@@ -77,10 +81,11 @@ class Moves(NamedTuple):
     evaluations: IntArray
 
 
-def empty_moves(template_objects: int, argument_objects: int) -> Moves:
+def empty_moves(template_objects: int, argument_objects: int, directed: bool = False) -> Moves:
     """Return room for the moves of a map."""
     pairs = template_objects * (template_objects - 1) // 2
     return Moves(
+        directed=directed,
         relations=np.empty((pairs, argument_objects, argument_objects, 4), dtype=np.float32),
         sums=np.zeros((template_objects, argument_objects, 4)),
         slack=np.zeros((template_objects, argument_objects)),
@@ -111,7 +116,7 @@ def read_relations(
     first, last
         Which values, counted row by row from 0 to Q·Q'/2.
     leanings
-        Shape (N, N', 3), added to: Σσ, Σ cos R and Σ sin R over the entries that a template
+        Shape (N, N', 3), added to: Σe, Σ cos R and Σ sin R over the entries that a template
         object would have with a partner and any partners of the other objects.
     """
     relations = moves.relations
@@ -120,9 +125,11 @@ def read_relations(
         a, b, c, d = pairs[i, 0], pairs[i, 1], others[j, 0], others[j, 1]
         values = map_entry(state, a, b, c, d)
         for part in range(4):
-            # The dual (a, b) → (d, c) has the same σ and L̂ and the opposite direction.
+            # The dual (a, b) → (d, c) has the same L̂ and the opposite direction.
             value = values[part]
             dual = -value if part in (_X, _Y) else value
+            if part == _S and moves.directed:
+                dual = map_evidence(state, a, b, d, c)
             relations[i, d, c, part] = value
             relations[i, c, d, part] = dual
             if part != _L:
@@ -263,7 +270,7 @@ def add_values(
     level: float,
     values: FloatArray,
 ) -> None:
-    """Add σ, cos R and sin R of the entries (a, k) → (c, partner), each times a factor, for all c.
+    """Add e, cos R and sin R of the entries (a, k) → (c, partner), each times a factor, for all c.
 
     ``steep`` times the distance of L̂ from a level is taken off. ``values`` has shape (N',).
     """
@@ -276,6 +283,11 @@ def add_values(
             values[c] += similar * relations[c, _S]
             values[c] += sign * (x * relations[c, _X] + y * relations[c, _Y])
             values[c] -= steep * abs(relations[c, _L] - level)
+    if moves.directed and a > k:
+        turned = _turned(moves, low, high, partner)
+        for c in range(values.size):
+            if c != partner:
+                values[c] += similar * (turned[c] - relations[c, _S])
 
 
 @kernel
@@ -326,14 +338,14 @@ def _estimate(
     b: int,
     c: int,
 ) -> tuple[float, float, float, float]:
-    """Return Σσ, Σ cos R and Σ sin R after a move, and about how Σ|x − y| changes."""
+    """Return Σe, Σ cos R and Σ sin R after a move, and about how Σ|x − y| changes."""
     similar = total[_S] + sums[a, c, _S] - sums[a, old, _S]
     x = total[_X] + sums[a, c, _X] - sums[a, old, _X]
     y = total[_Y] + sums[a, c, _Y] - sums[a, old, _Y]
     spread = sums[a, c, _L] - sums[a, old, _L]
     if b >= 0:
         # The entry (a, b) is in both sums that go, in neither that comes, and turns round.
-        similar += sums[b, old, _S] - sums[b, c, _S] + 2.0 * entries[a, b, _S]
+        similar += sums[b, old, _S] - sums[b, c, _S] + (entries[a, b, _S] + entries[a, b, _TURNED])
         x += sums[b, old, _X] - sums[b, c, _X]
         y += sums[b, old, _Y] - sums[b, c, _Y]
         spread += sums[b, old, _L] - sums[b, c, _L] + 2.0 * _line(lines, entries[a, b, _L])
@@ -380,6 +392,19 @@ def _add_entries(
             sums[a, c, _Y] += sign * relations[c, _Y]
             sums[a, c, _L] += factor * _line(lines, level)
             slack[a, c] += most * abs(level - now)
+    if moves.directed and a > k:
+        turned = _turned(moves, low, high, partner)
+        for c in range(others):
+            if c != partner:
+                sums[a, c, _S] += factor * (turned[c] - relations[c, _S])
+
+
+@kernel
+def _turned(moves: Moves, low: int, high: int, partner: int) -> NDArray[np.float32]:
+    """Return the evidence of the entries (low, high) → (partner, c), for all c."""
+    objects = moves.slack.shape[0]
+    i = low * objects - low * (low + 3) // 2 + high - 1
+    return moves.relations[i, :, partner, _S]
 
 
 @kernel

@@ -26,15 +26,17 @@ class Relations(NamedTuple):
         Shape (Q, 2), the template pairs.
     columns
         Shape (N', N'), the histogram correspondence of each ordered argument pair.
-    similarity, cosine, sine, dilation
-        Shape (Q, Q'/2): σ, cos R, sin R and L̂.
+    evidence
+        Shape (Q, Q'/2) or (Q, Q'): σ, or the evidence of every entry.
+    cosine, sine, dilation
+        Shape (Q, Q'/2): cos R, sin R and L̂.
     weights
         Shape (3,), of ζσ, ζR and ζL.
     """
 
     pairs: IntArray
     columns: IntArray
-    similarity: FloatArray
+    evidence: FloatArray
     cosine: FloatArray
     sine: FloatArray
     dilation: FloatArray
@@ -77,7 +79,7 @@ def offer(relations: Relations, found: Ranking, partners: IntArray, floor: float
         min(floor, found.values[-1]),
         entries,
         np.empty(entries.size),
-        relations.similarity,
+        relations.evidence,
         relations.cosine,
         relations.sine,
         relations.dilation,

@@ -201,7 +201,7 @@ class _Evolution:
         )
         objects, others = self.table.template_objects, self.table.argument_objects
         self.state = empty_map_state(self.table, problem.weights)
-        self.moves = empty_moves(objects, others)
+        self.moves = empty_moves(objects, others, self.table.evidence is not None)
         self.leanings = np.zeros((objects, others, 3))
         self.members = empty_ranking(params.population or _population(objects), objects)
         self.kept = empty_ranking(problem.alternatives + 1, objects)

@@ -101,6 +101,11 @@ class Easm(Searcher):
 
     params: Params
 
+    @property
+    def object_consistent(self) -> bool:
+        """Whether that is what makes an FMAP legal."""
+        return self.params.consistency == "object"
+
     @classmethod
     def warm_up(cls) -> None:
         """Compile the kernels for both meanings of a legal FMAP."""
@@ -155,7 +160,7 @@ class Easm(Searcher):
             rates=np.array([params.crossover_rate, params.exchange_rate, params.mutation_rate]),
             pairs=object_pairs(table.template_objects),
             columns=correspondences(table.argument_objects),
-            similarity=table.similarity,
+            evidence=table.entry_evidence,
             cosine=np.empty(shape),
             sine=np.empty(shape),
             dilation=np.empty(shape),
@@ -199,12 +204,14 @@ def _begin(table: RelationTable, evolution: Evolution, rng: np.random.Generator)
         first[:] = entries = rng.permutation(table.argument_pairs)[: first.size]
     column = entries % table.argument_pairs
     rows = np.arange(table.template_pairs)
+    evidence = table.entry_evidence
+    own = entries if evidence.shape[1] > table.argument_pairs else column
     rotation = table.rotation[rows, column, None]
     evolution.fitness[0] = fmap_confidence_above(
         -1.0,
         (entries != column).astype(np.int64),
         evolution.scratch,
-        sealed(table.similarity[rows, column, None]),
+        sealed(evidence[rows, own, None]),
         np.cos(rotation),
         np.sin(rotation),
         DILATION_SCALE * np.log(table.dilation[rows, column, None]),

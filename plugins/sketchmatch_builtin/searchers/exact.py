@@ -183,7 +183,7 @@ class _Search:
         self.relations = Relations(
             pairs=object_pairs(self.table.template_objects),
             columns=correspondences(self.table.argument_objects),
-            similarity=self.table.similarity,
+            evidence=self.table.entry_evidence,
             cosine=np.empty(shape),
             sine=np.empty(shape),
             dilation=np.empty(shape),

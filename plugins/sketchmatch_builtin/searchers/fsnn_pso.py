@@ -45,6 +45,7 @@ class FsnnPso(Searcher):
 
     name = "fsnn-pso"
     summary = "Particle swarm over seed points, FMAPs grown by fuzzy closeness (FSNN)."
+    object_consistent = False
 
     class Params(SwarmParams):
         """Parameters of closeness and of the swarm; α, k and the velocity as in the thesis."""

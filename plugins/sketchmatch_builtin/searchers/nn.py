@@ -40,6 +40,7 @@ class Nn(Searcher):
 
     name = "nn"
     summary = "Nearest neighbours of random seed points (the thesis's baseline)."
+    object_consistent = False
 
     class Params(Params):
         """How often it tries."""

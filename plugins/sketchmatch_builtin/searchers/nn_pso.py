@@ -35,6 +35,7 @@ class NnPso(Searcher):
 
     name = "nn-pso"
     summary = "Particle swarm over seed points, FMAPs grown by distance."
+    object_consistent = False
 
     class Params(SwarmParams):
         """Parameters of the swarm; the thesis leaves particles, c1, c2 and iterations open."""

@@ -18,39 +18,39 @@ from sketchmatch_proto.v1 import scene_pb2 as sketchmatch_dot_v1_dot_scene__pb2
 from sketchmatch_proto.v1 import source_pb2 as sketchmatch_dot_v1_dot_source__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1asketchmatch/v1/match.proto\x12\x0esketchmatch.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1asketchmatch/v1/scene.proto\x1a\x1bsketchmatch/v1/source.proto\"\x83\x01\n\x11\x43onfidenceWeights\x12\x17\n\nsimilarity\x18\x01 \x01(\x01H\x00\x88\x01\x01\x12\x15\n\x08rotation\x18\x02 \x01(\x01H\x01\x88\x01\x01\x12\x15\n\x08\x64ilation\x18\x03 \x01(\x01H\x02\x88\x01\x01\x42\r\n\x0b_similarityB\x0b\n\t_rotationB\x0b\n\t_dilation\"\xbf\x01\n\rMatchAccepted\x12\x10\n\x08match_id\x18\x01 \x01(\t\x12\x0c\n\x04seed\x18\x02 \x01(\x04\x12*\n\x08pipeline\x18\x03 \x01(\x0b\x32\x18.sketchmatch.v1.Pipeline\x12\x32\n\x07weights\x18\x04 \x01(\x0b\x32!.sketchmatch.v1.ConfidenceWeights\x12.\n\x0btime_budget\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\"\xb4\x01\n\x0bMatchScenes\x12%\n\x06sketch\x18\x01 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\"\n\x03map\x18\x02 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x17\n\x0fsketch_warnings\x18\x03 \x03(\t\x12\x14\n\x0cmap_warnings\x18\x04 \x03(\t\x12+\n\x0csketch_route\x18\x05 \x03(\x0b\x32\x15.sketchmatch.v1.Point\"\xb4\x02\n\rMatchProgress\x12$\n\x05phase\x18\x01 \x01(\x0e\x32\x15.sketchmatch.v1.Phase\x12\x15\n\x08\x66raction\x18\x02 \x01(\x01H\x00\x88\x01\x01\x12\x11\n\titeration\x18\x03 \x01(\x04\x12\x13\n\x0b\x65valuations\x18\x04 \x01(\x04\x12\x17\n\nconfidence\x18\x05 \x01(\x01H\x01\x88\x01\x01\x12\x18\n\x0bupper_bound\x18\x06 \x01(\x01H\x02\x88\x01\x01\x12\x33\n\x0eobject_matches\x18\x07 \x03(\x0b\x32\x1b.sketchmatch.v1.ObjectMatch\x12*\n\x07\x65lapsed\x18\x08 \x01(\x0b\x32\x19.google.protobuf.DurationB\x0b\n\t_fractionB\r\n\x0b_confidenceB\x0e\n\x0c_upper_bound\"\xa3\x04\n\x0bMatchResult\x12\x10\n\x08match_id\x18\x01 \x01(\t\x12\x0c\n\x04seed\x18\x02 \x01(\x04\x12(\n\x07outcome\x18\x03 \x01(\x0e\x32\x17.sketchmatch.v1.Outcome\x12\x33\n\x0eobject_matches\x18\x04 \x03(\x0b\x32\x1b.sketchmatch.v1.ObjectMatch\x12 \n\x18unmatched_sketch_objects\x18\x05 \x03(\r\x12\x1d\n\x15unmatched_map_objects\x18\x06 \x03(\r\x12\x17\n\x0fomap_confidence\x18\x07 \x01(\x01\x12\x37\n\x0f\x66map_confidence\x18\x08 \x01(\x0b\x32\x1e.sketchmatch.v1.FmapConfidence\x12\x18\n\x0bupper_bound\x18\t \x01(\x01H\x00\x88\x01\x01\x12/\n\x0c\x66map_entries\x18\n \x03(\x0b\x32\x19.sketchmatch.v1.FmapEntry\x12\x18\n\x10rotation_radians\x18\x0b \x01(\x01\x12\r\n\x05scale\x18\x0c \x01(\x01\x12\x33\n\nstatistics\x18\r \x01(\x0b\x32\x1f.sketchmatch.v1.MatchStatistics\x12\x34\n\x0c\x61lternatives\x18\x0e \x03(\x0b\x32\x1e.sketchmatch.v1.AlternativeMap\x12\x13\n\x0bsearch_note\x18\x0f \x01(\tB\x0e\n\x0c_upper_bound\"\x97\x01\n\x0e\x41lternativeMap\x12\x33\n\x0eobject_matches\x18\x01 \x03(\x0b\x32\x1b.sketchmatch.v1.ObjectMatch\x12\x37\n\x0f\x66map_confidence\x18\x02 \x01(\x0b\x32\x1e.sketchmatch.v1.FmapConfidence\x12\x17\n\x0fomap_confidence\x18\x03 \x01(\x01\"\xc7\x01\n\x0bObjectMatch\x12\x15\n\rsketch_object\x18\x01 \x01(\r\x12\x12\n\nmap_object\x18\x02 \x01(\r\x12\x14\n\x0csketch_label\x18\x03 \x01(\t\x12\x11\n\tmap_label\x18\x04 \x01(\t\x12\x12\n\nconfidence\x18\x05 \x01(\x01\x12\x13\n\x06margin\x18\x06 \x01(\x01H\x00\x88\x01\x01\x12\x30\n\x08relation\x18\x07 \x01(\x0b\x32\x1e.sketchmatch.v1.ObjectRelationB\t\n\x07_margin\"J\n\x0eObjectRelation\x12\x18\n\x10reference_object\x18\x01 \x01(\r\x12\x0e\n\x06phrase\x18\x02 \x01(\t\x12\x0e\n\x06\x64\x65gree\x18\x03 \x01(\x01\"W\n\x0e\x46mapConfidence\x12\r\n\x05total\x18\x01 \x01(\x01\x12\x12\n\nsimilarity\x18\x02 \x01(\x01\x12\x10\n\x08rotation\x18\x03 \x01(\x01\x12\x10\n\x08\x64ilation\x18\x04 \x01(\x01\"\xaa\x01\n\tFmapEntry\x12/\n\x0bsketch_pair\x18\x01 \x01(\x0b\x32\x1a.sketchmatch.v1.ObjectPair\x12,\n\x08map_pair\x18\x02 \x01(\x0b\x32\x1a.sketchmatch.v1.ObjectPair\x12\x12\n\nsimilarity\x18\x03 \x01(\x01\x12\x18\n\x10rotation_radians\x18\x04 \x01(\x01\x12\x10\n\x08\x64ilation\x18\x05 \x01(\x01\"+\n\nObjectPair\x12\r\n\x05\x66irst\x18\x01 \x01(\r\x12\x0e\n\x06second\x18\x02 \x01(\r\"\xbb\x02\n\x0fMatchStatistics\x12\x12\n\niterations\x18\x01 \x01(\x04\x12\x13\n\x0b\x65valuations\x18\x02 \x01(\x04\x12\x32\n\x0fsegment_elapsed\x18\x03 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x33\n\x10\x64\x65scribe_elapsed\x18\x04 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x31\n\x0erelate_elapsed\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x31\n\x0esearch_elapsed\x18\x06 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x30\n\rtotal_elapsed\x18\x07 \x01(\x0b\x32\x19.google.protobuf.Duration*i\n\x05Phase\x12\x15\n\x11PHASE_UNSPECIFIED\x10\x00\x12\x11\n\rPHASE_SEGMENT\x10\x01\x12\x12\n\x0ePHASE_DESCRIBE\x10\x02\x12\x10\n\x0cPHASE_RELATE\x10\x03\x12\x10\n\x0cPHASE_SEARCH\x10\x04*\x84\x01\n\x07Outcome\x12\x17\n\x13OUTCOME_UNSPECIFIED\x10\x00\x12\x15\n\x11OUTCOME_CONVERGED\x10\x01\x12\x13\n\x0fOUTCOME_OPTIMAL\x10\x02\x12\x17\n\x13OUTCOME_TIME_BUDGET\x10\x03\x12\x1b\n\x17OUTCOME_ITERATION_LIMIT\x10\x04\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1asketchmatch/v1/match.proto\x12\x0esketchmatch.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1asketchmatch/v1/scene.proto\x1a\x1bsketchmatch/v1/source.proto\"\xbd\x01\n\x11\x43onfidenceWeights\x12\x17\n\nsimilarity\x18\x01 \x01(\x01H\x00\x88\x01\x01\x12\x15\n\x08rotation\x18\x02 \x01(\x01H\x01\x88\x01\x01\x12\x15\n\x08\x64ilation\x18\x03 \x01(\x01H\x02\x88\x01\x01\x12\x12\n\x05shape\x18\x04 \x01(\x01H\x03\x88\x01\x01\x12\x11\n\x04size\x18\x05 \x01(\x01H\x04\x88\x01\x01\x42\r\n\x0b_similarityB\x0b\n\t_rotationB\x0b\n\t_dilationB\x08\n\x06_shapeB\x07\n\x05_size\"\xbf\x01\n\rMatchAccepted\x12\x10\n\x08match_id\x18\x01 \x01(\t\x12\x0c\n\x04seed\x18\x02 \x01(\x04\x12*\n\x08pipeline\x18\x03 \x01(\x0b\x32\x18.sketchmatch.v1.Pipeline\x12\x32\n\x07weights\x18\x04 \x01(\x0b\x32!.sketchmatch.v1.ConfidenceWeights\x12.\n\x0btime_budget\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\"\xb4\x01\n\x0bMatchScenes\x12%\n\x06sketch\x18\x01 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\"\n\x03map\x18\x02 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x17\n\x0fsketch_warnings\x18\x03 \x03(\t\x12\x14\n\x0cmap_warnings\x18\x04 \x03(\t\x12+\n\x0csketch_route\x18\x05 \x03(\x0b\x32\x15.sketchmatch.v1.Point\"\xb4\x02\n\rMatchProgress\x12$\n\x05phase\x18\x01 \x01(\x0e\x32\x15.sketchmatch.v1.Phase\x12\x15\n\x08\x66raction\x18\x02 \x01(\x01H\x00\x88\x01\x01\x12\x11\n\titeration\x18\x03 \x01(\x04\x12\x13\n\x0b\x65valuations\x18\x04 \x01(\x04\x12\x17\n\nconfidence\x18\x05 \x01(\x01H\x01\x88\x01\x01\x12\x18\n\x0bupper_bound\x18\x06 \x01(\x01H\x02\x88\x01\x01\x12\x33\n\x0eobject_matches\x18\x07 \x03(\x0b\x32\x1b.sketchmatch.v1.ObjectMatch\x12*\n\x07\x65lapsed\x18\x08 \x01(\x0b\x32\x19.google.protobuf.DurationB\x0b\n\t_fractionB\r\n\x0b_confidenceB\x0e\n\x0c_upper_bound\"\xa3\x04\n\x0bMatchResult\x12\x10\n\x08match_id\x18\x01 \x01(\t\x12\x0c\n\x04seed\x18\x02 \x01(\x04\x12(\n\x07outcome\x18\x03 \x01(\x0e\x32\x17.sketchmatch.v1.Outcome\x12\x33\n\x0eobject_matches\x18\x04 \x03(\x0b\x32\x1b.sketchmatch.v1.ObjectMatch\x12 \n\x18unmatched_sketch_objects\x18\x05 \x03(\r\x12\x1d\n\x15unmatched_map_objects\x18\x06 \x03(\r\x12\x17\n\x0fomap_confidence\x18\x07 \x01(\x01\x12\x37\n\x0f\x66map_confidence\x18\x08 \x01(\x0b\x32\x1e.sketchmatch.v1.FmapConfidence\x12\x18\n\x0bupper_bound\x18\t \x01(\x01H\x00\x88\x01\x01\x12/\n\x0c\x66map_entries\x18\n \x03(\x0b\x32\x19.sketchmatch.v1.FmapEntry\x12\x18\n\x10rotation_radians\x18\x0b \x01(\x01\x12\r\n\x05scale\x18\x0c \x01(\x01\x12\x33\n\nstatistics\x18\r \x01(\x0b\x32\x1f.sketchmatch.v1.MatchStatistics\x12\x34\n\x0c\x61lternatives\x18\x0e \x03(\x0b\x32\x1e.sketchmatch.v1.AlternativeMap\x12\x13\n\x0bsearch_note\x18\x0f \x01(\tB\x0e\n\x0c_upper_bound\"\x97\x01\n\x0e\x41lternativeMap\x12\x33\n\x0eobject_matches\x18\x01 \x03(\x0b\x32\x1b.sketchmatch.v1.ObjectMatch\x12\x37\n\x0f\x66map_confidence\x18\x02 \x01(\x0b\x32\x1e.sketchmatch.v1.FmapConfidence\x12\x17\n\x0fomap_confidence\x18\x03 \x01(\x01\"\xc7\x01\n\x0bObjectMatch\x12\x15\n\rsketch_object\x18\x01 \x01(\r\x12\x12\n\nmap_object\x18\x02 \x01(\r\x12\x14\n\x0csketch_label\x18\x03 \x01(\t\x12\x11\n\tmap_label\x18\x04 \x01(\t\x12\x12\n\nconfidence\x18\x05 \x01(\x01\x12\x13\n\x06margin\x18\x06 \x01(\x01H\x00\x88\x01\x01\x12\x30\n\x08relation\x18\x07 \x01(\x0b\x32\x1e.sketchmatch.v1.ObjectRelationB\t\n\x07_margin\"J\n\x0eObjectRelation\x12\x18\n\x10reference_object\x18\x01 \x01(\r\x12\x0e\n\x06phrase\x18\x02 \x01(\t\x12\x0e\n\x06\x64\x65gree\x18\x03 \x01(\x01\"\x91\x01\n\x0e\x46mapConfidence\x12\r\n\x05total\x18\x01 \x01(\x01\x12\x12\n\nsimilarity\x18\x02 \x01(\x01\x12\x10\n\x08rotation\x18\x03 \x01(\x01\x12\x10\n\x08\x64ilation\x18\x04 \x01(\x01\x12\x12\n\x05shape\x18\x05 \x01(\x01H\x00\x88\x01\x01\x12\x11\n\x04size\x18\x06 \x01(\x01H\x01\x88\x01\x01\x42\x08\n\x06_shapeB\x07\n\x05_size\"\xaa\x01\n\tFmapEntry\x12/\n\x0bsketch_pair\x18\x01 \x01(\x0b\x32\x1a.sketchmatch.v1.ObjectPair\x12,\n\x08map_pair\x18\x02 \x01(\x0b\x32\x1a.sketchmatch.v1.ObjectPair\x12\x12\n\nsimilarity\x18\x03 \x01(\x01\x12\x18\n\x10rotation_radians\x18\x04 \x01(\x01\x12\x10\n\x08\x64ilation\x18\x05 \x01(\x01\"+\n\nObjectPair\x12\r\n\x05\x66irst\x18\x01 \x01(\r\x12\x0e\n\x06second\x18\x02 \x01(\r\"\xbb\x02\n\x0fMatchStatistics\x12\x12\n\niterations\x18\x01 \x01(\x04\x12\x13\n\x0b\x65valuations\x18\x02 \x01(\x04\x12\x32\n\x0fsegment_elapsed\x18\x03 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x33\n\x10\x64\x65scribe_elapsed\x18\x04 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x31\n\x0erelate_elapsed\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x31\n\x0esearch_elapsed\x18\x06 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x30\n\rtotal_elapsed\x18\x07 \x01(\x0b\x32\x19.google.protobuf.Duration*i\n\x05Phase\x12\x15\n\x11PHASE_UNSPECIFIED\x10\x00\x12\x11\n\rPHASE_SEGMENT\x10\x01\x12\x12\n\x0ePHASE_DESCRIBE\x10\x02\x12\x10\n\x0cPHASE_RELATE\x10\x03\x12\x10\n\x0cPHASE_SEARCH\x10\x04*\x84\x01\n\x07Outcome\x12\x17\n\x13OUTCOME_UNSPECIFIED\x10\x00\x12\x15\n\x11OUTCOME_CONVERGED\x10\x01\x12\x13\n\x0fOUTCOME_OPTIMAL\x10\x02\x12\x17\n\x13OUTCOME_TIME_BUDGET\x10\x03\x12\x1b\n\x17OUTCOME_ITERATION_LIMIT\x10\x04\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'sketchmatch_proto.v1.match_pb2', _globals)
 if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
-  _globals['_PHASE']._serialized_start=2595
-  _globals['_PHASE']._serialized_end=2700
-  _globals['_OUTCOME']._serialized_start=2703
-  _globals['_OUTCOME']._serialized_end=2835
+  _globals['_PHASE']._serialized_start=2712
+  _globals['_PHASE']._serialized_end=2817
+  _globals['_OUTCOME']._serialized_start=2820
+  _globals['_OUTCOME']._serialized_end=2952
   _globals['_CONFIDENCEWEIGHTS']._serialized_start=167
-  _globals['_CONFIDENCEWEIGHTS']._serialized_end=298
-  _globals['_MATCHACCEPTED']._serialized_start=301
-  _globals['_MATCHACCEPTED']._serialized_end=492
-  _globals['_MATCHSCENES']._serialized_start=495
-  _globals['_MATCHSCENES']._serialized_end=675
-  _globals['_MATCHPROGRESS']._serialized_start=678
-  _globals['_MATCHPROGRESS']._serialized_end=986
-  _globals['_MATCHRESULT']._serialized_start=989
-  _globals['_MATCHRESULT']._serialized_end=1536
-  _globals['_ALTERNATIVEMAP']._serialized_start=1539
-  _globals['_ALTERNATIVEMAP']._serialized_end=1690
-  _globals['_OBJECTMATCH']._serialized_start=1693
-  _globals['_OBJECTMATCH']._serialized_end=1892
-  _globals['_OBJECTRELATION']._serialized_start=1894
-  _globals['_OBJECTRELATION']._serialized_end=1968
-  _globals['_FMAPCONFIDENCE']._serialized_start=1970
-  _globals['_FMAPCONFIDENCE']._serialized_end=2057
-  _globals['_FMAPENTRY']._serialized_start=2060
-  _globals['_FMAPENTRY']._serialized_end=2230
-  _globals['_OBJECTPAIR']._serialized_start=2232
-  _globals['_OBJECTPAIR']._serialized_end=2275
-  _globals['_MATCHSTATISTICS']._serialized_start=2278
-  _globals['_MATCHSTATISTICS']._serialized_end=2593
+  _globals['_CONFIDENCEWEIGHTS']._serialized_end=356
+  _globals['_MATCHACCEPTED']._serialized_start=359
+  _globals['_MATCHACCEPTED']._serialized_end=550
+  _globals['_MATCHSCENES']._serialized_start=553
+  _globals['_MATCHSCENES']._serialized_end=733
+  _globals['_MATCHPROGRESS']._serialized_start=736
+  _globals['_MATCHPROGRESS']._serialized_end=1044
+  _globals['_MATCHRESULT']._serialized_start=1047
+  _globals['_MATCHRESULT']._serialized_end=1594
+  _globals['_ALTERNATIVEMAP']._serialized_start=1597
+  _globals['_ALTERNATIVEMAP']._serialized_end=1748
+  _globals['_OBJECTMATCH']._serialized_start=1751
+  _globals['_OBJECTMATCH']._serialized_end=1950
+  _globals['_OBJECTRELATION']._serialized_start=1952
+  _globals['_OBJECTRELATION']._serialized_end=2026
+  _globals['_FMAPCONFIDENCE']._serialized_start=2029
+  _globals['_FMAPCONFIDENCE']._serialized_end=2174
+  _globals['_FMAPENTRY']._serialized_start=2177
+  _globals['_FMAPENTRY']._serialized_end=2347
+  _globals['_OBJECTPAIR']._serialized_start=2349
+  _globals['_OBJECTPAIR']._serialized_end=2392
+  _globals['_MATCHSTATISTICS']._serialized_start=2395
+  _globals['_MATCHSTATISTICS']._serialized_end=2710
 # @@protoc_insertion_point(module_scope)

@@ -89,9 +89,11 @@ global___Outcome = Outcome
 
 @typing.final
 class ConfidenceWeights(google.protobuf.message.Message):
-    """What each part of ζ counts for: ζ = (w₁ζσ + w₂ζR + w₃ζL) / (w₁ + w₂ + w₃).
+    """What each part of ζ counts for: ζ = (w₁ζσ + w₂ζR + w₃ζL + w₄ζS + w₅ζM) / (w₁ + w₂ + w₃ + w₄ + w₅).
 
-    Weights are at least 0 and not all 0; one that is left out is 1.
+    Weights are at least 0 and not all 0. Of the first three, which weigh how objects lie to each
+    other, one that is left out is 1; of the last two, which weigh the objects themselves, 0. Only
+    searchers that map objects can take these: all but nn, nn-pso, fsnn-pso and a pairwise easm.
     """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
@@ -99,27 +101,39 @@ class ConfidenceWeights(google.protobuf.message.Message):
     SIMILARITY_FIELD_NUMBER: builtins.int
     ROTATION_FIELD_NUMBER: builtins.int
     DILATION_FIELD_NUMBER: builtins.int
+    SHAPE_FIELD_NUMBER: builtins.int
+    SIZE_FIELD_NUMBER: builtins.int
     similarity: builtins.float
     """w₁, for ζσ: how alike the relations are."""
     rotation: builtins.float
     """w₂, for ζR: how well their rotations agree."""
     dilation: builtins.float
     """w₃, for ζL: how well their dilations agree."""
+    shape: builtins.float
+    """w₄, for ζS: how alike in shape each object and its partner are, turned as their relations are."""
+    size: builtins.float
+    """w₅, for ζM: how well the objects' sizes agree with the dilations of their relations."""
     def __init__(
         self,
         *,
         similarity: builtins.float | None = ...,
         rotation: builtins.float | None = ...,
         dilation: builtins.float | None = ...,
+        shape: builtins.float | None = ...,
+        size: builtins.float | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_dilation", b"_dilation", "_rotation", b"_rotation", "_similarity", b"_similarity", "dilation", b"dilation", "rotation", b"rotation", "similarity", b"similarity"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_dilation", b"_dilation", "_rotation", b"_rotation", "_similarity", b"_similarity", "dilation", b"dilation", "rotation", b"rotation", "similarity", b"similarity"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_dilation", b"_dilation", "_rotation", b"_rotation", "_shape", b"_shape", "_similarity", b"_similarity", "_size", b"_size", "dilation", b"dilation", "rotation", b"rotation", "shape", b"shape", "similarity", b"similarity", "size", b"size"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_dilation", b"_dilation", "_rotation", b"_rotation", "_shape", b"_shape", "_similarity", b"_similarity", "_size", b"_size", "dilation", b"dilation", "rotation", b"rotation", "shape", b"shape", "similarity", b"similarity", "size", b"size"]) -> None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_dilation", b"_dilation"]) -> typing.Literal["dilation"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_rotation", b"_rotation"]) -> typing.Literal["rotation"] | None: ...
     @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_shape", b"_shape"]) -> typing.Literal["shape"] | None: ...
+    @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_similarity", b"_similarity"]) -> typing.Literal["similarity"] | None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_size", b"_size"]) -> typing.Literal["size"] | None: ...
 
 global___ConfidenceWeights = ConfidenceWeights
 
@@ -482,7 +496,7 @@ global___ObjectRelation = ObjectRelation
 
 @typing.final
 class FmapConfidence(google.protobuf.message.Message):
-    """ζ, the confidence of a histogram map, and its three parts, each within [0, 1]."""
+    """ζ, the confidence of a histogram map, and its parts, each within [0, 1]."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -490,6 +504,8 @@ class FmapConfidence(google.protobuf.message.Message):
     SIMILARITY_FIELD_NUMBER: builtins.int
     ROTATION_FIELD_NUMBER: builtins.int
     DILATION_FIELD_NUMBER: builtins.int
+    SHAPE_FIELD_NUMBER: builtins.int
+    SIZE_FIELD_NUMBER: builtins.int
     total: builtins.float
     """ζ, the weighted mean of the parts."""
     similarity: builtins.float
@@ -498,6 +514,10 @@ class FmapConfidence(google.protobuf.message.Message):
     """ζR: how well their rotations agree."""
     dilation: builtins.float
     """ζL: how well their dilations agree."""
+    shape: builtins.float
+    """ζS: how alike in shape the objects are. Absent unless shape or size has a weight."""
+    size: builtins.float
+    """ζM: how well their sizes agree. Absent unless shape or size has a weight."""
     def __init__(
         self,
         *,
@@ -505,8 +525,15 @@ class FmapConfidence(google.protobuf.message.Message):
         similarity: builtins.float = ...,
         rotation: builtins.float = ...,
         dilation: builtins.float = ...,
+        shape: builtins.float | None = ...,
+        size: builtins.float | None = ...,
     ) -> None: ...
-    def ClearField(self, field_name: typing.Literal["dilation", b"dilation", "rotation", b"rotation", "similarity", b"similarity", "total", b"total"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_shape", b"_shape", "_size", b"_size", "shape", b"shape", "size", b"size"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_shape", b"_shape", "_size", b"_size", "dilation", b"dilation", "rotation", b"rotation", "shape", b"shape", "similarity", b"similarity", "size", b"size", "total", b"total"]) -> None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_shape", b"_shape"]) -> typing.Literal["shape"] | None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_size", b"_size"]) -> typing.Literal["size"] | None: ...
 
 global___FmapConfidence = FmapConfidence
 
