@@ -1,6 +1,7 @@
 """Hypothesis strategies that tests share: awkward shapes, scenes and relation tables."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -119,10 +120,18 @@ def tables(draw, least=2, most=7, more=4):
     return random_table(np.random.default_rng(draw(st.integers(0, 2**32))), template, argument)
 
 
+def with_evidence(rng, table):
+    """Return a table with random evidence beyond σ for every entry."""
+    shape = (table.template_pairs, 2 * table.argument_pairs)
+    return replace(table, evidence=rng.uniform(0.0, 1.0, shape))
+
+
 @st.composite
 def tables_and_object_maps(draw, most=7):
-    """Return a random relation table and an injective object map."""
+    """Return a random relation table, perhaps with evidence, and an injective object map."""
     table = draw(tables(most=most))
+    if draw(st.booleans()):
+        table = with_evidence(np.random.default_rng(draw(st.integers(0, 2**32))), table)
     order = draw(st.permutations(range(table.argument_objects)))
     return table, np.array(order[: table.template_objects])
 

@@ -92,6 +92,13 @@ class TestRequest:
         weights = request.weights
         assert (weights.similarity, weights.rotation, weights.dilation) == (1, 0, 0.5)
         assert weights.HasField("rotation")
+        assert not weights.HasField("shape")
+
+    def test_carries_weights_of_shape_and_size(self, call, server):
+        call(server.address, "match", SKETCH, MAP, weights=(1, 2, 3, 0.5, 0))
+        weights = server.requests[0].weights
+        assert (weights.dilation, weights.shape, weights.size) == (3, 0.5, 0)
+        assert weights.HasField("size")
 
     @pytest.mark.parametrize(
         ("options", "sentence"),
@@ -104,6 +111,10 @@ class TestRequest:
             ({"time_budget": float("inf")}, "time_budget is not a number of seconds"),
             ({"weights": (1, 1)}, "weights is not three numbers"),
             ({"weights": "abc"}, "weights is not three numbers"),
+            (
+                {"weights": (1, 1, 1, 1)},
+                "weights is not three numbers, similarity, rotation, dilation, or five",
+            ),
             ({"params": {"serch": {}}}, "params has no stage 'serch'; the stages are sketch_seg"),
             (
                 {"params": {"searcher": {"population": object()}}},

@@ -128,7 +128,7 @@ class Case:
     map: Callable[[Path, str], Path] = MAP
     chosen: dict[str, str] = field(default_factory=dict)
     params: dict[str, dict] = field(default_factory=dict)
-    weights: tuple[float, float, float] | None = None
+    weights: tuple[float, ...] | None = None
     time_budget: float | None = None
 
 
@@ -484,6 +484,23 @@ CASES = [
         weights=(math.nan, 1, 1),
     ),
     Case(
+        "weight of shape < 0",
+        "INVALID_FIELD",
+        "weights.shape",
+        "is -1",
+        "give a number from 0",
+        weights=(1, 1, 1, -1, 0),
+    ),
+    Case(
+        "weight of shape for pairs",
+        "INVALID_FIELD",
+        "weights.shape",
+        "compares objects, and the searcher 'nn'",
+        "choose another",
+        weights=(1, 1, 1, 1, 0),
+        chosen={"searcher": "nn"},
+    ),
+    Case(
         "no weight",
         "INVALID_FIELD",
         "weights",
@@ -533,10 +550,8 @@ def asked(case: Case, folder: Path) -> MatchRequest:
         selection.name = case.chosen.get(stage, "")
         selection.parameters.update(case.params.get(stage, {}))
     if case.weights:
-        similarity, rotation, dilation = case.weights
-        made.weights.CopyFrom(
-            ConfidenceWeights(similarity=similarity, rotation=rotation, dilation=dilation)
-        )
+        names = ("similarity", "rotation", "dilation", "shape", "size")
+        made.weights.CopyFrom(ConfidenceWeights(**dict(zip(names, case.weights, strict=False))))
     if case.time_budget is not None:
         made.time_budget.FromNanoseconds(round(1e9 * case.time_budget))
     return made

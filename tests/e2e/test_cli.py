@@ -215,6 +215,13 @@ def test_weights_weigh_the_parts_of_the_confidence(command_line, where):
     assert parts.total == pytest.approx((parts.similarity + 3 * parts.dilation) / 4)
 
 
+def test_weights_weigh_shapes_and_sizes_too(command_line, where):
+    answer = result(command_line("match", *ROOM, *where, "--json", "--weights", "1,0,3,2,1"))
+    parts = answer.fmap_confidence
+    weighed = parts.similarity + 3 * parts.dilation + 2 * parts.shape + parts.size
+    assert parts.total == pytest.approx(weighed / 7)
+
+
 def test_fewer_and_more_objects_in_the_sketch(command_line, where, uneven):
     four, three = uneven
     fewer = result(command_line("match", three, four, *where, "--json"))
@@ -435,6 +442,7 @@ def assert_one_line(done, code, *words):
         (["match", *ROOM, "--seed", "-1"], ["seed is -1", "give an integer 0"]),
         (["match", *ROOM, "--seed", str(2**64)], ["seed", "2**64"]),
         (["match", *ROOM, "--weights", "1,2"], ["--weights '1,2'", "as in 1,1,1"]),
+        (["match", *ROOM, "--weights", "1,1,1,1"], ["--weights '1,1,1,1'", "1,1,1,0.5,0.5"]),
         (["match", *ROOM, "--set", "population=3"], ["--set", "as in searcher.population=400"]),
         (["match", *ROOM, "--set", "sercher.population=3"], ["sercher", "searcher"]),
         (["match", *ROOM, "--time-budget", "nan"], ["time_budget", "give a positive time"]),

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from sketchmatch.testing.oracle import (
     best_object_map,
+    evidence,
     induced,
     is_object_legal,
     is_pairwise_legal,
@@ -20,6 +21,7 @@ from sketchmatch.testing.oracle import score_pairs as confidence
 __all__ = [
     "best_object_map",
     "confidence",
+    "evidence",
     "induced",
     "is_object_legal",
     "is_pairwise_legal",
@@ -34,15 +36,15 @@ __all__ = [
 def occm(table, mapped):
     """Return the evidence matrix and its part implied by order, of exact fractions."""
     rows, columns = table.template_objects, table.argument_objects
-    evidence = [[Fraction(0)] * columns for _ in range(rows)]
+    every = [[Fraction(0)] * columns for _ in range(rows)]
     implied = [[Fraction(0)] * columns for _ in range(rows)]
     for i, ((a, b), (c, d)) in enumerate(zip(pairs(rows), mapped, strict=True)):
         sigma = Fraction(look_up(table, i, (c, d))[0])
         for g, h in ((a, c), (b, d), (a, d), (b, c)):
-            evidence[g][h] += sigma
+            every[g][h] += sigma
         for g, h in ((a, c), (b, d)):
             implied[g][h] += sigma
-    return evidence, implied
+    return every, implied
 
 
 def object_map(evidence, implied):

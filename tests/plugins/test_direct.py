@@ -3,6 +3,7 @@
 import itertools
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ from sketchmatch_builtin.searchers.direct import Direct, evolve
 from tests.oracle import maps as oracle
 from tests.oracle.enumeration import best_of_all
 from tests.searching import WEIGHTS, drain, geometric_table, sketched_table
-from tests.strategies import random_table, tables, tables_and_object_maps
+from tests.strategies import random_table, tables, tables_and_object_maps, with_evidence
 
 TRUE = 1e-9
 EQUAL = (1.0, 1.0, 1.0)
@@ -160,7 +161,8 @@ def test_a_longer_run_gets_better_and_is_sound_all_along(monkeypatch):
 def climbed(table, partners, weights):
     """Return a map after it climbed, and ζ."""
     state = empty_map_state(table, weights)
-    moves = empty_moves(table.template_objects, table.argument_objects)
+    directed = table.evidence is not None
+    moves = empty_moves(table.template_objects, table.argument_objects, directed)
     pairs, others = object_pairs(table.template_objects), object_pairs(table.argument_objects)
     leanings = np.zeros((table.template_objects, table.argument_objects, 3))
     read_relations(state, moves, pairs, others, 0, table.similarity.size, leanings)
@@ -177,8 +179,7 @@ def climbed(table, partners, weights):
 def test_a_climbed_map_is_a_local_optimum_under_both_moves(case, weights, factor):
     table, partners = case
     dilation = np.exp(factor * np.log(table.dilation))
-    objects = (table.template_objects, table.argument_objects)
-    table = RelationTable(table.similarity, table.rotation, dilation, *objects)
+    table = replace(table, dilation=dilation)
     top, value = climbed(table, partners, weights)
     expected = true_confidence(table, top, weights)
     assert value == pytest.approx(expected, abs=1e-11)
@@ -201,7 +202,8 @@ def test_larger_maps_climb_to_local_optima_too(seed):
 def test_no_move_above_a_threshold_is_left_out(case, weights, above):
     table, partners = case
     objects, others = table.template_objects, table.argument_objects
-    state, moves = empty_map_state(table, weights), empty_moves(objects, others)
+    state = empty_map_state(table, weights)
+    moves = empty_moves(objects, others, table.evidence is not None)
     pairs = (object_pairs(objects), object_pairs(others))
     leanings = np.zeros((objects, others, 3))
     read_relations(state, moves, *pairs, 0, table.similarity.size, leanings)
@@ -255,6 +257,18 @@ def test_it_finds_the_best_of_sketches():
         table = sketched_table(seed, drawn, objects, displacement=noise, turn=noise)
         cases.append((table, WEIGHTS[0] if seed % 4 else WEIGHTS[seed % 7]))
     assert share_of_optima(cases) == 60
+
+
+def test_it_finds_the_best_where_there_is_evidence():
+    cases = []
+    for seed in range(20):
+        table = (
+            sketched_table(seed, 6, 7)
+            if seed % 2
+            else random_table(np.random.default_rng(seed), 6, 7)
+        )
+        cases.append((with_evidence(np.random.default_rng(seed), table), WEIGHTS[seed % 7]))
+    assert share_of_optima(cases) == 20
 
 
 @pytest.mark.parametrize("weights", WEIGHTS)

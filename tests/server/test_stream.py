@@ -92,6 +92,27 @@ def test_accepted_echoes_every_algorithm_with_every_parameter(address):
     )
 
 
+@pytest.mark.parametrize("weights", [(1, 2, 0.5, 0.7, 0), (1, 1, 1, 0, 2)])
+def test_objects_are_weighed_alike_in_process_and_over_grpc(address, weights):
+    sketch, map_ = shapes(5), turned(shapes(6))
+    local = sketchmatch.match(
+        Scene.from_polygons(sketch), Scene.from_polygons(map_), weights=weights
+    )
+    with Client(address) as client:
+        remote = client.match(sources.polygons(sketch), sources.polygons(map_), weights=weights)
+    accepted, parts = remote.accepted.weights, remote.result.fmap_confidence
+    assert (accepted.shape, accepted.size) == weights[3:]
+    assert timeless(remote.result) == timeless(responses.result(local))
+    assert (parts.shape, parts.size) == (local.confidence.shape, local.confidence.size)
+
+
+def test_without_weights_for_objects_their_parts_are_absent(address):
+    with Client(address) as client:
+        parts = client.match(scene(4), scene(5)).result.fmap_confidence
+    assert not parts.HasField("shape")
+    assert not parts.HasField("size")
+
+
 def test_what_accepted_echoes_sent_again_gives_the_same_result(address):
     sketch, map_ = scene(6), scene(7, 1)
     with Client(address) as client:

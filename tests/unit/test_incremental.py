@@ -1,5 +1,7 @@
 """ζ of object maps that is brought up to date move by move, against the slow oracle."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -11,10 +13,10 @@ from sketchmatch.api.kernels import (
     make_move,
     map_confidence,
     map_entry,
+    map_evidence,
     place_map,
     total_distance,
 )
-from sketchmatch.model import RelationTable
 from tests.oracle import maps as oracle
 from tests.strategies import random_table, tables_and_object_maps
 
@@ -40,8 +42,7 @@ kinds = st.sampled_from(sorted(DILATIONS))
 def of_kind(table, kind, seed=0):
     """Return a table with other dilations."""
     dilation = DILATIONS[kind](np.random.default_rng(seed), table.dilation.shape)
-    objects = (table.template_objects, table.argument_objects)
-    return RelationTable(table.similarity, table.rotation, dilation, *objects)
+    return replace(table, dilation=dilation)
 
 
 def placed(table, partners, weights=EQUAL):
@@ -78,7 +79,9 @@ def assert_same_state(state, table):
     levels = []
     for a, b in oracle.pairs(len(partners)):
         expected = map_entry(state, a, b, partners[a], partners[b])
+        expected += (map_evidence(state, a, b, partners[b], partners[a]),)
         assert tuple(state.entries[a, b]) == tuple(state.entries[b, a]) == expected
+        assert expected[0] == map_evidence(state, a, b, partners[a], partners[b])
         levels.append(expected[3])
     assert state.levels.tolist() == sorted(levels)
     assert state.prefix == pytest.approx(np.cumsum([0.0, *sorted(levels)]), abs=1e-9)
@@ -179,9 +182,9 @@ def test_an_entry_is_found_in_any_order_of_the_objects(case, data):
     c, d = data.draw(st.permutations(range(table.argument_objects)))[:2]
     pair = (c, d) if a < b else (d, c)
     row = oracle.pairs(table.template_objects).index((min(a, b), max(a, b)))
-    sigma, rotation, dilation = oracle.look_up(table, row, pair)
+    _, rotation, dilation = oracle.look_up(table, row, pair)
     level = 1.5 / np.log(2) * np.log(dilation)
-    expected = (sigma, np.cos(rotation), np.sin(rotation), level)
+    expected = (oracle.evidence(table, row, pair), np.cos(rotation), np.sin(rotation), level)
     assert map_entry(state, a, b, c, d) == pytest.approx(expected, abs=1e-14)
 
 

@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import pairwise
 from time import perf_counter  # the real one, whatever a check does to the module
@@ -23,7 +23,12 @@ from sketchmatch.model import Fmap, RelationTable, pair_count
 from sketchmatch.model.arrays import sealed
 from sketchmatch.testing.conformance.contract import BrokenError, Contract, require
 from sketchmatch.testing.conformance.use import Use, contracts_of_use, writable_view
-from sketchmatch.testing.oracle import best_object_map, is_legal, score_fmap
+from sketchmatch.testing.oracle import (
+    best_object_map,
+    is_legal,
+    is_object_consistent,
+    score_fmap,
+)
 from sketchmatch.testing.problems import random_relations
 
 __all__ = ["CONTRACTS", "Run", "large_problem", "run"]
@@ -151,6 +156,24 @@ def optimal_is_optimal(algorithm: type[Searcher]) -> None:
         )
 
 
+def object_maps_are_kept_to(algorithm: type[Searcher]) -> None:
+    """Yield FMAPs that follow from object maps alone, or say object_consistent = False."""
+    if not algorithm().object_consistent:
+        return
+    for problem in _problems():
+        for progress in _run(algorithm, problem).seen:
+            consistent = is_object_consistent(progress.fmap, problem.table)
+            require(consistent, "it says object_consistent, and an FMAP leads to no object map")
+
+
+def evidence_is_weighed(algorithm: type[Searcher]) -> None:
+    """Take table.entry_evidence for σ, or say object_consistent = False."""
+    if not algorithm().object_consistent:
+        return
+    for progress in run(algorithm(), _problem_with_evidence()).seen:
+        _scored(progress, _problem_with_evidence())
+
+
 def odd_problems_are_solved(algorithm: type[Searcher]) -> None:
     """Search two objects, two among many, alike relations and zero weights like any others."""
     for what, problem in _odd_problems().items():
@@ -230,6 +253,8 @@ CONTRACTS: tuple[Contract, ...] = (
     upper_bound_is_true,
     upper_bound_never_rises,
     optimal_is_optimal,
+    object_maps_are_kept_to,
+    evidence_is_weighed,
     odd_problems_are_solved,
     randomness_is_the_generators,
     clock_plays_no_part,
@@ -246,6 +271,14 @@ def _problems() -> tuple[MatchProblem, ...]:
         MatchProblem(random_relations(rng, 4, 6), alternatives=2),
         MatchProblem(random_relations(rng, 5, 5), weights=(1.0, 2.0, 0.5), alternatives=2),
     )
+
+
+@lru_cache(maxsize=1)
+def _problem_with_evidence() -> MatchProblem:
+    rng = np.random.default_rng(9)
+    table = random_relations(rng, 4, 5)
+    evidence = rng.uniform(0.0, 1.0, (table.template_pairs, 2 * table.argument_pairs))
+    return MatchProblem(replace(table, evidence=evidence), alternatives=2)
 
 
 def _odd_problems() -> dict[str, MatchProblem]:
