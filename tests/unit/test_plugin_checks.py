@@ -4,6 +4,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Annotated, Literal
 
@@ -302,6 +303,21 @@ def illegal(progress, problem, _):
     )
 
 
+def crossing(progress, problem, _):
+    if not is_usual(problem):
+        return progress
+    fmap = Fmap(np.arange(6))
+    return other(
+        progress, fmap=fmap, confidence=score_fmap(fmap, problem.table, problem.weights).total
+    )
+
+
+def seeing_pairs_alone(self, problem, rng):
+    table = replace(problem.table, evidence=None)
+    yield from RandomMaps.search(self, replace(problem, table=table), rng)
+    return Outcome.ITERATION_LIMIT
+
+
 def boasting(progress, problem, _):
     return other(progress, confidence=progress.confidence + (1e-6 if is_usual(problem) else 0.0))
 
@@ -423,6 +439,11 @@ SEARCHERS = {
         "it returned OPTIMAL",
         like(RandomMaps, search=first_only(Outcome.OPTIMAL)),
     ),
+    "object-maps-are-kept-to": (
+        "an FMAP leads to no object map",
+        like(RandomMaps, search=search(crossing)),
+    ),
+    "evidence-is-weighed": ("it claims ζ =", like(RandomMaps, search=seeing_pairs_alone)),
     "odd-problems-are-solved": (
         "with 2 on 2 objects, it raised ZeroDivisionError",
         like(RandomMaps, search=no_two),
@@ -685,6 +706,11 @@ def test_what_breaks_one_contract_fails_that_check_alone(name, seen, algorithm):
     assert seen in sentence
     assert "; expected: " in sentence
     assert "\n" not in sentence
+
+
+@pytest.mark.parametrize("search", [search(crossing), seeing_pairs_alone])
+def test_a_search_of_pairs_may_say_so(search):
+    assert not violations(like(RandomMaps, search=search, object_consistent=False))
 
 
 def test_every_check_has_a_class_that_breaks_it():
