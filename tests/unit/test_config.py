@@ -199,7 +199,7 @@ def test_a_fault_is_one_sentence_with_its_place(file, text, sentence):
         ("LIMITS_MAX_BYTES", "1", "is no setting; did you mean SKETCHMATCH_LIMITS__MAX_BYTES?"),
         ("LIMITS__MAX_BYTES", "0", "is 0; it should be greater than or equal to 1"),
         ("LIMITS__MAX_BYTES", "1" * 5000, "is '1111111111111111111111111111111111111111111111"),
-        ("PROFILE", "best", "is 'best', which is no profile; choose one of: fast, proof,"),
+        ("PROFILE", "best", "is 'best', which is no profile; choose one of: fast, learned, proof"),
         ("PIPELINE__SEARCHER", '{"nmae": 1}', ": nmae is no setting; did you mean SKETCHMATCH_PIP"),
     ],
 )
