@@ -8,7 +8,7 @@ import numpy as np
 
 from sketchmatch.api.kernels import MapState, kernel, map_confidence, map_entry, place_map
 from sketchmatch.model import DILATION_SCALE, FloatArray, IntArray
-from sketchmatch_builtin.searchers._moves import GAIN, Moves, add_values
+from sketchmatch_builtin.searchers._moves import GAIN, Moves, add_turned_values, add_values
 from sketchmatch_builtin.searchers._ranking import Ranking, insert
 
 __all__ = ["Plan", "admit", "breed", "offer"]
@@ -132,9 +132,10 @@ def _found(
             lean = similar * leanings[a, c, 0] + x * leanings[a, c, 1] + y * leanings[a, c, 2]
             values[c] = share * lean + variety * rng.random()
         for before in range(place):
-            add_values(
-                moves, a, order[before], child[order[before]], similar, x, y, steep, level, values
-            )
+            k = order[before]
+            add_values(moves, a, k, child[k], similar, x, y, steep, level, values)
+            if moves.directed and a > k:
+                add_turned_values(moves, a, k, child[k], similar, values)
         best = -1
         for c in range(others):
             if free[c] and (best < 0 or values[c] > values[best]):

@@ -28,7 +28,17 @@ from sketchmatch.api.kernels import (
 )
 from sketchmatch.model import FloatArray, IntArray
 
-__all__ = ["GAIN", "Moves", "climb", "empty_moves", "read_relations", "renew_moves", "weigh_moves"]
+__all__ = [
+    "GAIN",
+    "Moves",
+    "add_turned_values",
+    "add_values",
+    "climb",
+    "empty_moves",
+    "read_relations",
+    "renew_moves",
+    "weigh_moves",
+]
 
 GAIN = 1e-12
 """Less is rounding."""
@@ -251,6 +261,8 @@ def renew_moves(state: MapState, moves: Moves) -> None:
         for k in range(objects):
             if k != a:
                 _add_entries(state, moves, a, k, state.partners[k], 1.0, most)
+                if moves.directed and a > k:
+                    _add_turned(moves, a, k, state.partners[k], 1.0)
                 moves.distances[a] += total_distance(
                     state.levels, state.prefix, state.buckets, state.entries[a, k, _L]
                 )
@@ -273,6 +285,7 @@ def add_values(
     """Add e, cos R and sin R of the entries (a, k) → (c, partner), each times a factor, for all c.
 
     ``steep`` times the distance of L̂ from a level is taken off. ``values`` has shape (N',).
+    Where moves are directed and a > k, :func:`add_turned_values` has to follow.
     """
     objects = moves.slack.shape[0]
     low, high = min(a, k), max(a, k)
@@ -283,11 +296,22 @@ def add_values(
             values[c] += similar * relations[c, _S]
             values[c] += sign * (x * relations[c, _X] + y * relations[c, _Y])
             values[c] -= steep * abs(relations[c, _L] - level)
-    if moves.directed and a > k:
-        turned = _turned(moves, low, high, partner)
-        for c in range(values.size):
-            if c != partner:
-                values[c] += similar * (turned[c] - relations[c, _S])
+
+
+@kernel
+def add_turned_values(
+    moves: Moves, a: int, k: int, partner: int, similar: float, values: FloatArray
+) -> None:
+    """Correct values by the evidence of the entries (k, a) → (partner, c), for a > k and all c.
+
+    :func:`add_values` has added that of (k, a) → (c, partner), which lies together; within its
+    loop a choice between the two would cost half as much again.
+    """
+    objects = moves.slack.shape[0]
+    row = moves.relations[k * objects - k * (k + 3) // 2 + a - 1]
+    for c in range(values.size):
+        if c != partner:
+            values[c] += similar * (row[c, partner, _S] - row[partner, c, _S])
 
 
 @kernel
@@ -371,6 +395,9 @@ def _update_sums(state: MapState, moves: Moves, a: int, c: int) -> None:
             if other >= 0 and k != other:
                 _add_entries(state, moves, k, other, before, -1.0, 0.0)
                 _add_entries(state, moves, k, other, after, 1.0, 0.0)
+                if moves.directed and k > other:
+                    _add_turned(moves, k, other, before, -1.0)
+                    _add_turned(moves, k, other, after, 1.0)
 
 
 @kernel
@@ -392,19 +419,12 @@ def _add_entries(
             sums[a, c, _Y] += sign * relations[c, _Y]
             sums[a, c, _L] += factor * _line(lines, level)
             slack[a, c] += most * abs(level - now)
-    if moves.directed and a > k:
-        turned = _turned(moves, low, high, partner)
-        for c in range(others):
-            if c != partner:
-                sums[a, c, _S] += factor * (turned[c] - relations[c, _S])
 
 
 @kernel
-def _turned(moves: Moves, low: int, high: int, partner: int) -> NDArray[np.float32]:
-    """Return the evidence of the entries (low, high) → (partner, c), for all c."""
-    objects = moves.slack.shape[0]
-    i = low * objects - low * (low + 3) // 2 + high - 1
-    return moves.relations[i, :, partner, _S]
+def _add_turned(moves: Moves, a: int, k: int, partner: int, factor: float) -> None:
+    """Correct the sums of a after :func:`_add_entries`, as :func:`add_turned_values` does."""
+    add_turned_values(moves, a, k, partner, factor, moves.sums[a, :, _S])
 
 
 @kernel
