@@ -294,7 +294,7 @@ def test_the_built_in_profiles_are_sound_and_as_the_thesis_has_it():
     path, faults = check()
     assert (path, faults) == (None, [])
     profiles = {profile.name: profile for profile in builtin().defaults.profiles}
-    assert list(profiles) == ["fast", "proof", "thesis-easm", "thesis-fsnn"]
+    assert list(profiles) == ["fast", "learned", "proof", "thesis-easm", "thesis-fsnn"]
     assert all(profile.summary for profile in profiles.values())
     easm = profiles["thesis-easm"].stages["searcher"].parameters
     assert (easm["crossover_rate"], easm["exchange_rate"]) == (0.7, 0.5)

@@ -52,7 +52,8 @@ def best_values(table, price):
     values = {}
     for part in every_part(table):
         best = max(
-            zeta(partners, part.table) for partners in itertools.permutations(others, len(part.kept))
+            zeta(partners, part.table)
+            for partners in itertools.permutations(others, len(part.kept))
         )
         worth = best - price * part.left_out / part.objects
         values[part.left_out] = max(worth, values.get(part.left_out, worth))
@@ -194,8 +195,9 @@ def test_a_complete_sketch_is_matched_completely():
 
 def test_nothing_changes_where_it_is_not_allowed():
     sketch, map_, _ = place_with_extra()
-    plain, dear = matched(sketch, map_), matched(
-        sketch, map_, allow_unmatched=True, unmatched_price=1000.0
+    plain, dear = (
+        matched(sketch, map_),
+        matched(sketch, map_, allow_unmatched=True, unmatched_price=1000.0),
     )
     assert plain.object_map == dear.object_map
     assert plain.confidence == dear.confidence

@@ -47,8 +47,8 @@ class Calibration:
 
 
 _CALIBRATIONS = {
-    ConfidenceWeights(): Calibration(0.27, 5.0, 1.5, 0.8, 0.5),
-    LEARNED: Calibration(0.13, 8.0, 1.5, 0.8, 0.5),
+    ConfidenceWeights(): Calibration(0.35, 15.5, 1.08, 0.861, 0.41),
+    LEARNED: Calibration(0.12, 96.0, 0.8, 0.952, 0.43),
 }
 
 
