@@ -152,7 +152,7 @@ def test_a_label_that_looks_like_markup_is_shown_as_it_is(command, tmp_path):
 
 
 def test_a_pipe_stays_clean_while_the_terminal_shows_the_search():
-    terminal = Terminal("match", *ROOM, *LONG, "--time-budget", "1", "--json", stdout=False)
+    terminal = Terminal("match", *ROOM, *LONG, "--time-budget", "4", "--json", stdout=False)
     terminal.wait_for("searching")
     code, piped = terminal.end()
     assert code == 0

@@ -2,6 +2,7 @@ import json
 import math
 import os
 import re
+import resource
 import socket
 import subprocess
 import time
@@ -37,9 +38,9 @@ class Demo:
     ----------
     code, stdout, stderr
         How it ended and what it said.
-    result_seconds, seconds
+    result_seconds, cpu_seconds
         Time from the start of the process to the result, which is when it lets its server go, and
-        to its end.
+        the processor's time for all of it: how long it takes on a machine that does nothing else.
     overlay
         Where it drew.
     """
@@ -48,12 +49,13 @@ class Demo:
     stdout: str
     stderr: str
     result_seconds: float
-    seconds: float
+    cpu_seconds: float
     overlay: Path
 
 
 def run_demo(folder: Path, **environment: str) -> Demo:
     overlay, began, result = folder / "demo.png", time.monotonic(), math.nan
+    cpu = _cpu_of_children()
     with subprocess.Popen(
         [*COMMAND, "demo", "--overlay", str(overlay)],
         stdout=subprocess.PIPE,
@@ -68,9 +70,14 @@ def run_demo(folder: Path, **environment: str) -> Demo:
             if "stopping" in line:
                 result = time.monotonic() - began
         stdout = process.stdout.read()
-    seconds = time.monotonic() - began
-    print(f"{result:.2f} s to the result, {seconds:.2f} s in all")
-    return Demo(process.returncode, stdout, "".join(said), result, seconds, overlay)
+    cpu = _cpu_of_children() - cpu
+    print(f"{result:.2f} s to the result, {cpu:.2f} s of the processor in all")
+    return Demo(process.returncode, stdout, "".join(said), result, cpu, overlay)
+
+
+def _cpu_of_children() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +118,7 @@ def test_a_first_ever_run_says_that_it_compiles_and_takes_less_than_40_s(tmp_pat
     assert first.code == 0
     assert "[server] sketchmatch: compiling the kernels: this happens once" in first.stderr
     assert len(first.stdout.splitlines()) == 9
-    assert first.seconds < 40.0
+    assert first.cpu_seconds < 40.0
 
 
 def test_the_demo_shows_the_search_on_a_terminal(tmp_path):

@@ -32,6 +32,7 @@ __all__ = ["STOP", "Answer", "Ended", "Failed", "Job", "Method", "Ready", "live"
 STOP = "stop"
 """Ends the job under way."""
 
+_LOADING = 120.0
 _POLITE = 10
 _FIRST_TO_GO = 500
 
@@ -112,6 +113,7 @@ def live(connection: Connection, distributions: tuple[str, ...]) -> None:
         Whose algorithms are loaded, beside the engine's own.
     """
     _step_back()
+    _end_unless_alive(_LOADING)
     registry = discover(rules=PluginRules.of(allow=distributions))
     warm_up(registry)
     jobs: queue.SimpleQueue[Job] = queue.SimpleQueue()
@@ -120,12 +122,18 @@ def live(connection: Connection, distributions: tuple[str, ...]) -> None:
     listening.start()
     connection.send(Ready())
     while True:
+        faulthandler.cancel_dump_traceback_later()
         job = jobs.get()
         setup = Setup(registry, job.defaults, job.limits)
+        _end_unless_alive(job.patience)
         for message in _messages(job, setup, stop):
-            faulthandler.dump_traceback_later(2.0 * job.patience, exit=True)
+            _end_unless_alive(job.patience)
             connection.send(message)
-        faulthandler.cancel_dump_traceback_later()
+
+
+def _end_unless_alive(patience: float) -> None:
+    """End the process if it is not called again in time, even while no Python can run."""
+    faulthandler.dump_traceback_later(2.0 * patience, exit=True)
 
 
 def _step_back() -> None:

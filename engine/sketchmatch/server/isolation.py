@@ -14,7 +14,7 @@ import multiprocessing
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from typing import TYPE_CHECKING
@@ -190,10 +190,21 @@ class _Child:
                 raise _silent(watch, "did not load in its own process")
 
     def answer(self, job: Job, watch: Watch, stop: threading.Event) -> Iterator[bytes]:
+        """Do a job; one that is given up or stopped is over, if the child obeys."""
         if stop.is_set():
             return
         self.done = False
-        self._connection.send(job)
+        self._send(job, watch)
+        try:
+            yield from self._responses(watch, stop)
+        except GeneratorExit:
+            self._stop(watch)
+            raise
+        if not self.done:
+            self._stop(watch)
+
+    def _responses(self, watch: Watch, stop: threading.Event) -> Iterator[bytes]:
+        """Yield responses until the job is done or to be stopped."""
         started = heard = time.monotonic()
         while not stop.is_set():
             message = self._received(watch)
@@ -215,29 +226,35 @@ class _Child:
                     watch,
                     f"did not end {_OVERTIME:g} s after its time budget of {watch.time_budget:g} s",
                 )
-        self._stop(watch)
 
     def _stop(self, watch: Watch) -> None:
         """Ask it to stop; it is done if it does so in time."""
-        self._connection.send(STOP)
         deadline = time.monotonic() + _STOPPING
-        while not self.done and time.monotonic() < deadline:
-            self.done = isinstance(self._received(watch), Ended | Failed)
+        with suppress(PluginError):
+            self._send(STOP, watch)
+            while not self.done and time.monotonic() < deadline:
+                self.done = isinstance(self._received(watch), Ended | Failed)
+
+    def _send(self, message: object, watch: Watch) -> None:
+        try:
+            self._connection.send(message)
+        except OSError:
+            raise self._gone(watch) from None
 
     def _received(self, watch: Watch) -> object:
         """Return the next message, or None if there is none for a moment."""
         ready = wait([self._connection, self._process.sentinel], _LOOK)
-        if self._connection in ready:
-            try:
-                return self._connection.recv()
-            except (EOFError, OSError):
-                pass
-        elif not ready:
+        if not ready:
             return None
+        if self._connection in ready:
+            with suppress(EOFError, OSError):
+                return self._connection.recv()
+        raise self._gone(watch)
+
+    def _gone(self, watch: Watch) -> PluginError:
         self._process.join()
-        raise PluginError(
-            f"{watch.culprits} ended its process ({_ending(self._process.exitcode)}); {_REMEDY}"
-        )
+        ending = _ending(self._process.exitcode)
+        return PluginError(f"{watch.culprits} ended its process ({ending}); {_REMEDY}")
 
 
 def _silent(watch: Watch, what: str) -> PluginError:
