@@ -24,6 +24,7 @@ from sketchmatch.pipeline.unmatched import (
     part_of,
     trials,
 )
+from sketchmatch.pipeline.warmup import warm_up, warm_up_others
 from sketchmatch.registry import default_registry
 from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.searchers.exact import Exact
@@ -31,6 +32,13 @@ from tests.strategies import random_table, with_evidence
 
 WEIGHTS = (1.0, 2.0, 0.5)
 SEARCHERS = ["auto", "exact", "direct", "easm"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _warm():
+    # On a new machine the kernels compile here, and not while a test measures time.
+    warm_up(default_registry())
+    warm_up_others(default_registry())
 
 
 def zeta(partners, table):

@@ -47,8 +47,8 @@ class Calibration:
 
 
 _CALIBRATIONS = {
-    ConfidenceWeights(): Calibration(0.35, 15.5, 1.08, 0.861, 0.41),
-    LEARNED: Calibration(0.12, 96.0, 0.8, 0.952, 0.43),
+    ConfidenceWeights(): Calibration(0.35, 12.4, 1.18, 0.861, 0.44),
+    LEARNED: Calibration(0.12, 80.5, 0.8, 0.95, 0.46),
 }
 
 

@@ -43,8 +43,11 @@ __all__ = [
 FEWEST = 3
 """Template objects that find a partner in any case."""
 
-_WIDTH = 10
-"""Parts of each size that are searched at most."""
+_FEW = 10
+"""Template objects up to which each is left out in turn."""
+
+_WIDTH = 5
+"""Parts of each size that are searched where there are more."""
 
 _BRANCHES = 3
 """Parts of each size that one object more is taken from."""
@@ -174,10 +177,10 @@ def net_confidence(confidence: float, left_out: int, objects: int, price: float)
 def trials(objects: int, weights: Weights, price: float) -> Generator[Trial, Found, None]:
     """Say which parts of a template to search, given what came of those before.
 
-    First comes all of it. Then each object is left out in turn, or, of more than ten, those without
-    which ζ of the map found is highest; then one object more, from the best three parts; and so on
-    until that makes nothing better. So of two maps, the later one that is worth more has the
-    higher ζ.
+    First comes all of it. Then each object is left out in turn, or, of more than ten, the five
+    without which ζ of the map found is highest; then one object more, from the best three parts;
+    and so on until that makes nothing better. So of two maps, the later one that is worth more
+    has the higher ζ.
 
     Parameters
     ----------
@@ -197,7 +200,7 @@ def trials(objects: int, weights: Weights, price: float) -> Generator[Trial, Fou
     found = yield Trial(tuple(range(objects)), share=0.5 if most > 0 else 1.0)
     level = [_Lead.of(found, weights, price)]
     for _ in range(most):
-        best, wanted = level[0].value, _without_one_more(level[:_BRANCHES])
+        best, wanted = level[0].value, _without_one_more(level[:_BRANCHES], objects)
         level = []
         for k, kept in enumerate(wanted):
             found = yield Trial(kept, share=1.0 / (len(wanted) - k + 1))
@@ -289,11 +292,12 @@ class _Lead:
         )
 
 
-def _without_one_more(level: Iterable[_Lead]) -> list[tuple[int, ...]]:
+def _without_one_more(level: Iterable[_Lead], objects: int) -> list[tuple[int, ...]]:
     """Return what is kept where some parts lose an object more, the most promising first."""
     promise: dict[tuple[int, ...], float] = {}
     for lead in level:
         for g, value in enumerate(lead.without):
             kept = lead.kept[:g] + lead.kept[g + 1 :]
             promise[kept] = max(value, promise.get(kept, value))
-    return sorted(promise, key=lambda kept: -promise[kept])[:_WIDTH]
+    width = objects if objects <= _FEW else _WIDTH
+    return sorted(promise, key=lambda kept: -promise[kept])[:width]
