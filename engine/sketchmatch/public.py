@@ -43,7 +43,9 @@ def match(
     params: Mapping[str, Mapping[str, Any]] | None = None,
     seed: int = 0,
     time_budget: float | None = None,
-    weights: RequestWeights = (1.0, 1.0, 1.0),
+    weights: RequestWeights | None = None,
+    allow_unmatched: bool | None = None,
+    unmatched_price: float | None = None,
     alternatives: int | None = None,
     on_progress: Callable[[Progress], None] | None = None,
     config: str | Path | None = None,
@@ -69,7 +71,13 @@ def match(
         Seconds after which the best answer so far is given, or None for no limit.
     weights
         Of ζσ, ζR and ζL in ζ; with two numbers more, of ζS and ζM, which compare each object with
-        its partner in shape and in size.
+        its partner in shape and in size. Left out, as the profile says, or else 1, 1, 1.
+    allow_unmatched
+        Whether an object may stay without partner on both sides, where that is likelier. Left out,
+        as the profile says, or else not: the smaller scene is matched completely.
+    unmatched_price
+        What a map loses that leaves all objects of the smaller scene out, in units of ζ, and in
+        proportion where it leaves out some. Left out, one that was learned for the weights.
     alternatives
         How many of the next best object maps the result shall hold; None for 3, or as many as
         there are.
@@ -111,6 +119,8 @@ def match(
             seed=seed,
             time_budget=time_budget,
             weights=weights,
+            allow_unmatched=allow_unmatched,
+            unmatched_price=unmatched_price,
             alternatives=alternatives,
             profile=profile or "",
         )

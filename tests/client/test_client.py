@@ -94,6 +94,16 @@ class TestRequest:
         assert weights.HasField("rotation")
         assert not weights.HasField("shape")
 
+    def test_carries_whether_objects_may_stay_unmatched(self, call, server):
+        call(server.address, "match", SKETCH, MAP, allow_unmatched=False)
+        call(server.address, "match", SKETCH, MAP, allow_unmatched=True, unmatched_price=0.5)
+        without, allowing = server.requests
+        assert without.HasField("allow_unmatched")
+        assert not without.allow_unmatched
+        assert not without.HasField("unmatched_price")
+        assert allowing.allow_unmatched
+        assert allowing.unmatched_price == 0.5
+
     def test_carries_weights_of_shape_and_size(self, call, server):
         call(server.address, "match", SKETCH, MAP, weights=(1, 2, 3, 0.5, 0))
         weights = server.requests[0].weights
@@ -109,6 +119,8 @@ class TestRequest:
             ({"time_budget": "1 s"}, "time_budget is not a number of seconds"),
             ({"time_budget": float("nan")}, "time_budget is not a number of seconds"),
             ({"time_budget": float("inf")}, "time_budget is not a number of seconds"),
+            ({"allow_unmatched": "yes"}, "allow_unmatched is neither True nor False"),
+            ({"unmatched_price": "dear"}, "unmatched_price is not a number"),
             ({"weights": (1, 1)}, "weights is not three numbers"),
             ({"weights": "abc"}, "weights is not three numbers"),
             (

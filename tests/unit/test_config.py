@@ -199,7 +199,7 @@ def test_a_fault_is_one_sentence_with_its_place(file, text, sentence):
         ("LIMITS_MAX_BYTES", "1", "is no setting; did you mean SKETCHMATCH_LIMITS__MAX_BYTES?"),
         ("LIMITS__MAX_BYTES", "0", "is 0; it should be greater than or equal to 1"),
         ("LIMITS__MAX_BYTES", "1" * 5000, "is '1111111111111111111111111111111111111111111111"),
-        ("PROFILE", "best", "is 'best', which is no profile; choose one of: fast, proof,"),
+        ("PROFILE", "best", "is 'best', which is no profile; choose one of: fast, learned, proof"),
         ("PIPELINE__SEARCHER", '{"nmae": 1}', ": nmae is no setting; did you mean SKETCHMATCH_PIP"),
     ],
 )
@@ -294,7 +294,7 @@ def test_the_built_in_profiles_are_sound_and_as_the_thesis_has_it():
     path, faults = check()
     assert (path, faults) == (None, [])
     profiles = {profile.name: profile for profile in builtin().defaults.profiles}
-    assert list(profiles) == ["fast", "proof", "thesis-easm", "thesis-fsnn"]
+    assert list(profiles) == ["fast", "learned", "proof", "thesis-easm", "thesis-fsnn"]
     assert all(profile.summary for profile in profiles.values())
     easm = profiles["thesis-easm"].stages["searcher"].parameters
     assert (easm["crossover_rate"], easm["exchange_rate"]) == (0.7, 0.5)

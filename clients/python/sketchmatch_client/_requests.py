@@ -40,7 +40,13 @@ class MatchOptions(TypedDict, total=False):
         Seconds, or a timedelta, after which the best match so far is the result.
     weights
         Weights of similarity, rotation and dilation in ζ, and with two numbers more of the
-        objects' own shape and size. Left out: 1, 1, 1, 0, 0.
+        objects' own shape and size. Left out: as the profile says, or else 1, 1, 1, 0, 0.
+    allow_unmatched
+        Whether an object may stay without partner on both sides where that is likelier. Left out:
+        as the profile says, or else not.
+    unmatched_price
+        What a match loses that leaves all objects of the smaller scene out, in units of ζ, and in
+        proportion where it leaves out some. Left out: one that fits the weights.
     alternatives
         How many of the next best object maps the result shall hold. Left out: 3, or as many as
         there are.
@@ -58,6 +64,8 @@ class MatchOptions(TypedDict, total=False):
     seed: int | None
     time_budget: float | timedelta | None
     weights: Weights | None
+    allow_unmatched: bool | None
+    unmatched_price: float | None
     alternatives: int | None
     profile: str | None
 
@@ -70,6 +78,8 @@ def match_request(
     seed: int | None = None,
     time_budget: float | timedelta | None = None,
     weights: Weights | None = None,
+    allow_unmatched: bool | None = None,
+    unmatched_price: float | None = None,
     alternatives: int | None = None,
     profile: str | None = None,
     **names: str | None,
@@ -97,6 +107,12 @@ def match_request(
             "is not three numbers, similarity, rotation, dilation, or five, with shape and size",
         ):
             request.weights.CopyFrom(_weights(*weights))
+    if allow_unmatched is not None:
+        with refused_as("INVALID_FIELD", "allow_unmatched", "is neither True nor False"):
+            request.allow_unmatched = allow_unmatched
+    if unmatched_price is not None:
+        with refused_as("INVALID_FIELD", "unmatched_price", "is not a number"):
+            request.unmatched_price = unmatched_price
     if alternatives is not None:
         with refused_as("INVALID_FIELD", "alternatives", "is not a whole number from 0 to 100"):
             request.alternatives = alternatives

@@ -187,6 +187,7 @@ def facts(result: match_pb2.MatchResult) -> list[tuple[str, str]]:
         ("OMAP confidence", f"{result.omap_confidence:.3f}"),
         ("Rotation", f"{math.degrees(result.rotation_radians):.0f}°"),
         ("Scale", f"{result.scale:.3g}"),
+        *([("Probability", f"{result.probability:.0%}")] if result.HasField("probability") else []),
     ]
 
 
@@ -200,6 +201,7 @@ def _match_table(match: Match) -> RenderableType:
     table.add_column("confidence", justify="right")
     table.add_column("", width=12)
     table.add_column("margin", justify="right")
+    table.add_column("likely", justify="right")
     table.add_column("in the sketch")
     labels = [item.label for item in match.scenes.sketch.objects]
     for line in result.object_matches:
@@ -211,6 +213,7 @@ def _match_table(match: Match) -> RenderableType:
             f"{line.confidence:.3f}",
             ProgressBar(total=1.0, completed=line.confidence, width=12),
             _margin(line),
+            f"{line.probability:.0%}" if line.HasField("probability") else "",
             _relation(line, labels),
         )
     parts = result.fmap_confidence

@@ -44,6 +44,8 @@ def match_events(
             seed=settings.seed,
             time_budget=settings.time_budget,
             weights=settings.weights,
+            allow_unmatched=settings.allow_unmatched,
+            unmatched_price=settings.unmatched_price,
             alternatives=settings.alternatives,
             profile=settings.profile,
         )

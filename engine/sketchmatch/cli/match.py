@@ -52,12 +52,25 @@ def match(
         typer.Option(metavar="SECONDS", help="Give the best answer so far after this time."),
     ] = None,
     weights: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="W1,W2,W3[,W4,W5]",
-            help="Weights of ζσ, ζR and ζL in ζ, and of the objects' shapes and sizes.",
+            help="Weights of ζσ, ζR and ζL in ζ, and of the objects' shapes and sizes; 1,1,1 "
+            "by default.",
         ),
-    ] = "1,1,1",
+    ] = None,
+    allow_unmatched: Annotated[
+        bool | None,
+        typer.Option(
+            "--allow-unmatched/--no-allow-unmatched",
+            help="Leave objects without partner on both sides where that is likelier.",
+            show_default=False,
+        ),
+    ] = None,
+    unmatched_price: Annotated[
+        float | None,
+        typer.Option(metavar="PRICE", help="What leaving out all objects costs, in units of ζ."),
+    ] = None,
     alternatives: Annotated[
         int | None, typer.Option(metavar="K", help="How many of the next best maps; 3 by default.")
     ] = None,
@@ -88,7 +101,9 @@ def match(
         params=parse_settings(settings),
         seed=seed,
         time_budget=time_budget,
-        weights=_weights(weights),
+        weights=None if weights is None else _weights(weights),
+        allow_unmatched=allow_unmatched,
+        unmatched_price=unmatched_price,
         alternatives=alternatives,
         profile=profile,
     )

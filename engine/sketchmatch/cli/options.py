@@ -50,7 +50,8 @@ Profile = Annotated[
     typer.Option(
         "--profile",
         metavar="NAME",
-        help="Start from this pipeline: fast, proof, thesis-easm, thesis-fsnn or one of your own.",
+        help="Start from this pipeline: fast, learned, proof, thesis-easm, thesis-fsnn or one of "
+        "your own.",
     ),
 ]
 Settings = Annotated[
@@ -86,7 +87,7 @@ class MatchSettings:
         Algorithm by stage; empty for the default.
     params
         Parameters by stage, where some were set.
-    seed, time_budget, weights, alternatives
+    seed, time_budget, weights, allow_unmatched, unmatched_price, alternatives
         As in :class:`sketchmatch.pipeline.match.MatchRequest`.
     profile
         The pipeline to start from; empty for the default one.
@@ -96,7 +97,9 @@ class MatchSettings:
     params: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     seed: int = 0
     time_budget: float | None = None
-    weights: RequestWeights = (1.0, 1.0, 1.0)
+    weights: RequestWeights | None = None
+    allow_unmatched: bool | None = None
+    unmatched_price: float | None = None
     alternatives: int | None = None
     profile: str = ""
 

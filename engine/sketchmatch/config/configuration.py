@@ -225,7 +225,13 @@ def _defaults(settings: Settings) -> Defaults:
         pipeline=_selection(settings.pipeline),
         parameters={kind: getattr(settings.algorithms, kind) for kind in Kind},
         profiles=tuple(
-            Profile(name, profile.summary, _selection(profile))
+            Profile(
+                name,
+                profile.summary,
+                _selection(profile),
+                profile.weights,  # type: ignore[arg-type]  # three or five
+                profile.allow_unmatched,
+            )
             for name, profile in settings.profiles.items()
         ),
         profile=settings.profile,

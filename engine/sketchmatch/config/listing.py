@@ -143,6 +143,10 @@ def _profiles(configuration: Configuration) -> _Found:
     for profile in configuration.defaults.profiles:
         path = ("profiles", profile.name)
         yield (*path, "summary"), profile.summary, ""
+        if profile.weights is not None:
+            yield (*path, "weights"), list(profile.weights), ""
+        if profile.allow_unmatched:
+            yield (*path, "allow_unmatched"), True, ""
         for stage, choice in profile.stages.items():
             if choice.name:
                 yield (*path, stage, "name"), choice.name, ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Self, get_args, get_origin
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_settings import (
     BaseSettings,
     InitSettingsSource,
@@ -28,6 +28,14 @@ def _listed(value: Any) -> Any:
     return value
 
 
+def _weighing(weights: tuple[float, ...]) -> tuple[float, ...]:
+    if len(weights) not in (3, 5) or not sum(weights):
+        raise ValueError("should be three or five numbers, not all 0")
+    return weights
+
+
+_Weight = Annotated[float, Field(ge=0.0, le=1e6)]
+_Weights = Annotated[tuple[_Weight, ...], AfterValidator(_weighing)]
 _Names = Annotated[tuple[str, ...], BeforeValidator(_listed)]
 _Parameters = dict[str, Any]
 _Named = dict[str, _Parameters]
@@ -60,6 +68,15 @@ class _Profile(_Stages):
     """A pipeline that a request can name."""
 
     summary: str = Field("", description="One line for lists.")
+    weights: _Weights | None = Field(
+        None,
+        description="Weights of ζσ, ζR and ζL in ζ, and perhaps of the objects' shapes and sizes; "
+        "1, 1, 1, when left out.",
+    )
+    allow_unmatched: bool = Field(
+        False,
+        description="Leave objects without partner on both sides where that is likelier.",
+    )
 
 
 class _Algorithms(_Section):

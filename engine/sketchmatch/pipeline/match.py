@@ -7,7 +7,7 @@ import time
 import uuid
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
 from typing import TypeVar
@@ -27,6 +27,7 @@ from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, Reason
 from sketchmatch.kernels.evidence import SelfRelations
 from sketchmatch.model import (
     ConfidenceWeights,
+    FloatArray,
     RelationTable,
     RequestWeights,
     Scene,
@@ -35,17 +36,22 @@ from sketchmatch.model import (
 )
 from sketchmatch.pipeline import reading
 from sketchmatch.pipeline.alternatives import best_others, exchange_confidences, partner_margins
+from sketchmatch.pipeline.calibration import (
+    CALIBRATED_SIMILARITY,
+    Calibration,
+    calibrated,
+    default_price,
+)
 from sketchmatch.pipeline.correspond import (
     fmap_confidence,
     global_dilation,
     global_rotation,
-    object_map,
-    occm,
 )
 from sketchmatch.pipeline.describe import describe
 from sketchmatch.pipeline.evidence import compare_objects, weigh_objects
 from sketchmatch.pipeline.limits import check_comparisons, check_histograms
 from sketchmatch.pipeline.plugins import blaming, checked_progress, inspecting, segmented
+from sketchmatch.pipeline.probability import UNKNOWN, Likelihood, likelihood
 from sketchmatch.pipeline.relate import check_exponent, relate
 from sketchmatch.pipeline.result import (
     AlternativeMap,
@@ -53,7 +59,22 @@ from sketchmatch.pipeline.result import (
     ObjectMatch,
     Statistics,
 )
-from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, Pipeline, Selection, resolve
+from sketchmatch.pipeline.selection import (
+    UNCONFIGURED,
+    Defaults,
+    Pipeline,
+    Profile,
+    Selection,
+    resolve,
+)
+from sketchmatch.pipeline.unmatched import (
+    Found,
+    Part,
+    Rival,
+    omission_confidences,
+    part_of,
+    trials,
+)
 from sketchmatch.pipeline.words import nearest_relations
 from sketchmatch.registry import Registry
 
@@ -71,6 +92,7 @@ __all__ = [
 _PROGRESS_EVERY = 0.05
 _MAX_SEED = 2**64 - 1
 _MAX_WEIGHT = 1e6
+_MAX_PRICE = 1e3
 _MAX_ALTERNATIVES = 100
 _ALTERNATIVES = 3
 _Value = TypeVar("_Value")
@@ -100,12 +122,19 @@ class MatchRequest:
     time_budget
         Seconds after which the best answer so far is given, or None for no limit.
     weights
-        Of ζσ, ζR and ζL in ζ, and of ζS and ζM where there are five.
+        Of ζσ, ζR and ζL in ζ, and of ζS and ζM where there are five; None for those of the profile,
+        or else 1, 1, 1.
     alternatives
         How many of the next best object maps the result shall hold; None for 3, or as many as
         there are.
     profile
         Name of the profile to take the rest from; empty for the default one.
+    allow_unmatched
+        Whether an object may stay without partner on both sides where that is likelier; None for
+        what the profile says, or else not: the smaller scene is matched completely.
+    unmatched_price
+        What a map loses for leaving all objects of the smaller scene out, and for some of them
+        their share of it, in units of ζ; None for the one that fits the weights.
     """
 
     sketch: Source | Scene
@@ -113,9 +142,11 @@ class MatchRequest:
     selection: Selection = field(default_factory=lambda: MappingProxyType({}))
     seed: int = 0
     time_budget: float | None = None
-    weights: RequestWeights = (1.0, 1.0, 1.0)
+    weights: RequestWeights | None = None
     alternatives: int | None = None
     profile: str = ""
+    allow_unmatched: bool | None = None
+    unmatched_price: float | None = None
 
     def __post_init__(self) -> None:
         if not (isinstance(self.seed, int) and 0 <= self.seed <= _MAX_SEED):
@@ -128,45 +159,42 @@ class MatchRequest:
                 "time_budget",
                 f"is {self.time_budget:g} s; give a positive time or none at all",
             )
-        names = ConfidenceWeights._fields
-        if len(self.weights) not in (3, len(names)):
-            raise InvalidInputError(
-                Reason.INVALID_FIELD,
-                "weights",
-                f"are {len(self.weights)} numbers; give three, {', '.join(names[:3])}, "
-                f"or five, with {' and '.join(names[3:])}",
-            )
-        for name, weight in zip(names, self.weights, strict=False):
-            if not 0 <= weight <= _MAX_WEIGHT:
-                raise InvalidInputError(
-                    Reason.INVALID_FIELD,
-                    f"weights.{name}",
-                    f"is {weight:g}; give a number from 0 to {_MAX_WEIGHT:g}",
-                )
+        if self.weights is not None:
+            _check_request_weights(self.weights)
         if self.alternatives is not None and not 0 <= self.alternatives <= _MAX_ALTERNATIVES:
             raise InvalidInputError(
                 Reason.INVALID_FIELD,
                 "alternatives",
                 f"is {self.alternatives}; give a number from 0 to {_MAX_ALTERNATIVES}",
             )
-        if sum(self.weights) == 0:
+        price = self.unmatched_price
+        if price is not None and not 0 < price <= _MAX_PRICE:
             raise InvalidInputError(
-                Reason.INVALID_FIELD, "weights", "are all zero; give at least one above zero"
+                Reason.INVALID_FIELD,
+                "unmatched_price",
+                f"is {price:g}; give a number above 0, at most {_MAX_PRICE:g}",
             )
-
-    @property
-    def confidence_weights(self) -> ConfidenceWeights:
-        """The weights by name, all five."""
-        return ConfidenceWeights(*self.weights)
 
 
 @dataclass(frozen=True)
 class Accepted:
-    """The request is sound and work begins."""
+    """The request is sound and work begins.
+
+    Attributes
+    ----------
+    match_id
+        Unique to this match.
+    seed, pipeline, weights
+        Those in force.
+    unmatched_price
+        The price in force, or None where every object of the smaller scene must find a partner.
+    """
 
     match_id: str
     seed: int
     pipeline: Pipeline
+    weights: ConfidenceWeights
+    unmatched_price: float | None
 
 
 @dataclass(frozen=True)
@@ -261,12 +289,15 @@ class _Match:
             )
         except InvalidInputError as error:
             raise error.within("pipeline") from None
-        self.weights = request.confidence_weights
+        profile = defaults.named(request.profile)
+        self.weights = ConfidenceWeights(*(request.weights or profile.weights or ()))
         _check_weights(self.weights, self.pipeline.searcher)
+        self.price = _price(request, profile, self.weights, self.pipeline.searcher)
         self.own: SelfRelations | None = None
 
     def run(self) -> Generator[MatchEvent, None, None]:
-        yield Accepted(self.match_id, self.request.seed, self.pipeline)
+        price = self.price if self.price < math.inf else None
+        yield Accepted(self.match_id, self.request.seed, self.pipeline, self.weights, price)
         if self.may_report():
             yield Progress(Phase.SEGMENT, self.reported - self.started)
         with self.timed("segment"):
@@ -289,8 +320,9 @@ class _Match:
                 scenes, descriptors = scenes[::-1], descriptors[::-1]
             table = yield from self.related(scenes, descriptors)
         with self.timed("search"):
-            found, outcome = yield from self.search(table, exchanged, count)
-        yield Finished(self.result(sketch, map_, drawn, table, exchanged, found, outcome, count))
+            whole = Part.whole(table, self.own)
+            found, rivals = yield from self.search(whole, exchanged, count)
+        yield Finished(self.result(sketch, map_, drawn, exchanged, found, rivals, count))
 
     def described(self, side: str, scene: Scene) -> Generator[MatchEvent, None, SceneDescriptor]:
         """Return the histograms of one side."""
@@ -347,36 +379,95 @@ class _Match:
                 yield Progress(phase, self.reported - self.started, done)
 
     def search(
-        self, table: RelationTable, exchanged: bool, count: int
-    ) -> Generator[MatchEvent, None, tuple[SearchProgress, Outcome]]:
-        """Run the searcher until it ends or the time budget does."""
-        searcher = self.pipeline.searcher
-        budget = self.request.time_budget
-        left = None if budget is None else max(0.0, budget - self.elapsed())
-        problem = MatchProblem(table, self.weights.searched, count, left)
-        best: SearchProgress | None = None
+        self, whole: Part, exchanged: bool, count: int
+    ) -> Generator[MatchEvent, None, tuple[Found, list[Rival]]]:
+        """Search all that is to be searched; return the best, and what else was found."""
+        self.effort = (0, 0)
+        plan = trials(whole.objects, self.weights.searched, self.price)
+        trial, rivals = next(plan), list[Rival]()
+        best: Found | None = None
+        while True:
+            part = yield from self.parted(whole, trial.kept, best, exchanged)
+            found = yield from self.searched(part, trial.share, best, exchanged, count)
+            former = best
+            best = found if best is None else self.better(found, best)
+            if former is not None:
+                worse = former if best is found else found
+                rivals.append(worse.rival(self.weights.searched))
+            try:
+                trial = plan.send(found)
+            except StopIteration:
+                return best, rivals
+            if self.out_of_time():
+                return replace(best, outcome=Outcome.TIME_BUDGET), rivals
+
+    def parted(
+        self, whole: Part, kept: tuple[int, ...], former: Found | None, exchanged: bool
+    ) -> Generator[MatchEvent, None, Part]:
+        """Return a part of what is to be searched."""
+        work = part_of(whole, kept)
+        while True:
+            try:
+                next(work)
+            except StopIteration as stop:
+                return stop.value  # type: ignore[no-any-return]
+            if former is not None and self.may_report():
+                yield self.progress(former, exchanged)
+
+    def searched(
+        self, part: Part, share: float, former: Found | None, exchanged: bool, count: int
+    ) -> Generator[MatchEvent, None, Found]:
+        """Run the searcher on a part until it ends, or its share of the time budget does.
+
+        Progress shows the best of this and of what was found before.
+        """
+        searcher, table = self.pipeline.searcher, part.table
+        there_are = math.perm(table.argument_objects, table.template_objects) - 1
+        left = share * self.time_left()
+        problem = MatchProblem(
+            table,
+            self.weights.searched,
+            min(count, there_are),
+            left if left < math.inf else None,
+        )
+        until = time.monotonic() + left
+        iterations, evaluations = self.effort
+        found: Found | None = None
         with self.searching(searcher, problem) as work:
             while True:
                 with blaming(searcher, self.registry):
                     try:
-                        best = checked_progress(next(work), problem, best)
+                        before = None if found is None else found.best
+                        best = checked_progress(next(work), problem, before)
                     except StopIteration as stop:
-                        if best is None:
+                        if found is None:
                             raise ValueError("it ended without any answer") from None
-                        return best, Outcome(stop.value or Outcome.CONVERGED)
-                if self.out_of_time():
-                    return best, Outcome.TIME_BUDGET
+                        return replace(found, outcome=Outcome(stop.value or Outcome.CONVERGED))
+                found = Found(part, best)
+                self.effort = (iterations + best.iteration, evaluations + best.evaluations)
+                if time.monotonic() > until:
+                    return found
                 if self.may_report():
-                    mapped = object_map(occm(best.fmap, table))
-                    yield Progress(
-                        Phase.SEARCH,
-                        self.reported - self.started,
-                        iteration=best.iteration,
-                        evaluations=best.evaluations,
-                        confidence=best.confidence,
-                        upper_bound=best.upper_bound,
-                        matches=reading.matches(mapped, exchanged),
-                    )
+                    yield self.progress(self.better(found, former), exchanged)
+
+    def better(self, found: Found, former: Found | None) -> Found:
+        """Return what is worth more."""
+        if former is None or found.value(self.price) > former.value(self.price):
+            return found
+        return former
+
+    def progress(self, found: Found, exchanged: bool) -> Progress:
+        """Return how far the search is, with the best so far."""
+        iterations, evaluations = self.effort
+        return Progress(
+            Phase.SEARCH,
+            self.reported - self.started,
+            iteration=iterations,
+            evaluations=evaluations,
+            confidence=found.best.confidence,
+            upper_bound=found.best.upper_bound,
+            matches=reading.matches(found.mapped, exchanged, found.part.kept),
+        )
 
     @contextmanager
     def searching(
@@ -399,41 +490,43 @@ class _Match:
         sketch: Segmentation,
         map_: Segmentation,
         drawn: SceneDescriptor,
-        table: RelationTable,
         exchanged: bool,
-        found: SearchProgress,
-        outcome: Outcome,
+        found: Found,
+        rivals: list[Rival],
         count: int,
     ) -> MatchResult:
         """Read what was found from sketch to map; ``drawn`` describes the sketch."""
+        part, mapped, last = found.part, found.mapped, found.best
+        table, kept, fmap = part.table, part.kept, last.fmap
         weights = self.weights.searched
-        mapped = object_map(occm(found.fmap, table))
-        best = fmap_confidence(found.fmap, table, weights, self.own)
+        best = fmap_confidence(fmap, table, weights, part.own)
         exchanges = exchange_confidences(mapped, table, weights)
-        others = best_others(mapped, found.alternatives, exchanges, table, weights, count, self.own)
+        others = best_others(mapped, last.alternatives, exchanges, table, weights, count, part.own)
         margins = partner_margins(mapped, best.total, others, exchanges)
-        matched = mapped.partners.tolist() if exchanged else range(len(mapped.partners))
-        relations = nearest_relations(sketch.scene, drawn, matched)
-        rotation = global_rotation(found.fmap, table)
-        dilation = global_dilation(found.fmap, table)
-        bound = found.upper_bound
+        rivals += [Rival(kept, part.objects, other.mapped, other.confidence) for other in others]
+        rivals.sort(key=lambda rival: -rival.value(self.price))
+        likelihood = self.likelihood(found, exchanges, rivals)
+        matched = mapped.partners if exchanged else kept
+        relations = nearest_relations(sketch.scene, drawn, matched.tolist())
+        rotation, dilation = global_rotation(fmap, table), global_dilation(fmap, table)
+        bound = last.upper_bound
         if bound is not None:
             bound = max(bound, best.total)  # ζ was taken anew, and may differ by rounding
         self.seconds["total"] = self.elapsed()
         return MatchResult(
-            matches=reading.matches(mapped, exchanged, margins, relations),
+            matches=reading.matches(
+                mapped, exchanged, kept, margins, likelihood.of_objects, relations
+            ),
             omap_confidence=mapped.confidence,
             confidence=best,
-            fmap=reading.correspondences(found.fmap, table, exchanged),
+            fmap=reading.correspondences(fmap, table, exchanged, kept),
             rotation=reading.half_turned(-rotation if exchanged else rotation),
             scale=1.0 / dilation if exchanged else dilation,
-            outcome=outcome,
+            outcome=found.outcome,
             upper_bound=bound,
             seed=self.request.seed,
             match_id=self.match_id,
-            statistics=Statistics(
-                found.iteration, found.evaluations, MappingProxyType(self.seconds)
-            ),
+            statistics=Statistics(*self.effort, MappingProxyType(self.seconds)),
             sketch=sketch.scene,
             map=map_.scene,
             warnings=(
@@ -442,22 +535,44 @@ class _Match:
             ),
             alternatives=tuple(
                 AlternativeMap(
-                    reading.matches(other.mapped, exchanged),
-                    other.confidence,
-                    other.mapped.confidence,
+                    reading.matches(rival.mapped, exchanged, rival.kept),
+                    rival.confidence,
+                    rival.mapped.confidence,
                 )
-                for other in others
+                for rival in rivals[:count]
             ),
-            search_note=found.note,
+            search_note=last.note,
             sketch_route=sketch.route,
+            probability=likelihood.of_map,
         )
+
+    def likelihood(
+        self, found: Found, exchanges: FloatArray | None, rivals: list[Rival]
+    ) -> Likelihood:
+        """Return how likely the answer is right, where that was learned for such matches."""
+        calibration = self.calibration()
+        if calibration is None or exchanges is None:
+            return UNKNOWN
+        weights = self.weights.searched
+        omissions = omission_confidences(found.best.fmap, found.part.table, weights)
+        return likelihood(found, exchanges, omissions, rivals, calibration)
+
+    def calibration(self) -> Calibration | None:
+        """Return the calibration for this match, if there is one."""
+        pipeline = self.pipeline
+        if pipeline.similarity.name != CALIBRATED_SIMILARITY or pipeline.histogram.exponent:
+            return None
+        return calibrated(self.weights) if pipeline.searcher.object_consistent else None
 
     def elapsed(self) -> float:
         return time.monotonic() - self.started
 
-    def out_of_time(self) -> bool:
+    def time_left(self) -> float:
         budget = self.request.time_budget
-        return budget is not None and self.elapsed() > budget
+        return math.inf if budget is None else max(0.0, budget - self.elapsed())
+
+    def out_of_time(self) -> bool:
+        return self.time_left() <= 0.0
 
     def check_budget(self, phase: Phase) -> None:
         if self.out_of_time():
@@ -480,6 +595,53 @@ class _Match:
         started = time.monotonic()
         yield
         self.seconds[stage] = time.monotonic() - started
+
+
+def _check_request_weights(weights: RequestWeights) -> None:
+    """Refuse weights that make no ζ."""
+    names = ConfidenceWeights._fields
+    if len(weights) not in (3, len(names)):
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "weights",
+            f"are {len(weights)} numbers; give three, {', '.join(names[:3])}, "
+            f"or five, with {' and '.join(names[3:])}",
+        )
+    for name, weight in zip(names, weights, strict=False):
+        if not 0 <= weight <= _MAX_WEIGHT:
+            raise InvalidInputError(
+                Reason.INVALID_FIELD,
+                f"weights.{name}",
+                f"is {weight:g}; give a number from 0 to {_MAX_WEIGHT:g}",
+            )
+    if sum(weights) == 0:
+        raise InvalidInputError(
+            Reason.INVALID_FIELD, "weights", "are all zero; give at least one above zero"
+        )
+
+
+def _price(
+    request: MatchRequest, profile: Profile, weights: ConfidenceWeights, searcher: Searcher
+) -> float:
+    """Return the price of leaving objects out; infinite where that is not allowed."""
+    allowed, price = request.allow_unmatched, request.unmatched_price
+    if not (profile.allow_unmatched if allowed is None else allowed):
+        if price is not None:
+            raise InvalidInputError(
+                Reason.INVALID_FIELD,
+                "unmatched_price",
+                f"is {price:g}, but no object may stay unmatched; set allow_unmatched or drop it",
+            )
+        return math.inf
+    if not searcher.object_consistent:
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "allow_unmatched",
+            f"compares maps of objects, and the searcher {searcher.name!r}, as it is set here, "
+            "maps pairs that need not lead to one; choose another, such as 'auto', or switch it "
+            "off",
+        )
+    return default_price(weights) if price is None else price
 
 
 def _check_weights(weights: ConfidenceWeights, searcher: Searcher) -> None:

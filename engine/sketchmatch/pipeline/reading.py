@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from sketchmatch.model import FloatArray, Fmap, ObjectMap, RelationTable, object_pairs
+from sketchmatch.model import FloatArray, Fmap, IntArray, ObjectMap, RelationTable, object_pairs
 from sketchmatch.pipeline.result import Correspondence, ObjectMatch, ObjectRelation
 
 __all__ = ["correspondences", "half_turned", "matches"]
@@ -17,7 +17,9 @@ _UNKNOWN: Mapping[int, ObjectRelation] = MappingProxyType({})
 def matches(
     mapped: ObjectMap,
     exchanged: bool,
+    kept: IntArray,
     margins: FloatArray | None = None,
+    probabilities: FloatArray | None = None,
     relations: Mapping[int, ObjectRelation] = _UNKNOWN,
 ) -> tuple[ObjectMatch, ...]:
     """Return the lines of an object map, in the order of the sketch.
@@ -25,33 +27,41 @@ def matches(
     Parameters
     ----------
     mapped
-        From template to argument.
+        From kept objects of the template to the argument.
     exchanged
         Whether the template is the map.
-    margins
-        Shape (N,), of each template object, or None where unknown.
+    kept
+        Shape (k,), which template objects these are.
+    margins, probabilities
+        Shape (k,), of each of them, or None where unknown.
     relations
         By sketched object, where known.
     """
     partners = mapped.partners.tolist()
-    pairs = ((h, g) if exchanged else (g, h) for g, h in enumerate(partners))
-    known = [None] * len(partners) if margins is None else margins.tolist()
-    lines = zip(pairs, mapped.confidences.tolist(), known, strict=True)
+    pairs = ((h, g) if exchanged else (g, h) for g, h in zip(kept.tolist(), partners, strict=True))
+    unknown = [None] * len(partners)
+    lines = zip(
+        pairs,
+        mapped.confidences.tolist(),
+        unknown if margins is None else margins.tolist(),
+        unknown if probabilities is None else probabilities.tolist(),
+        strict=True,
+    )
     read = (
-        ObjectMatch(a, b, confidence, margin, relations.get(a))
-        for (a, b), confidence, margin in lines
+        ObjectMatch(a, b, confidence, margin, relations.get(a), probability)
+        for (a, b), confidence, margin, probability in lines
     )
     return tuple(sorted(read, key=lambda match: match.sketch_object))
 
 
 def correspondences(
-    fmap: Fmap, table: RelationTable, exchanged: bool
+    fmap: Fmap, table: RelationTable, exchanged: bool, kept: IntArray
 ) -> tuple[Correspondence, ...]:
-    """Return the entries of a histogram map, in the order of the template's pairs."""
+    """Return the entries of a histogram map of kept objects, in the order of their pairs."""
     half = table.argument_pairs
     argument_pairs = object_pairs(table.argument_objects)
     entries = []
-    for i, (a, b) in enumerate(object_pairs(table.template_objects).tolist()):
+    for i, (a, b) in enumerate(kept[object_pairs(table.template_objects)].tolist()):
         column = int(fmap.entries[i]) % half
         dual = bool(fmap.entries[i] >= half)
         c, d = argument_pairs[column].tolist()[:: -1 if dual else 1]

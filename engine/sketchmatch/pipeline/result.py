@@ -53,6 +53,8 @@ class ObjectMatch:
     relation
         How the sketched object lies, in the sketch, to the nearest other matched one; None in
         progress and alternatives.
+    probability
+        How likely this is its partner; None where unknown, see :class:`MatchResult`.
     """
 
     sketch_object: int
@@ -60,6 +62,7 @@ class ObjectMatch:
     confidence: float
     margin: float | None = None
     relation: ObjectRelation | None = None
+    probability: float | None = None
 
 
 @dataclass(frozen=True)
@@ -137,7 +140,9 @@ class MatchResult:
     outcome
         Why the search ended.
     upper_bound
-        A ζ that no legal FMAP exceeds, or None where the searcher proves nothing.
+        A ζ that no legal FMAP exceeds, or None where the searcher proves nothing. Where objects
+        may stay unmatched, it and an outcome OPTIMAL speak of maps of the objects of the smaller
+        scene that are matched; that no other objects should be is not proved.
     seed
         With it, the same request gives the same result.
     match_id
@@ -149,11 +154,17 @@ class MatchResult:
     warnings
         What segmentation left out or decided, each naming its side.
     alternatives
-        The next best object maps that were found, the highest ζ first.
+        The next best object maps that were found, the highest ζ first; where objects may stay
+        unmatched, the highest ζ less the price of those that do.
     search_note
         What the searcher says of what it did, or empty.
     sketch_route
         Shape (k, 2), the way drawn through the sketch, in its coordinates, or None.
+    probability
+        How likely the object map is right as a whole, learned from simulated sketches. None where
+        nothing was learned: for other weights than 1, 1, 1 and those of the profile ``learned``,
+        histograms of other than constant forces, other similarities than the default, maps of
+        pairs, and too many objects.
     """
 
     matches: tuple[ObjectMatch, ...]
@@ -173,6 +184,7 @@ class MatchResult:
     alternatives: tuple[AlternativeMap, ...] = ()
     search_note: str = ""
     sketch_route: FloatArray | None = field(default=None, compare=False)
+    probability: float | None = None
 
     @property
     def object_map(self) -> dict[int, int]:

@@ -17,7 +17,14 @@ from pydantic import ValidationError
 
 from sketchmatch.api import Algorithm, Histogram, Searcher, Segmenter, Similarity
 from sketchmatch.errors import InvalidInputError, Reason, quoted
-from sketchmatch.model import Image, OccupancyGrid, PolygonSet, Source, StrokeSet
+from sketchmatch.model import (
+    Image,
+    OccupancyGrid,
+    PolygonSet,
+    RequestWeights,
+    Source,
+    StrokeSet,
+)
 from sketchmatch.pipeline.plugins import blaming
 from sketchmatch.registry import Kind, Registered, Registry
 
@@ -95,11 +102,17 @@ class Profile:
         One line for lists.
     stages
         Its choices.
+    weights
+        Of the parts of ζ; None for 1, 1, 1.
+    allow_unmatched
+        Whether objects may stay without partner on both sides.
     """
 
     name: str
     summary: str = ""
     stages: Selection = field(default_factory=dict)
+    weights: RequestWeights | None = None
+    allow_unmatched: bool = False
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io.images import decode_image
 from sketchmatch.io.ros_map import decode_map_server
 from sketchmatch.model import (
+    ConfidenceWeights,
     FloatArray,
     LabelledPolygon,
     OccupancyGrid,
@@ -26,6 +27,7 @@ from sketchmatch.model.limits import check_objects, check_pixels, check_vertices
 from sketchmatch.pipeline.match import MatchRequest
 from sketchmatch.pipeline.selection import STAGES, Choice
 from sketchmatch_proto.v1 import (
+    match_pb2,
     match_service_pb2,
     pipeline_pb2,
     scene_service_pb2,
@@ -47,22 +49,17 @@ def match_request(
     InvalidInputError
         If it cannot be used, with the path of the field.
     """
-    weights = request.weights
     return MatchRequest(
         sketch=source(request.sketch, "sketch", request.HasField("sketch")),
         map=source(request.map, "map", request.HasField("map")),
         selection={stage: choice(getattr(request.pipeline, stage)) for stage in STAGES},
         seed=request.seed,
         time_budget=_time_budget(request, max_time_budget),
-        weights=(
-            weights.similarity if weights.HasField("similarity") else 1.0,
-            weights.rotation if weights.HasField("rotation") else 1.0,
-            weights.dilation if weights.HasField("dilation") else 1.0,
-            weights.shape,
-            weights.size,
-        ),
+        weights=_weights(request.weights) if request.HasField("weights") else None,
         alternatives=request.alternatives if request.HasField("alternatives") else None,
         profile=request.pipeline.profile,
+        allow_unmatched=request.allow_unmatched if request.HasField("allow_unmatched") else None,
+        unmatched_price=request.unmatched_price if request.HasField("unmatched_price") else None,
     )
 
 
@@ -138,6 +135,11 @@ def _plain(value: struct_pb2.Value) -> Any:
         case "number_value" | "string_value" | "bool_value" as kind:
             return getattr(value, kind)
     return None
+
+
+def _weights(message: match_pb2.ConfidenceWeights) -> ConfidenceWeights:
+    """Read weights, of which any can be left out."""
+    return ConfidenceWeights(**{field.name: value for field, value in message.ListFields()})
 
 
 def _time_budget(

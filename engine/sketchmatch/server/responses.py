@@ -10,10 +10,12 @@ from google.protobuf.duration_pb2 import Duration
 from sketchmatch.api import Algorithm, Segmentation, Segmenter
 from sketchmatch.model import (
     Confidence,
+    ConfidenceWeights,
     FloatArray,
     Image,
     OccupancyGrid,
     PolygonSet,
+    RequestWeights,
     Scene,
     StrokeSet,
 )
@@ -99,8 +101,9 @@ class ResponseWriter:
             match_id=event.match_id,
             seed=event.seed,
             pipeline=pipeline_pb2.Pipeline(**stages, profile=event.pipeline.profile),
-            weights=match_pb2.ConfidenceWeights(**self._request.confidence_weights._asdict()),
+            weights=_weights(event.weights),
             time_budget=None if budget is None else _duration(budget),
+            unmatched_price=event.unmatched_price,
         )
 
     def _progress(self, event: Progress) -> match_pb2.MatchProgress:
@@ -148,6 +151,7 @@ def result(value: MatchResult) -> match_pb2.MatchResult:
             for other in value.alternatives
         ],
         search_note=value.search_note,
+        probability=value.probability,
     )
 
 
@@ -238,6 +242,7 @@ def _object_matches(
             confidence=match.confidence,
             margin=match.margin,
             relation=_relation(match.relation),
+            probability=match.probability,
         )
         for match in matches
     ]
@@ -264,6 +269,10 @@ def _fmap_confidence(confidence: Confidence) -> match_pb2.FmapConfidence:
     )
 
 
+def _weights(weights: RequestWeights) -> match_pb2.ConfidenceWeights:
+    return match_pb2.ConfidenceWeights(**ConfidenceWeights(*weights)._asdict())
+
+
 def _duration(seconds: float) -> Duration:
     duration = Duration()
     duration.FromNanoseconds(round(seconds * 1e9))
@@ -277,6 +286,8 @@ def _profile(profile: Profile, is_default: bool) -> catalog_service_pb2.Profile:
         summary=profile.summary,
         pipeline=pipeline_pb2.Pipeline(**stages),
         is_default=is_default,
+        weights=None if profile.weights is None else _weights(profile.weights),
+        allow_unmatched=profile.allow_unmatched,
     )
 
 

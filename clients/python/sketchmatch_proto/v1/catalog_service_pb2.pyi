@@ -11,6 +11,7 @@ import google.protobuf.internal.containers
 import google.protobuf.internal.enum_type_wrapper
 import google.protobuf.message
 import google.protobuf.struct_pb2
+import sketchmatch_proto.v1.match_pb2
 import sketchmatch_proto.v1.pipeline_pb2
 import sys
 import typing
@@ -172,15 +173,23 @@ class Profile(google.protobuf.message.Message):
     SUMMARY_FIELD_NUMBER: builtins.int
     PIPELINE_FIELD_NUMBER: builtins.int
     IS_DEFAULT_FIELD_NUMBER: builtins.int
+    WEIGHTS_FIELD_NUMBER: builtins.int
+    ALLOW_UNMATCHED_FIELD_NUMBER: builtins.int
     name: builtins.str
     """What `Pipeline.profile` selects it by."""
     summary: builtins.str
     """One line for lists."""
     is_default: builtins.bool
     """Whether the server takes it where a request names none."""
+    allow_unmatched: builtins.bool
+    """Whether objects may stay without partner on both sides."""
     @property
     def pipeline(self) -> sketchmatch_proto.v1.pipeline_pb2.Pipeline:
         """What it chooses: the stages that it leaves out are the server's defaults."""
+
+    @property
+    def weights(self) -> sketchmatch_proto.v1.match_pb2.ConfidenceWeights:
+        """What the parts of ζ count for. Absent: the first three the same."""
 
     def __init__(
         self,
@@ -189,9 +198,11 @@ class Profile(google.protobuf.message.Message):
         summary: builtins.str = ...,
         pipeline: sketchmatch_proto.v1.pipeline_pb2.Pipeline | None = ...,
         is_default: builtins.bool = ...,
+        weights: sketchmatch_proto.v1.match_pb2.ConfidenceWeights | None = ...,
+        allow_unmatched: builtins.bool = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["pipeline", b"pipeline"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["is_default", b"is_default", "name", b"name", "pipeline", b"pipeline", "summary", b"summary"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["pipeline", b"pipeline", "weights", b"weights"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["allow_unmatched", b"allow_unmatched", "is_default", b"is_default", "name", b"name", "pipeline", b"pipeline", "summary", b"summary", "weights", b"weights"]) -> None: ...
 
 global___Profile = Profile
 

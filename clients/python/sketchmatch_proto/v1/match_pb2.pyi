@@ -66,7 +66,9 @@ class _OutcomeEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._EnumTy
     OUTCOME_CONVERGED: _Outcome.ValueType  # 1
     """The searcher found nothing better for as long as its parameters ask."""
     OUTCOME_OPTIMAL: _Outcome.ValueType  # 2
-    """The searcher proved that no map has a higher ζ."""
+    """The searcher proved that no map has a higher ζ; where objects may stay unmatched, no map of the
+    same objects of the smaller scene.
+    """
     OUTCOME_TIME_BUDGET: _Outcome.ValueType  # 3
     """The time budget ended; the result is the best map until then."""
     OUTCOME_ITERATION_LIMIT: _Outcome.ValueType  # 4
@@ -80,7 +82,9 @@ OUTCOME_UNSPECIFIED: Outcome.ValueType  # 0
 OUTCOME_CONVERGED: Outcome.ValueType  # 1
 """The searcher found nothing better for as long as its parameters ask."""
 OUTCOME_OPTIMAL: Outcome.ValueType  # 2
-"""The searcher proved that no map has a higher ζ."""
+"""The searcher proved that no map has a higher ζ; where objects may stay unmatched, no map of the
+same objects of the smaller scene.
+"""
 OUTCOME_TIME_BUDGET: Outcome.ValueType  # 3
 """The time budget ended; the result is the best map until then."""
 OUTCOME_ITERATION_LIMIT: Outcome.ValueType  # 4
@@ -150,10 +154,15 @@ class MatchAccepted(google.protobuf.message.Message):
     PIPELINE_FIELD_NUMBER: builtins.int
     WEIGHTS_FIELD_NUMBER: builtins.int
     TIME_BUDGET_FIELD_NUMBER: builtins.int
+    UNMATCHED_PRICE_FIELD_NUMBER: builtins.int
     match_id: builtins.str
     """Name of this match, unique on the server; it also stands in the server's log."""
     seed: builtins.int
     """The seed in force."""
+    unmatched_price: builtins.float
+    """The price in force for leaving objects unmatched. Absent: every object of the smaller scene finds
+    a partner.
+    """
     @property
     def pipeline(self) -> sketchmatch_proto.v1.pipeline_pb2.Pipeline:
         """The algorithm of every stage, each with the value of every parameter."""
@@ -174,9 +183,11 @@ class MatchAccepted(google.protobuf.message.Message):
         pipeline: sketchmatch_proto.v1.pipeline_pb2.Pipeline | None = ...,
         weights: global___ConfidenceWeights | None = ...,
         time_budget: google.protobuf.duration_pb2.Duration | None = ...,
+        unmatched_price: builtins.float | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["pipeline", b"pipeline", "time_budget", b"time_budget", "weights", b"weights"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["match_id", b"match_id", "pipeline", b"pipeline", "seed", b"seed", "time_budget", b"time_budget", "weights", b"weights"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_unmatched_price", b"_unmatched_price", "pipeline", b"pipeline", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_unmatched_price", b"_unmatched_price", "match_id", b"match_id", "pipeline", b"pipeline", "seed", b"seed", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> None: ...
+    def WhichOneof(self, oneof_group: typing.Literal["_unmatched_price", b"_unmatched_price"]) -> typing.Literal["unmatched_price"] | None: ...
 
 global___MatchAccepted = MatchAccepted
 
@@ -254,7 +265,7 @@ class MatchProgress(google.protobuf.message.Message):
     confidence: builtins.float
     """ζ of the best map so far, within [0, 1]; it never falls. Absent before the search."""
     upper_bound: builtins.float
-    """A ζ that no map exceeds. Absent where the searcher proves nothing."""
+    """A ζ that no map exceeds, as in the result. Absent where the searcher proves nothing."""
     @property
     def object_matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectMatch]:
         """The best object map so far, sketch → map. Empty before the search."""
@@ -307,6 +318,7 @@ class MatchResult(google.protobuf.message.Message):
     STATISTICS_FIELD_NUMBER: builtins.int
     ALTERNATIVES_FIELD_NUMBER: builtins.int
     SEARCH_NOTE_FIELD_NUMBER: builtins.int
+    PROBABILITY_FIELD_NUMBER: builtins.int
     match_id: builtins.str
     """Name of the match, as in `MatchAccepted`."""
     seed: builtins.int
@@ -316,7 +328,9 @@ class MatchResult(google.protobuf.message.Message):
     omap_confidence: builtins.float
     """Ω, the mean confidence of the object map, within [0, 1]."""
     upper_bound: builtins.float
-    """A ζ that no map exceeds. Absent where the searcher proves nothing."""
+    """A ζ that no map exceeds; where objects may stay unmatched, no map of the same objects of the
+    smaller scene. Absent where the searcher proves nothing.
+    """
     rotation_radians: builtins.float
     """Radians counter-clockwise by which the sketch as a whole is turned to lie like the map, within
     (−π, π].
@@ -327,17 +341,27 @@ class MatchResult(google.protobuf.message.Message):
     """
     search_note: builtins.str
     """One sentence on what the searcher did, where it has something to say."""
+    probability: builtins.float
+    """How likely the object map is right as a whole, within [0, 1], as learned from simulated
+    sketches. Absent where nothing was learned: for weights other than 1, 1, 1 and those of the
+    profile `learned`, for histograms of other than constant forces, for other similarities than
+    `cross-correlation`, for searchers that map pairs, and for too many objects.
+    """
     @property
     def object_matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectMatch]:
         """The object map: which sketched object is which mapped object, in the order of the sketch."""
 
     @property
     def unmatched_sketch_objects(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.int]:
-        """Sketched objects without a partner: the sketch has more objects than the map."""
+        """Sketched objects without a partner: the sketch has more objects than the map, or objects may
+        stay unmatched.
+        """
 
     @property
     def unmatched_map_objects(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.int]:
-        """Mapped objects without a partner: the map has more objects than the sketch."""
+        """Mapped objects without a partner: the map has more objects than the sketch, or objects may stay
+        unmatched.
+        """
 
     @property
     def fmap_confidence(self) -> global___FmapConfidence:
@@ -345,8 +369,8 @@ class MatchResult(google.protobuf.message.Message):
 
     @property
     def fmap_entries(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___FmapEntry]:
-        """The histogram map (FMAP) that the object map follows from, one entry for each pair of objects
-        of the scene with fewer objects.
+        """The histogram map (FMAP) that the object map follows from, one entry for each pair of matched
+        objects, read from the scene with fewer objects.
         """
 
     @property
@@ -355,7 +379,8 @@ class MatchResult(google.protobuf.message.Message):
 
     @property
     def alternatives(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___AlternativeMap]:
-        """The next best object maps that were found, the highest ζ first. Where one of them comes close to
+        """The next best object maps that were found, the highest ζ first, less the price of objects left
+        unmatched. Where one of them comes close to
         the best, the sketch does not tell the two apart.
         """
 
@@ -377,9 +402,13 @@ class MatchResult(google.protobuf.message.Message):
         statistics: global___MatchStatistics | None = ...,
         alternatives: collections.abc.Iterable[global___AlternativeMap] | None = ...,
         search_note: builtins.str = ...,
+        probability: builtins.float | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_upper_bound", b"_upper_bound", "fmap_confidence", b"fmap_confidence", "statistics", b"statistics", "upper_bound", b"upper_bound"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_upper_bound", b"_upper_bound", "alternatives", b"alternatives", "fmap_confidence", b"fmap_confidence", "fmap_entries", b"fmap_entries", "match_id", b"match_id", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence", "outcome", b"outcome", "rotation_radians", b"rotation_radians", "scale", b"scale", "search_note", b"search_note", "seed", b"seed", "statistics", b"statistics", "unmatched_map_objects", b"unmatched_map_objects", "unmatched_sketch_objects", b"unmatched_sketch_objects", "upper_bound", b"upper_bound"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_probability", b"_probability", "_upper_bound", b"_upper_bound", "fmap_confidence", b"fmap_confidence", "probability", b"probability", "statistics", b"statistics", "upper_bound", b"upper_bound"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_probability", b"_probability", "_upper_bound", b"_upper_bound", "alternatives", b"alternatives", "fmap_confidence", b"fmap_confidence", "fmap_entries", b"fmap_entries", "match_id", b"match_id", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence", "outcome", b"outcome", "probability", b"probability", "rotation_radians", b"rotation_radians", "scale", b"scale", "search_note", b"search_note", "seed", b"seed", "statistics", b"statistics", "unmatched_map_objects", b"unmatched_map_objects", "unmatched_sketch_objects", b"unmatched_sketch_objects", "upper_bound", b"upper_bound"]) -> None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_probability", b"_probability"]) -> typing.Literal["probability"] | None: ...
+    @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_upper_bound", b"_upper_bound"]) -> typing.Literal["upper_bound"] | None: ...
 
 global___MatchResult = MatchResult
@@ -428,6 +457,7 @@ class ObjectMatch(google.protobuf.message.Message):
     CONFIDENCE_FIELD_NUMBER: builtins.int
     MARGIN_FIELD_NUMBER: builtins.int
     RELATION_FIELD_NUMBER: builtins.int
+    PROBABILITY_FIELD_NUMBER: builtins.int
     sketch_object: builtins.int
     """Index in the sketch's scene, from 0."""
     map_object: builtins.int
@@ -442,6 +472,10 @@ class ObjectMatch(google.protobuf.message.Message):
     """By how much ζ falls if the sketched object takes its best other partner, in one exchange or in
     one of the alternatives. About 0: it could be either. Less than 0: the search ended too early.
     Absent during the search, and where there are too many objects to try.
+    """
+    probability: builtins.float
+    """How likely this is its partner, within [0, 1]. Absent during the search, in alternatives, and
+    where `MatchResult.probability` is.
     """
     @property
     def relation(self) -> global___ObjectRelation:
@@ -459,10 +493,14 @@ class ObjectMatch(google.protobuf.message.Message):
         confidence: builtins.float = ...,
         margin: builtins.float | None = ...,
         relation: global___ObjectRelation | None = ...,
+        probability: builtins.float | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_margin", b"_margin", "margin", b"margin", "relation", b"relation"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_margin", b"_margin", "confidence", b"confidence", "map_label", b"map_label", "map_object", b"map_object", "margin", b"margin", "relation", b"relation", "sketch_label", b"sketch_label", "sketch_object", b"sketch_object"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_margin", b"_margin", "_probability", b"_probability", "margin", b"margin", "probability", b"probability", "relation", b"relation"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_margin", b"_margin", "_probability", b"_probability", "confidence", b"confidence", "map_label", b"map_label", "map_object", b"map_object", "margin", b"margin", "probability", b"probability", "relation", b"relation", "sketch_label", b"sketch_label", "sketch_object", b"sketch_object"]) -> None: ...
+    @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_margin", b"_margin"]) -> typing.Literal["margin"] | None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_probability", b"_probability"]) -> typing.Literal["probability"] | None: ...
 
 global___ObjectMatch = ObjectMatch
 

@@ -27,11 +27,24 @@ class MatchRequest(google.protobuf.message.Message):
     TIME_BUDGET_FIELD_NUMBER: builtins.int
     WEIGHTS_FIELD_NUMBER: builtins.int
     ALTERNATIVES_FIELD_NUMBER: builtins.int
+    ALLOW_UNMATCHED_FIELD_NUMBER: builtins.int
+    UNMATCHED_PRICE_FIELD_NUMBER: builtins.int
     seed: builtins.int
     """Seed of everything random: the same request with the same seed gives the same result. Absent: 0."""
     alternatives: builtins.int
     """How many of the next best object maps the result shall hold, at most 100 and no more than there
     are. Absent: 3, or as many as there are.
+    """
+    allow_unmatched: builtins.bool
+    """Whether an object may stay without partner on both sides where that is likelier: a sketch can
+    show what the map lacks, while it lacks something itself. At least 3 objects of the smaller
+    scene find a partner. Only searchers that map objects can do it. Absent: as the profile says, or
+    else not: the smaller scene is matched completely.
+    """
+    unmatched_price: builtins.float
+    """What a map loses that leaves all objects of the smaller scene out, in units of ζ, and in
+    proportion where it leaves out some: more makes it rarer. Above 0, at most 1000, and only where
+    objects may stay unmatched. Absent: one that was learned for the weights.
     """
     @property
     def sketch(self) -> sketchmatch_proto.v1.source_pb2.Source:
@@ -53,7 +66,7 @@ class MatchRequest(google.protobuf.message.Message):
 
     @property
     def weights(self) -> sketchmatch_proto.v1.match_pb2.ConfidenceWeights:
-        """What the parts of ζ count for. Absent: all the same."""
+        """What the parts of ζ count for. Absent: as the profile says, or else the first three the same."""
 
     def __init__(
         self,
@@ -65,13 +78,19 @@ class MatchRequest(google.protobuf.message.Message):
         time_budget: google.protobuf.duration_pb2.Duration | None = ...,
         weights: sketchmatch_proto.v1.match_pb2.ConfidenceWeights | None = ...,
         alternatives: builtins.int | None = ...,
+        allow_unmatched: builtins.bool | None = ...,
+        unmatched_price: builtins.float | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_alternatives", b"_alternatives", "_seed", b"_seed", "alternatives", b"alternatives", "map", b"map", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "time_budget", b"time_budget", "weights", b"weights"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_alternatives", b"_alternatives", "_seed", b"_seed", "alternatives", b"alternatives", "map", b"map", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "time_budget", b"time_budget", "weights", b"weights"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_allow_unmatched", b"_allow_unmatched", "_alternatives", b"_alternatives", "_seed", b"_seed", "_unmatched_price", b"_unmatched_price", "allow_unmatched", b"allow_unmatched", "alternatives", b"alternatives", "map", b"map", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_allow_unmatched", b"_allow_unmatched", "_alternatives", b"_alternatives", "_seed", b"_seed", "_unmatched_price", b"_unmatched_price", "allow_unmatched", b"allow_unmatched", "alternatives", b"alternatives", "map", b"map", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_allow_unmatched", b"_allow_unmatched"]) -> typing.Literal["allow_unmatched"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_alternatives", b"_alternatives"]) -> typing.Literal["alternatives"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_seed", b"_seed"]) -> typing.Literal["seed"] | None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_unmatched_price", b"_unmatched_price"]) -> typing.Literal["unmatched_price"] | None: ...
 
 global___MatchRequest = MatchRequest
 

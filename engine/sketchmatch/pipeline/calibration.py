@@ -1,0 +1,70 @@
+"""What was learned of how ζ tells right maps from wrong ones: the one place of these numbers.
+
+They come from ``python -m tests.experiments.learn``: simulated sketches of the study's scenes and
+of random ones of 5 to 12 objects, with missing and extra objects, drawn well or badly, as outlines,
+boxes and ellipses; none of those that the study's tables are made of.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sketchmatch.model import ConfidenceWeights
+
+__all__ = ["CALIBRATED_SIMILARITY", "LEARNED", "Calibration", "calibrated", "default_price"]
+
+CALIBRATED_SIMILARITY = "cross-correlation"
+"""The measure that all was learned with, on histograms of constant forces."""
+
+LEARNED = ConfidenceWeights(1.0, 2.0, 0.1, 2.0, 0.25)
+"""The weights that tell right maps from wrong ones best; those of the profile ``learned``."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """How likely maps are that differ in ζ, for certain weights.
+
+    A map of N template objects that is worth v = ζ − price·u/N has odds of exp(κ·N^α·v).
+
+    Attributes
+    ----------
+    price
+        Of leaving all template objects out.
+    sharpness, growth
+        κ and α.
+    doubt
+        What it is worth that none of the maps known is right: v of a map as likely as that.
+    luck
+        How many of the objects are right all the same where the map as a whole is not among those
+        known.
+    """
+
+    price: float
+    sharpness: float
+    growth: float
+    doubt: float
+    luck: float
+
+
+_CALIBRATIONS = {
+    ConfidenceWeights(): Calibration(0.35, 12.4, 1.18, 0.861, 0.44),
+    LEARNED: Calibration(0.12, 80.5, 0.8, 0.95, 0.46),
+}
+
+
+def calibrated(weights: ConfidenceWeights) -> Calibration | None:
+    """Return what was learned for these weights, up to a common factor; None where nothing was."""
+    shares = _shares(weights)
+    for known, calibration in _CALIBRATIONS.items():
+        if all(abs(a - b) <= 1e-9 for a, b in zip(shares, _shares(known), strict=True)):
+            return calibration
+    return None
+
+
+def default_price(weights: ConfidenceWeights) -> float:
+    """Return the price of leaving objects out that fits weights; 1, 1, 1 stand for unknown ones."""
+    return (calibrated(weights) or _CALIBRATIONS[ConfidenceWeights()]).price
+
+
+def _shares(weights: ConfidenceWeights) -> tuple[float, ...]:
+    return tuple(weight / sum(weights) for weight in weights)

@@ -1,0 +1,303 @@
+"""Leaving objects without partner on both sides, where that is likelier than any pairing.
+
+A map that leaves u of the N template objects out is worth ζ − price·u/N: ζ of the others, less
+what leaving out costs. Searchers know nothing of it: they are given parts of the relation table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sketchmatch.api import Outcome, SearchProgress
+from sketchmatch.kernels.evidence import SelfRelations
+from sketchmatch.model import (
+    Confidence,
+    FloatArray,
+    Fmap,
+    IntArray,
+    ObjectMap,
+    RelationTable,
+    Weights,
+    object_pairs,
+)
+from sketchmatch.model.arrays import sealed
+from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
+from sketchmatch.pipeline.slices import in_slices
+
+__all__ = [
+    "FEWEST",
+    "Found",
+    "Part",
+    "Rival",
+    "Trial",
+    "net_confidence",
+    "omission_confidences",
+    "part_of",
+    "trials",
+]
+
+FEWEST = 3
+"""Template objects that find a partner in any case."""
+
+_FEW = 10
+"""Template objects up to which each is left out in turn."""
+
+_WIDTH = 5
+"""Parts of each size that are searched where there are more."""
+
+_BRANCHES = 3
+"""Parts of each size that one object more is taken from."""
+
+# Beyond this many entries in all, ζ without each object in turn would take too long at once.
+_MOST_ENTRIES = 3_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The relations of some of the template objects.
+
+    Attributes
+    ----------
+    kept
+        Shape (k,): which objects of the template these are, in ascending order.
+    objects
+        N, how many the template has.
+    table
+        Their relations.
+    own
+        How they compare themselves; None where that does not count.
+    """
+
+    kept: IntArray
+    objects: int
+    table: RelationTable
+    own: SelfRelations | None = None
+
+    @classmethod
+    def whole(cls, table: RelationTable, own: SelfRelations | None = None) -> Part:
+        """Return the part that leaves nothing out."""
+        return cls(np.arange(table.template_objects), table.template_objects, table, own)
+
+    @property
+    def left_out(self) -> int:
+        """u, the number of objects that are left out."""
+        return self.objects - len(self.kept)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What to search next.
+
+    Attributes
+    ----------
+    kept
+        The template objects that are to find a partner, in ascending order.
+    share
+        Of the time that is left, what the search may take.
+    """
+
+    kept: tuple[int, ...]
+    share: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What the search of a part has come to.
+
+    Attributes
+    ----------
+    part
+        What was searched.
+    best
+        The last progress.
+    outcome
+        Why it ended.
+    """
+
+    part: Part
+    best: SearchProgress
+    outcome: Outcome = Outcome.TIME_BUDGET
+
+    def value(self, price: float) -> float:
+        """Return what the best map is worth."""
+        return net_confidence(self.best.confidence, self.part.left_out, self.part.objects, price)
+
+    @cached_property
+    def mapped(self) -> ObjectMap:
+        """The object map, of the objects of the part alone."""
+        return object_map(occm(self.best.fmap, self.part.table))
+
+    def rival(self, weights: Weights) -> Rival:
+        """Return the map found, without the relations, which may be large."""
+        part = self.part
+        confidence = fmap_confidence(self.best.fmap, part.table, weights, part.own)
+        return Rival(part.kept, part.objects, self.mapped, confidence)
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """An object map that is not the best, and maybe of other objects.
+
+    Attributes
+    ----------
+    kept, objects
+        As in :class:`Part`.
+    mapped
+        The object map, of the kept objects alone.
+    confidence
+        ζ of its FMAP, and the parts.
+    """
+
+    kept: IntArray
+    objects: int
+    mapped: ObjectMap
+    confidence: Confidence
+
+    def value(self, price: float) -> float:
+        """Return what the map is worth."""
+        left_out = self.objects - len(self.kept)
+        return net_confidence(self.confidence.total, left_out, self.objects, price)
+
+
+def net_confidence(confidence: float, left_out: int, objects: int, price: float) -> float:
+    """Return ζ − price·u/N, what a map is worth that leaves u of N template objects out.
+
+    Examples
+    --------
+    >>> net_confidence(0.9, left_out=1, objects=8, price=0.4)
+    0.85
+    """
+    return confidence - price * left_out / objects
+
+
+def trials(objects: int, weights: Weights, price: float) -> Generator[Trial, Found, None]:
+    """Say which parts of a template to search, given what came of those before.
+
+    First comes all of it. Then each object is left out in turn, or, of more than ten, the five
+    without which ζ of the map found is highest; then one object more, from the best three parts;
+    and so on until that makes nothing better. So of two maps, the later one that is worth more
+    has the higher ζ.
+
+    Parameters
+    ----------
+    objects
+        N.
+    weights
+        Of ζ.
+    price
+        Of leaving out; infinite where that is not allowed.
+
+    Yields
+    ------
+    Trial
+        What to search; what was found is to be sent.
+    """
+    most = objects - FEWEST if price < np.inf else 0
+    found = yield Trial(tuple(range(objects)), share=0.5 if most > 0 else 1.0)
+    level = [_Lead.of(found, weights, price)]
+    for _ in range(most):
+        best, wanted = level[0].value, _without_one_more(level[:_BRANCHES], objects)
+        level = []
+        for k, kept in enumerate(wanted):
+            found = yield Trial(kept, share=1.0 / (len(wanted) - k + 1))
+            level.append(_Lead.of(found, weights, price))
+        level.sort(key=lambda lead: -lead.value)
+        if not level or level[0].value <= best:
+            return
+
+
+def part_of(whole: Part, kept: Iterable[int]) -> Generator[float, None, Part]:
+    """Return the relations of some of the objects, at least two.
+
+    Yields
+    ------
+    float
+        The share that is done.
+    """
+    chosen = np.array(list(kept))
+    if len(chosen) == whole.objects:
+        return whole
+    table, own = whole.table, whole.own
+    rows = np.flatnonzero(np.isin(object_pairs(whole.objects), chosen).all(axis=1))
+    relations = [table.similarity, table.rotation, table.dilation]
+    if table.evidence is not None:
+        relations.append(table.evidence)
+    copies = [np.empty((len(rows), array.shape[1])) for array in relations]
+
+    def work(first: int, last: int) -> None:
+        for array, copy in zip(relations, copies, strict=True):
+            copy[first:last] = array[rows[first:last]]
+
+    yield from in_slices(len(rows), work)
+    similarity, rotation, dilation, *evidence = (sealed(copy) for copy in copies)
+    part = RelationTable(
+        similarity, rotation, dilation, len(chosen), table.argument_objects, *evidence
+    )
+    if own is not None:
+        own = SelfRelations(own.products[chosen], own.roughness[chosen], own.levels[chosen])
+    return Part(chosen, whole.objects, part, own)
+
+
+def omission_confidences(fmap: Fmap, table: RelationTable, weights: Weights) -> FloatArray | None:
+    """Return ζ of a map without each of its objects in turn.
+
+    Returns
+    -------
+    ndarray
+        Shape (N,); None where there are too many objects, or fewer than 4: ζ of two means nothing.
+    """
+    objects, pairs = table.template_objects, object_pairs(table.template_objects)
+    if objects <= FEWEST or objects * len(pairs) > _MOST_ENTRIES:
+        return None
+    rows, columns = np.arange(len(pairs)), fmap.entries % table.argument_pairs
+    turned = np.where(fmap.entries < table.argument_pairs, 1.0, -1.0)
+    evidence = table.entry_evidence
+    counts = evidence[rows, columns if table.evidence is None else fmap.entries]
+    others = (pairs != np.arange(objects)[:, None, None]).all(axis=2)
+    kept = np.nonzero(others)[1].reshape(objects, -1)
+    x = (turned * table.cosine[rows, columns])[kept].mean(axis=1)
+    y = (turned * table.sine[rows, columns])[kept].mean(axis=1)
+    levels = np.sort(table.normalized_dilation[rows, columns][kept], axis=1)
+    count = kept.shape[1]
+    ranks = 2.0 * np.arange(count) - count + 1.0
+    apart = 2.0 * (levels @ ranks) / max(1, count * (count - 1))
+    shares = np.array(weights) / sum(weights)
+    confidences: FloatArray = (
+        shares[0] * counts[kept].mean(axis=1)
+        + shares[1] * np.hypot(x, y)
+        + shares[2] * np.exp2(-apart)
+    )
+    return confidences
+
+
+@dataclass(frozen=True)
+class _Lead:
+    """What is left of a search for the next: its objects, its worth, and ζ without each object."""
+
+    kept: tuple[int, ...]
+    value: float
+    without: tuple[float, ...]
+
+    @classmethod
+    def of(cls, found: Found, weights: Weights, price: float) -> _Lead:
+        without = omission_confidences(found.best.fmap, found.part.table, weights)
+        return cls(
+            tuple(found.part.kept.tolist()),
+            found.value(price),
+            () if without is None else tuple(without.tolist()),
+        )
+
+
+def _without_one_more(level: Iterable[_Lead], objects: int) -> list[tuple[int, ...]]:
+    """Return what is kept where some parts lose an object more, the most promising first."""
+    promise: dict[tuple[int, ...], float] = {}
+    for lead in level:
+        for g, value in enumerate(lead.without):
+            kept = lead.kept[:g] + lead.kept[g + 1 :]
+            promise[kept] = max(value, promise.get(kept, value))
+    width = objects if objects <= _FEW else _WIDTH
+    return sorted(promise, key=lambda kept: -promise[kept])[:width]

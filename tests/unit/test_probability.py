@@ -1,0 +1,167 @@
+"""How likely answers are right, against a sum over all maps that are considered."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sketchmatch import Scene, match
+from sketchmatch.api import MatchProblem, Outcome
+from sketchmatch.config import builtin
+from sketchmatch.model import ConfidenceWeights, Fmap
+from sketchmatch.pipeline.alternatives import exchange_confidences
+from sketchmatch.pipeline.calibration import LEARNED, Calibration, calibrated, default_price
+from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
+from sketchmatch.pipeline.probability import likelihood
+from sketchmatch.pipeline.slices import finish
+from sketchmatch.pipeline.unmatched import Found, Part, Rival, omission_confidences, part_of
+from sketchmatch.testing import random_scene, simulate_sketch
+from sketchmatch_builtin.searchers.exact import Exact
+from tests.strategies import random_table
+
+WEIGHTS = (1.0, 1.0, 1.0)
+SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
+
+
+def zeta(kept, partners, table):
+    part = finish(part_of(Part.whole(table), kept))
+    fmap = Fmap.from_object_map(np.array(partners), table.argument_objects)
+    return fmap_confidence(fmap, part.table, WEIGHTS)
+
+
+def worth(mapping, table, calibration):
+    """Return ζ less the price of what a map, template → argument, leaves out."""
+    objects = table.template_objects
+    kept = sorted(mapping)
+    confidence = zeta(kept, [mapping[g] for g in kept], table).total
+    return confidence - calibration.price * (objects - len(kept)) / objects
+
+
+def considered(best, argument_objects, others):
+    """Return the best map, every one that an exchange or an omission makes of it, and others."""
+    found = {frozenset(best.items())}
+    for g, h in itertools.product(best, range(argument_objects)):
+        changed = {k: best[g] if p == h else p for k, p in best.items()} | {g: h}
+        found.add(frozenset(changed.items()))
+        if len(best) > 3:
+            found.add(frozenset((k, p) for k, p in best.items() if k != g))
+    found |= {frozenset(other.items()) for other in others}
+    return [dict(each) for each in found]
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    few=st.integers(3, 6),
+    more=st.integers(0, 2),
+    left_out=st.integers(0, 1),
+    doubt=st.floats(0.0, 1.0),
+    luck=st.floats(0.0, 1.0),
+)
+def test_a_probability_is_a_share_of_all_odds(seed, few, more, left_out, doubt, luck):
+    rng = np.random.default_rng(seed)
+    table = random_table(rng, few, few + more)
+    calibration = Calibration(0.2, 2.0, 1.3, doubt, luck)
+    left_out = min(left_out, few - 3)
+    kept = sorted(rng.permutation(few)[left_out:].tolist())
+    part = finish(part_of(Part.whole(table), kept))
+    *_, last = Exact().search(MatchProblem(part.table, WEIGHTS), rng)
+    found = Found(part, last, Outcome.OPTIMAL)
+    best = dict(zip(kept, found.mapped.partners.tolist(), strict=True))
+    others = [random_map(rng, few, few + more) for _ in range(4)]
+    others = [other for k, other in enumerate(others) if other not in (best, *others[:k])]
+    computed = likelihood(
+        found,
+        exchange_confidences(found.mapped, part.table, WEIGHTS),
+        omission_confidences(last.fmap, part.table, WEIGHTS),
+        [rival(other, table) for other in others],
+        calibration,
+    )
+    maps = considered(best, few + more, others)
+    steep = calibration.sharpness * few**calibration.growth
+    top = worth(best, table, calibration)
+    odds = [math.exp(steep * (worth(each, table, calibration) - top)) for each in maps]
+    nothing = math.exp(steep * (doubt - top))
+    total = sum(odds) + nothing
+    assert computed.of_map == pytest.approx(1.0 / total, abs=1e-9)
+    for k, g in enumerate(kept):
+        agreeing = sum(o for o, each in zip(odds, maps, strict=True) if each.get(g) == best[g])
+        expected = (agreeing + luck * nothing) / total
+        assert computed.of_objects[k] == pytest.approx(expected, abs=1e-9)
+
+
+def random_map(rng, few, many):
+    kept = sorted(rng.permutation(few)[rng.integers(0, few - 2) :].tolist())
+    return dict(zip(kept, rng.permutation(many).tolist(), strict=False))
+
+
+def rival(mapping, table):
+    kept = sorted(mapping)
+    part = finish(part_of(Part.whole(table), kept))
+    partners = np.array([mapping[g] for g in kept])
+    fmap = Fmap.from_object_map(partners, table.argument_objects)
+    mapped = object_map(occm(fmap, part.table))
+    assert mapped.partners.tolist() == partners.tolist()
+    return Rival(np.array(kept), table.template_objects, mapped, zeta(kept, partners, table))
+
+
+def test_good_sketches_are_likelier_right_than_bad_ones():
+    scene = random_scene(np.random.default_rng(1), 8)
+    means = []
+    for displacement in (0.02, 0.8):
+        results = []
+        for seed in range(8):
+            rng = np.random.default_rng(seed)
+            drawn = simulate_sketch(scene, rng, objects=range(6), displacement=displacement)
+            results.append(match(drawn.scene, scene))
+        for result in results:
+            for line in result.matches:
+                assert result.probability - 1e-9 <= line.probability <= 1.0
+        means.append(np.mean([result.probability for result in results]))
+    assert means[0] > 0.75
+    assert means[1] < means[0] - 0.2
+
+
+def test_a_symmetric_scene_may_be_any_of_its_turns():
+    grid = Scene.from_polygons([np.add(SQUARE, (4 * k, 4 * m)) for k in range(3) for m in range(3)])
+    result = match(grid, grid)
+    assert result.probability == pytest.approx(0.25, abs=0.03)
+    by_object = {line.sketch_object: line.probability for line in result.matches}
+    assert by_object.pop(4) > 0.9, "the object in the middle"
+    assert all(value < 0.55 for value in by_object.values())
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"weights": (1, 2, 3)},
+        {"histogram": "gravitational"},
+        {"similarity": "pappis"},
+        {"searcher": "nn"},
+        {"searcher": "easm", "params": {"searcher": {"consistency": "pairwise"}}},
+    ],
+)
+def test_nothing_is_said_where_nothing_was_learned(settings):
+    scene = random_scene(np.random.default_rng(3), 5)
+    result = match(scene, scene, **settings)
+    assert result.probability is None
+    assert all(line.probability is None for line in result.matches)
+
+
+def test_the_learned_weights_are_those_of_the_profile_whatever_their_unit():
+    profile = builtin().defaults.named("learned")
+    assert ConfidenceWeights(*profile.weights) == LEARNED
+    assert calibrated(ConfidenceWeights(*(3.0 * weight for weight in LEARNED))) is not None
+    assert calibrated(ConfidenceWeights(1, 1, 2)) is None
+    assert default_price(ConfidenceWeights(1, 1, 2)) == default_price(ConfidenceWeights())
+    assert default_price(LEARNED) < default_price(ConfidenceWeights())
+
+
+def test_the_profile_weighs_unless_the_request_does():
+    scene = random_scene(np.random.default_rng(4), 5)
+    assert match(scene, scene, profile="learned").confidence.shape is not None
+    assert match(scene, scene, profile="learned", weights=(1, 1, 1)).confidence.shape is None
+    assert match(scene, scene).confidence.shape is None
