@@ -4,8 +4,13 @@ Run it with ``python -m tests.experiments.learn``; it takes about half an hour. 
 numbers of :mod:`sketchmatch.pipeline.calibration`: weights of ζ by a conditional logit over all
 object maps, then price, sharpness and doubt by another one over the maps that a match considers,
 and how well the probabilities that follow hold on other sketches. The study's own sketches have
-seed 0. The numbers in the engine are rounded, and the price under the learned weights is a little
-higher than the likeliest, 0.10, for the sake of sketches that show nothing else.
+seed 0.
+
+The engine's numbers are rounded, and on purpose not the likeliest in two places. Of the weights
+that come out, about (1, 2, 0, 3, 0.4), shape and size count less, as people may simplify shapes
+even more, and dilation a little, for maps that differ in nothing else; it makes no difference to
+how many maps are right (97.3 % against 97.2 % of the sketches learned from). And the price under
+these weights is 0.12, not 0.10, for the sake of sketches that show nothing else.
 """
 
 from __future__ import annotations
