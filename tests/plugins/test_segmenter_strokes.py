@@ -195,6 +195,16 @@ def test_gaps_and_overshoots_of_a_tenth_are_mended(star, overshoot, drift):
     assert warnings == ()
 
 
+def test_an_end_that_runs_along_the_beginning_is_mended():
+    angles = np.pi / 2 * np.arange(4)
+    radii = np.array([0.625, 0.8125, 1.0, 0.625])
+    outline = shapely.LinearRing(np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1))
+    stroke = drawn(outline, 0.84375, 1.0 + 0.0625 * 1.625 / outline.length)
+    item, warnings = first_object(stroke)
+    assert overlap(item, outline) > 0.9
+    assert warnings == ()
+
+
 @settings(max_examples=50, deadline=None)
 @given(stars(), st.floats(0.0, 6.3), st.floats(0.01, 100.0), st.tuples(*[st.floats(-9, 9)] * 2))
 def test_the_result_turns_scales_and_moves_with_the_drawing(star, angle, scale, shift):

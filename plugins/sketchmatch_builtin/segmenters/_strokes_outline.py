@@ -68,7 +68,11 @@ def own_gap(stroke: Trace) -> float:
 def areas_of(line: shapely.LineString) -> list[shapely.Polygon]:
     """Return the separate areas that a line encloses, largest first."""
     noded = shapely.get_parts(shapely.union_all([line]))
-    enclosed = shapely.coverage_union_all(shapely.get_parts(shapely.polygonize(noded)))
+    faces = shapely.get_parts(shapely.polygonize(noded))
+    try:
+        enclosed = shapely.coverage_union_all(faces)
+    except shapely.GEOSException:  # faces overlap where edges all but coincide
+        enclosed = shapely.union_all(faces, grid_size=_ROUNDING * max(np.ptp(line.coords, axis=0)))
     return sorted(shapely.get_parts(enclosed), key=lambda area: -area.area)
 
 
