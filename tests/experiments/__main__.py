@@ -15,7 +15,7 @@ from tests.experiments.records import Results
 from tests.experiments.report import report
 from tests.experiments.runs import PROCESSES, run_all
 
-METHODS_COMPARED = ("fsnn-pso", "easm", "auto")
+METHODS_COMPARED = ("fsnn-pso", "easm", "auto", "learned")
 
 _TIMES = "times"
 

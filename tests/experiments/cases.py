@@ -220,6 +220,7 @@ def evaluate(case: Case, method: str) -> Record:
         case.zeta(result.object_map),
         case.zeta(case.true_map),
         result.statistics.seconds["search"],
+        result.probability,
     )
 
 

@@ -14,7 +14,7 @@ __all__ = ["METHODS", "THESIS", "Method", "warm_up"]
 
 @dataclass(frozen=True)
 class Method:
-    """A name, a searcher, and whatever else the request says.
+    """A name, and what the request says.
 
     Attributes
     ----------
@@ -31,6 +31,8 @@ class Method:
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
+_LEARNED = {"profile": "learned"}
+
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
         method.name: method
@@ -41,6 +43,8 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             Method("auto", "auto"),
             Method("exact", "exact"),
             Method("direct", "direct"),
+            Method("learned", "auto", _LEARNED),
+            Method("unmatched", "auto", {**_LEARNED, "allow_unmatched": True}),
         )
     }
 )

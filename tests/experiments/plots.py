@@ -40,8 +40,9 @@ _COLOURS = {
     "fsnn-pso": "#1b9e77",
     "exact": "#7b3294",
     "direct": "#c2a000",
+    "learned": "#e7298a",
 }
-_OTHER = "#e7298a"
+_OTHER = "#888888"
 _WIDTHS = {"easm": 4.5}  # to be seen beneath auto, which mostly agrees
 _RIGHT, _WRONG = "#1f77b4", "#d95f02"
 _DOTS_PER_INCH = 110

@@ -51,6 +51,8 @@ STRONGER = 1.05
 
 _PAPERS = range(0, 360, 30)
 _LARGE = {10: 10, 12: 5, 16: 3, 20: 3, 30: 2}
+_SMALL = ("fsnn-pso", "easm", "auto", "learned", "exact")
+_LARGE_BY = ("easm", "auto", "learned", "direct")
 _FEWEST = 3
 _SLOW = ("fsnn-pso",)
 _SEARCH_LONG = ("fsnn-pso", "easm")
@@ -83,11 +85,11 @@ def experiments(
 def times(count: int = SKETCHES) -> dict[str, list[Work]]:
     """Return what times are measured on, Table 4.5 and beyond: to be done in one process."""
     small = [
-        Work("A", number, Style(), _smaller(number), methods=("fsnn-pso", "easm", "auto", "exact"))
+        Work("A", number, Style(), _smaller(number), methods=_SMALL)
         for number in range(max(1, count // 8))
     ]
     large = [
-        Work(f"{objects}", number, Style(), methods=("easm", "auto", "direct"))
+        Work(f"{objects}", number, Style(), methods=_LARGE_BY)
         for objects, most in _LARGE.items()
         for number in range(min(most, count))
     ]
@@ -194,6 +196,17 @@ def _rotation(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     return {"rotation": works}
 
 
+def _both_ways(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
+    """Return sketches that lack one object and show one that is not there."""
+    those = (*(method for method in methods if method not in _SLOW), "unmatched")
+    works = [
+        Work(place, number, Style(missing=1, extra=1), methods=tuple(dict.fromkeys(those)))
+        for place in PLACES
+        for number in range(max(1, count // 2))
+    ]
+    return {"one missing and one extra": works}
+
+
 PARTS: Mapping[str, Callable[[tuple[str, ...], int], dict[str, list[Work]]]] = {
     "1": lambda methods, count: _equal("map", methods, count),
     "2": lambda methods, count: _equal("map", methods, count),
@@ -203,6 +216,7 @@ PARTS: Mapping[str, Callable[[tuple[str, ...], int], dict[str, list[Work]]]] = {
     "strength": _strength,
     "rotation": _rotation,
     "shapes": _shapes,
+    "both-ways": _both_ways,
 }
 """The thesis's experiments by number, and the sweeps beside them. 1 and 2 are done together."""
 

@@ -14,7 +14,17 @@ from tests.experiments.cases import Record
 from tests.experiments.intervals import wilson
 from tests.experiments.thesis import Row
 
-__all__ = ["Results", "as_row", "chosen", "grouped", "interval_by_sketch", "right", "share"]
+__all__ = [
+    "Results",
+    "as_row",
+    "chosen",
+    "drawn_as_usual",
+    "given_probabilities",
+    "grouped",
+    "interval_by_sketch",
+    "right",
+    "share",
+]
 
 _RESAMPLES = 2000
 _Key = TypeVar("_Key")
@@ -89,6 +99,16 @@ def share(successes: int, tests: int) -> str:
         return "–"
     low, high = wilson(successes, tests)
     return f"{100 * successes / tests:.1f} [{100 * low:.1f}, {100 * high:.1f}]"
+
+
+def drawn_as_usual(title: str) -> bool:
+    """Whether an experiment's sketches are those of the study, none of a sweep or traced."""
+    return title.startswith(("all objects", "one missing", "several missing", "sketches like"))
+
+
+def given_probabilities(records: Iterable[Record]) -> list[tuple[float, bool]]:
+    """Return the probabilities of answers, where there are any, and whether they were right."""
+    return [(r.probability, r.perfect) for r in records if r.probability is not None]
 
 
 def as_row(records: Sequence[Record]) -> Row | None:

@@ -15,11 +15,14 @@ from tests.experiments.records import (
     Results,
     as_row,
     chosen,
+    drawn_as_usual,
+    given_probabilities,
     grouped,
     interval_by_sketch,
     right,
     share,
 )
+from tests.experiments.reliability import reliability
 from tests.experiments.scenes import PLACES
 from tests.experiments.thesis import Row, Summary
 
@@ -28,6 +31,8 @@ _Key = TypeVar("_Key")
 __all__ = [
     "NINE",
     "appendix",
+    "both_ways",
+    "calibration",
     "equal",
     "equal_summary",
     "one_missing",
@@ -238,6 +243,47 @@ def studies_of_nine(results: Results) -> Table:
         tuple(rows),
         note=f"Wholly right of {cases} cases; the thesis prints {thesis.TOTAL.perfect}. "
         f"{results.sketches} sketches a scene make {studies} studies; a slow method has fewer.",
+    )
+
+
+def both_ways(results: Results) -> Table:
+    """Return sketches that lack one object and show one that is not there."""
+    rows = []
+    for place in PLACES:
+        drawn = chosen(results["one missing and one extra"], place=place)
+        for method, own in grouped(drawn, lambda record: record.method).items():
+            correct = sum(record.right for record in own) / sum(record.objects for record in own)
+            figures = (share(right(own), len(own)), f"{100 * correct:.1f}")
+            rows.append((place, method, f"{len(own)}", *figures))
+    return Table(
+        "One object missing and one that is not there, map",
+        ("scene", "method", "sketches", "wholly right, %", "objects, %"),
+        tuple(rows),
+        left=2,
+        note="Only unmatched, which is learned with allow_unmatched, may leave an object of either "
+        f"side without partner: no other can be wholly right. {_INTERVAL}",
+    )
+
+
+def calibration(results: Results) -> Table:
+    """Return how the probabilities of answers compare with what came true."""
+    rows = []
+    for title, records in results.experiments.items():
+        if not drawn_as_usual(title):
+            continue
+        for method, own in grouped(records, lambda record: record.method).items():
+            answers = given_probabilities(own)
+            if answers:
+                said, came_true = zip(*answers, strict=True)
+                figures = (f"{100 * mean(said):.1f}", f"{100 * mean(came_true):.1f}")
+                error = f"{reliability(answers).error:.3f}"
+                rows.append((title, method, f"{len(answers)}", *figures, error))
+    return Table(
+        "Probabilities against what came true",
+        ("experiment", "method", "cases", "mean probability, %", "wholly right, %", "error"),
+        tuple(rows),
+        left=2,
+        note="error: expected calibration error in ten bins.",
     )
 
 

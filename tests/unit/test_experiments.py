@@ -392,8 +392,11 @@ def test_the_report_begins_with_the_numbers_of_the_readme(results):
     text = (results.folder / "report.md").read_text(encoding="utf-8")
     row = cells(text, "Against the thesis", "one object missing: wholly right, %")
     sweeps = [results.results[f"one missing, {map_}"] for map_ in ("map", "grid")]
-    own = [record for sweep in sweeps for record in chosen(sweep, method="auto")]
-    assert row[1:] == ["88.5 [84.2, 91.8]", share(sum(each.perfect for each in own), len(own))]
+    shares = []
+    for method in ("auto", "learned"):
+        own = [record for sweep in sweeps for record in chosen(sweep, method=method)]
+        shares.append(share(sum(each.perfect for each in own), len(own)))
+    assert row[1:] == ["88.5 [84.2, 91.8]", *shares]
     assert (results.folder / "against-the-thesis.png").exists()
 
 
@@ -511,8 +514,9 @@ def test_reliability_finds_what_is_too_sure():
 
 
 def test_probabilities_are_drawn_once_records_carry_them():
-    made = [dataclasses.replace(each, probability=0.9) for each in records([8, 8, 6])]
-    blocks = report(Results({"case (a), map": made}, (), 1))
+    made = [dataclasses.replace(each, probability=0.9) for each in records([8, 8, 6], "auto")]
+    traced = [dataclasses.replace(each, probability=0.1) for each in made]
+    blocks = report(Results({"several missing": made, "case (a), map": traced}, (), 1))
     (picture,) = [block for block in blocks if isinstance(block, document.Picture)]
     assert "expected calibration error 0.233" in picture.caption
 
