@@ -204,7 +204,7 @@ def _both_ways(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
         for place in PLACES
         for number in range(max(1, count // 2))
     ]
-    return {"one missing and one extra": works}
+    return {"missing and extra": works}
 
 
 PARTS: Mapping[str, Callable[[tuple[str, ...], int], dict[str, list[Work]]]] = {

@@ -200,7 +200,7 @@ def _sweeps(results: Results) -> Iterator[Block]:
             "each thing its place, its size and its direction."
         )
         yield _by_shapes(results)
-    if "one missing and one extra" in results:
+    if "missing and extra" in results:
         yield Heading("Missing and extra at once")
         yield tables.both_ways(results)
 

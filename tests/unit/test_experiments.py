@@ -364,6 +364,14 @@ def test_the_report_has_the_numbers_of_the_records(results):
     assert row[1:4] == ["37", "4607", "124.5"]
 
 
+def test_the_report_says_what_segmentation_cost_and_who_can_leave_objects_out(results):
+    text = (results.folder / "report.md").read_text(encoding="utf-8")
+    assert "In 0 of our 2 sketches segmentation lost" in text
+    drawn = chosen(results.results["missing and extra"], place="B", method="unmatched")
+    row = cells(text, "One object missing and one that is not there", "B", "unmatched")
+    assert row[2:4] == ["1", share(sum(record.perfect for record in drawn), 1)]
+
+
 def test_markdown_is_aligned_and_has_no_html(results):
     text = (results.folder / "report.md").read_text(encoding="utf-8")
     assert not re.search(r"</?[a-z]+[ >/]", text)
