@@ -13,9 +13,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from multiprocessing.connection import Connection
-from multiprocessing.reduction import ForkingPickler
 from pathlib import Path
-from types import MappingProxyType
 
 from sketchmatch.model.limits import limited_to
 from sketchmatch.pipeline.selection import Defaults
@@ -187,7 +185,3 @@ def _responses(job: Job, setup: Setup) -> Generator[bytes, None, None]:
             yield work.segment_response(wanted, source, setup).SerializeToString()
         case Method.WARM_UP:
             warm_up_others(setup.registry.without(OWN_DISTRIBUTION), setup.defaults)
-
-
-# Settings are read-only mappings, which Python does not know how to send.
-ForkingPickler.register(MappingProxyType, lambda mapping: (MappingProxyType, (dict(mapping),)))
