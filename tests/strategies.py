@@ -126,12 +126,21 @@ def with_evidence(rng, table):
     return replace(table, evidence=rng.uniform(0.0, 1.0, shape))
 
 
+def with_rotation_weights(rng, table):
+    """Return a table whose pairs' rotations count for very different random weights."""
+    return replace(table, rotation_weights=np.exp(rng.normal(0.0, 1.0, table.template_pairs)))
+
+
 @st.composite
 def tables_and_object_maps(draw, most=7):
-    """Return a random relation table, perhaps with evidence, and an injective object map."""
+    """Return a random relation table and an injective object map.
+
+    The table may have evidence and rotation weights.
+    """
     table = draw(tables(most=most))
-    if draw(st.booleans()):
-        table = with_evidence(np.random.default_rng(draw(st.integers(0, 2**32))), table)
+    for add in (with_evidence, with_rotation_weights):
+        if draw(st.booleans()):
+            table = add(np.random.default_rng(draw(st.integers(0, 2**32))), table)
     order = draw(st.permutations(range(table.argument_objects)))
     return table, np.array(order[: table.template_objects])
 

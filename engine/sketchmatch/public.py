@@ -23,8 +23,9 @@ from sketchmatch.model import (
     object_pairs,
 )
 from sketchmatch.model.limits import limited_to, source_limits
-from sketchmatch.pipeline.match import Finished, MatchRequest, Progress, run_match
+from sketchmatch.pipeline.match import Finished, Progress, run_match
 from sketchmatch.pipeline.plugins import segmented
+from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import MatchResult
 from sketchmatch.pipeline.selection import STAGES, Choice, Selection, resolve, resolve_segmenter
 from sketchmatch.registry import default_registry
@@ -71,7 +72,9 @@ def match(
         Seconds after which the best answer so far is given, or None for no limit.
     weights
         Of ζσ, ζR and ζL in ζ; with two numbers more, of ζS and ζM, which compare each object with
-        its partner in shape and in size. Left out, as the profile says, or else 1, 1, 1.
+        its partner in shape and in size; with a sixth, an exponent β by which the rotation of two
+        objects that are d apart counts in ζR for d^β. Left out, as the profile says, or else
+        1, 1, 1.
     allow_unmatched
         Whether an object may stay without partner on both sides, where that is likelier. Left out,
         as the profile says, or else not: the smaller scene is matched completely.

@@ -104,11 +104,14 @@ class TestRequest:
         assert allowing.allow_unmatched
         assert allowing.unmatched_price == 0.5
 
-    def test_carries_weights_of_shape_and_size(self, call, server):
-        call(server.address, "match", SKETCH, MAP, weights=(1, 2, 3, 0.5, 0))
-        weights = server.requests[0].weights
-        assert (weights.dilation, weights.shape, weights.size) == (3, 0.5, 0)
-        assert weights.HasField("size")
+    def test_carries_weights_of_shape_size_and_distance(self, call, server):
+        for given in ((1, 2, 3, 0.5, 0), (1, 2, 3, 0.5, 0, 1.5)):
+            call(server.address, "match", SKETCH, MAP, weights=given)
+        five, six = (request.weights for request in server.requests)
+        assert (five.dilation, five.shape, five.size) == (3, 0.5, 0)
+        assert five.HasField("size")
+        assert not five.HasField("distance")
+        assert (six.shape, six.size, six.distance) == (0.5, 0, 1.5)
 
     @pytest.mark.parametrize(
         ("options", "sentence"),
@@ -127,6 +130,7 @@ class TestRequest:
                 {"weights": (1, 1, 1, 1)},
                 "weights is not three numbers, similarity, rotation, dilation, or five",
             ),
+            ({"weights": (1,) * 7}, "weights is not three numbers"),
             ({"params": {"serch": {}}}, "params has no stage 'serch'; the stages are sketch_seg"),
             (
                 {"params": {"searcher": {"population": object()}}},

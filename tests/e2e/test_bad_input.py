@@ -501,6 +501,14 @@ CASES = [
         chosen={"searcher": "nn"},
     ),
     Case(
+        "exponent of distance > 4",
+        "INVALID_FIELD",
+        "weights.distance",
+        "is 5",
+        "give a number from 0 to 4",
+        weights=(1, 1, 1, 0, 0, 5),
+    ),
+    Case(
         "no weight",
         "INVALID_FIELD",
         "weights",
@@ -550,7 +558,7 @@ def asked(case: Case, folder: Path) -> MatchRequest:
         selection.name = case.chosen.get(stage, "")
         selection.parameters.update(case.params.get(stage, {}))
     if case.weights:
-        names = ("similarity", "rotation", "dilation", "shape", "size")
+        names = ("similarity", "rotation", "dilation", "shape", "size", "distance")
         made.weights.CopyFrom(ConfidenceWeights(**dict(zip(names, case.weights, strict=False))))
     if case.time_budget is not None:
         made.time_budget.FromNanoseconds(round(1e9 * case.time_budget))

@@ -222,6 +222,17 @@ def test_weights_weigh_shapes_and_sizes_too(command_line, where):
     assert parts.total == pytest.approx(weighed / 7)
 
 
+def test_rotations_of_distant_pairs_count_for_more(command_line, where):
+    alike, by_distance = (
+        result(command_line("match", *ROOM, *where, "--json", "--weights", f"1,1,1,0,0,{power}"))
+        for power in (0, 2)
+    )
+    assert alike.object_matches != by_distance.object_matches  # margins and confidences differ
+    parts = by_distance.fmap_confidence
+    assert parts.rotation > alike.fmap_confidence.rotation
+    assert parts.total == pytest.approx((parts.similarity + parts.rotation + parts.dilation) / 3)
+
+
 def test_fewer_and_more_objects_in_the_sketch(command_line, where, uneven):
     four, three = uneven
     fewer = result(command_line("match", three, four, *where, "--json"))

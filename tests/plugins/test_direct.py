@@ -28,7 +28,13 @@ from sketchmatch_builtin.searchers.direct import Direct, evolve
 from tests.oracle import maps as oracle
 from tests.oracle.enumeration import best_of_all
 from tests.searching import WEIGHTS, drain, geometric_table, sketched_table
-from tests.strategies import random_table, tables, tables_and_object_maps, with_evidence
+from tests.strategies import (
+    random_table,
+    tables,
+    tables_and_object_maps,
+    with_evidence,
+    with_rotation_weights,
+)
 
 TRUE = 1e-9
 EQUAL = (1.0, 1.0, 1.0)
@@ -259,7 +265,7 @@ def test_it_finds_the_best_of_sketches():
     assert share_of_optima(cases) == 60
 
 
-def test_it_finds_the_best_where_there_is_evidence():
+def test_it_finds_the_best_where_there_are_evidence_and_rotation_weights():
     cases = []
     for seed in range(20):
         table = (
@@ -267,7 +273,10 @@ def test_it_finds_the_best_where_there_is_evidence():
             if seed % 2
             else random_table(np.random.default_rng(seed), 6, 7)
         )
-        cases.append((with_evidence(np.random.default_rng(seed), table), WEIGHTS[seed % 7]))
+        table = with_evidence(np.random.default_rng(seed), table)
+        if seed % 3:
+            table = with_rotation_weights(np.random.default_rng(seed), table)
+        cases.append((table, WEIGHTS[seed % 7]))
     assert share_of_optima(cases) == 20
 
 

@@ -22,7 +22,7 @@ from sketchmatch_builtin.searchers.exact import Exact, branch_and_bound
 from tests.oracle import maps as oracle
 from tests.oracle.enumeration import best_of_all, every_confidence
 from tests.searching import WEIGHTS, drain, geometric_table, sketched_table
-from tests.strategies import random_table, tables, with_evidence
+from tests.strategies import random_table, tables, with_evidence, with_rotation_weights
 
 TRUE = 1e-9
 
@@ -99,7 +99,7 @@ def test_random_relations(seed):
 
 @pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("seed", range(30))
-def test_relations_with_evidence(seed):
+def test_relations_with_evidence_and_rotation_weights(seed):
     rng = np.random.default_rng(seed)
     shapes = [(4, 5), (5, 5), (5, 6), (6, 6), (2, 4)]
     template, argument = shapes[seed % len(shapes)]
@@ -107,7 +107,11 @@ def test_relations_with_evidence(seed):
     if seed % 2:
         table = sketched_table(seed, template, argument, displacement=0.3, turn=0.3)
     weights = tuple(rng.uniform(0.0, 2.0, 3))
-    assert_proved(with_evidence(rng, table), weights, seed)
+    for add in ((with_evidence,), (with_rotation_weights,), (with_evidence, with_rotation_weights))[
+        seed % 3
+    ]:
+        table = add(rng, table)
+    assert_proved(table, weights, seed)
 
 
 @given(tables(most=5, more=3), st.tuples(*3 * [st.floats(0.0, 10.0)]).filter(any))

@@ -92,7 +92,9 @@ def test_accepted_echoes_every_algorithm_with_every_parameter(address):
     )
 
 
-@pytest.mark.parametrize("weights", [(1, 2, 0.5, 0.7, 0), (1, 1, 1, 0, 2)])
+@pytest.mark.parametrize(
+    "weights", [(1, 2, 0.5, 0.7, 0), (1, 1, 1, 0, 2), (1, 2, 0.5, 0.7, 0, 1.5)]
+)
 def test_objects_are_weighed_alike_in_process_and_over_grpc(address, weights):
     sketch, map_ = shapes(5), turned(shapes(6))
     local = sketchmatch.match(
@@ -101,7 +103,8 @@ def test_objects_are_weighed_alike_in_process_and_over_grpc(address, weights):
     with Client(address) as client:
         remote = client.match(sources.polygons(sketch), sources.polygons(map_), weights=weights)
     accepted, parts = remote.accepted.weights, remote.result.fmap_confidence
-    assert (accepted.shape, accepted.size) == weights[3:]
+    sent = (accepted.shape, accepted.size, accepted.distance)
+    assert sent == (*weights[3:], 0)[:3]
     assert timeless(remote.result) == timeless(responses.result(local))
     assert (parts.shape, parts.size) == (local.confidence.shape, local.confidence.size)
 

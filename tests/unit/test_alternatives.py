@@ -10,7 +10,8 @@ from sketchmatch.api import Outcome, Searcher, SearchProgress
 from sketchmatch.model import Fmap
 from sketchmatch.pipeline.alternatives import best_others, exchange_confidences, partner_margins
 from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
-from sketchmatch.pipeline.match import MatchRequest, run_match
+from sketchmatch.pipeline.match import run_match
+from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import Choice
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from tests.strategies import random_table

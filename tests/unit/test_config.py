@@ -12,7 +12,8 @@ from sketchmatch import Scene, match
 from sketchmatch.config import Origin, builtin, check, entries, load, open_registry, template
 from sketchmatch.config.settings import static_paths
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.pipeline.match import MatchRequest, run_match
+from sketchmatch.pipeline.match import run_match
+from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import Choice, resolve
 from sketchmatch.registry import Kind, default_registry
 from tests.tools import ROOT

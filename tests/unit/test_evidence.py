@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sketchmatch import InvalidInputError, match
 from sketchmatch.model import ConfidenceWeights, Fmap, RelationTable, Scene
 from sketchmatch.pipeline.correspond import fmap_confidence
-from sketchmatch.pipeline.evidence import compare_objects, weigh_objects
+from sketchmatch.pipeline.evidence import compare_objects, rotation_weights, weigh_objects
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.testing import random_scene, simulate_sketch
 from tests.oracle import evidence as oracle
@@ -105,6 +105,54 @@ def test_turning_and_scaling_the_sketch_changes_nothing(seed, bins, factor, weig
     assert totals[0] == pytest.approx(totals[1], abs=1e-7)
 
 
+@pytest.mark.parametrize("searcher", ["auto", "exact", "direct", "easm", "nn", "fsnn-pso"])
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_rotations_of_distant_pairs_count_for_more(searcher, exchanged):
+    sketch, scene = sketched(4, 6, 5, displacement=0.3, turn=0.3)
+    first, second = (scene, sketch.scene) if exchanged else (sketch.scene, scene)
+    result = match(first, second, searcher=searcher, weights=(1, 2, 1, 0, 0, 1.5))
+    few = [item.centroid for item in sketch.scene.objects]
+    side = "map_pair" if exchanged else "sketch_pair"
+    counts = [math.dist(*(few[k] for k in getattr(line, side))) ** 1.5 for line in result.fmap]
+    turns = [complex(math.cos(line.rotation), math.sin(line.rotation)) for line in result.fmap]
+    total = sum(count * turn for count, turn in zip(counts, turns, strict=True))
+    found = result.confidence
+    assert found.rotation == pytest.approx(abs(total) / sum(counts), abs=1e-9)
+    parts = (found.similarity, found.rotation, found.dilation)
+    assert found.total == pytest.approx(np.average(parts, weights=(1, 2, 1)), abs=1e-9)
+    assert result.rotation == pytest.approx(math.atan2(total.imag, total.real), abs=1e-9)
+
+
+@given(scenes(most=5), floats(0.0, 4.0))
+@settings(deadline=None, max_examples=60)
+def test_rotation_weights_are_powers_of_distances(scene, distance):
+    apart = [
+        math.dist(scene.objects[a].centroid, scene.objects[b].centroid)
+        for a, b in maps.pairs(len(scene))
+    ]
+    mean = sum(apart) / len(apart)
+    expected = [max(d / mean, 0.01) ** distance if mean else 1.0 for d in apart]
+    assert rotation_weights(scene, distance).tolist() == pytest.approx(expected, rel=1e-9)
+
+
+def test_an_exponent_of_0_is_the_thesis_s_zeta():
+    sketch, scene = sketched(5)
+    three, six = (
+        match(sketch.scene, scene, weights=weights) for weights in ((1, 1, 1), (1, 1, 1, 0, 0, 0))
+    )
+    assert three.confidence == six.confidence
+    assert three.probability == six.probability is not None
+    assert match(sketch.scene, scene, weights=(1, 1, 1, 0, 0, 1)).probability is None
+
+
+def test_objects_around_one_centre_weigh_alike():
+    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    rings = [[square * k, square[::-1] * (k - 0.5)] for k in (1.0, 2.0, 3.0)]
+    scene = Scene.from_polygons(rings)
+    assert rotation_weights(scene, 2.0).tolist() == [1.0, 1.0, 1.0]
+    assert match(scene, scene, weights=(1, 1, 1, 0, 0, 2)).fmap_confidence == pytest.approx(1.0)
+
+
 def test_a_copy_is_as_alike_as_can_be():
     scene = random_scene(np.random.default_rng(1), 5)
     result = match(moved(scene, math.pi / 2, 3.0), scene, weights=(1, 1, 1, 1, 1))
@@ -176,6 +224,9 @@ def test_a_search_of_pairs_is_refused(searcher, params, weights, field):
     ("weights", "words"),
     [
         ((1, 1, 1, 1), "weights are 4 numbers; give three"),
+        ((1, 1, 1, 0, 0, 5), r"weights\.distance is 5; give a number from 0 to 4"),
+        ((1, 1, 1, 0, 0, math.nan), r"weights\.distance is nan; give a number from 0 to 4"),
+        ((0, 0, 0, 0, 0, 1), "weights are all zero"),
         ((1, 1, 1, -1, 0), r"weights\.shape is -1; give a number from 0"),
         ((1, 1, 1, 0, math.nan), r"weights\.size is nan; give a number from 0"),
         ((0, 0, 0, 0, 0), "weights are all zero"),

@@ -184,7 +184,9 @@ def test_an_entry_is_found_in_any_order_of_the_objects(case, data):
     row = oracle.pairs(table.template_objects).index((min(a, b), max(a, b)))
     _, rotation, dilation = oracle.look_up(table, row, pair)
     level = 1.5 / np.log(2) * np.log(dilation)
-    expected = (oracle.evidence(table, row, pair), np.cos(rotation), np.sin(rotation), level)
+    counts = table.rotation_weights[row]
+    turn = (counts * np.cos(rotation), counts * np.sin(rotation))
+    expected = (oracle.evidence(table, row, pair), *turn, level)
     assert map_entry(state, a, b, c, d) == pytest.approx(expected, abs=1e-14)
 
 

@@ -318,6 +318,12 @@ def seeing_pairs_alone(self, problem, rng):
     return Outcome.ITERATION_LIMIT
 
 
+def weighing_alike(self, problem, rng):
+    table = replace(problem.table, rotation_weights=np.ones(1))
+    yield from RandomMaps.search(self, replace(problem, table=table), rng)
+    return Outcome.ITERATION_LIMIT
+
+
 def boasting(progress, problem, _):
     return other(progress, confidence=progress.confidence + (1e-6 if is_usual(problem) else 0.0))
 
@@ -444,6 +450,7 @@ SEARCHERS = {
         like(RandomMaps, search=search(crossing)),
     ),
     "evidence-is-weighed": ("it claims ζ =", like(RandomMaps, search=seeing_pairs_alone)),
+    "rotations-are-weighed": ("it claims ζ =", like(RandomMaps, search=weighing_alike)),
     "odd-problems-are-solved": (
         "with 2 on 2 objects, it raised ZeroDivisionError",
         like(RandomMaps, search=no_two),

@@ -13,7 +13,8 @@ from sketchmatch.api import MatchProblem, Outcome
 from sketchmatch.config import builtin
 from sketchmatch.model import Fmap, object_pairs
 from sketchmatch.pipeline.correspond import fmap_confidence
-from sketchmatch.pipeline.match import Finished, MatchRequest, Progress, run_match
+from sketchmatch.pipeline.match import Finished, Progress, run_match
+from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import Choice
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.pipeline.unmatched import (
@@ -28,7 +29,7 @@ from sketchmatch.pipeline.warmup import warm_up, warm_up_others
 from sketchmatch.registry import default_registry
 from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.searchers.exact import Exact
-from tests.strategies import random_table, with_evidence
+from tests.strategies import random_table, with_evidence, with_rotation_weights
 
 WEIGHTS = (1.0, 2.0, 0.5)
 SEARCHERS = ["auto", "exact", "direct", "easm"]
@@ -125,7 +126,7 @@ def test_an_omission_has_the_confidence_of_the_map_that_it_leaves(seed, few, evi
     rng = np.random.default_rng(seed)
     table = random_table(rng, few, few + 1)
     if evidence:
-        table = with_evidence(rng, table)
+        table = with_rotation_weights(rng, with_evidence(rng, table))
     partners = rng.permutation(few + 1)[:few]
     fmap = Fmap.from_object_map(partners, few + 1)
     computed = omission_confidences(fmap, table, WEIGHTS)
@@ -137,13 +138,15 @@ def test_an_omission_has_the_confidence_of_the_map_that_it_leaves(seed, few, evi
 
 def test_a_part_has_the_relations_of_its_objects():
     rng = np.random.default_rng(1)
-    table = with_evidence(rng, random_table(rng, 5, 6))
+    table = with_rotation_weights(rng, with_evidence(rng, random_table(rng, 5, 6)))
     kept = (0, 2, 3)
     part = finish(part_of(Part.whole(table), kept))
     rows = [k for k, pair in enumerate(object_pairs(5).tolist()) if set(pair) <= set(kept)]
     assert (part.table.template_objects, part.table.argument_objects) == (3, 6)
     for name in ("similarity", "rotation", "dilation", "evidence"):
         assert (getattr(part.table, name) == getattr(table, name)[rows]).all()
+    counts = table.rotation_weights[rows]
+    assert part.table.rotation_weights == pytest.approx(counts / counts.mean(), rel=1e-12)
     assert part.left_out == 2
 
 

@@ -18,8 +18,12 @@ from sketchmatch_proto.v1.source_pb2 import Source
 
 __all__ = ["MatchOptions", "match_request", "segment_request"]
 
-Weights = tuple[float, float, float] | tuple[float, float, float, float, float]
-"""Of similarity, rotation and dilation in ζ, and perhaps of shape and size."""
+Weights = (
+    tuple[float, float, float]
+    | tuple[float, float, float, float, float]
+    | tuple[float, float, float, float, float, float]
+)
+"""Of similarity, rotation and dilation in ζ, perhaps of shape and size, and of distance in ζR."""
 
 _STAGES = ("sketch_segmenter", "map_segmenter", "histogram", "similarity", "searcher")
 
@@ -39,8 +43,9 @@ class MatchOptions(TypedDict, total=False):
     time_budget
         Seconds, or a timedelta, after which the best match so far is the result.
     weights
-        Weights of similarity, rotation and dilation in ζ, and with two numbers more of the
-        objects' own shape and size. Left out: as the profile says, or else 1, 1, 1, 0, 0.
+        Weights of similarity, rotation and dilation in ζ, with two numbers more of the objects'
+        own shape and size, and with a sixth the exponent β by which the rotation of two objects
+        that are d apart counts for d^β. Left out: as the profile says, or else 1, 1, 1, 0, 0, 0.
     allow_unmatched
         Whether an object may stay without partner on both sides where that is likelier. Left out:
         as the profile says, or else not.
@@ -104,7 +109,8 @@ def match_request(
         with refused_as(
             "INVALID_FIELD",
             "weights",
-            "is not three numbers, similarity, rotation, dilation, or five, with shape and size",
+            "is not three numbers, similarity, rotation, dilation, or five, with shape and size, "
+            "or six, with distance",
         ):
             request.weights.CopyFrom(_weights(*weights))
     if allow_unmatched is not None:
@@ -160,9 +166,14 @@ def _selection(field: str, name: str, params: Mapping[str, Any]) -> AlgorithmSel
 
 
 def _weights(similarity: float, rotation: float, dilation: float, *own: float) -> ConfidenceWeights:
-    shape, size = own or (None, None)
+    names = ("shape", "size", "distance")
+    if len(own) not in (0, 2, 3):
+        raise ValueError
     return ConfidenceWeights(
-        similarity=similarity, rotation=rotation, dilation=dilation, shape=shape, size=size
+        similarity=similarity,
+        rotation=rotation,
+        dilation=dilation,
+        **dict(zip(names, own, strict=False)),
     )
 
 

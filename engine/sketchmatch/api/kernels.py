@@ -14,7 +14,8 @@
 
 Evidence is what an entry counts for beside rotation and dilation: σ, or more where a request weighs
 the shapes and sizes of objects. A searcher that reads the table itself takes it, as these do, from
-``RelationTable.entry_evidence``.
+``RelationTable.entry_evidence``, and cos R and sin R from ``cosine`` and ``sine``, which are times
+the rotation weight of each pair.
 
 Generators of :mod:`numpy.random` may be handed to compiled code.
 

@@ -31,8 +31,8 @@ class MatchProblem:
     Attributes
     ----------
     table
-        Similarity, rotation and dilation of every histogram correspondence. The template has at
-        most as many objects as the argument.
+        Similarity, rotation and dilation of every histogram correspondence, and what they count
+        for. The template has at most as many objects as the argument.
     weights
         Weights of the three parts of ζ: of ζσ, or the mean of the evidence in its place where the
         table holds any, ζR and ζL.
@@ -84,8 +84,9 @@ class Searcher(Algorithm, ABC):
     """Looks for the FMAP with the highest confidence ζ.
 
     What speaks for an entry beside rotation and dilation is σ, unless the request weighs shapes and
-    sizes of objects; a searcher reads it from ``table.entry_evidence``, as all of
-    :mod:`sketchmatch.api.kernels` does.
+    sizes of objects; a searcher reads it from ``table.entry_evidence``. What the rotation of a
+    template pair counts for is in ``table.rotation_weights``, and so in ``table.cosine`` and
+    ``table.sine``. All of :mod:`sketchmatch.api.kernels` reads these.
     """
 
     @property

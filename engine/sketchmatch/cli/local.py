@@ -15,7 +15,8 @@ from sketchmatch.io import read_source
 from sketchmatch.model import Source
 from sketchmatch.model.limits import limited_to
 from sketchmatch.pipeline import plugins
-from sketchmatch.pipeline.match import MatchRequest, run_match
+from sketchmatch.pipeline.match import run_match
+from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import Choice, resolve_segmenter
 from sketchmatch.pipeline.warmup import announcing_compilation
 from sketchmatch.server import responses

@@ -54,9 +54,9 @@ def match(
     weights: Annotated[
         str | None,
         typer.Option(
-            metavar="W1,W2,W3[,W4,W5]",
-            help="Weights of ζσ, ζR and ζL in ζ, and of the objects' shapes and sizes; 1,1,1 "
-            "by default.",
+            metavar="W1,W2,W3[,W4,W5[,β]]",
+            help="Weights of ζσ, ζR and ζL in ζ, and of the objects' shapes and sizes; rotations "
+            "of pairs d apart count for d^β; 1,1,1 by default.",
         ),
     ] = None,
     allow_unmatched: Annotated[
@@ -133,12 +133,16 @@ def _weights(text: str) -> RequestWeights:
     try:
         similarity, rotation, dilation, *own = (float(part) for part in text.split(","))
         if own:
-            shape, size = own
+            shape, size, *distance = own
+            if distance:
+                (exponent,) = distance
+                return (similarity, rotation, dilation, shape, size, exponent)
             return (similarity, rotation, dilation, shape, size)
     except ValueError:
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             "--weights",
-            f"{text!r} is not three or five numbers, as in 1,1,1 or 1,1,1,0.5,0.5",
+            f"{text!r} is not three, five or six numbers, as in 1,1,1 or 1,1,1,0.5,0.5 or "
+            "1,2,0.1,2,0.3,1",
         ) from None
     return (similarity, rotation, dilation)

@@ -29,8 +29,8 @@ def _listed(value: Any) -> Any:
 
 
 def _weighing(weights: tuple[float, ...]) -> tuple[float, ...]:
-    if len(weights) not in (3, 5) or not sum(weights):
-        raise ValueError("should be three or five numbers, not all 0")
+    if len(weights) not in (3, 5, 6) or not sum(weights[:5]):
+        raise ValueError("should be three, five or six numbers, not all of the first five 0")
     return weights
 
 
@@ -70,8 +70,8 @@ class _Profile(_Stages):
     summary: str = Field("", description="One line for lists.")
     weights: _Weights | None = Field(
         None,
-        description="Weights of ζσ, ζR and ζL in ζ, and perhaps of the objects' shapes and sizes; "
-        "1, 1, 1, when left out.",
+        description="Weights of ζσ, ζR and ζL in ζ, perhaps of the objects' shapes and sizes, and "
+        "perhaps the exponent of distance in ζR; 1, 1, 1, when left out.",
     )
     allow_unmatched: bool = Field(
         False,

@@ -34,8 +34,9 @@ def fmap_confidence(
         Shape (Q, Q'/2): σ of the relation table, a dual having that of its column; or shape
         (Q, Q'): the evidence of every entry, and ζσ is its mean.
     cosine, sine, normalized_dilation
-        Shape (Q, Q'/2): cos R, sin R and L̂ of the relation table; a dual, entry j ≥ Q'/2, has
-        the cosine and the sine of column j − Q'/2 negated.
+        Shape (Q, Q'/2): cos R and sin R, times the rotation weight of each pair, and L̂, as the
+        relation table has them; a dual, entry j ≥ Q'/2, has the cosine and the sine of column
+        j − Q'/2 negated.
     weights
         Shape (3,), of ζσ, ζR and ζL.
 

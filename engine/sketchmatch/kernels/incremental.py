@@ -43,14 +43,16 @@ class MapState(NamedTuple):
         Shape (Q, Q'/2) or (Q, Q'): of each entry, or for both an entry and its dual; read only.
     rotation, dilation
         Shape (Q, Q'/2): R and L of the relation table, read only.
+    rotation_weights
+        Shape (Q,): what R of each template pair counts for, 1 on average; read only.
     weights
         Shape (3,), of ζσ, ζR and ζL; their sum is 1.
     partners, holders
         int64, shapes (N,) and (N',): the partner of each template object, and the template object
         that has each argument object, or −1.
     entries
-        Shape (N, N, 5): the evidence, cos R, sin R and L̂ of the entry of each template pair, and
-        the evidence of its dual, in either order.
+        Shape (N, N, 5): the evidence, cos R, sin R (both times the rotation weight) and L̂ of the
+        entry of each template pair, and the evidence of its dual, in either order.
     sums
         Shape (4,): the sum of the evidence, Σ cos R, Σ sin R, and Σ|x − y| over all pairs of L̂.
     levels, prefix
@@ -64,6 +66,7 @@ class MapState(NamedTuple):
     evidence: FloatArray
     rotation: FloatArray
     dilation: FloatArray
+    rotation_weights: FloatArray
     weights: FloatArray
     partners: IntArray
     holders: IntArray
@@ -82,6 +85,7 @@ def empty_map_state(table: RelationTable, weights: Weights) -> MapState:
         evidence=table.entry_evidence,
         rotation=table.rotation,
         dilation=table.dilation,
+        rotation_weights=table.rotation_weights,
         weights=np.array(weights, dtype=np.float64) / sum(weights),
         partners=np.zeros(objects, dtype=np.int64),
         holders=np.full(table.argument_objects, -1, dtype=np.int64),
@@ -202,11 +206,15 @@ def make_move(state: MapState, a: int, c: int) -> float:
 
 @kernel
 def map_entry(state: MapState, a: int, b: int, c: int, d: int) -> tuple[float, float, float, float]:
-    """Return evidence, cos R, sin R and L̂ of the entry (a, b) → (c, d), objects in any order."""
+    """Return evidence, cos R, sin R and L̂ of the entry (a, b) → (c, d), objects in any order.
+
+    Cosine and sine are times the rotation weight of the pair.
+    """
     i, j, sign = _place(state, a, b, c, d)
     rotation = state.rotation[i, j]
+    turn = sign * state.rotation_weights[i]
     level = DILATION_SCALE * np.log(state.dilation[i, j])
-    return _evidence(state, i, j, sign), sign * np.cos(rotation), sign * np.sin(rotation), level
+    return _evidence(state, i, j, sign), turn * np.cos(rotation), turn * np.sin(rotation), level
 
 
 @kernel

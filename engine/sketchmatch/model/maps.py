@@ -23,8 +23,12 @@ __all__ = [
 Weights = tuple[float, float, float]
 """Weights of ζσ, ζR and ζL; where a table holds evidence, its mean takes the place of ζσ."""
 
-RequestWeights = Weights | tuple[float, float, float, float, float]
-"""Weights of ζσ, ζR and ζL, and perhaps of ζS and ζM."""
+RequestWeights = (
+    Weights
+    | tuple[float, float, float, float, float]
+    | tuple[float, float, float, float, float, float]
+)
+"""Weights of ζσ, ζR and ζL, perhaps of ζS and ζM, and perhaps the exponent of distance."""
 
 
 class ConfidenceWeights(NamedTuple):
@@ -36,6 +40,10 @@ class ConfidenceWeights(NamedTuple):
         Of ζσ, ζR and ζL, which see relations of objects alone; the thesis's ζ.
     shape, size
         Of ζS and ζM, which compare each object with its partner.
+    distance
+        β, no weight but an exponent: the rotation of a pair of template objects that are d apart
+        counts in ζR for d^β, so ζR = |Σ d^β e^{iR}| / Σ d^β. With 0 all pairs count alike, as in
+        the thesis.
     """
 
     similarity: float = 1.0
@@ -43,6 +51,12 @@ class ConfidenceWeights(NamedTuple):
     dilation: float = 1.0
     shape: float = 0.0
     size: float = 0.0
+    distance: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """w₁ + w₂ + w₃ + w₄ + w₅."""
+        return self.of_entries + self.rotation + self.dilation
 
     @property
     def of_entries(self) -> float:

@@ -7,7 +7,7 @@ thesis's numbering (section 3.3), counted from 0.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -135,6 +135,9 @@ class RelationTable:
     evidence
         Shape (Q, Q'), within [0, 1]: what speaks for every correspondence, duals included, where
         that is more than σ; None where it is σ.
+    rotation_weights
+        Shape (Q,), above 0, 1 on average: what R of each template pair counts for in ζR. Numbers
+        of any scale may be given, one for each pair, or one for all; left out, all count alike.
     """
 
     similarity: FloatArray
@@ -143,6 +146,7 @@ class RelationTable:
     template_objects: int
     argument_objects: int
     evidence: FloatArray | None = None
+    rotation_weights: FloatArray = field(default_factory=lambda: np.ones(1))
 
     def __post_init__(self) -> None:
         if not 2 <= self.template_objects <= self.argument_objects:
@@ -159,6 +163,11 @@ class RelationTable:
                 wanted = (shape[0], 2 * shape[1])
                 raise ValueError(f"evidence has shape {evidence.shape}, not {wanted}")
             object.__setattr__(self, "evidence", evidence)
+        weights = np.asarray(self.rotation_weights, dtype=np.float64)
+        if weights.shape not in ((1,), shape[:1]) or not (weights > 0).all():
+            raise ValueError("rotation_weights must be one number above 0 for each template pair")
+        weights = np.broadcast_to(weights / weights.mean(), shape[:1])
+        object.__setattr__(self, "rotation_weights", frozen_floats(weights))
 
     @property
     def entry_evidence(self) -> FloatArray:
@@ -186,10 +195,10 @@ class RelationTable:
 
     @cached_property
     def cosine(self) -> FloatArray:
-        """cos R, shape (Q, Q'/2); a dual has it negated."""
-        return sealed(np.cos(self.rotation))
+        """cos R times the pair's rotation weight, shape (Q, Q'/2); a dual has it negated."""
+        return sealed(self.rotation_weights[:, None] * np.cos(self.rotation))
 
     @cached_property
     def sine(self) -> FloatArray:
-        """sin R, shape (Q, Q'/2); a dual has it negated."""
-        return sealed(np.sin(self.rotation))
+        """sin R times the pair's rotation weight, shape (Q, Q'/2); a dual has it negated."""
+        return sealed(self.rotation_weights[:, None] * np.sin(self.rotation))

@@ -32,8 +32,9 @@ class Calibration:
         Of leaving all template objects out.
     sharpness, growth
         κ and α.
-    doubt
-        What it is worth that none of the maps known is right: v of a map as likely as that.
+    doubt, reserve
+        That none of the maps known is right has e^reserve times the odds of a map that is worth
+        ``doubt``.
     luck
         How many of the objects are right all the same where the map as a whole is not among those
         known.
@@ -43,12 +44,13 @@ class Calibration:
     sharpness: float
     growth: float
     doubt: float
+    reserve: float
     luck: float
 
 
 _CALIBRATIONS = {
-    ConfidenceWeights(): Calibration(0.35, 12.4, 1.18, 0.861, 0.44),
-    LEARNED: Calibration(0.12, 80.5, 0.8, 0.95, 0.46),
+    ConfidenceWeights(): Calibration(0.35, 12.4, 1.18, 0.861, 0.0, 0.44),
+    LEARNED: Calibration(0.12, 80.5, 0.8, 0.95, 0.0, 0.46),
 }
 
 
@@ -67,4 +69,5 @@ def default_price(weights: ConfidenceWeights) -> float:
 
 
 def _shares(weights: ConfidenceWeights) -> tuple[float, ...]:
-    return tuple(weight / sum(weights) for weight in weights)
+    *parts, distance = weights
+    return (*(weight / weights.total for weight in parts), distance)

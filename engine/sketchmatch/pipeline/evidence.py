@@ -1,12 +1,17 @@
-"""Evidence beyond relations: how alike the objects are themselves, in shape and in size.
+"""Evidence beyond the thesis's: how alike objects are in shape and size, and how far apart.
 
-It comes from the histograms of the constant force (r = 0) within each object, whatever histogram
-describes the pairs: no other is defined for every object, and dilations follow from it best.
+How far apart the objects of a pair are says how far its rotation is to be trusted: where one of
+them is drawn out of place, near ones turn about each other more.
+
+How alike they are comes from the histograms of the constant force (r = 0) within each object,
+whatever histogram describes the pairs: no other is defined for every object, and dilations follow
+from it best.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,9 +29,12 @@ from sketchmatch.model.arrays import sealed
 from sketchmatch.pipeline.relate import Histograms
 from sketchmatch.pipeline.slices import in_slices
 
-__all__ = ["compare_objects", "weigh_objects"]
+__all__ = ["compare_objects", "rotation_weights", "weigh_objects"]
 
 _EXPONENT = 0.0
+
+# Of the mean distance; objects that surround each other may have one centroid.
+_LEAST_DISTANCE = 0.01
 
 
 def compare_objects(
@@ -95,9 +103,38 @@ def weigh_objects(
 
     yield from in_slices(table.template_pairs, work)
     np.clip(evidence, 0.0, 1.0, out=evidence)
-    return RelationTable(
-        *relations, table.template_objects, table.argument_objects, sealed(evidence)
-    )
+    return replace(table, evidence=sealed(evidence))
+
+
+def rotation_weights(template: Scene, distance: float) -> FloatArray:
+    """Return what the rotation of each pair of objects counts for: d^β, d apart by centroids.
+
+    Parameters
+    ----------
+    template
+        The scene, of at least two objects.
+    distance
+        β, 0 or more.
+
+    Returns
+    -------
+    ndarray
+        Shape (Q,), above 0; d is in units of its mean, and at least 0.01.
+
+    Examples
+    --------
+    >>> square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    >>> scene = Scene.from_polygons([square, square + (2, 0), square + (6, 0)])
+    >>> rotation_weights(scene, 1.0)
+    array([0.5, 1.5, 1. ])
+    """
+    centroids = np.array([item.centroid for item in template.objects])
+    a, b = object_pairs(len(template)).T
+    distances = np.hypot(*(centroids[a] - centroids[b]).T)
+    if not distances.any():
+        return np.ones(len(a))
+    weights: FloatArray = np.maximum(distances / distances.mean(), _LEAST_DISTANCE) ** distance
+    return weights
 
 
 def _own_histograms(

@@ -7,7 +7,7 @@ import time
 import uuid
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from types import MappingProxyType
 from typing import TypeVar
@@ -23,13 +23,12 @@ from sketchmatch.api import (
     Segmentation,
     Segmenter,
 )
-from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, Reason
+from sketchmatch.errors import AnswerUnavailableError, InvalidInputError
 from sketchmatch.kernels.evidence import SelfRelations
 from sketchmatch.model import (
     ConfidenceWeights,
     FloatArray,
     RelationTable,
-    RequestWeights,
     Scene,
     SceneDescriptor,
     Source,
@@ -40,7 +39,6 @@ from sketchmatch.pipeline.calibration import (
     CALIBRATED_SIMILARITY,
     Calibration,
     calibrated,
-    default_price,
 )
 from sketchmatch.pipeline.correspond import (
     fmap_confidence,
@@ -48,11 +46,17 @@ from sketchmatch.pipeline.correspond import (
     global_rotation,
 )
 from sketchmatch.pipeline.describe import describe
-from sketchmatch.pipeline.evidence import compare_objects, weigh_objects
+from sketchmatch.pipeline.evidence import compare_objects, rotation_weights, weigh_objects
 from sketchmatch.pipeline.limits import check_comparisons, check_histograms
 from sketchmatch.pipeline.plugins import blaming, checked_progress, inspecting, segmented
 from sketchmatch.pipeline.probability import UNKNOWN, Likelihood, likelihood
 from sketchmatch.pipeline.relate import check_exponent, relate
+from sketchmatch.pipeline.request import (
+    MatchRequest,
+    alternatives_wanted,
+    check_objects_weighed,
+    price_in_force,
+)
 from sketchmatch.pipeline.result import (
     AlternativeMap,
     MatchResult,
@@ -63,8 +67,6 @@ from sketchmatch.pipeline.selection import (
     UNCONFIGURED,
     Defaults,
     Pipeline,
-    Profile,
-    Selection,
     resolve,
 )
 from sketchmatch.pipeline.unmatched import (
@@ -82,7 +84,6 @@ __all__ = [
     "Accepted",
     "Finished",
     "MatchEvent",
-    "MatchRequest",
     "Phase",
     "Progress",
     "Segmented",
@@ -90,11 +91,6 @@ __all__ = [
 ]
 
 _PROGRESS_EVERY = 0.05
-_MAX_SEED = 2**64 - 1
-_MAX_WEIGHT = 1e6
-_MAX_PRICE = 1e3
-_MAX_ALTERNATIVES = 100
-_ALTERNATIVES = 3
 _Value = TypeVar("_Value")
 
 
@@ -105,75 +101,6 @@ class Phase(StrEnum):
     DESCRIBE = "DESCRIBE"
     RELATE = "RELATE"
     SEARCH = "SEARCH"
-
-
-@dataclass(frozen=True)
-class MatchRequest:
-    """What to match, and how.
-
-    Attributes
-    ----------
-    sketch, map
-        Sources, or scenes that need no segmentation.
-    selection
-        Algorithms and parameters, by stage.
-    seed
-        0 … 2⁶⁴−1; the same request with the same seed gives the same result.
-    time_budget
-        Seconds after which the best answer so far is given, or None for no limit.
-    weights
-        Of ζσ, ζR and ζL in ζ, and of ζS and ζM where there are five; None for those of the profile,
-        or else 1, 1, 1.
-    alternatives
-        How many of the next best object maps the result shall hold; None for 3, or as many as
-        there are.
-    profile
-        Name of the profile to take the rest from; empty for the default one.
-    allow_unmatched
-        Whether an object may stay without partner on both sides where that is likelier; None for
-        what the profile says, or else not: the smaller scene is matched completely.
-    unmatched_price
-        What a map loses for leaving all objects of the smaller scene out, and for some of them
-        their share of it, in units of ζ; None for the one that fits the weights.
-    """
-
-    sketch: Source | Scene
-    map: Source | Scene
-    selection: Selection = field(default_factory=lambda: MappingProxyType({}))
-    seed: int = 0
-    time_budget: float | None = None
-    weights: RequestWeights | None = None
-    alternatives: int | None = None
-    profile: str = ""
-    allow_unmatched: bool | None = None
-    unmatched_price: float | None = None
-
-    def __post_init__(self) -> None:
-        if not (isinstance(self.seed, int) and 0 <= self.seed <= _MAX_SEED):
-            raise InvalidInputError(
-                Reason.INVALID_FIELD, "seed", f"is {self.seed}; give an integer 0 … 2**64 − 1"
-            )
-        if self.time_budget is not None and not 0 < self.time_budget < math.inf:
-            raise InvalidInputError(
-                Reason.INVALID_FIELD,
-                "time_budget",
-                f"is {self.time_budget:g} s; give a positive time or none at all",
-            )
-        if self.weights is not None:
-            _check_request_weights(self.weights)
-        if self.alternatives is not None and not 0 <= self.alternatives <= _MAX_ALTERNATIVES:
-            raise InvalidInputError(
-                Reason.INVALID_FIELD,
-                "alternatives",
-                f"is {self.alternatives}; give a number from 0 to {_MAX_ALTERNATIVES}",
-            )
-        price = self.unmatched_price
-        if price is not None and not 0 < price <= _MAX_PRICE:
-            raise InvalidInputError(
-                Reason.INVALID_FIELD,
-                "unmatched_price",
-                f"is {price:g}; give a number above 0, at most {_MAX_PRICE:g}",
-            )
 
 
 @dataclass(frozen=True)
@@ -291,8 +218,8 @@ class _Match:
             raise error.within("pipeline") from None
         profile = defaults.named(request.profile)
         self.weights = ConfidenceWeights(*(request.weights or profile.weights or ()))
-        _check_weights(self.weights, self.pipeline.searcher)
-        self.price = _price(request, profile, self.weights, self.pipeline.searcher)
+        check_objects_weighed(self.weights, self.pipeline.searcher)
+        self.price = price_in_force(request, profile, self.weights, self.pipeline.searcher)
         self.own: SelfRelations | None = None
 
     def run(self) -> Generator[MatchEvent, None, None]:
@@ -309,7 +236,7 @@ class _Match:
         check_comparisons(sketch.scene, map_.scene)
         check_exponent(self.pipeline.histogram.exponent)
         yield Segmented(sketch, map_)
-        count = _alternatives_wanted(self.request.alternatives, sketch.scene, map_.scene)
+        count = alternatives_wanted(self.request.alternatives, sketch.scene, map_.scene)
         exchanged = len(sketch.scene) > len(map_.scene)
         with self.timed("describe"):
             drawn = yield from self.described("sketch", sketch.scene)
@@ -338,11 +265,14 @@ class _Match:
         self, scenes: tuple[Scene, Scene], descriptors: tuple[SceneDescriptor, SceneDescriptor]
     ) -> Generator[MatchEvent, None, RelationTable]:
         """Return the relations of template and argument, and the evidence that is asked for."""
-        similarity = self.pipeline.similarity
+        similarity, share = self.pipeline.similarity, 0.4 if self.weights.of_objects else 1.0
         comparing = relate(*descriptors, similarity)
+        table = yield from self.watched(Phase.RELATE, similarity, comparing, (0.0, share))
+        if self.weights.distance:
+            counts = rotation_weights(scenes[0], self.weights.distance)
+            table = replace(table, rotation_weights=counts)
         if not self.weights.of_objects:
-            return (yield from self.watched(Phase.RELATE, similarity, comparing))
-        table = yield from self.watched(Phase.RELATE, similarity, comparing, (0.0, 0.4))
+            return table
         directions = self.pipeline.histogram.params.directions
         work = compare_objects(*scenes, directions)
         self.own = yield from self.watched(Phase.RELATE, None, work, (0.4, 0.5))
@@ -595,78 +525,3 @@ class _Match:
         started = time.monotonic()
         yield
         self.seconds[stage] = time.monotonic() - started
-
-
-def _check_request_weights(weights: RequestWeights) -> None:
-    """Refuse weights that make no ζ."""
-    names = ConfidenceWeights._fields
-    if len(weights) not in (3, len(names)):
-        raise InvalidInputError(
-            Reason.INVALID_FIELD,
-            "weights",
-            f"are {len(weights)} numbers; give three, {', '.join(names[:3])}, "
-            f"or five, with {' and '.join(names[3:])}",
-        )
-    for name, weight in zip(names, weights, strict=False):
-        if not 0 <= weight <= _MAX_WEIGHT:
-            raise InvalidInputError(
-                Reason.INVALID_FIELD,
-                f"weights.{name}",
-                f"is {weight:g}; give a number from 0 to {_MAX_WEIGHT:g}",
-            )
-    if sum(weights) == 0:
-        raise InvalidInputError(
-            Reason.INVALID_FIELD, "weights", "are all zero; give at least one above zero"
-        )
-
-
-def _price(
-    request: MatchRequest, profile: Profile, weights: ConfidenceWeights, searcher: Searcher
-) -> float:
-    """Return the price of leaving objects out; infinite where that is not allowed."""
-    allowed, price = request.allow_unmatched, request.unmatched_price
-    if not (profile.allow_unmatched if allowed is None else allowed):
-        if price is not None:
-            raise InvalidInputError(
-                Reason.INVALID_FIELD,
-                "unmatched_price",
-                f"is {price:g}, but no object may stay unmatched; set allow_unmatched or drop it",
-            )
-        return math.inf
-    if not searcher.object_consistent:
-        raise InvalidInputError(
-            Reason.INVALID_FIELD,
-            "allow_unmatched",
-            f"compares maps of objects, and the searcher {searcher.name!r}, as it is set here, "
-            "maps pairs that need not lead to one; choose another, such as 'auto', or switch it "
-            "off",
-        )
-    return default_price(weights) if price is None else price
-
-
-def _check_weights(weights: ConfidenceWeights, searcher: Searcher) -> None:
-    """Refuse to compare objects where the search compares nothing but pairs."""
-    if weights.of_objects and not searcher.object_consistent:
-        name = "shape" if weights.shape > 0 else "size"
-        raise InvalidInputError(
-            Reason.INVALID_FIELD,
-            f"weights.{name}",
-            f"compares objects, and the searcher {searcher.name!r}, as it is set here, maps pairs "
-            "that need not lead to one map of objects; choose another, such as 'auto', or weight 0",
-        )
-
-
-def _alternatives_wanted(requested: int | None, sketch: Scene, map_: Scene) -> int:
-    """Return how many object maps beside the best there shall be."""
-    few, many = sorted((len(sketch), len(map_)))
-    there_are = math.perm(many, few) - 1
-    if requested is None:
-        return min(_ALTERNATIVES, there_are)
-    if requested > there_are:
-        raise InvalidInputError(
-            Reason.INVALID_FIELD,
-            "alternatives",
-            f"is {requested}, but {few} objects in {many} have {there_are} other maps; "
-            "ask for no more",
-        )
-    return requested

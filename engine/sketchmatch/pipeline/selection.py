@@ -103,7 +103,7 @@ class Profile:
     stages
         Its choices.
     weights
-        Of the parts of ζ; None for 1, 1, 1.
+        Of the parts of ζ, as in a request; None for 1, 1, 1.
     allow_unmatched
         Whether objects may stay without partner on both sides.
     """

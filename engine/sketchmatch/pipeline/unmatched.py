@@ -235,7 +235,13 @@ def part_of(whole: Part, kept: Iterable[int]) -> Generator[float, None, Part]:
     yield from in_slices(len(rows), work)
     similarity, rotation, dilation, *evidence = (sealed(copy) for copy in copies)
     part = RelationTable(
-        similarity, rotation, dilation, len(chosen), table.argument_objects, *evidence
+        similarity,
+        rotation,
+        dilation,
+        len(chosen),
+        table.argument_objects,
+        evidence[0] if evidence else None,
+        table.rotation_weights[rows],
     )
     if own is not None:
         own = SelfRelations(own.products[chosen], own.roughness[chosen], own.levels[chosen])
@@ -259,17 +265,16 @@ def omission_confidences(fmap: Fmap, table: RelationTable, weights: Weights) -> 
     counts = evidence[rows, columns if table.evidence is None else fmap.entries]
     others = (pairs != np.arange(objects)[:, None, None]).all(axis=2)
     kept = np.nonzero(others)[1].reshape(objects, -1)
-    x = (turned * table.cosine[rows, columns])[kept].mean(axis=1)
-    y = (turned * table.sine[rows, columns])[kept].mean(axis=1)
+    x = (turned * table.cosine[rows, columns])[kept].sum(axis=1)
+    y = (turned * table.sine[rows, columns])[kept].sum(axis=1)
+    rotations = np.hypot(x, y) / table.rotation_weights[kept].sum(axis=1)
     levels = np.sort(table.normalized_dilation[rows, columns][kept], axis=1)
     count = kept.shape[1]
     ranks = 2.0 * np.arange(count) - count + 1.0
     apart = 2.0 * (levels @ ranks) / max(1, count * (count - 1))
     shares = np.array(weights) / sum(weights)
     confidences: FloatArray = (
-        shares[0] * counts[kept].mean(axis=1)
-        + shares[1] * np.hypot(x, y)
-        + shares[2] * np.exp2(-apart)
+        shares[0] * counts[kept].mean(axis=1) + shares[1] * rotations + shares[2] * np.exp2(-apart)
     )
     return confidences
 

@@ -24,7 +24,7 @@ from sketchmatch.model import (
     StrokeSet,
 )
 from sketchmatch.model.limits import check_objects, check_pixels, check_vertices
-from sketchmatch.pipeline.match import MatchRequest
+from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import STAGES, Choice
 from sketchmatch_proto.v1 import (
     match_pb2,

@@ -23,10 +23,10 @@ from sketchmatch.pipeline.match import (
     Accepted,
     Finished,
     MatchEvent,
-    MatchRequest,
     Progress,
     Segmented,
 )
+from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import Correspondence, MatchResult, ObjectMatch, ObjectRelation
 from sketchmatch.pipeline.selection import (
     UNCONFIGURED,

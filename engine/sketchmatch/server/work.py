@@ -7,8 +7,9 @@ from contextlib import closing
 
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.model import Scene, Source
-from sketchmatch.pipeline.match import MatchRequest, run_match
+from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.plugins import segmented
+from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import chosen_algorithms, resolve_segmenter, stage_of
 from sketchmatch.registry import Registered
 from sketchmatch.server import requests, responses

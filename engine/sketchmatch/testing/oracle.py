@@ -90,7 +90,9 @@ def score_pairs(
     count = len(entries)
     zeta_s = sum(sigma for sigma, _, _ in entries) / count
     speaks = sum(evidence(table, i, pair) for i, pair in enumerate(mapped)) / count
-    zeta_r = abs(sum(complex(math.cos(r), math.sin(r)) for _, r, _ in entries)) / count
+    turns = [complex(math.cos(r), math.sin(r)) for _, r, _ in entries]
+    counts = [float(table.rotation_weights[i]) for i in range(count)]
+    zeta_r = abs(sum(w * turn for w, turn in zip(counts, turns, strict=True))) / sum(counts)
     levels = [1.5 / math.log(2) * math.log(dilation) for _, _, dilation in entries]
     gaps = [abs(x - y) for k, x in enumerate(levels) for y in levels[k + 1 :]]
     zeta_l = math.exp(-math.log(2) * (sum(gaps) / len(gaps) if gaps else 0.0))

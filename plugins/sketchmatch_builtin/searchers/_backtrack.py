@@ -4,7 +4,7 @@ With f of P entries fixed and g = P − f left, for any map that completes them
 
 - Σe, of the evidence, is at most Σe over the fixed entries, and for each other pair the greatest
   e of its row,
-- |Σ e^{iR}| at most the length of that sum over the fixed entries, and g,
+- |Σ ω e^{iR}| at most the length of that sum over the fixed entries, and Σω over the others,
 - Σ|x − y| over all pairs of L̂ at least that sum over the fixed entries, and g times the sum of
   their distances to their median: nothing is nearer to all of them.
 """
@@ -43,11 +43,11 @@ class Path(NamedTuple):
     used
         Shape (N',): which partners are taken.
     sums
-        Shape (N + 1, 4): Σe, Σ cos R and Σ sin R over the fixed entries, and a bound of ζL.
+        Shape (N + 1, 4): Σe, Σ ω cos R and Σ ω sin R over the fixed entries, and a bound of ζL.
     levels
         Shape (N + 1, P): their L̂ in order.
     rest
-        Shape (N + 1,): the sum of the greatest e of all other pairs.
+        Shape (2, N + 1): the sums of the greatest e, and of ω, of all other pairs.
     place
         Shape (3,): DEPTH, STEPS and LEAVES.
     """
@@ -92,7 +92,8 @@ def first_path(relations: Relations, argument_objects: int, evaluations: int) ->
     evidence, half = relations.evidence[rows], relations.cosine.shape[1]
     if evidence.shape[1] > half:
         evidence = np.where(turned > 0.0, evidence, np.roll(evidence, half, axis=1))
-    rest = np.bincount(later, evidence.max(axis=1), objects + 1)
+    most = (evidence.max(axis=1), relations.rotation_weights[rows])
+    rest = np.array([np.bincount(later, values, objects + 1) for values in most])
     return Path(
         order=order,
         evidence=evidence,
@@ -103,7 +104,7 @@ def first_path(relations: Relations, argument_objects: int, evaluations: int) ->
         used=np.zeros(argument_objects, dtype=np.bool_),
         sums=np.array([[0.0, 0.0, 0.0, 1.0]]).repeat(objects + 1, axis=0),
         levels=np.zeros((objects + 1, len(low))),
-        rest=rest[::-1].cumsum()[::-1].copy(),
+        rest=rest[:, ::-1].cumsum(axis=1)[:, ::-1].copy(),
         place=np.array([0, 0, evaluations]),
     )
 
@@ -161,7 +162,7 @@ def backtrack(  # noqa: PLR0912, PLR0915
             similar += evidence[old + k, own]
             x += sign * cosine[old + k, j]
             y += sign * sine[old + k, j]
-        most = w_s * (similar + rest[below]) + w_r * (np.sqrt(x * x + y * y) + left)
+        most = w_s * (similar + rest[0, below]) + w_r * (np.sqrt(x * x + y * y) + rest[1, below])
         least = needed - most / pairs
         if sums[depth, 3] * w_l <= least:
             continue

@@ -2,8 +2,9 @@
 
 Let P be the number of template pairs, W = w1 + w2 + w3, and call 1 − ζ the loss of an object map.
 
-- |Σ e^{iR}| = Σ cos(R − θ) where θ is the direction of the sum. If that lies in [θ1, θ2], no pair
-  contributes more than the greatest cosine over the cell, cosmax.
+- |Σ ω e^{iR}| = Σ ω cos(R − θ) where θ is the direction of the sum and ω are the rotation weights,
+  1 on average. If θ lies in [θ1, θ2], no pair contributes more than ω times the greatest cosine
+  over the cell, cosmax.
 - With F(t) the share of the L̂ up to t, δL = (P/(P − 1)) 2 ∫ F(1 − F) dt. A cell says of some
   quantiles of the L̂ in which intervals they lie, and so in which interval [l, h] each F(t) lies.
   There F(1 − F) is nowhere below its chord F(1 − l − h) + l h, which is linear in F: the integral
@@ -18,7 +19,7 @@ Let P be the number of template pairs, W = w1 + w2 + w3, and call 1 − ζ the l
 So every map that is better than the incumbent and whose θ and quantiles lie in the cell loses at
 least a base of w3 (1 − 2^{−d})/W and the sum of
 
-    w1 (1 − e)/(W P) + w2 (1 − cosmax)/(W P) + w3 s·φ(L̂)/(W (P − 1))
+    w1 (1 − e)/(W P) + w2 ω (1 − cosmax)/(W P) + w3 s·φ(L̂)/(W (P − 1))
 
 over its entries, where e is σ or the evidence in its place: a quadratic assignment problem. Every
 θ and all quantiles are covered, so a bound for every cell is a bound for every map. With P = 1,
@@ -85,7 +86,7 @@ class CellTerms(NamedTuple):
     Attributes
     ----------
     rates
-        Shape (3,): what an entry loses for 1 − e, 1 − cosmax and a unit of φ.
+        Shape (3,): what an entry loses for 1 − e, ω (1 − cosmax) and a unit of φ.
     turn
         Shape (4,): cosine and sine of the middle of θ and of half its width.
     base
@@ -230,13 +231,15 @@ def pair_costs(
                 for j in range(half):
                     away = dilation[j] - place
                     loss[j] += slope * away if away > 0.0 else 0.0
+        most = relations.rotation_weights[first + row]
+        nearly = half_c * most
         for j in range(half):
             along = cosine[j] * turn_c + sine[j] * turn_s
             across = abs(sine[j] * turn_c - cosine[j] * turn_s) * half_s
-            nearest = 1.0 if along >= half_c else along * half_c + across
-            nearest_dual = 1.0 if -along >= half_c else across - along * half_c
-            costs[row, half + j] = loss[j] + rate_r * (1.0 - nearest_dual)
-            costs[row, j] = loss[j] + rate_r * (1.0 - nearest)
+            nearest = most if along >= nearly else along * half_c + across
+            nearest_dual = most if -along >= nearly else across - along * half_c
+            costs[row, half + j] = loss[j] + rate_r * (most - nearest_dual)
+            costs[row, j] = loss[j] + rate_r * (most - nearest)
         if directed:
             for j in range(half):
                 cost = costs[row, half + j] + rate_s * (evidence[j] - evidence[half + j])

@@ -4,7 +4,7 @@ In the costs of a cell each entry has the θ of its own that suits it best. Thos
 between fixed objects are known, and θ is the same for all of them, so any map within a node loses
 more than its costs say, by at least
 
-    w2/(W P) (Σ cosmax − max_θ Σ cos(R − θ)),
+    w2/(W P) (Σ ω cosmax − max_θ Σ ω cos(R − θ)),
 
 θ within the cell and both sums over F. The maximum is that of a vector sum, and the difference
 does not fall as more objects are fixed.
@@ -31,11 +31,11 @@ class Fixed(NamedTuple):
     objects, partners
         Shape (N,): the k-th object fixed, and its partner.
     sums
-        Shape (N + 1, 3): Σ cos R, Σ sin R and Σ cosmax over the entries of each level.
+        Shape (N + 1, 3): Σ ω cos R, Σ ω sin R and Σ ω cosmax over the entries of each level.
     losses
         Shape (N + 1,): the loss beyond the bound at each level.
     rate, turn
-        Shapes (1,) and (4,): what an entry loses for 1 − cosmax in this cell, and its θ, as in
+        Shapes (1,) and (4,): what an entry loses for ω (1 − cosmax) in this cell, and its θ, as in
         :class:`~sketchmatch_builtin.searchers._cells.CellTerms`.
     """
 
@@ -69,7 +69,7 @@ def fixed_loss(relations: Relations, fixed: Fixed, level: int, a: int, c: int) -
         i, j, sign = _entry(relations, a, fixed.objects[k], c, fixed.partners[k])
         cosine, sine = sign * relations.cosine[i, j], sign * relations.sine[i, j]
         x, y = x + cosine, y + sine
-        greatest += _greatest(cosine, sine, 1.0, fixed.turn)
+        greatest += _greatest(cosine, sine, relations.rotation_weights[i], fixed.turn)
     below = level + 1
     fixed.sums[below, 0], fixed.sums[below, 1], fixed.sums[below, 2] = x, y, greatest
     most = _greatest(x, y, np.sqrt(x * x + y * y), fixed.turn)

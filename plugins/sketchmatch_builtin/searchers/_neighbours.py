@@ -122,6 +122,7 @@ def entries_confidence(
     similarity: FloatArray,
     rotation: FloatArray,
     dilation: FloatArray,
+    rotation_weights: FloatArray,
     weights: FloatArray,
 ) -> float:
     """Return ζ of an FMAP, reading only its own entries of the relation table."""
@@ -132,8 +133,8 @@ def entries_confidence(
         c = entries[i] % pairs
         signs[i] = entries[i] // pairs
         own[0, i, 0] = similarity[i, c]
-        own[1, i, 0] = np.cos(rotation[i, c])
-        own[2, i, 0] = np.sin(rotation[i, c])
+        own[1, i, 0] = rotation_weights[i] * np.cos(rotation[i, c])
+        own[2, i, 0] = rotation_weights[i] * np.sin(rotation[i, c])
         own[3, i, 0] = DILATION_SCALE * np.log(dilation[i, c])
     return fmap_confidence(signs, np.empty(count), own[0], own[1], own[2], own[3], weights)[0]
 

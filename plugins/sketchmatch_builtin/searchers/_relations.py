@@ -29,7 +29,9 @@ class Relations(NamedTuple):
     evidence
         Shape (Q, Q'/2) or (Q, Q'): σ, or the evidence of every entry.
     cosine, sine, dilation
-        Shape (Q, Q'/2): cos R, sin R and L̂.
+        Shape (Q, Q'/2): cos R and sin R, times the rotation weight of each pair, and L̂.
+    rotation_weights
+        Shape (Q,): what R of each template pair counts for in ζR, 1 on average.
     weights
         Shape (3,), of ζσ, ζR and ζL.
     """
@@ -40,13 +42,14 @@ class Relations(NamedTuple):
     cosine: FloatArray
     sine: FloatArray
     dilation: FloatArray
+    rotation_weights: FloatArray
     weights: FloatArray
 
 
 def read_slices(
     table: RelationTable, cosine: FloatArray, sine: FloatArray, dilation: FloatArray
 ) -> Iterator[slice]:
-    """Write cos R, sin R and L̂ of a relation table into arrays of its shape.
+    """Write cos R and sin R, weighted, and L̂ of a relation table into arrays of its shape.
 
     Yields
     ------
@@ -56,8 +59,9 @@ def read_slices(
     step = max(1, _VALUES // table.argument_pairs)
     for first in range(0, table.template_pairs, step):
         rows = slice(first, first + step)
-        np.cos(table.rotation[rows], out=cosine[rows])
-        np.sin(table.rotation[rows], out=sine[rows])
+        for function, part in ((np.cos, cosine), (np.sin, sine)):
+            function(table.rotation[rows], out=part[rows])
+            part[rows] *= table.rotation_weights[rows, None]
         np.multiply(np.log(table.dilation[rows]), DILATION_SCALE, out=dilation[rows])
         yield rows
 

@@ -206,14 +206,14 @@ def _begin(table: RelationTable, evolution: Evolution, rng: np.random.Generator)
     rows = np.arange(table.template_pairs)
     evidence = table.entry_evidence
     own = entries if evidence.shape[1] > table.argument_pairs else column
-    rotation = table.rotation[rows, column, None]
+    rotation, counts = table.rotation[rows, column, None], table.rotation_weights[:, None]
     evolution.fitness[0] = fmap_confidence_above(
         -1.0,
         (entries != column).astype(np.int64),
         evolution.scratch,
         sealed(evidence[rows, own, None]),
-        np.cos(rotation),
-        np.sin(rotation),
+        sealed(counts * np.cos(rotation)),
+        sealed(counts * np.sin(rotation)),
         DILATION_SCALE * np.log(table.dilation[rows, column, None]),
         evolution.weights,
     )[0]

@@ -187,6 +187,7 @@ class _Search:
             cosine=np.empty(shape),
             sine=np.empty(shape),
             dilation=np.empty(shape),
+            rotation_weights=self.table.rotation_weights,
             weights=np.array(problem.weights, dtype=np.float64),
         )
         self.iterations, self.evaluations = start.iterations, start.evaluations
@@ -218,7 +219,7 @@ class _Search:
         """Search all maps depth first."""
         path = first_path(self.relations, self.table.argument_objects, self.evaluations)
         w_s, w_r, w_l = self.relations.weights
-        self.upper_bound = (w_s * path.rest[0] / len(path.levels[0]) + w_r + w_l) / (
+        self.upper_bound = (w_s * path.rest[0, 0] / len(path.levels[0]) + w_r + w_l) / (
             w_s + w_r + w_l
         )
         before = self.iterations

@@ -95,7 +95,7 @@ global___Outcome = Outcome
 class ConfidenceWeights(google.protobuf.message.Message):
     """What each part of ζ counts for: ζ = (w₁ζσ + w₂ζR + w₃ζL + w₄ζS + w₅ζM) / (w₁ + w₂ + w₃ + w₄ + w₅).
 
-    Weights are at least 0 and not all 0. Of the first three, which weigh how objects lie to each
+    Weights are at least 0, and w₁ to w₅ not all 0. Of the first three, which weigh how objects lie to each
     other, one that is left out is 1; of the last two, which weigh the objects themselves, 0. Only
     searchers that map objects can take these: all but nn, nn-pso, fsnn-pso and a pairwise easm.
     """
@@ -107,6 +107,7 @@ class ConfidenceWeights(google.protobuf.message.Message):
     DILATION_FIELD_NUMBER: builtins.int
     SHAPE_FIELD_NUMBER: builtins.int
     SIZE_FIELD_NUMBER: builtins.int
+    DISTANCE_FIELD_NUMBER: builtins.int
     similarity: builtins.float
     """w₁, for ζσ: how alike the relations are."""
     rotation: builtins.float
@@ -117,6 +118,11 @@ class ConfidenceWeights(google.protobuf.message.Message):
     """w₄, for ζS: how alike in shape each object and its partner are, turned as their relations are."""
     size: builtins.float
     """w₅, for ζM: how well the objects' sizes agree with the dilations of their relations."""
+    distance: builtins.float
+    """β, no weight but an exponent, from 0 to 4; 0 when left out. In ζR the rotation of a pair of
+    objects counts for d^β, d being their distance in the scene with fewer objects: far ones turn
+    less about each other when one of them is drawn out of place. Any searcher can take it.
+    """
     def __init__(
         self,
         *,
@@ -125,11 +131,14 @@ class ConfidenceWeights(google.protobuf.message.Message):
         dilation: builtins.float | None = ...,
         shape: builtins.float | None = ...,
         size: builtins.float | None = ...,
+        distance: builtins.float | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_dilation", b"_dilation", "_rotation", b"_rotation", "_shape", b"_shape", "_similarity", b"_similarity", "_size", b"_size", "dilation", b"dilation", "rotation", b"rotation", "shape", b"shape", "similarity", b"similarity", "size", b"size"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_dilation", b"_dilation", "_rotation", b"_rotation", "_shape", b"_shape", "_similarity", b"_similarity", "_size", b"_size", "dilation", b"dilation", "rotation", b"rotation", "shape", b"shape", "similarity", b"similarity", "size", b"size"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_dilation", b"_dilation", "_distance", b"_distance", "_rotation", b"_rotation", "_shape", b"_shape", "_similarity", b"_similarity", "_size", b"_size", "dilation", b"dilation", "distance", b"distance", "rotation", b"rotation", "shape", b"shape", "similarity", b"similarity", "size", b"size"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_dilation", b"_dilation", "_distance", b"_distance", "_rotation", b"_rotation", "_shape", b"_shape", "_similarity", b"_similarity", "_size", b"_size", "dilation", b"dilation", "distance", b"distance", "rotation", b"rotation", "shape", b"shape", "similarity", b"similarity", "size", b"size"]) -> None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_dilation", b"_dilation"]) -> typing.Literal["dilation"] | None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_distance", b"_distance"]) -> typing.Literal["distance"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_rotation", b"_rotation"]) -> typing.Literal["rotation"] | None: ...
     @typing.overload

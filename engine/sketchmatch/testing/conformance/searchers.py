@@ -177,6 +177,12 @@ def evidence_is_weighed(algorithm: type[Searcher]) -> None:
         _scored(progress, _problem_with_evidence())
 
 
+def rotations_are_weighed(algorithm: type[Searcher]) -> None:
+    """Let the rotation of each template pair count for its weight, as table.cosine does."""
+    for progress in run(algorithm(), _problem_with_rotation_weights()).seen:
+        _scored(progress, _problem_with_rotation_weights())
+
+
 def odd_problems_are_solved(algorithm: type[Searcher]) -> None:
     """Search two objects, two among many, alike relations and zero weights like any others."""
     for what, problem in _odd_problems().items():
@@ -237,7 +243,7 @@ def _uses() -> Iterator[Use]:
         similarity, rotation, dilation = (sealed(array.view()) for array in arrays)
         own = RelationTable(similarity, rotation, dilation, 4, 6)  # it holds these, and no copies
         problem = MatchProblem(own, (1.0, 2.0, 0.5), alternatives=2)
-        derived = (own.normalized_dilation, own.cosine, own.sine)
+        derived = (own.normalized_dilation, own.cosine, own.sine, own.rotation_weights)
         yield Use("4 on 6 objects", (*arrays, *derived), partial(_answer, problem))
 
 
@@ -258,6 +264,7 @@ CONTRACTS: tuple[Contract, ...] = (
     optimal_is_optimal,
     object_maps_are_kept_to,
     evidence_is_weighed,
+    rotations_are_weighed,
     odd_problems_are_solved,
     randomness_is_the_generators,
     clock_plays_no_part,
@@ -282,6 +289,13 @@ def _problem_with_evidence() -> MatchProblem:
     table = random_relations(rng, 4, 5)
     evidence = rng.uniform(0.0, 1.0, (table.template_pairs, 2 * table.argument_pairs))
     return MatchProblem(replace(table, evidence=evidence), alternatives=2)
+
+
+@lru_cache(maxsize=1)
+def _problem_with_rotation_weights() -> MatchProblem:
+    table = random_relations(np.random.default_rng(10), 4, 5)
+    weights = np.linspace(0.2, 3.0, table.template_pairs)
+    return MatchProblem(replace(table, rotation_weights=weights), alternatives=2)
 
 
 def _odd_problems() -> dict[str, MatchProblem]:

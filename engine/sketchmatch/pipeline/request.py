@@ -1,0 +1,156 @@
+"""What a match is asked for, and whether it can be had."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from sketchmatch.api import Searcher
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.model import ConfidenceWeights, RequestWeights, Scene, Source
+from sketchmatch.pipeline.calibration import default_price
+from sketchmatch.pipeline.selection import Profile, Selection
+
+__all__ = ["MatchRequest", "alternatives_wanted", "check_objects_weighed", "price_in_force"]
+
+_MAX_SEED = 2**64 - 1
+_MAX_WEIGHT = 1e6
+_MAX_DISTANCE = 4.0
+_MAX_PRICE = 1e3
+_MAX_ALTERNATIVES = 100
+_ALTERNATIVES = 3
+_COUNTS = (3, 5, 6)
+
+
+@dataclass(frozen=True)
+class MatchRequest:
+    """What to match, and how.
+
+    Attributes
+    ----------
+    sketch, map
+        Sources, or scenes that need no segmentation.
+    selection
+        Algorithms and parameters, by stage.
+    seed
+        0 … 2⁶⁴−1; the same request with the same seed gives the same result.
+    time_budget
+        Seconds after which the best answer so far is given, or None for no limit.
+    weights
+        Of ζσ, ζR and ζL in ζ, of ζS and ζM where there are five, and the exponent of distance in
+        ζR where there are six; None for those of the profile, or else 1, 1, 1.
+    alternatives
+        How many of the next best object maps the result shall hold; None for 3, or as many as
+        there are.
+    profile
+        Name of the profile to take the rest from; empty for the default one.
+    allow_unmatched
+        Whether an object may stay without partner on both sides where that is likelier; None for
+        what the profile says, or else not: the smaller scene is matched completely.
+    unmatched_price
+        What a map loses for leaving all objects of the smaller scene out, and for some of them
+        their share of it, in units of ζ; None for the one that fits the weights.
+
+    Raises
+    ------
+    InvalidInputError
+        If a value is out of its bounds.
+    """
+
+    sketch: Source | Scene
+    map: Source | Scene
+    selection: Selection = field(default_factory=lambda: MappingProxyType({}))
+    seed: int = 0
+    time_budget: float | None = None
+    weights: RequestWeights | None = None
+    alternatives: int | None = None
+    profile: str = ""
+    allow_unmatched: bool | None = None
+    unmatched_price: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.seed, int) and 0 <= self.seed <= _MAX_SEED):
+            raise _refused("seed", f"is {self.seed}; give an integer 0 … 2**64 − 1")
+        budget, price, wanted = self.time_budget, self.unmatched_price, self.alternatives
+        if budget is not None and not 0 < budget < math.inf:
+            raise _refused("time_budget", f"is {budget:g} s; give a positive time or none at all")
+        if self.weights is not None:
+            _check_weights(self.weights)
+        if wanted is not None and not 0 <= wanted <= _MAX_ALTERNATIVES:
+            raise _refused(
+                "alternatives", f"is {wanted}; give a number from 0 to {_MAX_ALTERNATIVES}"
+            )
+        if price is not None and not 0 < price <= _MAX_PRICE:
+            raise _refused(
+                "unmatched_price", f"is {price:g}; give a number above 0, at most {_MAX_PRICE:g}"
+            )
+
+
+def check_objects_weighed(weights: ConfidenceWeights, searcher: Searcher) -> None:
+    """Refuse to compare objects where the search compares nothing but pairs."""
+    if weights.of_objects and not searcher.object_consistent:
+        name = "shape" if weights.shape > 0 else "size"
+        raise _refused(
+            f"weights.{name}",
+            f"compares objects, and the searcher {searcher.name!r}, as it is set here, maps pairs "
+            "that need not lead to one map of objects; choose another, such as 'auto', or weight 0",
+        )
+
+
+def price_in_force(
+    request: MatchRequest, profile: Profile, weights: ConfidenceWeights, searcher: Searcher
+) -> float:
+    """Return the price of leaving objects out; infinite where that is not allowed."""
+    allowed, price = request.allow_unmatched, request.unmatched_price
+    if not (profile.allow_unmatched if allowed is None else allowed):
+        if price is not None:
+            raise _refused(
+                "unmatched_price",
+                f"is {price:g}, but no object may stay unmatched; set allow_unmatched or drop it",
+            )
+        return math.inf
+    if not searcher.object_consistent:
+        raise _refused(
+            "allow_unmatched",
+            f"compares maps of objects, and the searcher {searcher.name!r}, as it is set here, "
+            "maps pairs that need not lead to one; choose another, such as 'auto', or switch it "
+            "off",
+        )
+    return default_price(weights) if price is None else price
+
+
+def alternatives_wanted(requested: int | None, sketch: Scene, map_: Scene) -> int:
+    """Return how many object maps beside the best there shall be."""
+    few, many = sorted((len(sketch), len(map_)))
+    there_are = math.perm(many, few) - 1
+    if requested is None:
+        return min(_ALTERNATIVES, there_are)
+    if requested > there_are:
+        raise _refused(
+            "alternatives",
+            f"is {requested}, but {few} objects in {many} have {there_are} other maps; "
+            "ask for no more",
+        )
+    return requested
+
+
+def _check_weights(weights: RequestWeights) -> None:
+    """Refuse weights that make no ζ."""
+    names = ConfidenceWeights._fields
+    if len(weights) not in _COUNTS:
+        raise _refused(
+            "weights",
+            f"are {len(weights)} numbers; give three, {', '.join(names[:3])}, five, with "
+            f"{' and '.join(names[3:5])}, or six, with the exponent of {names[5]}",
+        )
+    for name, weight in zip(names, weights, strict=False):
+        most = _MAX_DISTANCE if name == "distance" else _MAX_WEIGHT
+        if not 0 <= weight <= most:
+            raise _refused(f"weights.{name}", f"is {weight:g}; give a number from 0 to {most:g}")
+    if ConfidenceWeights(*weights).total == 0:
+        raise _refused("weights", "are all zero; give at least one above zero")
+
+
+def _refused(field_: str, words: str) -> InvalidInputError:
+    return InvalidInputError(Reason.INVALID_FIELD, field_, words)
