@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -21,6 +22,7 @@ from sketchmatch.config.layers import (
     flag_layer,
     found_file,
     variable_of,
+    variables_in,
     without_overruled,
 )
 from sketchmatch.config.settings import Settings, keys_of, static_paths
@@ -119,7 +121,18 @@ def load(
     >>> load(flags={"limits.max_objects": 50}, search=False).limits.max_objects
     50
     """
+    if not (path or flags or search):
+        return _of_environment(variables_in(os.environ))
     return _merged(_layers(path, flags, search))
+
+
+@lru_cache(maxsize=4)
+def _of_environment(variables: tuple[tuple[str, str], ...]) -> Configuration:
+    """Return what is in force where there are only environment variables.
+
+    Every match in Python needs it, and merging takes as long as a small match.
+    """
+    return _merged((environment_layer(dict(variables)), builtin_layer()))
 
 
 def builtin() -> Configuration:
@@ -229,7 +242,7 @@ def _defaults(settings: Settings) -> Defaults:
                 name,
                 profile.summary,
                 _selection(profile),
-                profile.weights,  # type: ignore[arg-type]  # three or five
+                profile.weights,  # type: ignore[arg-type]  # three, five or six
                 profile.allow_unmatched,
             )
             for name, profile in settings.profiles.items()

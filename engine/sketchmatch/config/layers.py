@@ -123,6 +123,12 @@ def file_layer(path: Path) -> Layer:
     return Layer(Origin.FILE, values, {leaf: "" for leaf, _ in leaves_of(values)}, str(path))
 
 
+def variables_in(environment: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    """Return the variables that may say something, and their texts, in alphabetical order."""
+    items = sorted(environment.items())
+    return tuple((name, text) for name, text in items if name.startswith(_PREFIX))
+
+
 def environment_layer(environment: Mapping[str, str]) -> Layer:
     """Return what environment variables say.
 
@@ -133,8 +139,8 @@ def environment_layer(environment: Mapping[str, str]) -> Layer:
     """
     values: dict[str, Any] = {}
     labels = {}
-    for variable, text in sorted(environment.items()):
-        if not variable.startswith(_PREFIX) or variable in _NO_SETTINGS or not text.strip():
+    for variable, text in variables_in(environment):
+        if variable in _NO_SETTINGS or not text.strip():
             continue
         path = _path_of(variable)
         if path is not None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import shapely
 
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.model import FloatArray, Scene, SceneDescriptor
+from sketchmatch.model import FloatArray, IntArray, Scene, SceneDescriptor
+from sketchmatch.model.arrays import sealed
 from sketchmatch.pipeline.result import ObjectRelation
 
 __all__ = [
@@ -217,20 +219,29 @@ def _effective(rows: FloatArray, start: float) -> tuple[FloatArray, FloatArray]:
     forces, moments : ndarray
         Shape (m,).
     """
-    bins = rows.shape[1]
-    edges = np.arange(bins // 2 + 1) + (0.5 - start) % 1.0
-    stops = np.unique([0.0, bins / 4.0, *edges[edges < bins / 2.0], bins / 2.0])
-    low, width = stops[:-1], np.diff(stops)
-    places = np.floor(start + low + width / 2.0 + 0.5).astype(np.int64) % bins
+    places, low, width = _half_turn(rows.shape[1], start)
+    ahead = np.searchsorted(low, rows.shape[1] / 4.0)
     forces = rows[:, places] * width
-    ahead = low < bins / 4.0
-    against = forces[:, ~ahead].sum(axis=1)
-    forces, low, width = forces[:, ahead], low[ahead], width[ahead]
+    against = forces[:, ahead:].sum(axis=1)
+    forces, low, width = forces[:, :ahead], low[:ahead], width[:ahead]
     effective = np.maximum(forces.sum(axis=1) - against, 0.0)
     before = np.cumsum(forces, axis=1) - forces
     kept = np.clip(effective[:, None] - before, 0.0, forces)
     share = np.divide(kept, forces, out=np.zeros_like(kept), where=forces > 0.0)
     return effective, (kept * (low + 0.5 * width * share)).sum(axis=1)
+
+
+@lru_cache(maxsize=64)
+def _half_turn(bins: int, start: float) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return the bins of half a turn from a direction: which, how far off, and how much of each.
+
+    A quarter turn away one begins.
+    """
+    edges = np.arange(bins // 2 + 1) + (0.5 - start) % 1.0
+    stops = np.unique([0.0, bins / 4.0, *edges[edges < bins / 2.0], bins / 2.0])
+    low, width = stops[:-1], np.diff(stops)
+    places = np.floor(start + low + width / 2.0 + 0.5).astype(np.int64) % bins
+    return sealed(places), sealed(low), sealed(width)
 
 
 def _relation(degrees: FloatArray) -> DirectionalRelation:
