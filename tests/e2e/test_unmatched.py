@@ -85,7 +85,7 @@ def test_a_server_says_what_is_in_force(place, address):
 
 def test_a_profile_may_allow_it(command_line, files, place, tmp_path):
     mine = tmp_path / "mine.toml"
-    mine.write_text("[profiles.mine]\nweights = [1, 2, 0.1, 2, 0.25]\nallow_unmatched = true\n")
+    mine.write_text(f"[profiles.mine]\nweights = {[*LEARNED]}\nallow_unmatched = true\n")
     options = ("--config", mine, "--profile", "mine", "--json")
     result = json.loads(command_line("match", *files, *options).stdout)
     assert len(result["objectMatches"]) == len(place[2])

@@ -8,5 +8,9 @@ The thesis's figures, and so its scenes and sketches, are not available. What st
 - ``study``: the sketches, which go through the real segmenter as pen strokes;
 - ``cases``: what is matched with what, and what came of it;
 - ``runs``: many cases in two processes;
-- ``thesis``: the numbers that the thesis printed.
+- ``thesis``: the numbers that the thesis printed;
+- ``records``, ``tables``, ``plots``, ``claims``, ``examples``: what is read out of it all, and
+  ``report``, a ``document`` of these;
+- ``learn``: weights, price and probabilities of the engine, from ``drawings`` that no table is made
+  of.
 """

@@ -1,32 +1,23 @@
 """The strength at which ζ of the right map is the thesis's.
 
-Run it with ``python -m tests.experiments.calibrate``; it takes about three minutes. It was done
-once, with people who draw nothing else, 200 sketches a scene, and gave :data:`CURVE`.
+``python -m tests.experiments.calibrate`` takes about three minutes and writes ``calibrated.json``
+beside this file, from which the report tells what each strength gives. Its people draw nothing
+else.
 
-The thesis prints a mean ζ of 0.911 and 0.913 with all objects (tables 4.3 and 4.4), which 0.95
-gives, and of 0.897 with one missing (table 4.18). One dial cannot give both, as taking an object
-away hardly changes ζ of the right map. Nor need it: the former means count case (a), the map with
-itself, as 1.000, and sketches (b) to (j) alone have 0.901 and 0.903, as at 1.05. How much ζ differs
-among the objects removed from one sketch, a standard deviation of 0.008 and 0.010, is as in the
-thesis's appendices (0.009 and 0.010); how much it differs among sketches, 0.019, is a little more
-than there (0.018 and 0.012).
-
-What people draw for a thing hardly matters to ζ: at 0.95, boxes and ellipses give 0.911 to 0.912.
-
-The thesis's Ω of 0.81 beside this ζ does not come from object-consistent FMAPs here: for these Ω is
-ζσ, 0.979. Pairwise legal ones have 0.60 and 0.62, with a ζ of 0.922 and 0.919 above the right
-map's, and only 45 % and 47 % of the object maps are right; where they are, Ω is 0.68 and 0.70.
+The thesis prints a mean ζ of 0.911 and 0.913 with all objects (tables 4.3 and 4.4), and of 0.897
+with one missing (table 4.18). One dial cannot give both, as taking an object away hardly changes ζ
+of the right map. Nor need it: the former means count case (a), the map with itself, as 1.000;
+sketches (b) to (j) alone have 0.901 and 0.903. :data:`~tests.experiments.study.STRENGTH` gives the
+former, :data:`~tests.experiments.protocol.STRONGER` the latter.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from statistics import mean, stdev
-
-import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from tests.experiments.cases import NOTHING, Record, Removal
 from tests.experiments.people import Person, Shapes
@@ -35,62 +26,107 @@ from tests.experiments.runs import Work, run
 from tests.experiments.scenes import PLACES
 from tests.experiments.study import STRENGTH, Style
 
+__all__ = ["Calibrated", "Legal", "Line", "calibrated"]
+
 SEED = 1
 """Of the calibration's people, who draw nothing else."""
 
+STRENGTHS = (0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2)
+
+LEGAL = ("easm", "easm-pairwise")
+"""Methods whose FMAPs one object map induces, and whose FMAPs are legal pair by pair alone."""
+
+_SKETCHES = 200
+_FILE = Path(__file__).with_name("calibrated.json")
+
 
 @dataclass(frozen=True)
-class Point:
-    """What one strength gave, in scenes A and B.
+class Line:
+    """What comes of one way to draw, on the map, with ``auto``.
 
     Attributes
     ----------
-    strength
-        Of the people.
-    zeta, zeta_missing
-        Mean ζ of the right map with all objects and with one missing.
+    drawn
+        The strength, or what is drawn for a thing.
+    place
+        The scene.
+    zeta, spread
+        Mean and standard deviation of ζ of the right map, with all objects.
+    zeta_missing, spread_missing
+        Mean of ζ of the right map with one object missing, and how much it differs among the
+        objects taken from one sketch.
     right, right_missing
-        Share wholly right with ``auto``, in per cent.
+        Shares wholly right.
     """
 
-    strength: float
-    zeta: tuple[float, float]
-    zeta_missing: tuple[float, float]
-    right: tuple[float, float]
-    right_missing: tuple[float, float]
+    drawn: str
+    place: str
+    zeta: float
+    spread: float
+    zeta_missing: float
+    spread_missing: float
+    right: float
+    right_missing: float
 
 
-CURVE = (
-    Point(0.7, (0.934, 0.933), (0.935, 0.934), (100.0, 100.0), (96.1, 96.9)),
-    Point(0.8, (0.926, 0.924), (0.927, 0.925), (100.0, 100.0), (94.3, 94.5)),
-    Point(0.9, (0.917, 0.915), (0.918, 0.917), (100.0, 100.0), (92.4, 90.4)),
-    Point(0.95, (0.912, 0.910), (0.914, 0.911), (99.5, 100.0), (90.4, 88.3)),
-    Point(1.0, (0.908, 0.906), (0.909, 0.907), (99.5, 99.5), (88.7, 86.1)),
-    Point(1.05, (0.903, 0.901), (0.905, 0.903), (99.5, 99.5), (87.4, 84.4)),
-    Point(1.1, (0.899, 0.898), (0.900, 0.900), (99.0, 99.0), (85.7, 82.8)),
-    Point(1.2, (0.891, 0.889), (0.892, 0.891), (98.5, 98.5), (81.8, 78.9)),
-)
-"""What it gave, on the map."""
+@dataclass(frozen=True)
+class Legal:
+    """What EASM finds, all objects drawn, by what makes an FMAP legal.
 
-_SKETCHES = 200
-_COLUMNS = ("ζ all", "sd", "ζ one missing", "sd within", "right all", "right one missing", "faults")
+    Attributes
+    ----------
+    place, method
+        The scene, and one of :data:`LEGAL`.
+    zeta, omega
+        Means of what it finds.
+    omega_right
+        Mean Ω where the answer is right.
+    right
+        Share wholly right.
+    """
+
+    place: str
+    method: str
+    zeta: float
+    omega: float
+    omega_right: float
+    right: float
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What was found: by strength, by shapes at the strength of the study, and by legality."""
+
+    sketches: int
+    strengths: tuple[Line, ...]
+    shapes: tuple[Line, ...]
+    legal: tuple[Legal, ...]
+
+
+def calibrated() -> Calibrated:
+    """Return what was found when it was done last."""
+    found = json.loads(_FILE.read_text(encoding="utf-8"))
+    return Calibrated(
+        found["sketches"],
+        tuple(Line(**line) for line in found["strengths"]),
+        tuple(Line(**line) for line in found["shapes"]),
+        tuple(Legal(**line) for line in found["legal"]),
+    )
 
 
 def main() -> None:
-    """Print the curve, the shapes people draw, and what legal FMAPs of each kind give."""
-    console = Console(width=118)
-    strengths = [point.strength for point in CURVE]
-    by_strength = {f"{strength:g}": Person(strength) for strength in strengths}
+    """Find out, and write it down."""
+    by_strength = {f"{strength:g}": Person(strength) for strength in STRENGTHS}
     by_shape = {str(shape): Person(STRENGTH, shapes=shape) for shape in Shapes}
-    console.print(_curve("ζ of the right map against strength", "strength", by_strength))
-    console.print(_curve(f"the same at strength {STRENGTH:g} by what is drawn", "shapes", by_shape))
-    console.print(_legal())
+    found = Calibrated(
+        _SKETCHES, _lines("strength", by_strength), _lines("shapes", by_shape), _legal()
+    )
+    text = json.dumps(asdict(found), indent=1, ensure_ascii=False)
+    _FILE.write_text(text + "\n", encoding="utf-8")
+    print(f"wrote {_FILE}")
 
 
-def _curve(title: str, first: str, people: Mapping[str, Person]) -> Table:
-    table = Table(title=f"{title}; right: share with auto", title_justify="left")
-    for column in (first, "scene", *_COLUMNS):
-        table.add_column(column, justify="right")
+def _lines(title: str, people: Mapping[str, Person]) -> tuple[Line, ...]:
     works = [
         work
         for person in people.values()
@@ -98,15 +134,11 @@ def _curve(title: str, first: str, people: Mapping[str, Person]) -> Table:
         for work in _works(place, person, (NOTHING, *one_missing(place)), ("auto",))
     ]
     records = run(works, title)
-    for name, person in people.items():
-        for place in PLACES:
-            own = [
-                record
-                for record in records
-                if record.case.place == place and record.case.style.person == person
-            ]
-            table.add_row(name, place, *_figures(own))
-    return table
+    return tuple(
+        _line(name, place, _drawn(records, place, person))
+        for name, person in people.items()
+        for place in PLACES
+    )
 
 
 def _works(
@@ -116,51 +148,52 @@ def _works(
     return [Work(place, k, style, removals, methods=methods) for k in range(_SKETCHES)]
 
 
-def _figures(records: Sequence[Record]) -> list[str]:
-    all_drawn = [record for record in records if not record.case.removed.sketch]
+def _drawn(records: Sequence[Record], place: str, person: Person) -> list[Record]:
+    return [r for r in records if r.case.place == place and r.case.style.person == person]
+
+
+def _line(name: str, place: str, records: Sequence[Record]) -> Line:
+    whole = [record for record in records if not record.case.removed.sketch]
     missing = [record for record in records if record.case.removed.sketch]
     sketches: dict[int, list[float]] = {}
     for record in missing:
         sketches.setdefault(record.case.number, []).append(record.true_zeta)
-    return [
-        f"{mean(record.true_zeta for record in all_drawn):.4f}",
-        f"{stdev(record.true_zeta for record in all_drawn):.4f}",
-        f"{mean(record.true_zeta for record in missing):.4f}",
-        f"{mean(stdev(values) for values in sketches.values()):.4f}",
-        f"{mean(record.perfect for record in all_drawn):.1%}",
-        f"{mean(record.perfect for record in missing):.1%}",
-        f"{sum(record.faults > 0 for record in all_drawn)}",
-    ]
+    return Line(
+        name,
+        place,
+        _rounded(mean(record.true_zeta for record in whole)),
+        _rounded(stdev(record.true_zeta for record in whole)),
+        _rounded(mean(record.true_zeta for record in missing)),
+        _rounded(mean(stdev(values) for values in sketches.values())),
+        _rounded(mean(record.perfect for record in whole)),
+        _rounded(mean(record.perfect for record in missing)),
+    )
 
 
-def _legal() -> Table:
-    """Return ζ and Ω that EASM finds with object-consistent and with pairwise legal FMAPs."""
-    table = Table(title="EASM by what FMAPs are legal, all objects", title_justify="left")
-    for column in ("scene", "FMAPs", "ζ found", "Ω", "Ω, answer right", "right", "ζ of the right"):
-        table.add_column(column, justify="right")
-    methods = ("easm", "easm-pairwise")
+def _legal() -> tuple[Legal, ...]:
     works = [
-        work for place in PLACES for work in _works(place, Person(STRENGTH), (NOTHING,), methods)
+        work for place in PLACES for work in _works(place, Person(STRENGTH), (NOTHING,), LEGAL)
     ]
     records = run(works, "legal FMAPs")
+    lines = []
     for place in PLACES:
-        for method in methods:
-            own = [
-                record
-                for record in records
-                if record.case.place == place and record.method == method
-            ]
-            right = [record.omega for record in own if record.perfect]
-            table.add_row(
-                place,
-                method,
-                f"{mean(record.zeta for record in own):.3f}",
-                f"{mean(record.omega for record in own):.3f}",
-                f"{float(np.mean(right)) if right else float('nan'):.3f}",
-                f"{mean(record.perfect for record in own):.1%}",
-                f"{mean(record.true_zeta for record in own):.3f}",
+        for method in LEGAL:
+            own = [r for r in records if r.case.place == place and r.method == method]
+            lines.append(
+                Legal(
+                    place,
+                    method,
+                    _rounded(mean(record.zeta for record in own)),
+                    _rounded(mean(record.omega for record in own)),
+                    _rounded(mean(record.omega for record in own if record.perfect)),
+                    _rounded(mean(record.perfect for record in own)),
+                )
             )
-    return table
+    return tuple(lines)
+
+
+def _rounded(number: float) -> float:
+    return round(float(number), 4)
 
 
 if __name__ == "__main__":

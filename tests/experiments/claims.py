@@ -72,8 +72,8 @@ def _fsnn_good(results: Results) -> Claim:
         f"{share(right(own), len(own))} % of {len(own)} sketches are wholly right (thesis: "
         f"{share(printed, 2 * len(LETTERS))} %). The FMAPs it keeps need not lead to a consistent "
         f"object map; in {share(above, len(failed))} % of its failures the one it found has a "
-        "higher ζ than the right one. Our fsnn-pso follows the thesis's text, its program is not "
-        "available; 3000 particles in place of 100 gave the same answers (once, 16 sketches).",
+        "higher ζ than the right one. Our fsnn-pso follows the thesis's text; its program is not "
+        "available.",
     )
 
 

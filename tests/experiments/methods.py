@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from sketchmatch.pipeline import warmup
 from sketchmatch.registry import Kind, default_registry
 
 __all__ = ["METHODS", "THESIS", "Method", "warm_up"]
@@ -56,6 +57,7 @@ THESIS = frozenset({"fsnn-pso", "easm", "easm-pairwise"})
 
 def warm_up(methods: Iterable[str]) -> None:
     """Compile what methods need, so that no time measured includes it."""
+    warmup.warm_up(default_registry())
     searchers = {item.name: item.algorithm for item in default_registry().of_kind(Kind.SEARCHER)}
     for method in methods:
         searchers[METHODS[method].searcher].warm_up()

@@ -66,8 +66,8 @@ def experiments(
     Parameters
     ----------
     methods
-        Names of methods. Where objects are missing or extra, ``fsnn-pso`` gets a quarter of the
-        sketches; the thesis did not try it there.
+        Names of methods. Where objects are missing or extra, ``fsnn-pso`` gets an eighth of the
+        sketches, nine at least; the thesis did not try it there.
     count
         Sketches of each scene.
     only
@@ -222,8 +222,8 @@ PARTS: Mapping[str, Callable[[tuple[str, ...], int], dict[str, list[Work]]]] = {
 
 
 def _affordable(methods: tuple[str, ...], number: int, count: int) -> tuple[str, ...]:
-    """Return the methods for a sketch: slow ones get the first quarter, nine at least."""
-    if number < max(len(LETTERS), count // 4):
+    """Return the methods for a sketch: slow ones get the first eighth, nine at least."""
+    if number < max(len(LETTERS), count // 8):
         return methods
     return tuple(method for method in methods if method not in _SLOW)
 

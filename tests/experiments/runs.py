@@ -9,19 +9,25 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from sketchmatch.pipeline.warmup import announcing_compilation
 from tests.experiments.cases import NOTHING, Record, Removal, cases, evaluate
 from tests.experiments.methods import warm_up
 from tests.experiments.study import Style
 
-__all__ = ["PROCESSES", "Work", "run", "run_all"]
+__all__ = ["PROCESSES", "Work", "each_of", "run", "run_all"]
 
 PROCESSES = 2
 
 _CHUNK = 2
+_TELL_EVERY = 30.0
+_Item = TypeVar("_Item")
+_Done = TypeVar("_Done")
 
 
 @dataclass(frozen=True)
@@ -71,36 +77,50 @@ def run_all(
     dict
         For each experiment its records, in the order of the works.
     """
-    with _workers(experiments, processes) as do, _progress(experiments) as advanced:
+    methods = {
+        method for works in experiments.values() for work in works for method in work.methods
+    }
+    counts = {title: len(works) for title, works in experiments.items()}
+    with _workers(processes, methods) as do, _progress(counts) as advanced:
         records: dict[str, list[Record]] = {}
         for title, works in experiments.items():
             records[title] = []
-            for each in do(works):
+            for each in do(Work.done, works):
                 records[title] += each
                 advanced(title)
     return records
 
 
-_Doing = Callable[[Sequence[Work]], Iterable[list[Record]]]
+def each_of(
+    do: Callable[[_Item], _Done], items: Sequence[_Item], title: str, *, processes: int = PROCESSES
+) -> Iterator[_Done]:
+    """Yield what comes of each item, in their order, showing progress on the error stream."""
+    with _workers(processes) as all_of, _progress({title: len(items)}) as advanced:
+        for done in all_of(do, items):
+            yield done
+            advanced(title)
 
 
 @contextmanager
-def _workers(experiments: Mapping[str, Sequence[Work]], processes: int) -> Iterator[_Doing]:
-    methods = {
-        method for works in experiments.values() for work in works for method in work.methods
-    }
+def _workers(processes: int, methods: Iterable[str] = ()) -> Iterator[Callable[..., Any]]:
+    """Compile what methods need, and give what maps a function over items, in processes.
+
+    The kernels are compiled here, once; the processes find them in the cache.
+    """
+    names = tuple(methods)
+    with announcing_compilation(partial(print, file=sys.stderr)):
+        warm_up(names)
     if processes == 1:
-        warm_up(methods)
-        yield lambda works: map(Work.done, works)
+        yield map
         return
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, context, warm_up, (methods,)) as pool:
-        yield lambda works: pool.map(Work.done, works, chunksize=_CHUNK)
+    with ProcessPoolExecutor(processes, context, warm_up, (names,)) as pool:
+        yield partial(pool.map, chunksize=_CHUNK)
 
 
 @contextmanager
-def _progress(experiments: Mapping[str, Sequence[Work]]) -> Iterator[Callable[[str], None]]:
-    """Show a bar for each experiment on a terminal, and a line when it is done elsewhere."""
+def _progress(counts: Mapping[str, int]) -> Iterator[Callable[[str], None]]:
+    """Show a bar for each experiment on a terminal; elsewhere lines, half a minute apart."""
     console = Console(file=sys.stderr)
     columns = (
         TextColumn("{task.description}"),
@@ -108,18 +128,17 @@ def _progress(experiments: Mapping[str, Sequence[Work]]) -> Iterator[Callable[[s
         MofNCompleteColumn(),
         TimeRemainingColumn(),
     )
-    started = time.perf_counter()
+    started = told = time.perf_counter()
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
-        tasks = {
-            title: progress.add_task(title, total=len(works))
-            for title, works in experiments.items()
-        }
+        tasks = {title: progress.add_task(title, total=count) for title, count in counts.items()}
 
         def advanced(title: str) -> None:
+            nonlocal told
             progress.advance(tasks[title])
-            task = progress.tasks[tasks[title]]
-            if not console.is_terminal and task.finished:
-                seconds = time.perf_counter() - started
-                console.print(f"{title}: {len(experiments[title])} sketches, {seconds:.0f} s")
+            task, now = progress.tasks[tasks[title]], time.perf_counter()
+            if not console.is_terminal and (task.finished or now > told + _TELL_EVERY):
+                told = now
+                done = f"{task.completed:.0f} of {counts[title]} sketches"
+                console.print(f"{title}: {done}, {now - started:.0f} s")
 
         yield advanced

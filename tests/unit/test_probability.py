@@ -59,12 +59,13 @@ def considered(best, argument_objects, others):
     more=st.integers(0, 2),
     left_out=st.integers(0, 1),
     doubt=st.floats(0.0, 1.0),
+    reserve=st.floats(-5.0, 5.0),
     luck=st.floats(0.0, 1.0),
 )
-def test_a_probability_is_a_share_of_all_odds(seed, few, more, left_out, doubt, luck):
+def test_a_probability_is_a_share_of_all_odds(seed, few, more, left_out, doubt, reserve, luck):
     rng = np.random.default_rng(seed)
     table = random_table(rng, few, few + more)
-    calibration = Calibration(0.2, 2.0, 1.3, doubt, luck)
+    calibration = Calibration(0.2, 2.0, 1.3, doubt, reserve, luck)
     left_out = min(left_out, few - 3)
     kept = sorted(rng.permutation(few)[left_out:].tolist())
     part = finish(part_of(Part.whole(table), kept))
@@ -84,7 +85,7 @@ def test_a_probability_is_a_share_of_all_odds(seed, few, more, left_out, doubt, 
     steep = calibration.sharpness * few**calibration.growth
     top = worth(best, table, calibration)
     odds = [math.exp(steep * (worth(each, table, calibration) - top)) for each in maps]
-    nothing = math.exp(steep * (doubt - top))
+    nothing = math.exp(steep * (doubt - top) + reserve)
     total = sum(odds) + nothing
     assert computed.of_map == pytest.approx(1.0 / total, abs=1e-9)
     for k, g in enumerate(kept):
@@ -154,7 +155,9 @@ def test_nothing_is_said_where_nothing_was_learned(settings):
 def test_the_learned_weights_are_those_of_the_profile_whatever_their_unit():
     profile = builtin().defaults.named("learned")
     assert ConfidenceWeights(*profile.weights) == LEARNED
-    assert calibrated(ConfidenceWeights(*(3.0 * weight for weight in LEARNED))) is not None
+    *parts, distance = LEARNED
+    assert calibrated(ConfidenceWeights(*(3.0 * each for each in parts), distance)) is not None
+    assert calibrated(LEARNED._replace(distance=distance + 0.5)) is None
     assert calibrated(ConfidenceWeights(1, 1, 2)) is None
     assert default_price(ConfidenceWeights(1, 1, 2)) == default_price(ConfidenceWeights())
     assert default_price(LEARNED) < default_price(ConfidenceWeights())

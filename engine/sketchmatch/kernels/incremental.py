@@ -43,10 +43,9 @@ class MapState(NamedTuple):
         Shape (Q, Q'/2) or (Q, Q'): of each entry, or for both an entry and its dual; read only.
     rotation, dilation
         Shape (Q, Q'/2): R and L of the relation table, read only.
-    rotation_weights
-        Shape (Q,): what R of each template pair counts for, 1 on average; read only.
     weights
-        Shape (3,), of ζσ, ζR and ζL; their sum is 1.
+        Shape (3 + Q,): of ζσ, ζR and ζL, whose sum is 1; then the rotation weights, what R of each
+        template pair counts for. In an array of their own they would slow down every call.
     partners, holders
         int64, shapes (N,) and (N',): the partner of each template object, and the template object
         that has each argument object, or −1.
@@ -66,7 +65,6 @@ class MapState(NamedTuple):
     evidence: FloatArray
     rotation: FloatArray
     dilation: FloatArray
-    rotation_weights: FloatArray
     weights: FloatArray
     partners: IntArray
     holders: IntArray
@@ -85,8 +83,7 @@ def empty_map_state(table: RelationTable, weights: Weights) -> MapState:
         evidence=table.entry_evidence,
         rotation=table.rotation,
         dilation=table.dilation,
-        rotation_weights=table.rotation_weights,
-        weights=np.array(weights, dtype=np.float64) / sum(weights),
+        weights=np.concatenate([np.array(weights) / sum(weights), table.rotation_weights]),
         partners=np.zeros(objects, dtype=np.int64),
         holders=np.full(table.argument_objects, -1, dtype=np.int64),
         entries=np.zeros((objects, objects, 5)),
@@ -212,7 +209,7 @@ def map_entry(state: MapState, a: int, b: int, c: int, d: int) -> tuple[float, f
     """
     i, j, sign = _place(state, a, b, c, d)
     rotation = state.rotation[i, j]
-    turn = sign * state.rotation_weights[i]
+    turn = sign * state.weights[3 + i]
     level = DILATION_SCALE * np.log(state.dilation[i, j])
     return _evidence(state, i, j, sign), turn * np.cos(rotation), turn * np.sin(rotation), level
 

@@ -67,9 +67,9 @@ def likelihood(
     agreeing = np.array([_agreement(rival, found) for rival in met], dtype=bool)
     steep = calibration.sharpness * objects**calibration.growth
 
-    def odds(values: FloatArray) -> FloatArray:
+    def odds(values: FloatArray, reserve: float = 0.0) -> FloatArray:
         """Return how much likelier maps are than the best."""
-        raised: FloatArray = np.exp(np.minimum(steep * (values - best), 50.0))
+        raised: FloatArray = np.exp(np.minimum(steep * (values - best) + reserve, 50.0))
         return raised
 
     exchanged = odds(exchanges - price * left_out / objects)
@@ -77,7 +77,7 @@ def likelihood(
     if omissions is not None:
         omitted = odds(omissions - price * (left_out + 1) / objects)
     met_odds = odds(met_values)
-    unknown = float(odds(np.array([calibration.doubt]))[0])
+    unknown = float(odds(np.array([calibration.doubt]), calibration.reserve)[0])
     # An exchange between two objects stands in the rows of both.
     used = exchanged[:, partners].sum()
     total = 1.0 + exchanged.sum() - 0.5 * used + omitted.sum() + met_odds.sum() + unknown

@@ -212,8 +212,8 @@ def _begin(table: RelationTable, evolution: Evolution, rng: np.random.Generator)
         (entries != column).astype(np.int64),
         evolution.scratch,
         sealed(evidence[rows, own, None]),
-        sealed(counts * np.cos(rotation)),
-        sealed(counts * np.sin(rotation)),
+        counts * np.cos(rotation),
+        counts * np.sin(rotation),
         DILATION_SCALE * np.log(table.dilation[rows, column, None]),
         evolution.weights,
     )[0]
