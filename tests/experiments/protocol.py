@@ -50,7 +50,7 @@ STRONGER = 1.05
 """Gives sketches (b) to (j) alone the thesis's mean ζ, without case (a); see ``calibrate``."""
 
 _PAPERS = range(0, 360, 30)
-_LARGE = {10: 10, 12: 5, 16: 3, 20: 3, 30: 2}
+_LARGE = {10: 5, 12: 3, 16: 3, 20: 2, 30: 1}
 _SMALL = ("fsnn-pso", "easm", "auto", "learned", "exact")
 _LARGE_BY = ("easm", "auto", "learned", "direct")
 _FEWEST = 3
@@ -87,7 +87,7 @@ def times(count: int = SKETCHES) -> dict[str, list[Work]]:
     """Return what times are measured on, Table 4.5 and beyond: to be done in one process."""
     small = [
         Work("A", number, Style(), _smaller(number), methods=_SMALL)
-        for number in range(max(1, count // 8))
+        for number in range(max(1, count // 16))
     ]
     large = [
         Work(f"{objects}", number, Style(), methods=_LARGE_BY)
