@@ -163,12 +163,13 @@ def _strength(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
         for place in PLACES:
             for number in range(max(1, count // 8)):
                 sweep.append(Work(place, number, style, methods=methods))
+            for number in range(max(1, count // 16)):
                 sweep.append(Work(place, number, style, one_missing(place), methods=swift))
     those = tuple(method for method in methods if method not in _SLOW)
     stronger = [
         Work(place, number, Style(Person(STRONGER)), (NOTHING, *one_missing(place)), methods=those)
         for place in PLACES
-        for number in range(max(1, count // 4))
+        for number in range(max(1, count // 8))
     ]
     return {"strength": sweep, f"strength {STRONGER:g}": stronger}
 
