@@ -161,10 +161,13 @@ def _strength(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     for strength in STRENGTHS:
         style = Style(Person(strength))
         for place in PLACES:
-            for number in range(max(1, count // 8)):
-                sweep.append(Work(place, number, style, methods=methods))
-            for number in range(max(1, count // 16)):
-                sweep.append(Work(place, number, style, one_missing(place), methods=swift))
+            sweep += [
+                Work(place, number, style, methods=methods) for number in range(max(1, count // 8))
+            ]
+            sweep += [
+                Work(place, number, style, one_missing(place), methods=swift)
+                for number in range(max(1, count // 16))
+            ]
     those = tuple(method for method in methods if method not in _SLOW)
     stronger = [
         Work(place, number, Style(Person(STRONGER)), (NOTHING, *one_missing(place)), methods=those)
