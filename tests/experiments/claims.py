@@ -292,7 +292,8 @@ def _paired(records: Sequence[Record]) -> list[tuple[Record, Record]]:
     """Return what easm and fsnn-pso made of the same sketches."""
     by_case = grouped(records, lambda record: record.case)
     found = [{record.method: record for record in each} for each in by_case.values()]
-    return [(each["easm"], each["fsnn-pso"]) for each in found]
+    both = [each for each in found if {"easm", "fsnn-pso"} <= each.keys()]
+    return [(each["easm"], each["fsnn-pso"]) for each in both]
 
 
 def _concordance(points: Sequence[tuple[float, float]]) -> tuple[int, int]:

@@ -303,7 +303,10 @@ def test_slow_methods_get_fewer_sketches_where_objects_are_missing():
     work = protocol.experiments(("fsnn-pso", "auto"), 80)
     slow = [each.number for each in work["one missing, map"] if "fsnn-pso" in each.methods]
     assert sorted(set(slow)) == [*range(9)]
-    assert all("fsnn-pso" in each.methods for each in work["all objects, map"])
+    slow = [each.number for each in work["all objects, map"] if "fsnn-pso" in each.methods]
+    assert sorted(set(slow)) == [*range(40)]
+    few = protocol.experiments(("fsnn-pso", "auto"), 9)
+    assert all("fsnn-pso" in each.methods for each in few["all objects, map"])
 
 
 def test_wilson():
