@@ -103,7 +103,10 @@ def test_turn_and_scale_of_the_whole_are_those_of_the_entries(given_):
         oracle.look_up(table, i, pair)
         for i, pair in enumerate(oracle.read(fmap.entries, table.argument_objects))
     ]
-    total = sum(complex(math.cos(r), math.sin(r)) for _, r, _ in entries)
+    total = sum(
+        count * complex(math.cos(r), math.sin(r))
+        for count, (_, r, _) in zip(table.rotation_weights.tolist(), entries, strict=True)
+    )
     found = global_rotation(fmap, table)
     if abs(total) > 1e-3:
         apart = found - math.atan2(total.imag, total.real)
