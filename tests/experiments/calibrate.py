@@ -22,6 +22,7 @@ from statistics import mean, stdev
 from tests.experiments.cases import NOTHING, Record, Removal
 from tests.experiments.people import Person, Shapes
 from tests.experiments.protocol import one_missing
+from tests.experiments.records import chosen, grouped
 from tests.experiments.runs import Work, run
 from tests.experiments.scenes import PLACES
 from tests.experiments.study import STRENGTH, Style
@@ -134,8 +135,9 @@ def _lines(title: str, people: Mapping[str, Person]) -> tuple[Line, ...]:
         for work in _works(place, person, (NOTHING, *one_missing(place)), ("auto",))
     ]
     records = run(works, title)
+    drawn = grouped(records, lambda record: (record.case.style.person, record.case.place))
     return tuple(
-        _line(name, place, _drawn(records, place, person))
+        _line(name, place, drawn[person, place])
         for name, person in people.items()
         for place in PLACES
     )
@@ -148,23 +150,17 @@ def _works(
     return [Work(place, k, style, removals, methods=methods) for k in range(_SKETCHES)]
 
 
-def _drawn(records: Sequence[Record], place: str, person: Person) -> list[Record]:
-    return [r for r in records if r.case.place == place and r.case.style.person == person]
-
-
 def _line(name: str, place: str, records: Sequence[Record]) -> Line:
     whole = [record for record in records if not record.case.removed.sketch]
     missing = [record for record in records if record.case.removed.sketch]
-    sketches: dict[int, list[float]] = {}
-    for record in missing:
-        sketches.setdefault(record.case.number, []).append(record.true_zeta)
+    sketches = grouped(missing, lambda record: record.case.number).values()
     return Line(
         name,
         place,
         _rounded(mean(record.true_zeta for record in whole)),
         _rounded(stdev(record.true_zeta for record in whole)),
         _rounded(mean(record.true_zeta for record in missing)),
-        _rounded(mean(stdev(values) for values in sketches.values())),
+        _rounded(mean(stdev(record.true_zeta for record in each) for each in sketches)),
         _rounded(mean(record.perfect for record in whole)),
         _rounded(mean(record.perfect for record in missing)),
     )
@@ -178,7 +174,7 @@ def _legal() -> tuple[Legal, ...]:
     lines = []
     for place in PLACES:
         for method in LEGAL:
-            own = [r for r in records if r.case.place == place and r.method == method]
+            own = chosen(records, place=place, method=method)
             lines.append(
                 Legal(
                     place,

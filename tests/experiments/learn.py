@@ -63,7 +63,8 @@ def main() -> None:
         "weights": weights,
         "odds": odds,
     }
-    LEARNED.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n")
+    text = json.dumps(found, indent=1, ensure_ascii=False)
+    LEARNED.write_text(text + "\n", encoding="utf-8")
 
 
 def _all_of(do: Callable[[int], list[_Case]], part: str) -> list[_Case]:

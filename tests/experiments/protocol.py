@@ -148,16 +148,15 @@ def _several(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
         for number in range(count):
             order = np.random.default_rng((number, ord(place))).permutation(objects).tolist()
             removals = tuple(Removal(tuple(order[:k])) for k in range(1, objects - _FEWEST + 1))
-            those = _affordable(methods, number)
-            if number >= max(len(LETTERS), count // 4):
-                those = _swift(methods)
+            few = number < max(len(LETTERS), count // 4)
+            those = _affordable(methods, number) if few else _without(_SEARCH_LONG, methods)
             works.append(Work(place, number, Style(), removals, methods=those))
     return {"several missing": works}
 
 
 def _strength(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     """Return the sweep over strength, and many sketches at one that is a little stronger."""
-    swift = _swift(methods)
+    swift = _without(_SEARCH_LONG, methods)
     sweep = []
     for strength in STRENGTHS:
         style = Style(Person(strength))
@@ -169,7 +168,7 @@ def _strength(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
                 Work(place, number, style, one_missing(place), methods=swift)
                 for number in range(max(1, count // 16))
             ]
-    those = tuple(method for method in methods if method not in _SLOW)
+    those = _without(_SLOW, methods)
     stronger = [
         Work(place, number, Style(Person(STRONGER)), (NOTHING, *one_missing(place)), methods=those)
         for place in PLACES
@@ -180,7 +179,7 @@ def _strength(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
 
 def _shapes(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     """Return people who draw outlines, and others who draw a box or an ellipse for everything."""
-    swift = _swift(methods)
+    swift = _without(_SEARCH_LONG, methods)
     works = [
         Work(place, number, Style(Person(STRENGTH, shapes=shapes)), removals, methods=swift)
         for shapes in Shapes
@@ -193,7 +192,7 @@ def _shapes(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
 
 def _rotation(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     """Return sketches with all objects and with one missing on paper turned all the way round."""
-    those = tuple(method for method in methods if method not in _SLOW)
+    those = _without(_SLOW, methods)
     works = []
     for place in PLACES:
         for number in range(max(1, count // 16)):
@@ -206,7 +205,7 @@ def _rotation(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
 
 def _both_ways(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     """Return sketches that lack one object and show one that is not there."""
-    those = (*(method for method in methods if method not in _SLOW), "unmatched")
+    those = (*_without(_SLOW, methods), "unmatched")
     works = [
         Work(place, number, Style(missing=1, extra=1), methods=tuple(dict.fromkeys(those)))
         for place in PLACES
@@ -233,12 +232,12 @@ def _affordable(methods: tuple[str, ...], number: int, most: int = len(LETTERS))
     """Return the methods for a sketch: slow ones get the first nine, or as many as is said."""
     if number < most:
         return methods
-    return tuple(method for method in methods if method not in _SLOW)
+    return _without(_SLOW, methods)
 
 
-def _swift(methods: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the methods that do not search long."""
-    return tuple(method for method in methods if method not in _SEARCH_LONG)
+def _without(left_out: tuple[str, ...], methods: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the other methods."""
+    return tuple(method for method in methods if method not in left_out)
 
 
 def _smaller(number: int) -> tuple[Removal, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from sketchmatch.kernels._jit import kernel
 from sketchmatch.kernels.confidence import fmap_confidence
 from sketchmatch.kernels.evidence import mean_parts
-from sketchmatch.model import FloatArray, IntArray, correspondences, object_pairs
+from sketchmatch.model import BoolArray, FloatArray, IntArray, correspondences, object_pairs
 from sketchmatch.pipeline.describe import describe
 from sketchmatch.pipeline.evidence import compare_objects, rotation_weights
 from sketchmatch.pipeline.relate import relate
@@ -138,7 +138,7 @@ def learned_weights(cases: list[Parts]) -> tuple[list[Held], tuple[float, ...]]:
     enough = best.loss + best.error
     chosen = max((best, *calmer), key=lambda each: (each.loss <= enough, each.penalty))
     found = np.zeros(5)
-    fitted = _logit(cases, chosen).fitted(chosen.penalty)
+    fitted = _logit(cases, chosen.compared, chosen.distance).fitted(chosen.penalty)
     found[: len(fitted)] = fitted / fitted[0]
     found[:3] = np.maximum(found[:3], _LEAST_WEIGHT)
     weights = (*(significant(each, 2) for each in found), chosen.distance)
@@ -147,10 +147,20 @@ def learned_weights(cases: list[Parts]) -> tuple[list[Held], tuple[float, ...]]:
 
 @dataclass(frozen=True, eq=False)
 class _Logit:
-    """A conditional logit: the shape (cases, k, parts) of maps, −∞ for none, and the right ones."""
+    """A conditional logit.
+
+    Attributes
+    ----------
+    parts
+        Shape (cases, k, parts): those of k maps of each case, or of fewer.
+    none
+        bool, shape (cases, k): where there is no map.
+    right
+        Shape (cases,): which map is right.
+    """
 
     parts: FloatArray
-    none: Any
+    none: BoolArray
     right: IntArray
 
     @classmethod
@@ -192,18 +202,17 @@ class _Logit:
 
 def _held(cases: list[Parts], compared: str, distance: float, penalty: float) -> Held:
     """Fit to all folds but one, try that one, and so on."""
-    held = Held(compared, distance, penalty, 0.0, 0.0, 0.0)
-    logit, fold = _logit(cases, held), np.arange(len(cases)) % FOLDS
+    logit, fold = _logit(cases, compared, distance), np.arange(len(cases)) % FOLDS
     losses, rights = np.empty(len(cases)), np.empty(len(cases))
     for k in range(FOLDS):
         fitted = logit.part(fold != k).fitted(penalty)
         losses[fold == k], rights[fold == k] = logit.part(fold == k).tried(fitted)
-    error = float(losses.std() / math.sqrt(len(cases)))
-    return replace(held, loss=float(losses.mean()), error=error, right=float(rights.mean()))
+    loss, error = float(losses.mean()), float(losses.std() / math.sqrt(len(cases)))
+    return Held(compared, distance, penalty, loss, error, float(rights.mean()))
 
 
-def _logit(cases: list[Parts], what: Held) -> _Logit:
-    parts = [each.at(what.distance, COMPARED[what.compared]) for each in cases]
+def _logit(cases: list[Parts], compared: str, distance: float) -> _Logit:
+    parts = [each.at(distance, COMPARED[compared]) for each in cases]
     return _Logit.of(parts, [each.right for each in cases])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 from google.protobuf.json_format import MessageToJson
@@ -131,18 +131,14 @@ def _events(
 
 def _weights(text: str) -> RequestWeights:
     try:
-        similarity, rotation, dilation, *own = (float(part) for part in text.split(","))
-        if own:
-            shape, size, *distance = own
-            if distance:
-                (exponent,) = distance
-                return (similarity, rotation, dilation, shape, size, exponent)
-            return (similarity, rotation, dilation, shape, size)
+        weights = tuple(float(part) for part in text.split(","))
     except ValueError:
+        weights = ()
+    if len(weights) not in (3, 5, 6):
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             "--weights",
             f"{text!r} is not three, five or six numbers, as in 1,1,1 or 1,1,1,0.5,0.5 or "
             "1,2,0.1,2,0.3,1",
-        ) from None
-    return (similarity, rotation, dilation)
+        )
+    return cast("RequestWeights", weights)

@@ -130,7 +130,7 @@ def load(
 def _of_environment(variables: tuple[tuple[str, str], ...]) -> Configuration:
     """Return what is in force where there are only environment variables.
 
-    Every match in Python needs it, and merging takes as long as a small match.
+    Every match in Python needs it, and merging takes a millisecond or two.
     """
     return _merged((environment_layer(dict(variables)), builtin_layer()))
 

@@ -35,11 +35,7 @@ from sketchmatch.model import (
 )
 from sketchmatch.pipeline import reading
 from sketchmatch.pipeline.alternatives import best_others, exchange_confidences, partner_margins
-from sketchmatch.pipeline.calibration import (
-    CALIBRATED_SIMILARITY,
-    Calibration,
-    calibrated,
-)
+from sketchmatch.pipeline.calibration import CALIBRATED_SIMILARITY, Calibration, calibrated
 from sketchmatch.pipeline.correspond import (
     fmap_confidence,
     global_dilation,
@@ -63,12 +59,7 @@ from sketchmatch.pipeline.result import (
     ObjectMatch,
     Statistics,
 )
-from sketchmatch.pipeline.selection import (
-    UNCONFIGURED,
-    Defaults,
-    Pipeline,
-    resolve,
-)
+from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, Pipeline, resolve
 from sketchmatch.pipeline.unmatched import (
     Found,
     Part,

@@ -19,13 +19,7 @@ from sketchmatch.model import (
     Scene,
     StrokeSet,
 )
-from sketchmatch.pipeline.match import (
-    Accepted,
-    Finished,
-    MatchEvent,
-    Progress,
-    Segmented,
-)
+from sketchmatch.pipeline.match import Accepted, Finished, MatchEvent, Progress, Segmented
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import Correspondence, MatchResult, ObjectMatch, ObjectRelation
 from sketchmatch.pipeline.selection import (

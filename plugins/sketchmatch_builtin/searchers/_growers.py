@@ -77,8 +77,12 @@ class Found:
 
     def __init__(self, problem: MatchProblem) -> None:
         table = problem.table
-        relations = (table.similarity, table.rotation, table.dilation)
-        self._relations = (*relations, table.rotation_weights)
+        self._relations = (
+            table.similarity,
+            table.rotation,
+            table.dilation,
+            table.rotation_weights,
+        )
         self._weights = np.array(problem.weights, dtype=np.float64)
         # FMAPs that lead to the same object map count once for the caller, so keep more.
         self._room = 1 + _SPARE * problem.alternatives
