@@ -99,3 +99,20 @@ def test_a_profile_may_allow_it(command_line, files, place, tmp_path):
         "it should be three, five or six numbers, not all of the first five 0"
         in checked.stdout + checked.stderr
     )
+
+
+@pytest.mark.parametrize(
+    ("weights", "problem"),
+    [
+        ("[1, 1, 1, 0, 0, 9]", "it should have an exponent of distance of at most 4"),
+        ("[1, 1, 1, 0, 2e6]", "2000000"),
+    ],
+)
+def test_weights_of_a_profile_have_the_bounds_of_a_request_s(
+    command_line, tmp_path, weights, problem
+):
+    mine = tmp_path / "mine.toml"
+    mine.write_text(f"[profiles.mine]\nweights = {weights}\n")
+    checked = command_line("config", "check", mine)
+    assert checked.returncode == 2
+    assert problem in checked.stdout + checked.stderr

@@ -14,6 +14,7 @@ from pydantic_settings import (
 )
 
 from sketchmatch.model.limits import SourceLimits
+from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
 
 __all__ = ["Settings", "annotation_of", "keys_of", "static_paths"]
 
@@ -29,12 +30,14 @@ def _listed(value: Any) -> Any:
 
 
 def _weighing(weights: tuple[float, ...]) -> tuple[float, ...]:
-    if len(weights) not in (3, 5, 6) or not sum(weights[:5]):
+    if len(weights) not in WEIGHT_COUNTS or not sum(weights[:5]):
         raise ValueError("should be three, five or six numbers, not all of the first five 0")
+    if any(exponent > MAX_DISTANCE for exponent in weights[5:]):
+        raise ValueError(f"should have an exponent of distance of at most {MAX_DISTANCE:g}")
     return weights
 
 
-_Weight = Annotated[float, Field(ge=0.0, le=1e6)]
+_Weight = Annotated[float, Field(ge=0.0, le=MAX_WEIGHT)]
 _Weights = Annotated[tuple[_Weight, ...], AfterValidator(_weighing)]
 _Names = Annotated[tuple[str, ...], BeforeValidator(_listed)]
 _Parameters = dict[str, Any]

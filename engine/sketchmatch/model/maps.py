@@ -11,6 +11,9 @@ from sketchmatch.model.arrays import FloatArray, IntArray, frozen, frozen_floats
 from sketchmatch.model.relations import object_pairs, pair_index
 
 __all__ = [
+    "MAX_DISTANCE",
+    "MAX_WEIGHT",
+    "WEIGHT_COUNTS",
     "Confidence",
     "ConfidenceWeights",
     "Fmap",
@@ -29,6 +32,12 @@ RequestWeights = (
     | tuple[float, float, float, float, float, float]
 )
 """Weights of ζσ, ζR and ζL, perhaps of ζS and ζM, and perhaps the exponent of distance."""
+
+WEIGHT_COUNTS = (3, 5, 6)
+"""How many numbers that may be."""
+
+MAX_WEIGHT, MAX_DISTANCE = 1e6, 4.0
+"""The largest weight, and the largest exponent."""
 
 
 class ConfidenceWeights(NamedTuple):

@@ -9,18 +9,16 @@ from types import MappingProxyType
 from sketchmatch.api import Searcher
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import ConfidenceWeights, RequestWeights, Scene, Source
+from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
 from sketchmatch.pipeline.calibration import default_price
 from sketchmatch.pipeline.selection import Profile, Selection
 
 __all__ = ["MatchRequest", "alternatives_wanted", "check_objects_weighed", "price_in_force"]
 
 _MAX_SEED = 2**64 - 1
-_MAX_WEIGHT = 1e6
-_MAX_DISTANCE = 4.0
 _MAX_PRICE = 1e3
 _MAX_ALTERNATIVES = 100
 _ALTERNATIVES = 3
-_COUNTS = (3, 5, 6)
 
 
 @dataclass(frozen=True)
@@ -138,14 +136,14 @@ def alternatives_wanted(requested: int | None, sketch: Scene, map_: Scene) -> in
 def _check_weights(weights: RequestWeights) -> None:
     """Refuse weights that make no ζ."""
     names = ConfidenceWeights._fields
-    if len(weights) not in _COUNTS:
+    if len(weights) not in WEIGHT_COUNTS:
         raise _refused(
             "weights",
             f"are {len(weights)} numbers; give three, {', '.join(names[:3])}, five, with "
             f"{' and '.join(names[3:5])}, or six, with the exponent of {names[5]}",
         )
     for name, weight in zip(names, weights, strict=False):
-        most = _MAX_DISTANCE if name == "distance" else _MAX_WEIGHT
+        most = MAX_DISTANCE if name == "distance" else MAX_WEIGHT
         if not 0 <= weight <= most:
             raise _refused(f"weights.{name}", f"is {weight:g}; give a number from 0 to {most:g}")
     if ConfidenceWeights(*weights).total == 0:
