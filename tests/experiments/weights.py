@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from sketchmatch.kernels._jit import kernel
-from sketchmatch.kernels.confidence import fmap_confidence
+from sketchmatch.kernels.confidence import fmap_confidence, fmap_confidence_above
 from sketchmatch.kernels.evidence import mean_parts
 from sketchmatch.model import BoolArray, FloatArray, IntArray, correspondences, object_pairs
 from sketchmatch.pipeline.describe import describe
@@ -101,11 +101,11 @@ def parts_of(number: int) -> list[Parts]:
     alike, turned = np.empty((len(maps), 4)), np.empty((len(maps), len(DISTANCES)))
     pairs = object_pairs(len(drawn.scene)), object_pairs(len(drawn.map))
     relations = table.similarity, table.cosine, table.sine, table.normalized_dilation
-    counts = np.array([rotation_weights(drawn.scene, distance) for distance in DISTANCES])
-    counts /= counts.sum(axis=1, keepdims=True)
+    tables = [replace(table, rotation_weights=rotation_weights(drawn.scene, d)) for d in DISTANCES]
+    weighed = np.stack([each.cosine for each in tables]), np.stack([each.sine for each in tables])
     columns = correspondences(len(drawn.map))
     turns = table.rotation, table.dilation
-    _weigh(maps, pairs, columns, relations, turns, own, counts, alike, turned)
+    _weigh(maps, pairs, columns, relations, weighed, turns, own, alike, turned)
     right = int(np.flatnonzero((maps == drawn.truth).all(axis=1))[0])
     kept, every = {right}, Parts(alike, turned, right)
     for weights, distance in itertools.product(_FIRST_GUESSES, DISTANCES):
@@ -222,31 +222,28 @@ def _weigh(
     pairs: Any,
     columns: Any,
     relations: Any,
+    weighed: Any,
     turns: Any,
     own: Any,
-    counts: Any,
     alike: Any,
     turned: Any,
 ) -> None:
     """Write ζσ, ζL, ζS and ζM of the FMAP of each object map, and ζR by exponents of distance."""
-    template, half = pairs[0], turns[0].shape[1]
+    template, ones = pairs[0], np.ones(3)
+    similarity, cosine, sine, level = relations
+    cosines, sines = weighed
     entries, scratch = np.empty(len(template), dtype=np.int64), np.empty(len(template))
     for k in range(len(maps)):
         for i in range(len(template)):
             entries[i] = columns[maps[k, template[i, 0]], maps[k, template[i, 1]]]
-        found = fmap_confidence(
-            entries, scratch, relations[0], relations[1], relations[2], relations[3], np.ones(3)
-        )
+        found = fmap_confidence(entries, scratch, similarity, cosine, sine, level, ones)
         alike[k, 0], alike[k, 1] = found[1], found[3]
         alike[k, 2], alike[k, 3] = mean_parts(entries, pairs, turns[0], turns[1], own)
-        for d in range(len(counts)):
-            x = y = 0.0
-            for i in range(len(template)):
-                j = entries[i] % half
-                sign = 1.0 if entries[i] < half else -1.0
-                x += sign * counts[d, i] * relations[1][i, j]
-                y += sign * counts[d, i] * relations[2][i, j]
-            turned[k, d] = np.sqrt(x * x + y * y)
+        for d in range(len(cosines)):
+            # Above infinity there is no ζ, so ζL, which takes longest, is left out.
+            turned[k, d] = fmap_confidence_above(
+                np.inf, entries, scratch, similarity, cosines[d], sines[d], level, ones
+            )[2]
 
 
 @cache
