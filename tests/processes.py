@@ -17,7 +17,7 @@ _ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 COMMAND = [sys.executable, "-m", "sketchmatch"]
 
 
-def sketchmatch(*arguments, timeout=60, **options) -> subprocess.CompletedProcess[str]:
+def sketchmatch(*arguments, timeout=200, **options) -> subprocess.CompletedProcess[str]:
     """Run a command to its end, as a shell with pipes would."""
     return subprocess.run(
         [*COMMAND, *map(str, arguments)],
@@ -65,7 +65,7 @@ class Server:
     def address(self) -> str:
         return self.wait_for(r"listening on (\S+)")
 
-    def wait_for(self, pattern: str, seconds: float = 60.0) -> str:
+    def wait_for(self, pattern: str, seconds: float = 120.0) -> str:
         """Wait until the server says something, and return the pattern's last group."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
@@ -76,7 +76,7 @@ class Server:
             time.sleep(0.005)
         raise AssertionError(f"the server said no {pattern!r}: {self.said}")
 
-    def end(self, seconds: float = 20.0) -> int:
+    def end(self, seconds: float = 120.0) -> int:
         """Wait until the process ends and return its exit code."""
         code = self.process.wait(seconds)
         self._reader.join()
@@ -110,14 +110,14 @@ class Terminal:
         """All that was written to the screen so far, without colours and cursor movements."""
         return _ESCAPE.sub("", self._shown.decode("utf-8", "replace"))
 
-    def wait_for(self, text: str, seconds: float = 60.0) -> None:
+    def wait_for(self, text: str, seconds: float = 120.0) -> None:
         deadline = time.monotonic() + seconds
         while text not in self.shown:
             assert time.monotonic() < deadline, f"no {text!r} on the screen: {self.shown}"
             assert self.process.poll() is None, f"the command ended: {self.shown}"
             time.sleep(0.005)
 
-    def end(self, seconds: float = 60.0) -> tuple[int, str]:
+    def end(self, seconds: float = 120.0) -> tuple[int, str]:
         """Wait until the process ends and return its exit code and what it piped."""
         piped, _ = self.process.communicate(timeout=seconds)
         self._reader.join(10)

@@ -21,6 +21,7 @@ from rich.table import Table
 from sketchmatch.api import MatchProblem
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 from sketchmatch.io import read_source
+from sketchmatch.model import OccupancyGrid
 from sketchmatch.pipeline.correspond import object_map, occm
 from sketchmatch.pipeline.describe import describe
 from sketchmatch.pipeline.relate import relate
@@ -39,6 +40,7 @@ def main() -> None:
     console = Console()
     console.print(_table("one match in a warm process", _stages()))
     console.print(_table("what a new process adds, kernels in the cache", _start_up()))
+    console.print(_table("objects of large maps", _large_maps(), parts=False))
 
 
 def _stages() -> list[tuple[str, list[float]]]:
@@ -101,6 +103,26 @@ def _start_up() -> list[tuple[str, list[float]]]:
     return rows
 
 
+def _large_maps() -> list[tuple[str, list[float]]]:
+    """Measure how long maps of pillars in a hall take, by their cells."""
+    rows = []
+    for side in (1000, 2000, 4000):
+        cells = np.zeros((side, side), np.int8)
+        cells[:3] = cells[-3:] = cells[:, :3] = cells[:, -3:] = 100
+        for row in range(100, side - 100, 200):
+            for column in range(100, side - 100, 200):
+                cells[row : row + 40, column : column + 30] = 100
+        grid = OccupancyGrid(cells, 0.05)
+        rows.append((f"{side} x {side} cells", _times(partial(_segmented, grid), 5)))
+    return rows
+
+
+def _segmented(grid: OccupancyGrid) -> None:
+    segmenter = resolve(default_registry(), {}, grid, grid).map_segmenter
+    assert segmenter is not None
+    assert len(segmenter.segment(grid).scene) > 10
+
+
 def _times(work: Callable[[], object], repeats: int = _REPEATS) -> list[float]:
     """Return the seconds of each of several runs, after one that does not count."""
     seconds = []
@@ -111,18 +133,20 @@ def _times(work: Callable[[], object], repeats: int = _REPEATS) -> list[float]:
     return seconds[1:]
 
 
-def _table(title: str, rows: list[tuple[str, list[float]]]) -> Table:
+def _table(title: str, rows: list[tuple[str, list[float]]], *, parts: bool = True) -> Table:
+    """Return a table of rows, as parts of one whole or each for itself."""
     total = sum(median(times) for _, times in rows)
     table = Table(title=title, title_justify="left")
     table.add_column("stage")
-    for column in ("median ms", "min ms", "max ms", "share"):
+    for column in ("median ms", "min ms", "max ms", *(["share"] if parts else [])):
         table.add_column(column, justify="right")
     for name, times in rows:
-        figures = (median(times), min(times), max(times))
-        share = f"{median(times) / total:.1%}"
-        table.add_row(name, *(f"{1e3 * value:.2f}" for value in figures), share)
-    table.add_section()
-    table.add_row("sum of medians", f"{1e3 * total:.2f}", "", "", "")
+        figures = [f"{1e3 * value:.2f}" for value in (median(times), min(times), max(times))]
+        share = [f"{median(times) / total:.1%}"] if parts else []
+        table.add_row(name, *figures, *share)
+    if parts:
+        table.add_section()
+        table.add_row("sum of medians", f"{1e3 * total:.2f}", "", "", "")
     return table
 
 

@@ -13,14 +13,14 @@ def server():
 
 
 def call_sync(address, method, *arguments, **options):
-    with Client(address, timeout=10) as client:
+    with Client(address, timeout=60) as client:
         answer = getattr(client, method)(*arguments, **options)
         return list(answer) if method == "events" else answer
 
 
 def call_async(address, method, *arguments, **options):
     async def answer():
-        async with AsyncClient(address, timeout=10) as client:
+        async with AsyncClient(address, timeout=60) as client:
             answer = getattr(client, method)(*arguments, **options)
             return [event async for event in answer] if method == "events" else await answer
 

@@ -13,7 +13,7 @@ IMAGE = sources.image(b"picture")
 
 def match(address: str) -> object:
     with Client(address) as client:
-        client.wait_until_serving(timeout=10)
+        client.wait_until_serving(timeout=60)
         try:
             return client.match(IMAGE, IMAGE, searcher="easm", time_budget=1).object_map
         except InvalidRequestError as error:
@@ -22,7 +22,7 @@ def match(address: str) -> object:
 
 async def match_async(address: str) -> object:
     async with AsyncClient(address) as client:
-        await client.wait_until_serving(timeout=10)
+        await client.wait_until_serving(timeout=60)
         try:
             return (await client.match(IMAGE, IMAGE)).object_map
         except InvalidRequestError as error:

@@ -20,6 +20,7 @@ from sketchmatch_client.errors import (
     SketchmatchError,
 )
 from tests.client.fake_server import EVENTS, reason, retry_after, running, violation
+from tests.pace import within
 
 TRIANGLE = [(0, 0), (2, 0), (2, 1)]
 SKETCH = sources.strokes([TRIANGLE, TRIANGLE], y_axis="down")
@@ -236,7 +237,7 @@ class TestWaitUntilServing:
         timer = Timer(0.3, server.set_health, ["SERVING"])
         timer.start()
         began = time.monotonic()
-        call(server.address, "wait_until_serving", timeout=10)
+        call(server.address, "wait_until_serving", timeout=60)
         timer.join()
         assert time.monotonic() - began > 0.2
 
@@ -303,10 +304,8 @@ class TestErrors:
         assert (caught.value.reason, caught.value.field) == ("", "")
 
     def test_an_absent_server_is_noticed_at_once(self, call, nobody):
-        began = time.monotonic()
-        with pytest.raises(ServerUnavailableError) as caught:
+        with within(3.0), pytest.raises(ServerUnavailableError) as caught:
             call(nobody, "match", SKETCH, MAP)
-        assert time.monotonic() - began < 3
         assert str(caught.value).startswith(
             f"the sketchmatch server at {nobody} is not available; start it, or check the address"
         )

@@ -34,7 +34,7 @@ def run_script(address: str) -> list[str]:
         env={"PYTHONPATH": str(CLIENT)},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
     )
     assert done.returncode == 0, done.stderr

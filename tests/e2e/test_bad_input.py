@@ -607,7 +607,7 @@ def test_over_grpc_it_is_an_invalid_argument_with_the_fields_path_and_the_remedy
     stub, case, tmp_path
 ):
     with pytest.raises(grpc.RpcError) as raised:
-        list(stub.Match(asked(case, tmp_path), timeout=20))
+        list(stub.Match(asked(case, tmp_path), timeout=60))
     sentence = raised.value.details()
     info, (violation,) = details(raised.value)
     assert raised.value.code() is grpc.StatusCode.INVALID_ARGUMENT
@@ -615,7 +615,7 @@ def test_over_grpc_it_is_an_invalid_argument_with_the_fields_path_and_the_remedy
     assert violation.field == case.path
     assert sentence == f"{case.path} {violation.description}"
     assert_helps(sentence, case.path, case)
-    good = list(stub.Match(asked(FINE, tmp_path), timeout=20))
+    good = list(stub.Match(asked(FINE, tmp_path), timeout=60))
     assert len(good[-1].result.object_matches) == 3, "the server goes on serving"
 
 
@@ -675,7 +675,7 @@ def test_a_wrong_occupancy_grid_is_refused_with_the_path(stub, changes, path, pr
     grid = {"rows": 2, "columns": 2, "resolution_meters": 0.05, "cells": bytes(4)} | changes
     wrong.map.occupancy_grid.CopyFrom(source_pb2.OccupancyGrid(**grid))
     with pytest.raises(grpc.RpcError, match=re.escape(f"{path} {problem}")) as raised:
-        list(stub.Match(wrong, timeout=20))
+        list(stub.Match(wrong, timeout=60))
     assert details(raised.value)[1][0].field == path
 
 
@@ -687,7 +687,7 @@ def test_a_missing_source_is_refused_with_what_there_is_to_give(stub, field, emp
     if empty is not None:
         getattr(wrong, field).CopyFrom(empty)
     with pytest.raises(grpc.RpcError, match=f"{field} is not set; give stroke_set, poly") as raised:
-        list(stub.Match(wrong, timeout=20))
+        list(stub.Match(wrong, timeout=60))
     info, (violation,) = details(raised.value)
     assert (info.reason, violation.field) == ("MISSING_FIELD", field)
 
@@ -696,7 +696,7 @@ def test_half_timed_strokes_are_refused_with_the_path(stub, tmp_path):
     wrong = asked(FINE, tmp_path)
     wrong.sketch.stroke_set.strokes[1].points[2].time_seconds = 0.5
     with pytest.raises(grpc.RpcError, match="set it on every point or on none") as raised:
-        list(stub.Match(wrong, timeout=20))
+        list(stub.Match(wrong, timeout=60))
     path = "sketch.stroke_set.strokes[1].points[0].time_seconds"
     assert details(raised.value)[1][0].field == path
 
@@ -705,7 +705,7 @@ def test_a_name_of_any_length_gets_an_answer_that_fits_into_a_trailer(stub, tmp_
     wrong = asked(FINE, tmp_path)
     wrong.pipeline.searcher.name = "ζ" * 100_000
     with pytest.raises(grpc.RpcError, match="which is no searcher; choose one of") as raised:
-        list(stub.Match(wrong, timeout=20))
+        list(stub.Match(wrong, timeout=60))
     info, (violation,) = details(raised.value)
     assert raised.value.code() is grpc.StatusCode.INVALID_ARGUMENT
     assert (info.reason, violation.field) == ("UNKNOWN_ALGORITHM", "pipeline.searcher.name")
@@ -717,7 +717,7 @@ def test_a_parameter_of_any_length_gets_an_answer_that_fits_into_a_trailer(stub,
     long = "x" * 100_000
     wrong.pipeline.searcher.parameters[long if kind == "name" else "population"] = long
     with pytest.raises(grpc.RpcError, match=r"pipeline\.searcher\.parameters") as raised:
-        list(stub.Match(wrong, timeout=20))
+        list(stub.Match(wrong, timeout=60))
     assert raised.value.code() is grpc.StatusCode.INVALID_ARGUMENT
     assert details(raised.value)[0].reason == "INVALID_PARAMETER"
 

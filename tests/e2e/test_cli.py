@@ -5,7 +5,6 @@ import shlex
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import PIL.Image
@@ -22,6 +21,7 @@ from sketchmatch_proto.v1.catalog_service_pb2 import Algorithm, ListAlgorithmsRe
 from sketchmatch_proto.v1.match_pb2 import MatchResult
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 from tests import processes
+from tests.pace import within
 from tests.processes import Terminal
 from tests.processes import sketchmatch as run
 
@@ -202,9 +202,8 @@ def test_set_sets_parameters_of_any_stage(command_line, where):
 
 
 def test_a_time_budget_gives_the_best_answer_until_then(command_line, where):
-    began = time.monotonic()
-    answer = result(command_line("match", *ROOM, *where, *LONG, "--json", "--time-budget", 0.5))
-    assert time.monotonic() - began < 2.5
+    with within(2.5):
+        answer = result(command_line("match", *ROOM, *where, *LONG, "--json", "--time-budget", 0.5))
     assert answer.outcome == match_pb2.OUTCOME_TIME_BUDGET
     assert len(answer.object_matches) == 8
 
@@ -515,11 +514,9 @@ def test_what_nobody_foresaw_is_exit_code_1_and_still_one_line(command_line, mon
 def test_ctrl_c_ends_a_long_match_soon_and_quietly(where):
     terminal = Terminal("match", *ROOM, *where, *LONG)
     terminal.wait_for("searching")
-    asked = time.monotonic()
-    terminal.process.send_signal(signal.SIGINT)
-    code, _ = terminal.end()
-    print(f"ended after {time.monotonic() - asked:.2f} s")
-    assert time.monotonic() - asked < 3.0
+    with within(3.0):
+        terminal.process.send_signal(signal.SIGINT)
+        code, _ = terminal.end()
     assert code == ExitCode.INTERRUPTED == 130
     assert "Traceback" not in terminal.shown
     assert terminal.shown.rstrip().endswith("sketchmatch: interrupted")
@@ -532,7 +529,7 @@ def test_a_reader_who_has_had_enough_is_no_error(command, where):
         ["bash", "-c", f"set -o pipefail; ({line}; echo $? >&2) | true"],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
     )
     assert done.stderr.split() == ["0"]

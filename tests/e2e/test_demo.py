@@ -2,10 +2,7 @@ import json
 import math
 import os
 import re
-import resource
 import socket
-import subprocess
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +11,7 @@ import pytest
 
 from sketchmatch import Scene
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_TRUTH
-from tests.processes import COMMAND, Terminal, sketchmatch
+from tests.processes import Terminal, sketchmatch
 
 
 @pytest.fixture(scope="module")
@@ -38,9 +35,6 @@ class Demo:
     ----------
     code, stdout, stderr
         How it ended and what it said.
-    result_seconds, cpu_seconds
-        Time from the start of the process to the result, which is when it lets its server go, and
-        the processor's time for all of it: how long it takes on a machine that does nothing else.
     overlay
         Where it drew.
     """
@@ -48,36 +42,13 @@ class Demo:
     code: int
     stdout: str
     stderr: str
-    result_seconds: float
-    cpu_seconds: float
     overlay: Path
 
 
 def run_demo(folder: Path, **environment: str) -> Demo:
-    overlay, began, result = folder / "demo.png", time.monotonic(), math.nan
-    cpu = _cpu_of_children()
-    with subprocess.Popen(
-        [*COMMAND, "demo", "--overlay", str(overlay)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        encoding="utf-8",
-        env={**os.environ, **environment},
-    ) as process:
-        said = []
-        for line in process.stderr:
-            said.append(line)
-            if "stopping" in line:
-                result = time.monotonic() - began
-        stdout = process.stdout.read()
-    cpu = _cpu_of_children() - cpu
-    print(f"{result:.2f} s to the result, {cpu:.2f} s of the processor in all")
-    return Demo(process.returncode, stdout, "".join(said), result, cpu, overlay)
-
-
-def _cpu_of_children() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+    overlay = folder / "demo.png"
+    done = sketchmatch("demo", "--overlay", overlay, env={**os.environ, **environment})
+    return Demo(done.returncode, done.stdout, done.stderr, overlay)
 
 
 @pytest.fixture(scope="module")
@@ -105,20 +76,16 @@ def test_the_demo_asks_a_real_server_and_leaves_none_behind(demo):
         assert link.connect_ex(("127.0.0.1", int(port))) != 0
 
 
-def test_with_a_warm_cache_the_result_is_there_soon(demo, tmp_path):
-    # The goal is 2 s on a machine that does nothing else; what is held here is that nothing hangs.
+def test_with_a_warm_cache_nothing_is_compiled(demo, tmp_path):
     del demo  # it saw to the cache
-    warm = run_demo(tmp_path)
-    assert "compiling" not in warm.stderr
-    assert warm.result_seconds < 10.0
+    assert "compiling" not in run_demo(tmp_path).stderr
 
 
-def test_a_first_ever_run_says_that_it_compiles_and_takes_less_than_40_s(tmp_path):
+def test_a_first_ever_run_says_that_it_compiles(tmp_path):
     first = run_demo(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
     assert first.code == 0
     assert "[server] sketchmatch: compiling the kernels: this happens once" in first.stderr
     assert len(first.stdout.splitlines()) == 9
-    assert first.cpu_seconds < 40.0
 
 
 def test_the_demo_shows_the_search_on_a_terminal(tmp_path):
@@ -129,8 +96,6 @@ def test_the_demo_shows_the_search_on_a_terminal(tmp_path):
 
 
 def test_a_demo_that_cannot_draw_says_so_and_leaves_no_server_behind(tmp_path):
-    began = time.monotonic()
     done = sketchmatch("demo", "--overlay", tmp_path / "missing" / "demo.png")
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1].startswith("sketchmatch: ")
-    assert time.monotonic() - began < 10.0

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sketchmatch.errors import InvalidInputError
@@ -126,13 +126,13 @@ def read_or_refused(decode, text, kind):
 
 
 @given(GEOJSON)
-@settings(max_examples=200, deadline=2000, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=200)
 def test_geojson_of_any_structure_is_read_or_refused(document):
     read_or_refused(decode_geojson, json.dumps(document), PolygonSet)
 
 
 @given(STROKES | VALUES)
-@settings(max_examples=200, deadline=2000, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=200)
 def test_stroke_json_of_any_structure_is_read_or_refused(document):
     read_or_refused(decode_strokes, json.dumps(document), StrokeSet)
 
@@ -211,7 +211,7 @@ def xml(element):
 
 
 @given(st.lists(ELEMENTS, max_size=5))
-@settings(max_examples=300, deadline=2000, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=300)
 def test_svg_of_any_structure_is_read_or_refused(elements):
     document = f"<svg>{''.join(map(xml, elements))}</svg>"
     read_or_refused(lambda text: decode_svg(text.encode()), document, StrokeSet)

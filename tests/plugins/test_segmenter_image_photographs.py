@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 import shapely
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sketchmatch.errors import InvalidInputError
@@ -100,7 +100,7 @@ def same(scene, outlines, least=0.85):
     contrast=st.floats(0.3, 1.0),
     brightness=st.floats(0.0, 1.0),
 )
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=15)
 def test_brightness_and_contrast_change_nothing(contrast, brightness):
     lowest = brightness * (1.0 - contrast) * 255.0
     pixels = np.rint(PLAIN * contrast + lowest).astype(np.uint8)
@@ -108,7 +108,7 @@ def test_brightness_and_contrast_change_nothing(contrast, brightness):
 
 
 @given(margins=st.tuples(*[st.integers(0, 80)] * 4))
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=15)
 def test_a_margin_changes_nothing_but_where_things_are(margins):
     top, bottom, left, right = margins
     wider = cv2.copyMakeBorder(

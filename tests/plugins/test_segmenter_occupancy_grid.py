@@ -1,7 +1,6 @@
 """The segmenter of occupancy grids, on grids drawn here and on real robots' maps."""
 
 import contextlib
-import time
 
 import cv2
 import numpy as np
@@ -292,11 +291,3 @@ def test_depot_has_ten_crates_among_its_objects():
     assert len(scene) == 18
     crates = [item for item in scene.objects if item.area > 1.5]
     assert len(crates) == 10
-
-
-def test_a_map_of_four_million_cells_takes_well_under_half_a_second():
-    grid = real_map("husky-playpen/playpen_map.yaml")
-    segmented(grid)
-    start = time.perf_counter()
-    segmented(grid)
-    assert time.perf_counter() - start < 0.5

@@ -1,7 +1,5 @@
 """Occupancy grids: tables of legs, things at walls, closed doors, big maps, and invariants."""
 
-import time
-
 import numpy as np
 import pytest
 import shapely
@@ -13,6 +11,7 @@ from sketchmatch.io import read_source
 from sketchmatch.model import OccupancyGrid
 from sketchmatch_builtin.segmenters._merging import merged
 from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
+from tests.pace import within
 from tests.tools import ROOT, require
 
 
@@ -234,7 +233,7 @@ def test_depots_threshold_makes_unknown_free_and_is_reported():
     assert others == [()] * 3
 
 
-def test_sixteen_million_cells_take_a_moment():
+def test_sixteen_million_cells_are_no_trouble():
     cells = np.zeros((4000, 4000), np.int8)
     cells[:3] = cells[-3:] = cells[:, :3] = cells[:, -3:] = 100
     rng = np.random.default_rng(0)
@@ -242,12 +241,5 @@ def test_sixteen_million_cells_take_a_moment():
     for row in range(100, 3900, 200):
         for column in range(100, 3900, 200):
             cells[row : row + 40, column : column + 30] = 100
-    grid = OccupancyGrid(cells, 0.05)
-    times = []
-    for _ in range(3):
-        start = time.perf_counter()
-        assert len(segmented(grid).scene) == 361
-        times.append(time.perf_counter() - start)
-    # Below a second on a machine that does nothing else; what is held is that nothing is slower
-    # than linear.
-    assert min(times) < 5.0
+    with within(5.0):  # below a second; what is slower than linear takes minutes
+        assert len(segmented(OccupancyGrid(cells, 0.05)).scene) == 361

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 import shapely
@@ -13,6 +11,7 @@ from hypothesis import strategies as st
 from sketchmatch.model import Stroke, StrokeSet
 from sketchmatch.testing.sloppy import draw_sloppily
 from sketchmatch_builtin.segmenters.strokes import StrokeSegmenter
+from tests.pace import within
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]
 AWAY = [[20, 0], [24, 0], [24, 4], [20, 4], [20, 0]]
@@ -73,7 +72,7 @@ def test_sloppy_objects_are_recovered(sloppiness, recovered, marks, invented):
     assert made_up <= invented * total
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.integers(0, 10_000),
     st.floats(0.0, 6.3),
@@ -177,9 +176,8 @@ def test_two_thousand_strokes_are_quick(kind):
         word = np.stack([3.0 * t, 0.5 * np.sin(18.0 * t)], axis=1)
         place = rng.uniform(0.0, 0.1 if kind == "one place" else 30.0, 2)
         strokes.append((word if kind == "words" else arc) + place)
-    spent = time.process_time()
-    assert len(found_in(*strokes).scene) >= 2
-    assert time.process_time() - spent < 6.0  # 1 to 3.5 s; machines differ
+    with within(8.0):  # 1 to 3.5 s
+        assert len(found_in(*strokes).scene) >= 2
 
 
 @pytest.mark.parametrize("kind", ["apart", "one place", "tangles"])
@@ -193,9 +191,8 @@ def test_two_thousand_scribbles_are_quick_and_objects_among_them_are_found(kind)
             points = rng.normal(size=(60, 2)).cumsum(axis=0)
         scribbles.append(points + rng.uniform(-1e3, 1e3, 2) * (kind == "apart"))
     big = [5000.0 + 20.0 * np.array(each) for each in (SQUARE, AWAY)]
-    spent = time.process_time()
-    found = found_in(*scribbles, *big)
-    assert time.process_time() - spent < 4.0  # below 2 s; machines differ
+    with within(6.0):  # below 2 s
+        found = found_in(*scribbles, *big)
     assert {1600.0 * 4.0} <= set(np.round(areas(found), 6))
     assert any("cross themselves too often to look at them all" in each for each in found.warnings)
 

@@ -61,7 +61,7 @@ def test_values_by_hand():
 
 @each_measure
 @given(rows())
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_values_are_those_of_the_definition(measure, definition, rows):
     first, second = rows
     (found,) = measure.compare(first[None], second[None])

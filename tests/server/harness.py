@@ -147,7 +147,7 @@ def scene(count: int, seed: int = 0, labels: list[str] | None = None) -> source_
     return sources.polygons(shapes(count, seed), labels)
 
 
-def when_there_is_room(call: Callable[[], _Answer], seconds: float = 2.0) -> _Answer:
+def when_there_is_room(call: Callable[[], _Answer], seconds: float = 30.0) -> _Answer:
     """Call until the server is no longer busy; a stopped search takes a moment to end."""
     deadline = time.monotonic() + seconds
     while True:

@@ -14,6 +14,7 @@ from sketchmatch.server import serve
 from sketchmatch_client import Client, ServerUnavailableError
 from sketchmatch_client.errors import CallCancelledError
 from sketchmatch_proto.v1 import catalog_service_pb2
+from tests.pace import within
 from tests.processes import server
 from tests.processes import sketchmatch as run
 from tests.server.harness import ENDLESS, scene, serving
@@ -25,7 +26,7 @@ SERVICES = [f"sketchmatch.v1.{name}Service" for name in ("Match", "Scene", "Cata
 def health(address: str, service: str = "") -> str:
     with insecure_channel(address) as channel:
         request = health_pb2.HealthCheckRequest(service=service)
-        status = health_pb2_grpc.HealthStub(channel).Check(request, timeout=5).status
+        status = health_pb2_grpc.HealthStub(channel).Check(request, timeout=60).status
     return health_pb2.HealthCheckResponse.ServingStatus.Name(status)
 
 
@@ -130,11 +131,9 @@ def test_the_server_tells_its_version_and_limits():
 
 
 def test_sigterm_ends_an_idle_server_at_once_with_exit_code_0():
-    with server() as running:
-        asked = time.monotonic()
+    with server() as running, within(2.0):
         running.process.send_signal(signal.SIGTERM)
         assert running.end() == 0
-        assert time.monotonic() - asked < 2.0
     assert running.said[-1] == "sketchmatch: stopped"
 
 
@@ -143,11 +142,10 @@ def test_sigterm_lets_a_running_match_end_within_the_grace():
         events = client.events(scene(20), scene(20, 1), **ENDLESS, time_budget=1.0)
         while not next(events).progress.HasField("confidence"):
             pass
-        asked = time.monotonic()
-        running.process.send_signal(signal.SIGTERM)
-        assert list(events)[-1].WhichOneof("event") == "result"
-        assert running.end() == 0
-        assert time.monotonic() - asked < 3.0
+        with within(3.0):
+            running.process.send_signal(signal.SIGTERM)
+            assert list(events)[-1].WhichOneof("event") == "result"
+            assert running.end() == 0
 
 
 def test_sigterm_ends_matches_that_outlast_the_grace():
@@ -155,12 +153,12 @@ def test_sigterm_ends_matches_that_outlast_the_grace():
         events = client.events(scene(20), scene(20, 1), **ENDLESS)
         while not next(events).progress.HasField("confidence"):
             pass
-        asked = time.monotonic()
-        running.process.send_signal(signal.SIGTERM)
-        with pytest.raises((ServerUnavailableError, CallCancelledError)):
-            list(events)
-        assert running.end() == 0
-        assert 0.4 < time.monotonic() - asked < 3.0
+        with within(3.0) as watch:
+            running.process.send_signal(signal.SIGTERM)
+            with pytest.raises((ServerUnavailableError, CallCancelledError)):
+                list(events)
+            assert running.end() == 0
+        assert watch.seconds > 0.4
     assert not any("Traceback" in line for line in running.said)
 
 

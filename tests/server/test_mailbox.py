@@ -101,6 +101,6 @@ def test_a_reader_waits_until_something_comes_or_the_mailbox_closes():
         await asyncio.sleep(0.02)
         assert not reading.done()
         mailbox.put("result")
-        return await asyncio.wait_for(reading, 1)
+        return await asyncio.wait_for(reading, 60)
 
     assert asyncio.run(read()) == "result"

@@ -7,6 +7,7 @@ from contextlib import aclosing
 import pytest
 
 from sketchmatch_client import AsyncClient, CallCancelledError, Client, DeadlineExceededError
+from tests.pace import slowness, within
 from tests.server import probes
 from tests.server.harness import ENDLESS, in_loop, kinds, scene, serving, when_there_is_room
 
@@ -34,8 +35,9 @@ def blank():
 
 def assert_prompt(latencies):
     print(f"median {1e3 * statistics.median(latencies):.0f} ms, max {1e3 * max(latencies):.0f} ms")
-    assert statistics.median(latencies) < TARGET
-    assert max(latencies) < LENIENT
+    slower = slowness()
+    assert statistics.median(latencies) < TARGET * slower
+    assert max(latencies) < LENIENT * slower
 
 
 def test_closing_the_stream_stops_the_search_within_100_ms(recorded):
@@ -46,7 +48,7 @@ def test_closing_the_stream_stops_the_search_within_100_ms(recorded):
         time.sleep(0.03)  # not in step with the reports
         left = time.monotonic()
         events.close()
-        return probes.ended.get(timeout=5) - left
+        return probes.ended.get(timeout=60) - left
 
     with Client(recorded) as client:
         assert_prompt([latency(client) for _ in range(10)])
@@ -55,13 +57,13 @@ def test_closing_the_stream_stops_the_search_within_100_ms(recorded):
 def test_cancelling_an_asyncio_task_stops_the_search_within_100_ms(recorded):
     async def latency(client):
         task = asyncio.create_task(client.match(scene(30), scene(30, 1), **OPTIONS))
-        await asyncio.to_thread(probes.started.get, timeout=5)
+        await asyncio.to_thread(probes.started.get, timeout=60)
         await asyncio.sleep(0.13)
         left = time.monotonic()
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
             await task
-        return await asyncio.to_thread(probes.ended.get, timeout=5) - left
+        return await asyncio.to_thread(probes.ended.get, timeout=60) - left
 
     async def latencies():
         async with AsyncClient(recorded) as client:
@@ -75,7 +77,7 @@ def test_a_deadline_stops_the_search_within_100_ms(recorded):
         began = time.monotonic()
         with pytest.raises(DeadlineExceededError, match="allow more time"):
             client.match(scene(30), scene(30, 1), timeout=0.4, **OPTIONS)
-        return probes.ended.get(timeout=5) - began - 0.4
+        return probes.ended.get(timeout=60) - began - 0.4
 
     with Client(recorded) as client:
         assert_prompt([latency(client) for _ in range(5)])
@@ -86,9 +88,9 @@ def test_a_client_that_vanishes_stops_its_search(recorded):
     events = client.events(scene(30), scene(30, 1), **OPTIONS)
     while not next(events).progress.HasField("confidence"):
         pass
-    left = time.monotonic()
-    client.close()
-    assert probes.ended.get(timeout=5) - left < LENIENT
+    with within(LENIENT):
+        client.close()
+        probes.ended.get(timeout=60)
     with pytest.raises(CallCancelledError):
         list(events)
 
@@ -104,7 +106,7 @@ def test_cancel_stops_the_description_of_many_objects_within_100_ms(recorded):
         )
         while next(events).WhichOneof("event") != "scenes":
             pass
-        probes.started.get(timeout=5)
+        probes.started.get(timeout=60)
         time.sleep(0.13)
         left = time.monotonic()
         events.close()
@@ -143,16 +145,14 @@ def test_many_matches_at_once_stop_when_their_callers_leave(recorded):
 
     in_loop(all_of_them()).result(30)
     for _ in range(6):
-        probes.ended.get(timeout=5)
+        probes.ended.get(timeout=60)
     with pytest.raises(queue.Empty):
         probes.ended.get(timeout=0.05)
 
 
 def test_a_time_budget_ends_a_search_with_its_best_answer(recorded):
-    with Client(recorded) as client:
-        began = time.monotonic()
+    with Client(recorded) as client, within(1.5):
         events = list(client.events(scene(30), scene(30, 1), time_budget=0.5, **OPTIONS))
-        assert time.monotonic() - began < 1.5
     assert kinds(events)[-1] == "result"
     assert len(events[-1].result.object_matches) == 30
 

@@ -24,7 +24,7 @@ def test_a_place_is_taken_until_the_work_has_ended_even_if_nobody_waits_for_it(f
         workers, may_end = Workers(Limits(max_concurrent_matches=1)), threading.Event()
 
         def work():
-            may_end.wait(5)
+            may_end.wait(60)
             assert not fails
 
         with workers.admitted(MatchRequest()):
@@ -35,7 +35,7 @@ def test_a_place_is_taken_until_the_work_has_ended_even_if_nobody_waits_for_it(f
         await asyncio.gather(running, return_exceptions=True)
         await until_free(workers)
 
-    asyncio.run(asyncio.wait_for(scenario(), 5))
+    asyncio.run(asyncio.wait_for(scenario(), 60))
 
 
 def test_a_request_of_exactly_the_limit_passes_and_one_byte_more_does_not():
@@ -61,7 +61,7 @@ def test_close_stops_what_runs_and_waits_for_its_threads():
         ended = []
 
         def work(stop):
-            stop.wait(10)
+            stop.wait(60)
             time.sleep(0.05)
             ended.append(threading.current_thread().name)
 
@@ -72,4 +72,4 @@ def test_close_stops_what_runs_and_waits_for_its_threads():
             assert len(ended) == 2
             await asyncio.gather(*running)
 
-    asyncio.run(asyncio.wait_for(closed(), 5))
+    asyncio.run(asyncio.wait_for(closed(), 60))

@@ -19,7 +19,7 @@ from tests.strategies import (
     star_rings,
 )
 
-checked = settings(deadline=None, max_examples=60)
+checked = settings(max_examples=60)
 
 
 def assert_same(computed, expected, first, second):
@@ -40,20 +40,20 @@ def turned(rings, angle):
 
 
 @given(pairs_of_rings(), st.sampled_from([4, 8, 12]))
-@settings(deadline=None, max_examples=400)
+@settings(max_examples=400)
 def test_it_agrees_with_the_definition(shapes, directions):
     computed = force_histogram(*shapes, directions=directions)
     assert_same(computed, by_definition(*shapes, directions), *shapes)
 
 
 @given(pairs_of_rings())
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=12)
 def test_it_agrees_with_the_definition_in_180_directions(shapes):
     assert_same(force_histogram(*shapes), by_definition(*shapes, 180), *shapes)
 
 
 @given(cornered_rings(), cornered_rings(), st.tuples(st.integers(-4, 4), st.integers(-4, 4)))
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 def test_it_agrees_where_edges_lie_on_each_other_and_along_the_direction(first, second, offset):
     second = [ring + offset for ring in second]
     computed = force_histogram(first, second, directions=8)

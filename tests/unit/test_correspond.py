@@ -18,7 +18,7 @@ from sketchmatch.pipeline.correspond import (
 from tests.oracle import maps as oracle
 from tests.strategies import tables, tables_and_object_maps
 
-checked = settings(deadline=None, max_examples=120)
+checked = settings(max_examples=120)
 
 
 def table_of(similarity, template_objects, argument_objects, rotation=0.0, dilation=1.0):

@@ -25,7 +25,7 @@ def square(x, y, side=1.0):
 
 
 @given(scenes(most=4))
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 def test_every_pair_is_described_in_its_place(scene):
     found = finish(describe(scene, constant(24)))
     assert (found.objects, found.exponent, found.directions) == (len(scene), 0.0, 24)

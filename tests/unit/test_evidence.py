@@ -47,7 +47,7 @@ def sketched(seed, objects=5, drawn=4, **drawing):
 
 
 @given(scenes(most=3), scenes(least=3, most=4), WEIGHTS, st.sampled_from([4, 10, 36, 180]))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_the_evidence_is_what_the_definition_says(template, argument, weights, directions):
     table, _ = weighed(template, argument, weights, directions)
     drawn, mapped = (oracle.own_histograms(scene, directions) for scene in (template, argument))
@@ -93,7 +93,7 @@ def test_zeta_is_the_weighted_mean_of_its_five_parts(seed):
     st.sampled_from([1e-6, 0.3, 1.0, 7.0, 1e6]),
     WEIGHTS,
 )
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_turning_and_scaling_the_sketch_changes_nothing(seed, bins, factor, weights):
     sketch, scene = sketched(seed)
     searched = ConfidenceWeights(*weights).searched
@@ -124,7 +124,7 @@ def test_rotations_of_distant_pairs_count_for_more(searcher, exchanged):
 
 
 @given(scenes(most=5), floats(0.0, 4.0))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_rotation_weights_are_powers_of_distances(scene, distance):
     apart = [
         math.dist(scene.objects[a].centroid, scene.objects[b].centroid)

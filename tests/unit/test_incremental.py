@@ -88,7 +88,7 @@ def assert_same_state(state, table):
 
 
 @given(tables_and_object_maps(), kinds, weightings)
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_a_placed_map_has_its_confidence(case, kind, weights):
     table, partners = case
     table = of_kind(table, kind)
@@ -104,7 +104,7 @@ def test_a_placed_map_has_its_confidence(case, kind, weights):
 
 
 @given(tables_and_object_maps(most=6), kinds, weightings)
-@settings(deadline=None, max_examples=120)
+@settings(max_examples=120)
 def test_confidence_after_any_move_is_foreseen(case, kind, weights):
     table, partners = case
     table = of_kind(table, kind)
@@ -119,7 +119,7 @@ def test_confidence_after_any_move_is_foreseen(case, kind, weights):
 
 
 @given(tables_and_object_maps(), kinds, weightings, st.integers(0, 2**32))
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_moves_in_a_row_lead_where_they_say(case, kind, weights, seed):
     table, partners = case
     table = of_kind(table, kind)
@@ -174,7 +174,7 @@ def test_equal_dilations_agree_wholly():
 
 
 @given(tables_and_object_maps(most=5), st.data())
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_an_entry_is_found_in_any_order_of_the_objects(case, data):
     table, partners = case
     state = placed(table, partners)
@@ -193,7 +193,7 @@ def test_an_entry_is_found_in_any_order_of_the_objects(case, data):
 @given(st.integers(2, 20), kinds, st.integers(0, 2**32))
 @example(20, "equal but for rounding", 0)
 @example(20, "close with outliers", 0)
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_total_distance_to_values_within_and_beyond(objects, kind, seed):
     rng = np.random.default_rng(seed)
     table = of_kind(random_table(rng, objects, objects), kind, seed)

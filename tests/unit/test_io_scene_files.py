@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch import Scene
@@ -43,7 +43,6 @@ def assert_same(one, other):
 
 
 @given(scenes())
-@settings(deadline=None)
 def test_reading_what_was_saved_gives_the_same_scene(tmp_path_factory, scene):
     path = tmp_path_factory.mktemp("scene") / "scene.geojson"
     save_scene(path, scene)

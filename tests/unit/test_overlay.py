@@ -207,7 +207,7 @@ def test_a_route_is_a_light_arrow_and_all_of_it_is_seen():
         assert draw_scene(room(), route=np.array(short), width=400).width == 400
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     offset=st.sampled_from([0.0, -3.0, 5e5, 5e6]),
     size=st.sampled_from([1e-3, 1.0, 1e3]),

@@ -52,7 +52,7 @@ def considered(best, argument_objects, others):
     return [dict(each) for each in found]
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 2**32 - 1),
     few=st.integers(3, 6),

@@ -70,7 +70,7 @@ def assert_entry(found, expected):
 
 
 @given(scenes(most=3), scenes(most=3))
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 def test_two_scenes_compare_as_their_definition_says(first, second):
     template, argument = sorted((first, second), key=len)
     histograms = [oracle.descriptor(scene, 24) for scene in (template, argument)]
@@ -88,7 +88,7 @@ def test_two_scenes_compare_as_their_definition_says(first, second):
 
 
 @given(st.integers(0, 2**32), st.sampled_from([0.0, 1.0, 2.0]), st.sampled_from([4, 8, 12, 180]))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_histograms_of_any_force_compare_as_the_definition_says(seed, exponent, directions):
     rng = np.random.default_rng(seed)
     objects = sorted(rng.integers(2, 5, 2))
@@ -183,7 +183,7 @@ def test_the_peak_lies_between_bins_where_that_is_better():
 
 @pytest.mark.parametrize("similarity", [CrossCorrelation, CircularPeak, Pappis])
 @given(st.integers(0, 2**32), st.integers(0, 35))
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 def test_turning_the_template_by_bins_shifts_the_rotation_alone(similarity, seed, steps):
     first, second = np.random.default_rng(seed).random((2, 6, 36)) ** 3
     before = related(descriptor(first), descriptor(second), similarity)

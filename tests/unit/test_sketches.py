@@ -75,7 +75,7 @@ def test_the_spacing_is_the_median_distance_to_the_nearest():
 
 
 @given(scenes(), st.integers(0, 2**32))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_however_much_outlines_wobble_every_object_stays_a_polygon(scene, seed):
     sketch = simulate_sketch(scene, np.random.default_rng(seed), wobble=0.4)
     for item, partner in zip(sketch.scene.objects, sketch.partners, strict=True):

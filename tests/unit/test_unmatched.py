@@ -100,7 +100,7 @@ def matched(sketch, map_, **settings):
     return last.result
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(
     seed=st.integers(0, 2**32 - 1),
     few=st.integers(3, 5),
@@ -120,7 +120,7 @@ def test_what_is_found_is_the_best_of_all_parts(seed, few, more, price):
     assert deepest in (best.part.left_out, best.part.left_out + 1)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1), few=st.integers(4, 7), evidence=st.booleans())
 def test_an_omission_has_the_confidence_of_the_map_that_it_leaves(seed, few, evidence):
     rng = np.random.default_rng(seed)

@@ -53,13 +53,12 @@ def small_and_far(angle, bins=360):
 
 
 @given(histograms(counts=(4, 8, 12, 36)), st.floats(-7.0, 7.0))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_degrees_are_those_of_the_definition(row, direction):
     assert degrees(row, direction)[0] == pytest.approx(by_definition(row, direction), abs=2e-3)
 
 
 @given(histograms())
-@settings(deadline=None)
 def test_degrees_are_within_0_and_1_and_the_relation_has_the_highest(row):
     found = degrees(row)
     assert ((found >= 0) & (found <= 1)).all()
@@ -80,7 +79,6 @@ def clear(row):
 
 
 @given(histograms(counts=(8, 16, 64, 360)), st.integers(0, 7))
-@settings(deadline=None)
 def test_turning_by_eighths_turns_the_relation(row, eighths):
     turned = np.roll(row, eighths * len(row) // 8)
     np.testing.assert_allclose(degrees(turned), np.roll(degrees(row), eighths), atol=1e-12)
@@ -94,7 +92,6 @@ def test_turning_by_eighths_turns_the_relation(row, eighths):
 
 
 @given(histograms())
-@settings(deadline=None)
 def test_the_mirror_image_has_the_mirrored_relation(row):
     mirrored = row[-np.arange(len(row)) % len(row)]
     np.testing.assert_allclose(degrees(mirrored), degrees(row)[-np.arange(8) % 8], atol=1e-12)
@@ -105,7 +102,6 @@ def test_the_mirror_image_has_the_mirrored_relation(row):
 
 
 @given(histograms())
-@settings(deadline=None)
 def test_the_dual_has_the_opposite_phrase_and_the_same_degree(row):
     there, back = directional_relation(row), directional_relation(np.roll(row, len(row) // 2))
     assert back.degree == pytest.approx(there.degree, abs=1e-12)
@@ -114,13 +110,11 @@ def test_the_dual_has_the_opposite_phrase_and_the_same_degree(row):
 
 
 @given(histograms(), st.sampled_from([1e-300, 1e-9, 3.0, 1e300]))
-@settings(deadline=None)
 def test_scale_does_not_matter(row, factor):
     np.testing.assert_allclose(degrees(factor * row), degrees(row), atol=1e-12)
 
 
 @given(histograms(), st.floats(-4.0, 4.0), st.integers(0, 10**9))
-@settings(deadline=None)
 def test_degrees_change_continuously(row, direction, seed):
     noise = np.random.default_rng(seed).uniform(0, 1e-7, len(row)) * row.max()
     here = degrees(row, direction)[0]
@@ -267,7 +261,7 @@ def test_touching_overlapping_and_equal_objects_are_nearest():
 
 
 @given(st.integers(0, 10**6), st.integers(2, 12))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_the_nearest_is_the_one_at_the_smallest_distance(seed, count):
     rng = np.random.default_rng(seed)
     scene = Scene.from_polygons(

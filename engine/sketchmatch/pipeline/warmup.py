@@ -24,7 +24,7 @@ __all__ = ["COMPILING", "announcing_compilation", "warm_up", "warm_up_others"]
 
 _log = logging.getLogger(__name__)
 
-COMPILING = "compiling the kernels: this happens once after an installation and takes about 20 s"
+COMPILING = "compiling the kernels: this happens once after an installation and takes 20 to 80 s"
 
 
 @contextmanager
