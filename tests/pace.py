@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_REFERENCE_SECONDS = 0.1
+_REFERENCE_SECONDS = 0.03
 
 
 @dataclass

@@ -147,6 +147,5 @@ def _environment(folder: Path) -> dict[str, str]:
         "PIP_CONSTRAINT": str(ROOT / "constraints.txt"),
         "PIP_DISABLE_PIP_VERSION_CHECK": "1",
         "PIP_NO_COMPILE": "1",
-        "NUMBA_CACHE_DIR": str(folder / "kernels"),
         "XDG_CONFIG_HOME": str(folder / "config"),
     }

@@ -200,7 +200,8 @@ def test_a_wrong_key_is_named_with_the_remedy(case):
         ("a: b: c", "is not YAML (line 1)"),
         ("a: !!python/object:os.system x", "has types written with '!'; give plain values"),
         ("x: \0", "is not YAML"),
-        ("[" * 5000, "is not YAML"),
+        ("[" * 60_000, "has lists in lists, more than 20 deep"),
+        ("{a: " * 10_000, "has lists in lists, more than 20 deep"),
         ("a: 2001-99-99", "is not YAML"),
     ],
 )

@@ -64,8 +64,8 @@ with on_compile(names.append):
 }
 
 
-def run_outer(folder):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
+def run_outer(folder, cache=None):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache or folder / "cache")}
     command = [sys.executable, "-B", "outer.py"]
     done = subprocess.run(
         command, cwd=folder, env=environment, check=True, capture_output=True, text=True
@@ -74,8 +74,7 @@ def run_outer(folder):
 
 
 def test_a_change_in_another_file_is_compiled_anew(tmp_path):
-    for name, text in PACKAGE.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
+    write(tmp_path, PACKAGE)
 
     def printed():
         return run_outer(tmp_path).split()
@@ -86,6 +85,27 @@ def test_a_change_in_another_file_is_compiled_anew(tmp_path):
     assert printed() == ["30", "walk", "step"]
     (tmp_path / "constants.py").write_text("FACTOR = 100", encoding="utf-8")
     assert printed() == ["300", "walk"]
+
+
+def write(folder, package):
+    folder.mkdir(exist_ok=True)
+    for name, text in package.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+@pytest.mark.skipif(
+    not hasattr(numba.config, "CACHE_LOCATOR_CLASSES"), reason="this numba keeps code by path"
+)
+def test_the_same_source_elsewhere_is_not_compiled_again(tmp_path):
+    for folder, printed in (("here", "20 walk step"), ("there", "20")):
+        write(tmp_path / folder, PACKAGE)
+        assert run_outer(tmp_path / folder, tmp_path / "cache") == printed
+
+
+def test_a_cache_that_cannot_be_written_keeps_nothing_from_running(tmp_path):
+    write(tmp_path, PACKAGE)
+    (tmp_path / "file").write_bytes(b"")
+    assert run_outer(tmp_path, tmp_path / "file" / "cache") == "20 walk step"
 
 
 MAKER = {
@@ -121,8 +141,7 @@ print(walk(1))
     [("maker.py", "step(step(x))", "step(step(step(x)))"), ("step.py", "+ 1", "+ 2")],
 )
 def test_a_change_in_what_makes_a_kernel_is_compiled_anew(tmp_path, name, before, after):
-    for file, text in MAKER.items():
-        (tmp_path / file).write_text(text, encoding="utf-8")
+    write(tmp_path, MAKER)
     assert run_outer(tmp_path) == "3"
     (tmp_path / name).write_text(MAKER[name].replace(before, after), encoding="utf-8")
     assert run_outer(tmp_path) == {"maker.py": "4", "step.py": "5"}[name]

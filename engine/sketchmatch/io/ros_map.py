@@ -59,7 +59,7 @@ import yaml
 from numpy.typing import NDArray
 
 from sketchmatch.errors import InvalidInputError, Reason, quoted
-from sketchmatch.io._yaml import check_header
+from sketchmatch.io._yaml import LOADER, check_header
 from sketchmatch.io.images import load_picture, scaled_to_8_bits
 from sketchmatch.model import OccupancyGrid
 from sketchmatch.model.sources import check_placement
@@ -208,10 +208,10 @@ def parse_header(yaml_text: str) -> MapServerHeader:
 def _document(text: str) -> Mapping[Any, Any]:
     check_header(text)
     try:
-        document = yaml.safe_load(text)
+        document = yaml.load(text, LOADER)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
-        where = f" (line {mark.line + 1})" if mark else ""
+        where = f" (line {min(mark.line, text.count(chr(10))) + 1})" if mark else ""
         raise _invalid("", f"is not YAML{where}; give the file that map_server saved") from None
     if not isinstance(document, Mapping):
         raise _invalid("", "is not a list of keys and values; give the file that map_server saved")

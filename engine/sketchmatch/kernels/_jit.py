@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 from types import FunctionType
 from typing import Any, TypeVar
 
@@ -25,7 +26,7 @@ def kernel(function: _Function) -> _Function:
 
     Fast-math stays off because it would reorder sums and break agreement with the oracles.
     """
-    with _cache_in(_cache_folder(function)):
+    with _caching_in(_cache_folder(function)):
         compiled: _Function = numba.njit(function, cache=True, nogil=True, error_model="numpy")
     return compiled
 
@@ -85,11 +86,59 @@ _DIGESTS: dict[str, str] = {}
 """By file; at the first kernel of a file all its imports have been made."""
 
 
+class ByContent:
+    """Tells numba where a kernel's machine code is: by all its source, wherever that is installed.
+
+    So another environment, another checkout and an upgrade that changes no kernel find it. It has
+    what numba asks of a cache locator; a numba too old to ask keeps code by path as well.
+    """
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        self._py_file = file  # numba names it in warnings
+        self._first_line = function.__code__.co_firstlineno
+        self._folder = Path(_config().CACHE_DIR)
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> ByContent:
+        """Return the locator of a function."""
+        return cls(function, file)
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder, and see that it can be written."""
+        _make(self._folder)
+
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        """Return what changes with the source: the folder's name is made of it."""
+        return self._folder.name
+
+    def get_disambiguator(self) -> str:
+        """Return what tells functions of one name in one file apart."""
+        return str(self._first_line)
+
+
 @contextmanager
-def _cache_in(folder: Path) -> Iterator[None]:
-    config: Any = numba.config
-    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+def _caching_in(folder: Path) -> Iterator[None]:
+    """Let numba keep machine code in a folder, or where it likes if that cannot be written."""
+    config = _config()
+    before = config.CACHE_DIR, getattr(config, "CACHE_LOCATOR_CLASSES", "")
     try:
+        with suppress(OSError):
+            _make(folder)
+            config.CACHE_DIR = str(folder)
+            config.CACHE_LOCATOR_CLASSES = f"{ByContent.__module__}.{ByContent.__qualname__}"
         yield
     finally:
-        config.CACHE_DIR = before
+        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
+
+
+def _make(folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    TemporaryFile(dir=folder).close()
+
+
+def _config() -> Any:
+    return numba.config
