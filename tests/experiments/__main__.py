@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -66,6 +67,12 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
             parser.error(f"no {what} is called {', '.join(unknown)}; there are {', '.join(names)}")
     if options.sketches < 1 or options.processes < 1:
         parser.error("--sketches and --processes must be 1 or more")
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(
+            f"--out {options.out} cannot be made ({error.strerror}); choose another folder"
+        )
     return options
 
 
@@ -74,4 +81,7 @@ def _listed(text: str) -> tuple[str, ...]:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit("stopped; there is no report")

@@ -5,6 +5,7 @@ Each is what is matched with what: which sketches, what is removed, on which map
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
@@ -49,13 +50,13 @@ STRENGTHS = (0.5, 0.7, 0.95, 1.25, 1.5, 2.0)
 STRONGER = 1.05
 """Gives sketches (b) to (j) alone the thesis's mean ζ, without case (a); see ``calibrate``."""
 
+_NINE = len(LETTERS)
 _PAPERS = range(0, 360, 30)
-_LARGE = {10: 5, 12: 3, 16: 3, 20: 2, 30: 1}
+_LARGE = {10: 4, 12: 3, 16: 2, 20: 2, 30: 1}
 _SMALL = ("fsnn-pso", "easm", "auto", "learned", "exact")
 _LARGE_BY = ("easm", "auto", "learned", "direct")
 _FEWEST = 3
-_SLOW = ("fsnn-pso",)
-_SEARCH_LONG = ("fsnn-pso", "easm")
+_FSNN, _EASM = "fsnn-pso", "easm"
 
 
 def experiments(
@@ -66,9 +67,10 @@ def experiments(
     Parameters
     ----------
     methods
-        Names of methods. ``fsnn-pso`` gets half of the sketches with all objects, and the first
-        nine where objects are missing or extra; the thesis did not try it there. In the sweeps it
-        and ``easm``, which search long, get fewer as well.
+        Names of methods. All get all sketches, but for the thesis's own, which search long:
+        ``fsnn-pso`` gets a quarter of those with all objects and the first nine of others, where
+        the thesis did not try it; ``easm`` gets half of those with one object missing on the
+        occupancy grid, and fewer in the sweeps.
     count
         Sketches of each scene.
     only
@@ -114,18 +116,19 @@ def _equal(map_: str, methods: tuple[str, ...], count: int) -> dict[str, list[Wo
         Work(place, number, Style(), grids=grids, methods=those)
         for place in PLACES
         for number in range(count)
-        for those in [_affordable(methods, number, max(len(LETTERS), count // 2))]
+        for those in [_affordable(methods, number, fsnn=max(_NINE, count // 4))]
     ]
     return {f"case (a), {map_}": own, f"all objects, {map_}": drawn}
 
 
 def _missing(map_: str, methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     """Return experiments 4 or 5: every object removed in turn, and sketches (k) to (m)."""
-    grids = (MAPS[map_],)
+    grids, divisor = (MAPS[map_],), 2 if MAPS[map_] else 1
     sweep = [
-        Work(place, number, Style(), one_missing(place), grids, _affordable(methods, number))
+        Work(place, number, Style(), one_missing(place), grids, those)
         for place in PLACES
         for number in range(count)
+        for those in [_affordable(methods, number, easm=max(_NINE, count // divisor))]
     ]
     few = max(1, count // 4)
     unequal = {
@@ -133,7 +136,7 @@ def _missing(map_: str, methods: tuple[str, ...], count: int) -> dict[str, list[
             Work(place, index * count + number, styles[letter], grids=grids, methods=those)
             for place, styles in UNEQUAL.items()
             for number in range(few)
-            for those in [_affordable(methods, number)]
+            for those in [_affordable(methods, number, easm=max(_NINE, few // 2))]
         ]
         for index, letter in enumerate("klm")
     }
@@ -148,38 +151,42 @@ def _several(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
         for number in range(count):
             order = np.random.default_rng((number, ord(place))).permutation(objects).tolist()
             removals = tuple(Removal(tuple(order[:k])) for k in range(1, objects - _FEWEST + 1))
-            few = number < max(len(LETTERS), count // 4)
-            those = _affordable(methods, number) if few else _without(_SEARCH_LONG, methods)
+            those = _affordable(methods, number, easm=max(_NINE, count // 8))
             works.append(Work(place, number, Style(), removals, methods=those))
     return {"several missing": works}
 
 
 def _strength(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     """Return the sweep over strength, and many sketches at one that is a little stronger."""
-    swift = _without(_SEARCH_LONG, methods)
-    sweep = []
+    swift, sweep = _swift(methods), []
     for strength in STRENGTHS:
         style = Style(Person(strength))
         for place in PLACES:
             sweep += [
-                Work(place, number, style, methods=methods) for number in range(max(1, count // 8))
+                Work(
+                    place,
+                    number,
+                    style,
+                    methods=_affordable(methods, number, easm=max(1, count // 16)),
+                )
+                for number in range(max(1, count // 8))
             ]
             sweep += [
                 Work(place, number, style, one_missing(place), methods=swift)
                 for number in range(max(1, count // 16))
             ]
-    those = _without(_SLOW, methods)
     stronger = [
         Work(place, number, Style(Person(STRONGER)), (NOTHING, *one_missing(place)), methods=those)
         for place in PLACES
         for number in range(max(1, count // 8))
+        for those in [_affordable(methods, number, fsnn=0, easm=_NINE)]
     ]
     return {"strength": sweep, f"strength {STRONGER:g}": stronger}
 
 
 def _shapes(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     """Return people who draw outlines, and others who draw a box or an ellipse for everything."""
-    swift = _without(_SEARCH_LONG, methods)
+    swift = _swift(methods)
     works = [
         Work(place, number, Style(Person(STRENGTH, shapes=shapes)), removals, methods=swift)
         for shapes in Shapes
@@ -192,10 +199,10 @@ def _shapes(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
 
 def _rotation(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     """Return sketches with all objects and with one missing on paper turned all the way round."""
-    those = _without(_SLOW, methods)
     works = []
     for place in PLACES:
-        for number in range(max(1, count // 16)):
+        for number in range(max(1, count // 20)):
+            those = _affordable(methods, number, fsnn=0, easm=max(1, count // 40))
             removals = (NOTHING, one_missing(place)[number % len(PLACES[place].furniture)])
             for paper in _PAPERS:
                 style = Style(paper=float(paper))
@@ -205,11 +212,11 @@ def _rotation(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
 
 def _both_ways(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     """Return sketches that lack one object and show one that is not there."""
-    those = (*_without(_SLOW, methods), "unmatched")
     works = [
         Work(place, number, Style(missing=1, extra=1), methods=tuple(dict.fromkeys(those)))
         for place in PLACES
         for number in range(max(1, count // 2))
+        for those in [(*_affordable(methods, number, fsnn=0), "unmatched")]
     ]
     return {"missing and extra": works}
 
@@ -228,16 +235,17 @@ PARTS: Mapping[str, Callable[[tuple[str, ...], int], dict[str, list[Work]]]] = {
 """The thesis's experiments by number, and the sweeps beside them. 1 and 2 are done together."""
 
 
-def _affordable(methods: tuple[str, ...], number: int, most: int = len(LETTERS)) -> tuple[str, ...]:
-    """Return the methods for a sketch: slow ones get the first nine, or as many as is said."""
-    if number < most:
-        return methods
-    return _without(_SLOW, methods)
+def _affordable(
+    methods: tuple[str, ...], number: int, *, fsnn: int = _NINE, easm: float = math.inf
+) -> tuple[str, ...]:
+    """Return the methods for a sketch: those that search long get the first ones alone."""
+    most = {_FSNN: fsnn, _EASM: easm}
+    return tuple(method for method in methods if number < most.get(method, math.inf))
 
 
-def _without(left_out: tuple[str, ...], methods: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the other methods."""
-    return tuple(method for method in methods if method not in left_out)
+def _swift(methods: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the methods that do not search long."""
+    return _affordable(methods, 0, fsnn=0, easm=0)
 
 
 def _smaller(number: int) -> tuple[Removal, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -114,8 +115,22 @@ def _workers(processes: int, methods: Iterable[str] = ()) -> Iterator[Callable[.
         yield map
         return
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, context, warm_up, (names,)) as pool:
-        yield partial(pool.map, chunksize=_CHUNK)
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with ProcessPoolExecutor(processes, context, _begin, (names,)) as pool:
+            try:
+                yield partial(pool.map, chunksize=_CHUNK)
+            except BaseException:
+                pool.shutdown(cancel_futures=True)  # it would do all the work before it ends
+                raise
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _begin(methods: Iterable[str]) -> None:
+    """Make a process ready, which ends when the first one says so and not by Ctrl-C itself."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    warm_up(methods)
 
 
 @contextmanager

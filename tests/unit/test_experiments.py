@@ -5,6 +5,9 @@ import dataclasses
 import io
 import math
 import re
+import signal
+import subprocess
+import sys
 from statistics import mean
 from types import SimpleNamespace
 
@@ -34,6 +37,7 @@ from tests.experiments.report import report
 from tests.experiments.runs import Work, run
 from tests.experiments.scenes import PLACES, charted, place_named, truth_by_overlap
 from tests.experiments.study import Style, sketch
+from tests.processes import children_of, is_alive
 
 NEAT = Person(0.3)
 
@@ -299,12 +303,16 @@ def test_the_protocol_is_the_thesis_s():
     assert len({(each.place, each.number) for each in letters}) == len(letters)
 
 
-def test_slow_methods_get_fewer_sketches_where_objects_are_missing():
-    work = protocol.experiments(("fsnn-pso", "auto"), 80)
-    slow = [each.number for each in work["one missing, map"] if "fsnn-pso" in each.methods]
-    assert sorted(set(slow)) == [*range(9)]
-    slow = [each.number for each in work["all objects, map"] if "fsnn-pso" in each.methods]
-    assert sorted(set(slow)) == [*range(40)]
+def test_slow_methods_get_fewer_sketches():
+    work = protocol.experiments(("fsnn-pso", "easm", "auto"), 80)
+    for title, fsnn, easm in (
+        ("all objects, map", 20, 80),
+        ("one missing, map", 9, 80),
+        ("one missing, grid", 9, 40),
+    ):
+        for method, count in (("fsnn-pso", fsnn), ("easm", easm), ("auto", 80)):
+            numbers = {each.number for each in work[title] if method in each.methods}
+            assert sorted(numbers) == [*range(count)]
     few = protocol.experiments(("fsnn-pso", "auto"), 9)
     assert all("fsnn-pso" in each.methods for each in few["all objects, map"])
 
@@ -429,8 +437,30 @@ def test_a_part_alone_makes_a_report(tmp_path, capsys):
     assert str(tmp_path / "report.html") in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
+def test_it_stops_when_it_is_told_to_and_leaves_no_process_behind(how, tmp_path):
+    command = [sys.executable, "-m", "tests.experiments", "--only=2", "--methods=auto"]
+    with subprocess.Popen(
+        [*command, f"--out={tmp_path}"],
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+        start_new_session=True,
+    ) as running:
+        told = iter(running.stderr.readline, "")
+        assert any("sketches, " in line for line in told), "it has begun"
+        children = children_of(running.pid)
+        assert len(children) >= 2
+        running.send_signal(how)
+        rest = list(told)
+    assert "stopped; there is no report\n" in rest
+    assert running.returncode == 1
+    assert not any(map(is_alive, children))
+
+
 @pytest.mark.parametrize(
-    "arguments", [["--methods=x"], ["--sketches=0"], ["--only=6"], ["--processes=0"]]
+    "arguments",
+    [["--methods=x"], ["--sketches=0"], ["--only=6"], ["--processes=0"], [f"--out={__file__}/x"]],
 )
 def test_senseless_options_are_refused(arguments, capsys):
     with pytest.raises(SystemExit):

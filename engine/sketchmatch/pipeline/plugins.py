@@ -24,6 +24,8 @@ _ROUNDING = 1e-9
 _DOUBT = 1e-6
 _COUNTABLE = 2**63
 _ROW = 4096
+_SMALL = 2**15
+"""Bytes up to which an array is hashed whole: sums by column cost more."""
 
 
 @contextmanager
@@ -148,6 +150,8 @@ def _checksums(value: Any, name: str = "") -> Iterator[tuple[str, int]]:
 
 def _checksum(array: NDArray[Any]) -> int:
     """Return a number that changes with almost any change: as fast as memory, for large tables."""
+    if array.nbytes <= _SMALL:
+        return hash(array.tobytes())
     octets = np.ascontiguousarray(array).reshape(-1).view(np.uint8)
     whole = len(octets) - len(octets) % _ROW
     sums = octets[:whole].view(np.uint64).reshape(-1, _ROW // 8).sum(axis=0, dtype=np.uint64)

@@ -259,10 +259,12 @@ def _nearest_pairs(scene: Scene, objects: Sequence[int]) -> list[tuple[int, int]
         return []
     shapes = [scene.objects[k].polygon for k in objects]
     tree = shapely.STRtree(shapes)
-    pairs = []
-    for k, shape in enumerate(shapes):
-        near = set(tree.query(shape, predicate="intersects").tolist()) - {k}
-        # Nothing touches it, so nothing is its equal, and "exclusive" leaves out itself alone.
-        near = near or set(tree.query_nearest(shape, exclusive=True).tolist())
-        pairs.append((objects[k], objects[min(near)]))
-    return pairs
+    near = np.full(len(shapes), len(shapes))
+    touching, touched = tree.query(shapes, predicate="intersects")
+    others = touching != touched
+    np.minimum.at(near, touching[others], touched[others])
+    # Nothing touches these, so nothing is their equal, and "exclusive" leaves out itself alone.
+    apart = np.flatnonzero(near == len(shapes))
+    distant, nearest = tree.query_nearest([shapes[k] for k in apart], exclusive=True)
+    np.minimum.at(near, apart[distant], nearest)
+    return [(objects[k], objects[other]) for k, other in enumerate(near.tolist())]
