@@ -47,6 +47,14 @@ def is_alive(pid: int) -> bool:
         return False
 
 
+def assert_all_end(pids: list[int], seconds: float = 60.0) -> None:
+    """See that processes end without being told again."""
+    deadline = time.monotonic() + seconds
+    while any(map(is_alive, pids)):
+        assert time.monotonic() < deadline, "it outlives the process that started it"
+        time.sleep(0.05)
+
+
 class Server:
     """A ``sketchmatch serve`` process and what it says on standard error."""
 

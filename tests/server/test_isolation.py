@@ -15,7 +15,7 @@ from sketchmatch.server.setup import Isolation, Setup
 from sketchmatch_client import Client, InvalidRequestError, ServerFailedError
 from sketchmatch_proto.v1.catalog_service_pb2 import PluginState
 from sketchmatch_proto.v1.match_pb2 import Outcome
-from tests.processes import children_of, is_alive, server, sketchmatch
+from tests.processes import assert_all_end, children_of, server, sketchmatch
 from tests.server.harness import hosting, scene
 from tests.server.misbehaving import BROKEN, UNSTOPPABLE
 
@@ -246,10 +246,7 @@ def test_no_process_outlives_a_server_that_is_killed(site, tmp_path, monkeypatch
         assert process_of(found) in children
         running.process.kill()
         running.process.wait(10)
-        deadline = time.monotonic() + 20
-        while any(map(is_alive, children)) and time.monotonic() < deadline:
-            time.sleep(0.05)
-        assert not any(map(is_alive, children))
+        assert_all_end(children)
 
 
 def test_strict_plugins_keep_a_server_from_starting_and_a_denied_one_is_no_problem(

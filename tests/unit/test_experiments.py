@@ -37,7 +37,7 @@ from tests.experiments.report import report
 from tests.experiments.runs import Work, run
 from tests.experiments.scenes import PLACES, charted, place_named, truth_by_overlap
 from tests.experiments.study import Style, sketch
-from tests.processes import children_of, is_alive
+from tests.processes import assert_all_end, children_of
 
 NEAT = Person(0.3)
 
@@ -455,7 +455,7 @@ def test_it_stops_when_it_is_told_to_and_leaves_no_process_behind(how, tmp_path)
         rest = list(told)
     assert "stopped; there is no report\n" in rest
     assert running.returncode == 1
-    assert not any(map(is_alive, children))
+    assert_all_end(children)
 
 
 @pytest.mark.parametrize(
