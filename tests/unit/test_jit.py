@@ -102,6 +102,15 @@ def test_the_same_source_elsewhere_is_not_compiled_again(tmp_path):
         assert run_outer(tmp_path / folder, tmp_path / "cache") == printed
 
 
+def test_a_module_of_the_same_source_and_another_name_has_its_own(tmp_path):
+    write(tmp_path, PACKAGE)
+    assert run_outer(tmp_path) == "20 walk step"
+    (tmp_path / "inner.py").rename(tmp_path / "other.py")
+    text = PACKAGE["outer.py"].replace("from inner", "from other")
+    (tmp_path / "outer.py").write_text(text, encoding="utf-8")
+    assert run_outer(tmp_path) == "20 walk step"
+
+
 def test_a_cache_that_cannot_be_written_keeps_nothing_from_running(tmp_path):
     write(tmp_path, PACKAGE)
     (tmp_path / "file").write_bytes(b"")

@@ -95,7 +95,7 @@ class ByContent:
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         self._py_file = file  # numba names it in warnings
-        self._first_line = function.__code__.co_firstlineno
+        self._place = f"{function.__module__}-{function.__code__.co_firstlineno}"
         self._folder = Path(_config().CACHE_DIR)
 
     @classmethod
@@ -116,8 +116,8 @@ class ByContent:
         return self._folder.name
 
     def get_disambiguator(self) -> str:
-        """Return what tells functions of one name in one file apart."""
-        return str(self._first_line)
+        """Return what tells functions of one name apart: machine code refers to its module."""
+        return self._place
 
 
 @contextmanager
