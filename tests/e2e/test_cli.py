@@ -122,7 +122,7 @@ def test_a_pipe_gets_tab_separated_lines_and_nothing_else(where):
 
 
 def test_a_terminal_shows_the_search_while_it_runs_and_then_a_table(where):
-    terminal = Terminal("match", *ROOM, *where, *LONG, "--time-budget", "1.5")
+    terminal = Terminal("match", *ROOM, *where, *LONG, "--time-budget", "5")
     terminal.wait_for("searching")
     terminal.wait_for("ζ 0.")
     terminal.wait_for("best so far: 1→")
