@@ -8,7 +8,7 @@ multiplied by how much longer the same piece of work takes here and now.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -41,6 +41,14 @@ def within(limit: float) -> Iterator[Watch]:
     if watch.seconds >= limit:
         allowed = limit * max(before, slowness())
         assert watch.seconds < allowed, f"it took {watch.seconds:.2f} s, more than {allowed:.2f} s"
+
+
+def wait_until(condition: Callable[[], object], complaint: str, seconds: float = 60.0) -> None:
+    """Wait for what takes a moment, or as long as a very slow machine may need."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, complaint
+        time.sleep(0.01)
 
 
 def _work() -> None:

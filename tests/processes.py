@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.pace import wait_until
+
 _ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 COMMAND = [sys.executable, "-m", "sketchmatch"]
 
@@ -47,12 +49,9 @@ def is_alive(pid: int) -> bool:
         return False
 
 
-def assert_all_end(pids: list[int], seconds: float = 60.0) -> None:
+def assert_all_end(pids: list[int]) -> None:
     """See that processes end without being told again."""
-    deadline = time.monotonic() + seconds
-    while any(map(is_alive, pids)):
-        assert time.monotonic() < deadline, "it outlives the process that started it"
-        time.sleep(0.05)
+    wait_until(lambda: not any(map(is_alive, pids)), "a process outlives the one that started it")
 
 
 class Server:

@@ -25,13 +25,13 @@ _MOST_CANDIDATES = 2500
 
 @dataclass(frozen=True)
 class Peer:
-    """One solver of a library.
+    """One solver of a package.
 
     Attributes
     ----------
     name
         As the table shows it.
-    library
+    package
         The module to import; where it is missing, the peer is left out.
     prepare
         Turns a relation table into the solver's input and returns what runs the solver and
@@ -41,14 +41,14 @@ class Peer:
     """
 
     name: str
-    library: str
+    package: str
     prepare: Callable[[RelationTable], Callable[[], IntArray]]
     limit: float = np.inf
 
     @property
     def installed(self) -> bool:
-        """Whether the library is there."""
-        return importlib.util.find_spec(self.library) is not None
+        """Whether the package is there."""
+        return importlib.util.find_spec(self.package) is not None
 
 
 def contrast(table: RelationTable) -> FloatArray:

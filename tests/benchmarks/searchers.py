@@ -153,8 +153,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     console.print(_table(results, [*methods, ENUMERATION, TRUTH]))
     for line in [*_findings(results), _NOTES, *([_PEER_NOTES] if options.peers else [])]:
         console.print(line, highlight=False, markup=False)
-    for library in sorted({peer.library for peer in options.peers if not peer.installed}):
-        console.print(f"{library} is not installed, so it is left out (make .venv/bench)")
+    for package in sorted({peer.package for peer in options.peers if not peer.installed}):
+        console.print(f"{package} is not installed, so it is left out (make .venv/bench)")
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:

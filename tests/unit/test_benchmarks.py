@@ -39,7 +39,7 @@ def test_affinity_is_what_each_pair_of_pairings_adds():
 @pytest.mark.parametrize("peer", peers.PEERS, ids=lambda peer: peer.name)
 @pytest.mark.parametrize("others", [5, 7])
 def test_a_peer_finds_an_obvious_answer(peer, others):
-    require(peer.installed, f"{peer.library} (`make .venv/bench` installs it)")
+    require(peer.installed, f"{peer.package} (`make .venv/bench` installs it)")
     partners = [3, 0, 4, 2, 1]
     assert peer.prepare(table_with_answer(partners, others))().tolist() == partners
 

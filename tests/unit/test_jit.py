@@ -12,7 +12,7 @@ import pytest
 from sketchmatch.kernels import _jit
 from sketchmatch.kernels.confidence import fmap_confidence, mean_absolute_difference
 from sketchmatch.kernels.projection import project
-from tests.tools import ROOT
+from tests.tools import ROOT, require
 
 NUMBA = re.compile(r"\b(numba|n?jit)\b")
 
@@ -93,10 +93,8 @@ def write(folder, package):
         (folder / name).write_text(text, encoding="utf-8")
 
 
-@pytest.mark.skipif(
-    not hasattr(numba.config, "CACHE_LOCATOR_CLASSES"), reason="this numba keeps code by path"
-)
 def test_the_same_source_elsewhere_is_not_compiled_again(tmp_path):
+    require(hasattr(numba.config, "CACHE_LOCATOR_CLASSES"), "a numba that asks where code is kept")
     for folder, printed in (("here", "20 walk step"), ("there", "20")):
         write(tmp_path / folder, PACKAGE)
         assert run_outer(tmp_path / folder, tmp_path / "cache") == printed

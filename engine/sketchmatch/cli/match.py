@@ -130,11 +130,13 @@ def _events(
 
 
 def _weights(text: str) -> RequestWeights:
+    from sketchmatch.model.maps import WEIGHT_COUNTS
+
     try:
         weights = tuple(float(part) for part in text.split(","))
     except ValueError:
         weights = ()
-    if len(weights) not in (3, 5, 6):
+    if len(weights) not in WEIGHT_COUNTS:
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             "--weights",

@@ -34,8 +34,7 @@ def check_header(text: str) -> None:
         raise InvalidInputError(
             Reason.LIMIT_EXCEEDED,
             "",
-            f"has {size} bytes, more than the limit of {_MOST_KIB} KiB for a map's YAML; give the "
-            "file that map_server saved",
+            f"has {size} bytes, more than the limit of {_MOST_KIB} KiB for a map's YAML; {_REMEDY}",
         )
     aliases, depth = 0, 0
     try:

@@ -18,6 +18,7 @@ from platformdirs import user_cache_path
 
 __all__ = ["kernel", "on_compile"]
 
+_CONFIG: Any = numba.config
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
@@ -96,7 +97,7 @@ class ByContent:
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         self._py_file = file  # numba names it in warnings
         self._place = f"{function.__module__}-{function.__code__.co_firstlineno}"
-        self._folder = Path(_config().CACHE_DIR)
+        self._folder = Path(_CONFIG.CACHE_DIR)
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> ByContent:
@@ -123,22 +124,17 @@ class ByContent:
 @contextmanager
 def _caching_in(folder: Path) -> Iterator[None]:
     """Let numba keep machine code in a folder, or where it likes if that cannot be written."""
-    config = _config()
-    before = config.CACHE_DIR, getattr(config, "CACHE_LOCATOR_CLASSES", "")
+    before = _CONFIG.CACHE_DIR, getattr(_CONFIG, "CACHE_LOCATOR_CLASSES", "")
     try:
         with suppress(OSError):
             _make(folder)
-            config.CACHE_DIR = str(folder)
-            config.CACHE_LOCATOR_CLASSES = f"{ByContent.__module__}.{ByContent.__qualname__}"
+            _CONFIG.CACHE_DIR = str(folder)
+            _CONFIG.CACHE_LOCATOR_CLASSES = f"{ByContent.__module__}.{ByContent.__qualname__}"
         yield
     finally:
-        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
+        _CONFIG.CACHE_DIR, _CONFIG.CACHE_LOCATOR_CLASSES = before
 
 
 def _make(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     TemporaryFile(dir=folder).close()
-
-
-def _config() -> Any:
-    return numba.config
