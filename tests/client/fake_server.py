@@ -53,7 +53,12 @@ class FakeServer(
         self.events = EVENTS
         self.endless = False
         self.cancelled = Event()
-        self.error: tuple[grpc.StatusCode, str, tuple[Message, ...]] | None = None
+        self.segments: scene_service_pb2.SegmentResponse | None = None
+        self.catalogue = catalog_service_pb2.ListAlgorithmsResponse(
+            algorithms=[catalog_service_pb2.Algorithm(name="easm")]
+        )
+        self.info = catalog_service_pb2.GetServerInfoResponse(api_version="sketchmatch.v1")
+        self.error: status_pb2.Status | None = None
         self.health = health.HealthServicer()
 
     def Match(self, request, context):
@@ -66,19 +71,22 @@ class FakeServer(
 
     def Segment(self, request, context):
         self._take(request, context)
+        if self.segments is not None:
+            return self.segments
         return scene_service_pb2.SegmentResponse(segmenter=request.segmenter, warnings=["w"])
 
     def ListAlgorithms(self, request, context):
         self._take(request, context)
-        algorithm = catalog_service_pb2.Algorithm(name="easm")
-        return catalog_service_pb2.ListAlgorithmsResponse(algorithms=[algorithm])
+        return self.catalogue
 
     def GetServerInfo(self, request, context):
         self._take(request, context)
-        return catalog_service_pb2.GetServerInfoResponse(api_version="sketchmatch.v1")
+        return self.info
 
     def fail(self, code: grpc.StatusCode, message: str, *details: Message) -> None:
-        self.error = (code, message, details)
+        self.error = status_pb2.Status(code=code.value[0], message=message)
+        for detail in details:
+            self.error.details.add().Pack(detail)
 
     def set_health(self, status: str) -> None:
         self.health.set("", health_pb2.HealthCheckResponse.ServingStatus.Value(status))
@@ -86,14 +94,10 @@ class FakeServer(
     def _take(self, request, context) -> None:
         self.requests.append(request)
         if self.error:
-            code, message, details = self.error
-            status = status_pb2.Status(code=code.value[0], message=message)
-            for detail in details:
-                status.details.add().Pack(detail)
-            context.set_trailing_metadata(
-                [("grpc-status-details-bin", status.SerializeToString())] if details else []
-            )
-            context.abort(code, message)
+            (code,) = (code for code in grpc.StatusCode if code.value[0] == self.error.code)
+            packed = self.error.SerializeToString() if self.error.details else None
+            context.set_trailing_metadata([("grpc-status-details-bin", packed)] if packed else [])
+            context.abort(code, self.error.message)
 
 
 @contextmanager

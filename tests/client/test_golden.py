@@ -1,0 +1,225 @@
+"""The client builds the golden requests from plain Python, and reads the golden responses."""
+
+from datetime import timedelta
+
+import pytest
+
+from sketchmatch_client import (
+    DeadlineExceededError,
+    InvalidRequestError,
+    ServerBusyError,
+    ServerFailedError,
+    SketchmatchError,
+    sources,
+)
+from tests.contract.golden import NAMES, golden
+
+BAR = [[(2, 12), (8, 12), (8, 20), (2, 20)], [(3, 17), (5, 17), (5, 13), (3, 13)]]
+PICTURE = b"P2\n3 2\n255\n0 64 128 192 224 255\n"
+YAML = """\
+image: room.pgm
+resolution: 0.25
+origin: [-1.5, 2.25, 0.75]
+negate: 0
+occupied_thresh: 0.65
+free_thresh: 0.196
+"""
+
+STROKES = sources.strokes(
+    [
+        [(1.5, 2.5, 0.25), (3.5, 4.75, 0.5), (5.25, 0.125, 0.875)],
+        [(7.5, -8.5), (9.25, 6.5)],
+    ],
+    ["sofa", "route"],
+    y_axis="down",
+)
+POLYGONS = sources.polygons([BAR, [(1.5, 2.5), (4.5, 3.5), (0.5, 6.5)]], ["bar", ""], y_axis="down")
+GRID = sources.occupancy_grid([[0, 100, -1], [0, 100, 30]], 0.05, (-1.5, 2.25, 0.75))
+MATCHES = {
+    "MatchRequest": (
+        STROKES,
+        GRID,
+        {
+            "sketch_segmenter": "tracing",
+            "map_segmenter": "tiling",
+            "histogram": "compass",
+            "similarity": "alikeness",
+            "searcher": "guessing",
+            "params": {
+                "sketch_segmenter": {"closing": 0.125, "mode": "neat"},
+                "map_segmenter": {"least": None, "walls": True},
+                "histogram": {"directions": 36},
+                "similarity": {"shares": [0.5, "rest", False]},
+                "searcher": {"limits": {"rounds": 9, "quiet": True}},
+            },
+            "profile": "careful",
+            "seed": 2**53 + 1,
+            "time_budget": 3.25,
+            "weights": (1.5, 2.5, 0.75, 0.5, 0.25, 1.25),
+            "alternatives": 5,
+            "allow_unmatched": True,
+            "unmatched_price": 0.4375,
+        },
+    ),
+    "MatchRequest.sparse": (
+        sources.image(PICTURE),
+        sources.polygons([[(1, 2), (4, 2), (4, 8)], [(5, 3), (9, 3), (9, 6)]]),
+        {
+            "params": {"searcher": {"rounds": 4}},
+            "weights": (0.5, 0, 2),
+            "allow_unmatched": False,
+        },
+    ),
+    "MatchRequest.turned": (
+        sources.polygons(
+            [
+                [(1, -1), (5, -1), (5, -3), (1, -3)],
+                [(7, -2), (9, -2), (9, -5), (7, -5)],
+                [(2, -6), (3, -6), (3, -11), (2, -11)],
+            ],
+            ["bed", "desk", "shelf"],
+            y_axis="down",
+        ),
+        sources.polygons(
+            [
+                [(22, 14), (28, 14), (28, 18), (22, 18)],
+                BAR,
+                [(26, 2), (30, 2), (30, 10), (26, 10)],
+                [(10, 4), (20, 4), (20, 6), (10, 6)],
+            ],
+            ["table", "bar", "bunk", "rack"],
+        ),
+        {
+            "params": {"histogram": {"directions": 36}},
+            "searcher": "exact",
+            "seed": 7,
+            "weights": (1, 2, 3, 0.5, 0.25, 1.5),
+            "alternatives": 2,
+        },
+    ),
+}
+
+
+@pytest.fixture
+def map_files(tmp_path):
+    """A map as map_server saves it."""
+    (tmp_path / "room.pgm").write_bytes(b"P2\n3 2\n255\n0 254 128\n254 0 254\n")
+    (tmp_path / "room.yaml").write_text(YAML, encoding="utf-8")
+    return tmp_path / "room.yaml"
+
+
+class TestRequests:
+    @pytest.mark.parametrize("name", MATCHES)
+    def test_a_match_is_asked_for(self, call, server, name):
+        sketch, map_, options = MATCHES[name]
+        call(server.address, "match", sketch, map_, **options)
+        assert server.requests == [golden(name)]
+
+    def test_a_time_budget_may_be_a_timedelta(self, call, server):
+        options = MATCHES["MatchRequest"][2] | {"time_budget": timedelta(seconds=3.25)}
+        call(server.address, "match", STROKES, GRID, **options)
+        assert server.requests == [golden("MatchRequest")]
+
+    def test_a_segmentation_is_asked_for_with_a_segmenter(self, call, server):
+        params = {"closing": 0.125, "mode": "neat"}
+        call(
+            server.address,
+            "segment",
+            POLYGONS,
+            segmenter="tracing",
+            params=params,
+            profile="careful",
+        )
+        assert server.requests == [golden("SegmentRequest")]
+
+    def test_each_other_form_of_source_is_sent(self, call, server, map_files):
+        sent = {
+            "stroke_set": sources.strokes([[(1.5, 2.5), (3.5, 4.75), (5.25, 0.125)]], ["lamp"]),
+            "occupancy_grid": sources.occupancy_grid([[0, 100], [-1, 0], [100, 30]], 0.125),
+            "map_server_map": sources.map_server_map(map_files),
+            "image": sources.image(PICTURE),
+        }
+        for source in sent.values():
+            call(server.address, "segment", source)
+        names = [f"SegmentRequest.{kind}" for kind in sent]
+        assert server.requests == [golden(name) for name in names]
+        assert {*names, "SegmentRequest"} == {n for n in NAMES if n.startswith("SegmentRequest")}
+
+    def test_the_catalogue_and_the_servers_info_are_asked_for(self, call, server):
+        call(server.address, "algorithms")
+        call(server.address, "server_info")
+        asked = ["ListAlgorithmsRequest", "GetServerInfoRequest"]
+        assert server.requests == [golden(name) for name in asked]
+
+
+class TestResponses:
+    STREAM = tuple(
+        golden(f"MatchResponse.{kind}") for kind in ("accepted", "scenes", "progress", "result")
+    )
+
+    def test_a_stream_becomes_a_match(self, call, server):
+        server.events = self.STREAM
+        seen = []
+        match = call(server.address, "match", STROKES, GRID, on_progress=seen.append)
+        accepted, scenes, progress, result = self.STREAM
+        assert match.accepted == accepted.accepted
+        assert match.scenes == scenes.scenes
+        assert seen == [progress.progress]
+        assert match.result == result.result
+        assert match.object_map == {1: 3, 2: 0}
+
+    def test_its_numbers_are_those_that_are_written(self, call, server):
+        server.events = self.STREAM
+        match = call(server.address, "match", STROKES, GRID)
+        result = match.result
+        assert match.accepted.seed == result.seed == 2**53 + 1
+        assert (result.scale, result.rotation_radians) == (2.125, 1.75)
+        assert result.statistics.total_elapsed.ToTimedelta() == timedelta(seconds=2.625)
+        assert match.scenes.map.objects[1].centroid.y == 16.2
+        assert match.accepted.pipeline.sketch_segmenter.parameters["mode"] == "neat"
+
+    def test_the_turned_scene_has_its_object_map(self, call, server):
+        server.events = (golden("MatchResponse.turned"),)
+        match = call(server.address, "match", STROKES, GRID)
+        assert match.object_map == {0: 2, 1: 0, 2: 3}
+
+    def test_the_answers_of_the_other_methods_are_those_that_were_sent(self, call, server):
+        server.segments = golden("SegmentResponse")
+        server.catalogue = golden("ListAlgorithmsResponse")
+        server.info = golden("GetServerInfoResponse")
+        assert call(server.address, "segment", GRID) == server.segments
+        assert call(server.address, "algorithms") == server.catalogue
+        assert call(server.address, "server_info") == server.info
+
+
+class TestStatuses:
+    @pytest.fixture
+    def error(self, call, server, request):
+        """What a call raises where the server answers with a golden status."""
+        server.error = golden(f"Status.{request.param}")
+        with pytest.raises(SketchmatchError) as caught:
+            call(server.address, "match", STROKES, GRID)
+        assert str(caught.value) == server.error.message
+        return caught.value
+
+    @pytest.mark.parametrize("error", ["invalid_argument"], indirect=True)
+    def test_a_request_that_cannot_be_used_names_its_field(self, error):
+        assert type(error) is InvalidRequestError
+        assert error.reason == "INVALID_STROKE"
+        assert error.field == "sketch.stroke_set.strokes[3]"
+
+    @pytest.mark.parametrize("error", ["resource_exhausted"], indirect=True)
+    def test_a_busy_server_says_when_to_come_back(self, error):
+        assert type(error) is ServerBusyError
+        assert error.reason == "LIMIT_EXCEEDED"
+        assert error.retry_after == 1.0
+
+    @pytest.mark.parametrize("error", ["deadline_exceeded"], indirect=True)
+    def test_a_time_budget_that_was_too_short_keeps_the_servers_sentence(self, error):
+        assert type(error) is DeadlineExceededError
+        assert error.reason == "TIME_BUDGET_EXHAUSTED"
+
+    @pytest.mark.parametrize("error", ["internal"], indirect=True)
+    def test_a_plugin_that_failed_is_the_servers_fault(self, error):
+        assert type(error) is ServerFailedError
+        assert error.reason == "PLUGIN_FAILED"

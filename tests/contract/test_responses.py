@@ -1,0 +1,95 @@
+"""The engine's values become the golden responses, and its errors the golden statuses."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from google.rpc import code_pb2, status_pb2
+
+import sketchmatch
+from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError, Reason
+from sketchmatch.model.limits import SourceLimits
+from sketchmatch.pipeline.match import Phase, Progress
+from sketchmatch.server import services
+from sketchmatch.server.limits import Limits
+from sketchmatch.server.setup import Current, Setup
+from tests.contract.conversions import responses, status
+from tests.contract.golden import as_json, as_written, golden
+from tests.contract.values import (
+    ACCEPTED,
+    DEFAULTS,
+    EVENTS,
+    MATCHES,
+    REGISTRY,
+    SEGMENTATION,
+    TRACING,
+)
+
+REFUSALS = {
+    "Status.invalid_argument": status.refusal(
+        InvalidInputError(
+            Reason.INVALID_STROKE, "sketch.stroke_set.strokes[3]", "has one point; draw a line"
+        )
+    ),
+    "Status.resource_exhausted": status.too_busy(12),
+    "Status.deadline_exceeded": status.refusal(
+        AnswerUnavailableError(
+            "the time budget of 0.25 s ended in phase describe, before there was any answer"
+        )
+    ),
+    "Status.internal": status.refusal(
+        PluginError("searcher guessing of acme-tiles 2.1 failed: it ended without any answer")
+    ),
+}
+
+
+def test_the_events_of_a_match_are_written_field_by_field():
+    writer = responses.ResponseWriter(MATCHES["MatchRequest"])
+    written = {name: as_json(writer.response(event)) for name, event in EVENTS.items()}
+    assert written == {name: as_written(name) for name in EVENTS}
+
+
+def test_a_time_budget_and_a_price_that_there_are_not_are_absent():
+    writer = responses.ResponseWriter(MATCHES["MatchRequest.sparse"])
+    expected = as_written("MatchResponse.accepted")
+    del expected["accepted"]["timeBudget"], expected["accepted"]["unmatchedPrice"]
+    assert as_json(writer.response(replace(ACCEPTED, unmatched_price=None))) == expected
+
+
+def test_what_nobody_knows_yet_is_absent_from_progress():
+    writer = responses.ResponseWriter(MATCHES["MatchRequest"])
+    early = writer.response(Progress(Phase.DESCRIBE, 0.5))
+    assert as_json(early) == {"progress": {"phase": "PHASE_DESCRIBE", "elapsed": "0.500s"}}
+
+
+def test_what_a_segmenter_found_is_written():
+    written = responses.segmented(SEGMENTATION, TRACING)
+    assert as_json(written) == as_written("SegmentResponse")
+
+
+def test_the_catalogue_is_written():
+    written = responses.catalogue(REGISTRY, DEFAULTS)
+    assert as_json(written) == as_written("ListAlgorithmsResponse")
+
+
+def test_the_server_tells_versions_limits_and_its_age(monkeypatch):
+    monkeypatch.setattr(sketchmatch, "__version__", "4.5.6")
+    monkeypatch.setattr(services, "API_VERSION", 3)
+    times = iter([100.25, 175.75])
+    monkeypatch.setattr(services, "time", SimpleNamespace(monotonic=lambda: next(times)))
+    limits = Limits(1_048_576, 12, 90.5, SourceLimits(max_objects=250))
+    service = services.CatalogService(Current(Setup(REGISTRY, limits=limits)))
+    asked = golden("GetServerInfoRequest")
+    with pytest.raises(StopIteration) as ended:  # it waits for nothing, so no loop is needed
+        service.GetServerInfo(asked, None).send(None)
+    assert as_json(ended.value.value) == as_written("GetServerInfoResponse")
+
+
+@pytest.mark.parametrize("name", REFUSALS)
+def test_an_error_is_written_as_a_status(name):
+    refusal, expected = REFUSALS[name], as_written(name)
+    ((key, packed),) = refusal.trailing_metadata
+    assert key == "grpc-status-details-bin"
+    assert as_json(status_pb2.Status.FromString(packed)) == expected
+    assert code_pb2.Code.Value(refusal.code.name) == expected["code"]
+    assert refusal.message == expected["message"]
