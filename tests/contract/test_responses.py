@@ -14,7 +14,7 @@ from sketchmatch.server import services
 from sketchmatch.server.limits import Limits
 from sketchmatch.server.setup import Current, Setup
 from tests.contract.conversions import responses, status
-from tests.contract.golden import as_json, as_written, golden
+from tests.contract.golden import NAMES, as_json, as_written, golden
 from tests.contract.values import (
     ACCEPTED,
     DEFAULTS,
@@ -41,6 +41,11 @@ REFUSALS = {
         PluginError("searcher guessing of acme-tiles 2.1 failed: it ended without any answer")
     ),
 }
+
+
+def test_every_golden_event_and_status_is_written_here():
+    named = {name for name in NAMES if name.startswith(("MatchResponse.", "Status."))}
+    assert named - {"MatchResponse.turned"} == {*EVENTS, *REFUSALS}
 
 
 def test_the_events_of_a_match_are_written_field_by_field():
