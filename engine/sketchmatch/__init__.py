@@ -12,16 +12,27 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sketchmatch.errors import InvalidInputError, SketchmatchError
     from sketchmatch.model import Scene
+    from sketchmatch.pipeline.compare import Comparison
+    from sketchmatch.pipeline.engine import Engine
     from sketchmatch.pipeline.result import MatchResult
     from sketchmatch.pipeline.words import DirectionalRelation, directional_relation
-    from sketchmatch.public import force_histogram, label_force_histograms, match, read_scene
+    from sketchmatch.public import (
+        compare,
+        force_histogram,
+        label_force_histograms,
+        match,
+        read_scene,
+    )
 
 __all__ = [
+    "Comparison",
     "DirectionalRelation",
+    "Engine",
     "InvalidInputError",
     "MatchResult",
     "Scene",
     "SketchmatchError",
+    "compare",
     "directional_relation",
     "force_histogram",
     "label_force_histograms",
@@ -31,6 +42,9 @@ __all__ = [
 __version__ = "0.1.0"
 
 _HOMES = {
+    "Comparison": "sketchmatch.pipeline.compare",
+    "Engine": "sketchmatch.pipeline.engine",
+    "compare": "sketchmatch.public",
     "DirectionalRelation": "sketchmatch.pipeline.words",
     "InvalidInputError": "sketchmatch.errors",
     "MatchResult": "sketchmatch.pipeline.result",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import reprlib
 from enum import StrEnum
-from typing import Self
+from typing import Any, Self
 
 __all__ = [
     "AnswerUnavailableError",
@@ -17,6 +17,7 @@ __all__ = [
     "PluginError",
     "Reason",
     "SketchmatchError",
+    "TooBusyError",
     "quoted",
 ]
 
@@ -94,6 +95,9 @@ class InvalidInputError(SketchmatchError, ValueError):
         self.field = field
         self.problem = problem
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.reason, self.field, self.problem)
+
     def within(self, parent: str) -> Self:
         """Return the same error with its path seen from ``parent``.
 
@@ -116,3 +120,24 @@ class PluginError(SketchmatchError):
     """A plugin broke its contract or raised; the sentence names plugin and distribution."""
 
     reason = Reason.PLUGIN_FAILED
+
+
+class TooBusyError(SketchmatchError):
+    """There is no room for one more request now.
+
+    Parameters
+    ----------
+    running
+        How many there are.
+    """
+
+    reason = Reason.LIMIT_EXCEEDED
+    retry_seconds = 1
+    """When to ask again."""
+
+    def __init__(self, running: int) -> None:
+        super().__init__(
+            f"the server runs {running} requests already, which is its limit; "
+            f"send the request again in {self.retry_seconds} s"
+        )
+        self.running = running

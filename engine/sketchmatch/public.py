@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
-from sketchmatch.api.forces import force_histograms, refuse_infinite, scene_relations
+from sketchmatch.api.forces import (
+    ForceParams,
+    force_histograms,
+    refuse_infinite,
+    scene_relations,
+)
 from sketchmatch.api.pixels import PixelObject, outlines, pixel_object, pixel_relations
-from sketchmatch.config import load, open_registry
+from sketchmatch.config import load, open_engine
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import (
@@ -22,15 +29,16 @@ from sketchmatch.model import (
     Source,
     object_pairs,
 )
-from sketchmatch.model.limits import limited_to, source_limits
-from sketchmatch.pipeline.match import Finished, Progress, run_match
-from sketchmatch.pipeline.plugins import segmented
+from sketchmatch.model.limits import source_limits
+from sketchmatch.pipeline.compare import Comparison
+from sketchmatch.pipeline.engine import Engine
+from sketchmatch.pipeline.events import Finished, Progress
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import MatchResult
-from sketchmatch.pipeline.selection import STAGES, Choice, Selection, resolve, resolve_segmenter
-from sketchmatch.registry import default_registry
+from sketchmatch.pipeline.selection import SIDES, STAGES, Choice, Selection, fault_of
+from sketchmatch.pipeline.slices import finish
 
-__all__ = ["force_histogram", "label_force_histograms", "match", "read_scene"]
+__all__ = ["compare", "force_histogram", "label_force_histograms", "match", "read_scene"]
 
 
 def match(
@@ -111,10 +119,9 @@ def match(
     >>> match(scene, turned).object_map
     {0: 1, 1: 2, 2: 0}
     """
-    configuration = load(config, search=False)
-    registry = open_registry(configuration)
+    engine = _engine(config)
     names = {"searcher": searcher, "histogram": histogram, "similarity": similarity}
-    with limited_to(source_limits(configuration.limits)):
+    with engine.limited():
         request = MatchRequest(
             sketch=_loaded("sketch", sketch),
             map=_loaded("map", map),
@@ -127,11 +134,11 @@ def match(
             alternatives=alternatives,
             profile=profile or "",
         )
-        for event in run_match(request, registry, configuration.defaults):
-            if isinstance(event, Finished):
-                return event.result
-            if isinstance(event, Progress) and on_progress is not None:
-                on_progress(event)
+    for event in engine.match(request):
+        if isinstance(event, Finished):
+            return event.result
+        if isinstance(event, Progress) and on_progress is not None:
+            on_progress(event)
     raise AssertionError("a match ends with a result or an error")
 
 
@@ -146,12 +153,61 @@ def read_scene(path: str | Path) -> Scene:
     InvalidInputError
         If the file cannot be read or holds fewer than two objects.
     """
-    configuration = load(search=False)
-    registry = open_registry(configuration)
-    with limited_to(source_limits(configuration.limits)):
+    engine = _engine()
+    with engine.limited():
         source = read_source(Path(path))
-        segmenter = resolve_segmenter(registry, Choice(), source, configuration.defaults)
-        return segmented(source, segmenter, registry, f"{path}: {source.field}").scene
+    segmenter = engine.resolve_segmenter(Choice(), source)
+    return engine.segment(source, segmenter, f"{path}: {source.field}").scene
+
+
+def compare(
+    sketch: Scene | Source | str | Path,
+    map: Scene | Source | str | Path,  # noqa: A002
+    *,
+    profile: str | None = None,
+    histogram: str | None = None,
+    similarity: str | None = None,
+    params: Mapping[str, Mapping[str, Any]] | None = None,
+    config: str | Path | None = None,
+) -> Comparison:
+    """Compare the relations within a sketch with those on a map, without a search.
+
+    Parameters
+    ----------
+    sketch, map, profile, histogram, similarity, params, config
+        As for :func:`match`.
+
+    Returns
+    -------
+    Comparison
+        Scenes, histograms and the table of σ, R and L; ``most_similar`` reads it from sketch to
+        map.
+
+    Raises
+    ------
+    InvalidInputError
+        If something cannot be used; the sentence says what, where and what would help.
+
+    Examples
+    --------
+    >>> box, bar = [[0, 0], [2, 0], [2, 2], [0, 2]], [[5, 0], [9, 0], [9, 1]]
+    >>> scene = Scene.from_polygons([box, bar, [[1, 6], [2, 6], [2, 7]]])
+    >>> found = compare(scene, scene)
+    >>> [(each.sketch_pair, each.map_pair) for each in found.most_similar(limit=3)]
+    [((0, 1), (0, 1)), ((0, 2), (0, 2)), ((1, 2), (1, 2))]
+    """
+    engine = _engine(config)
+    with engine.limited():
+        given = _loaded("sketch", sketch), _loaded("map", map)
+    names = {"histogram": histogram, "similarity": similarity}
+    selection = _selection(names, params or {})
+    unread = [None if isinstance(each, Scene) else each for each in given]
+    pipeline = engine.resolve(selection, unread[0], unread[1], profile or "")
+    drawn, mapped = (
+        engine.segment_side(side, each, pipeline).scene
+        for side, each in zip(SIDES, given, strict=True)
+    )
+    return finish(engine.compare((drawn, mapped), pipeline.histogram, pipeline.similarity))
 
 
 def force_histogram(a: Any, b: Any, *, r: float = 0.0, directions: int = 180) -> FloatArray:
@@ -262,14 +318,20 @@ def label_force_histograms(labels: Any, *, r: float = 0.0, directions: int = 180
 _PAIR = object_pairs(2)
 
 
-def _force_params(r: float, directions: int) -> Any:
-    """Return both as parameters of the histogram ``force``, which says what they may be."""
-    stage = {"histogram": Choice("force", {"r": r, "directions": directions})}
+def _engine(config: str | Path | None = None) -> Engine:
+    """Return the engine of a configuration; limits that are in force hold for it too."""
+    engine = open_engine(load(config, search=False))
+    return replace(engine, limits=source_limits(engine.limits))
+
+
+def _force_params(r: float, directions: int) -> ForceParams:
     try:
-        return resolve(default_registry(), stage).histogram.params
-    except InvalidInputError as error:
-        field = error.field.removeprefix("histogram.parameters.")
-        raise InvalidInputError(error.reason, field, error.problem) from None
+        return ForceParams(r=r, directions=directions)
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        raise InvalidInputError(
+            Reason.INVALID_PARAMETER, str(fault["loc"][0]), fault_of(fault["input"], fault["msg"])
+        ) from None
 
 
 def _is_mask(value: Any) -> bool:

@@ -1,20 +1,24 @@
 """The engine's values become the golden responses, and its errors the golden statuses."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 from google.rpc import code_pb2, status_pb2
 
 import sketchmatch
-from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError, Reason
+from sketchmatch.app.setup import RequestLimits, Setup
+from sketchmatch.errors import (
+    AnswerUnavailableError,
+    InvalidInputError,
+    PluginError,
+    Reason,
+    TooBusyError,
+)
 from sketchmatch.model.limits import SourceLimits
-from sketchmatch.pipeline.match import Phase, Progress
-from sketchmatch.server import services
-from sketchmatch.server.limits import Limits
-from sketchmatch.server.setup import Current, Setup
+from sketchmatch.pipeline.engine import Engine
+from sketchmatch.pipeline.events import Phase, Progress
 from tests.contract.conversions import responses, status
-from tests.contract.golden import NAMES, as_json, as_written, golden
+from tests.contract.golden import NAMES, as_json, as_written
 from tests.contract.values import (
     ACCEPTED,
     DEFAULTS,
@@ -31,7 +35,7 @@ REFUSALS = {
             Reason.INVALID_STROKE, "sketch.stroke_set.strokes[3]", "has one point; draw a line"
         )
     ),
-    "Status.resource_exhausted": status.too_busy(12),
+    "Status.resource_exhausted": status.refusal(TooBusyError(12)),
     "Status.deadline_exceeded": status.refusal(
         AnswerUnavailableError(
             "the time budget of 0.25 s ended in phase describe, before there was any answer"
@@ -79,15 +83,10 @@ def test_the_catalogue_is_written():
 
 def test_the_server_tells_versions_limits_and_its_age(monkeypatch):
     monkeypatch.setattr(sketchmatch, "__version__", "4.5.6")
-    monkeypatch.setattr(services, "API_VERSION", 3)
-    times = iter([100.25, 175.75])
-    monkeypatch.setattr(services, "time", SimpleNamespace(monotonic=lambda: next(times)))
-    limits = Limits(1_048_576, 12, 90.5, SourceLimits(max_objects=250))
-    service = services.CatalogService(Current(Setup(REGISTRY, limits=limits)))
-    asked = golden("GetServerInfoRequest")
-    with pytest.raises(StopIteration) as ended:  # it waits for nothing, so no loop is needed
-        service.GetServerInfo(asked, None).send(None)
-    assert as_json(ended.value.value) == as_written("GetServerInfoResponse")
+    monkeypatch.setattr(responses, "API_VERSION", 3)
+    engine = Engine(REGISTRY, limits=SourceLimits(max_objects=250))
+    written = responses.server_info(Setup(engine, RequestLimits(1_048_576, 12, 90.5)), 75.5)
+    assert as_json(written) == as_written("GetServerInfoResponse")
 
 
 @pytest.mark.parametrize("name", REFUSALS)

@@ -26,7 +26,7 @@ from sketchmatch.model import (
     Stroke,
     StrokeSet,
 )
-from sketchmatch.pipeline.match import Accepted, Finished, Phase, Progress, Segmented
+from sketchmatch.pipeline.events import Accepted, Finished, Phase, Progress, Segmented
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import (
     AlternativeMap,

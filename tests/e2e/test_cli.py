@@ -12,7 +12,7 @@ import pytest
 from google.protobuf.json_format import Parse
 
 import sketchmatch
-from sketchmatch.cli import local
+from sketchmatch.app.application import Application
 from sketchmatch.cli.app import ExitCode
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 from sketchmatch_client import Client
@@ -503,7 +503,7 @@ def test_what_nobody_foresaw_is_exit_code_1_and_still_one_line(command_line, mon
     def failing(*_):
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr(local, "match_events", failing)
+    monkeypatch.setattr(Application, "answers", failing)
     monkeypatch.delenv("SKETCHMATCH_DEBUG", raising=False)
     done = command_line("match", *ROOM)
     assert_one_line(done, ExitCode.UNFORESEEN, "division by zero", "SKETCHMATCH_DEBUG=1")

@@ -9,7 +9,7 @@ from pathlib import Path
 import PIL.Image
 import pytest
 
-from sketchmatch import Scene
+from sketchmatch import read_scene
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_TRUTH
 from tests.processes import Terminal, sketchmatch
 
@@ -18,7 +18,7 @@ from tests.processes import Terminal, sketchmatch
 def truth():
     """Return the mapped object of each sketched one, the nearest to where the truth has it."""
     known = json.loads(LIVING_ROOM_TRUTH.read_text())["objects"]
-    mapped = [item.centroid for item in Scene.from_file(LIVING_ROOM_MAP).objects]
+    mapped = [item.centroid for item in read_scene(LIVING_ROOM_MAP).objects]
     nearest = [
         min(range(len(mapped)), key=lambda k: math.dist(mapped[k], item["map_centroid"]))
         for item in known

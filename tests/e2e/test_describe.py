@@ -9,7 +9,7 @@ import numpy as np
 import PIL.Image
 import pytest
 
-from sketchmatch import Scene, directional_relation, force_histogram, match
+from sketchmatch import directional_relation, force_histogram, match, read_scene
 from sketchmatch.cli.app import ExitCode
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 from sketchmatch.pipeline.warmup import warm_up
@@ -89,7 +89,7 @@ def test_json_is_one_document(command_line):
     )
     assert found["histogram"] == {"name": "constant", "parameters": {"directions": 360}}
     assert found["segmenter"]["name"] == "strokes"
-    scene = Scene.from_file(LIVING_ROOM_SKETCH)
+    scene = read_scene(LIVING_ROOM_SKETCH)
     assert tuple(found["labels"]) == scene.labels
     assert len(found["relations"]) == 28
     for line in found["relations"][:5]:

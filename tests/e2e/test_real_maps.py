@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from sketchmatch import Scene, match
+from sketchmatch import Scene, match, read_scene
 from sketchmatch.model import Fmap
 from sketchmatch.pipeline.correspond import fmap_confidence
 from sketchmatch.pipeline.describe import describe
@@ -42,7 +42,7 @@ symmetric on purpose, reach 0.969 with each of the three wrong turns: this lies 
 def runs(request):
     path = MAPS / request.param / FILES[request.param]
     require(path.exists(), f"shared/data/ogm/{request.param}")
-    scene = Scene.from_file(path)
+    scene = read_scene(path)
     results = [run(scene, seed) for seed in range(RUNS)]
     print(f"\n{request.param}: {len(scene)} objects; ζ found − ζ of the truth, and right or not")
     for seed, result in enumerate(results):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from google.protobuf.json_format import Parse
 
-from sketchmatch import Scene
+from sketchmatch import read_scene
 from sketchmatch.cli.pictures import scene_of
 from sketchmatch.examples import LIVING_ROOM_MAP
 from sketchmatch.io import read_source
@@ -27,7 +27,7 @@ def test_what_was_found_is_saved_to_the_last_digit(command_line, where, tmp_path
     done = command_line("segment", LIVING_ROOM_MAP, "--json", "--out", saved, *where)
     assert done.returncode == 0
     found = scene_of(Parse(done.stdout, SegmentResponse()).scene)
-    read = Scene.from_file(saved)
+    read = read_scene(saved)
     assert read.labels == found.labels
     for a, b in zip(read.objects, found.objects, strict=True):
         for ring, other in zip(a.rings, b.rings, strict=True):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 
-from sketchmatch.io.overlay import OverlayMatch, draw_overlay
+from sketchmatch.pictures.overlay import OverlayMatch, draw_overlay
 from tests.experiments.cases import Case, Record, answer, cases
 from tests.experiments.document import Picture
 from tests.experiments.records import Results, chosen

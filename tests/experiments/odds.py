@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
-from unittest import mock
 
 import numpy as np
 from scipy.optimize import minimize
 
-from sketchmatch.model import FloatArray, IntArray
-from sketchmatch.pipeline import match
+from sketchmatch.model import ConfidenceWeights, FloatArray, IntArray
+from sketchmatch.pipeline import answer
+from sketchmatch.pipeline.answer import considered
 from sketchmatch.pipeline.calibration import Calibration
-from sketchmatch.pipeline.match import run_match
-from sketchmatch.pipeline.probability import Likelihood
-from sketchmatch.pipeline.request import MatchRequest
+from sketchmatch.pipeline.engine import Engine
+from sketchmatch.pipeline.request import alternatives_wanted
+from sketchmatch.pipeline.search import Goal
+from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import default_registry
 from tests.experiments.drawings import SHARE_WITH_EXTRAS, Drawing, drawing
 from tests.experiments.logits import log_shares, significant
@@ -25,6 +27,7 @@ __all__ = ["Considered", "considered_by", "errors", "learned_odds"]
 _MOST_OBJECTS = 16
 _FITTED = ("price", "sharpness", "growth", "doubt", "reserve")
 _SIMPLEXES = 4
+_ENGINE = Engine(default_registry())
 
 _Padded = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -104,29 +107,22 @@ def errors(cases: list[Considered], calibration: Calibration) -> dict[str, float
 
 
 def _considered(drawing: Drawing, weights: Any, price: float | None) -> Considered:
-    """Match, and watch which maps the likelihood is made of."""
-    seen: list[Any] = []
+    """Search, and return the maps that an answer would be chosen from."""
+    pipeline = _ENGINE.resolve({})
+    scenes, weights = (drawing.scene, drawing.map), ConfidenceWeights(*weights)
+    work = _ENGINE.compare(scenes, pipeline.histogram, pipeline.similarity, weights)
+    comparison = finish(work)
+    price = math.inf if price is None else price
+    goal = Goal(weights, price, alternatives_wanted(None, *scenes))
+    maps = considered(finish(_ENGINE.search(comparison, pipeline.searcher, goal)), goal)
+    return _of(maps, drawing, comparison.swapped)
 
-    def watch(*arguments: Any) -> Likelihood:
-        seen.extend(arguments)
-        return Likelihood()
 
-    request = MatchRequest(
-        drawing.scene,
-        drawing.map,
-        weights=weights,
-        allow_unmatched=price is not None,
-        unmatched_price=price,
-    )
-    with (
-        mock.patch.object(match, "likelihood", watch),
-        mock.patch.object(match, "calibrated", return_value=object()),
-    ):
-        for _ in run_match(request, default_registry()):
-            pass
-    found, exchanges, omissions, rivals, _ = seen
-    exchanged = len(drawing.scene) > len(drawing.map)
-    truth = _turned(drawing.truth, len(drawing.map)) if exchanged else drawing.truth
+def _of(considering: answer.Considered, drawing: Drawing, swapped: bool) -> Considered:
+    """Return maps as numbers, beside the right one."""
+    found, exchanges, omissions = considering.best, considering.exchanges, considering.omissions()
+    assert exchanges is not None
+    truth = _turned(drawing.truth, len(drawing.map)) if swapped else drawing.truth
     kept, partners = found.part.kept, found.mapped.partners
     best = np.full(len(truth), -1)
     best[kept] = partners
@@ -140,7 +136,7 @@ def _considered(drawing: Drawing, weights: Any, price: float | None) -> Consider
         changed = best.copy()
         changed[kept[g]] = -1
         maps.setdefault(tuple(changed.tolist()), confidence)
-    for rival in rivals:
+    for rival in considering.rivals:
         changed = np.full(len(truth), -1)
         changed[rival.kept] = rival.mapped.partners
         maps.setdefault(tuple(changed.tolist()), rival.confidence.total)

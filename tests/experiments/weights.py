@@ -14,11 +14,18 @@ from scipy.optimize import minimize
 from sketchmatch.kernels._jit import kernel
 from sketchmatch.kernels.confidence import fmap_confidence, fmap_confidence_above
 from sketchmatch.kernels.evidence import mean_parts
-from sketchmatch.model import BoolArray, FloatArray, IntArray, correspondences, object_pairs
-from sketchmatch.pipeline.describe import describe
-from sketchmatch.pipeline.evidence import compare_objects, rotation_weights
-from sketchmatch.pipeline.relate import relate
+from sketchmatch.model import (
+    BoolArray,
+    ConfidenceWeights,
+    FloatArray,
+    IntArray,
+    correspondences,
+    object_pairs,
+)
+from sketchmatch.pipeline.engine import Engine
+from sketchmatch.pipeline.evidence import rotation_weights
 from sketchmatch.pipeline.slices import finish
+from sketchmatch.registry import default_registry
 from sketchmatch_builtin.histograms.constant import ConstantForce
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from tests.experiments.drawings import drawing
@@ -94,9 +101,11 @@ def parts_of(number: int) -> list[Parts]:
     drawn = drawing("weights", number, _MOST_OBJECTS, missing=1, extra=0)
     if drawn is None:
         return []
-    descriptors = [finish(describe(each, ConstantForce())) for each in (drawn.scene, drawn.map)]
-    table = finish(relate(*descriptors, CrossCorrelation()))
-    own = finish(compare_objects(drawn.scene, drawn.map, 180))
+    engine = Engine(default_registry())
+    scenes, both = (drawn.scene, drawn.map), ConfidenceWeights(shape=1.0, size=1.0)
+    compared = finish(engine.compare(scenes, ConstantForce(), CrossCorrelation(), both))
+    table, own = replace(compared.table, evidence=None), compared.own
+    assert own is not None
     maps = _all_maps(len(drawn.scene), len(drawn.map))
     alike, turned = np.empty((len(maps), 4)), np.empty((len(maps), len(DISTANCES)))
     pairs = object_pairs(len(drawn.scene)), object_pairs(len(drawn.map))

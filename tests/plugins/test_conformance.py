@@ -3,7 +3,7 @@
 import pytest
 
 from sketchmatch.registry import default_registry
-from sketchmatch.registry.plugins import OWN_DISTRIBUTION
+from sketchmatch.registry.distributions import OWN_DISTRIBUTION
 from sketchmatch.testing import parametrize_plugins
 from sketchmatch_builtin.histograms.raster import RasterForce
 

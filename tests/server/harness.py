@@ -13,11 +13,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from sketchmatch.api import Algorithm
+from sketchmatch.app.setup import Isolation, RequestLimits, Setup
+from sketchmatch.model.limits import SourceLimits
+from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
-from sketchmatch.server.limits import Limits
 from sketchmatch.server.serve import ServerSettings, serve
-from sketchmatch.server.setup import Isolation, Setup
 from sketchmatch_client import ServerBusyError, sources
 from sketchmatch_proto.v1 import source_pb2
 
@@ -86,14 +87,14 @@ def serving(
     warm: bool = True,
     grace: float = 0.0,
     defaults: Defaults = UNCONFIGURED,
+    sources: SourceLimits = SourceLimits(),  # noqa: B008
     **limits: float,
 ) -> Iterator[Host]:
     """Run a server that offers the built-in algorithms and ``plugins``, in its own process."""
     setup = Setup(
-        registry_with(*plugins),
-        defaults,
-        limits=Limits(**{**_LONGEST, **limits}),
-        isolation=Isolation(trusted=frozenset("*")),
+        Engine(registry_with(*plugins), defaults, sources),
+        RequestLimits(**{**_LONGEST, **limits}),
+        Isolation(trusted=frozenset("*")),
     )
     with hosting(setup, warm, grace) as host:
         yield host

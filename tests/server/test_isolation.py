@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from sketchmatch.app.setup import Isolation, Setup
+from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import discover
-from sketchmatch.server.setup import Isolation, Setup
 from sketchmatch_client import Client, InvalidRequestError, ServerFailedError
 from sketchmatch_proto.v1.catalog_service_pb2 import PluginState
 from sketchmatch_proto.v1.match_pb2 import Outcome
@@ -49,7 +50,7 @@ def host(site):
     """Yield a server that finds the distributions."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(site)
-        setup = Setup(discover(), isolation=Isolation(patience=PATIENCE))
+        setup = Setup(Engine(discover()), isolation=Isolation(patience=PATIENCE))
         with hosting(setup) as running:
             yield running
 
@@ -70,7 +71,9 @@ def test_a_strangers_search_runs_in_another_process_and_finds_the_same(client):
     first, again = (client.match(scene(4), scene(5, 1), **asked) for _ in range(2))
     assert process_of(first) != os.getpid()
     assert process_of(first) == process_of(again), "a process that behaved is used again"
-    trusting = Setup(discover(), isolation=Isolation(trusted=frozenset({"acme-well-behaved"})))
+    trusting = Setup(
+        Engine(discover()), isolation=Isolation(trusted=frozenset({"acme-well-behaved"}))
+    )
     with hosting(trusting, warm=False) as host, Client(host.address) as inside:
         trusted = inside.match(scene(4), scene(5, 1), **asked)
     assert process_of(trusted) == os.getpid()
@@ -211,7 +214,7 @@ def test_plugins_that_misbehave_harm_no_other_request(host, client, plugins):
 
 def test_a_search_that_ignores_its_time_budget_is_stopped(host):
     del host
-    patient = Setup(discover(), isolation=Isolation(patience=60.0))
+    patient = Setup(Engine(discover()), isolation=Isolation(patience=60.0))
     words = r"did not end 2 s after its time budget of 0\.5 s and was stopped"
     with (
         hosting(patient, warm=False) as other,
@@ -223,7 +226,10 @@ def test_a_search_that_ignores_its_time_budget_is_stopped(host):
 
 def test_no_process_outlives_its_server(host):
     del host
-    with hosting(Setup(discover()), warm=False) as other, Client(other.address) as connected:
+    with (
+        hosting(Setup(Engine(discover())), warm=False) as other,
+        Client(other.address) as connected,
+    ):
         found = connected.match(scene(4), scene(4), searcher="guessing")
         assert process_of(found) in {child.pid for child in multiprocessing.active_children()}
     assert process_of(found) not in {child.pid for child in multiprocessing.active_children()}

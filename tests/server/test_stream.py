@@ -5,7 +5,7 @@ import pytest
 from google.protobuf.json_format import MessageToDict
 
 import sketchmatch
-from sketchmatch import Scene
+from sketchmatch import Scene, read_scene
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 from sketchmatch.io import read_source
 from sketchmatch_client import AsyncClient, Client, sources
@@ -223,7 +223,7 @@ def assert_same_scene(address, sent, path):
         segmented = client.segment(sent)
     expected = [
         (item.label, [ring.tolist() for ring in item.rings], item.area, list(item.centroid))
-        for item in Scene.from_file(path).objects
+        for item in read_scene(path).objects
     ]
     for found in (matched.scenes.sketch, matched.scenes.map, segmented.scene):
         assert [

@@ -8,7 +8,7 @@ import tomllib
 
 import pytest
 
-from sketchmatch import Scene, match
+from sketchmatch import Scene, match, read_scene
 from sketchmatch.config import Origin, builtin, check, entries, load, open_registry, template
 from sketchmatch.config.settings import static_paths
 from sketchmatch.errors import InvalidInputError, Reason
@@ -323,9 +323,9 @@ def test_python_keeps_to_the_limits_of_the_environment(monkeypatch, tmp_path):
     ]
     path = tmp_path / "map.geojson"
     path.write_text(json.dumps({"type": "GeometryCollection", "geometries": shapes}))
-    assert len(Scene.from_file(path)) == 3
+    assert len(read_scene(path)) == 3
     monkeypatch.setenv("SKETCHMATCH_LIMITS__MAX_OBJECTS", "2")
-    for call in (Scene.from_file, lambda path: match(path, SCENE)):
+    for call in (read_scene, lambda path: match(path, SCENE)):
         error = refused(call, path)
         assert "or raise limits.max_objects (SKETCHMATCH_LIMITS__MAX_OBJECTS)" in error.problem
 

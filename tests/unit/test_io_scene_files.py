@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sketchmatch import Scene
+from sketchmatch import Scene, read_scene
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.io.geojson import decode_geojson
 from sketchmatch.io.scene_files import check_scene_path, encode_geojson, save_scene
@@ -46,9 +46,9 @@ def assert_same(one, other):
 def test_reading_what_was_saved_gives_the_same_scene(tmp_path_factory, scene):
     path = tmp_path_factory.mktemp("scene") / "scene.geojson"
     save_scene(path, scene)
-    assert_same(scene, Scene.from_file(path))
+    assert_same(scene, read_scene(path))
     again = path.with_name("again.geojson")
-    save_scene(again, Scene.from_file(path))
+    save_scene(again, read_scene(path))
     assert again.read_bytes() == path.read_bytes()
 
 

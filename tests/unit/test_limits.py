@@ -9,7 +9,7 @@ import numpy as np
 import PIL.Image
 import pytest
 
-from sketchmatch import Scene
+from sketchmatch import read_scene
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.io.images import decode_image
@@ -67,7 +67,7 @@ def test_a_scene_of_too_many_objects_is_refused(tmp_path):
     path.write_text(json.dumps({"strokes": drawn}))
     assert (
         "has 5 objects, more than the limit of 4 objects"
-        in refused(lambda: Scene.from_file(path), max_objects=4).problem
+        in refused(lambda: read_scene(path), max_objects=4).problem
     )
 
 

@@ -10,15 +10,9 @@ from sketchmatch import Scene, directional_relation, force_histogram
 from sketchmatch.api import Outcome, Searcher, SearchProgress
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError, Reason
 from sketchmatch.model import Fmap, LabelledPolygon, OccupancyGrid, PolygonSet
-from sketchmatch.pipeline.match import (
-    Accepted,
-    Finished,
-    MatchRequest,
-    Phase,
-    Progress,
-    Segmented,
-    run_match,
-)
+from sketchmatch.pipeline.events import Accepted, Finished, Phase, Progress, Segmented
+from sketchmatch.pipeline.match import run_match
+from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import Choice
 from sketchmatch.pipeline.warmup import warm_up, warm_up_others
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
@@ -189,11 +183,11 @@ def test_each_match_tells_how_the_object_lies_in_the_sketch(drawn, mapped):
     assert [line[1] for line in turned.values()] != [line[1] for line in expected.values()]
 
 
-@pytest.mark.parametrize("exchanged", [False, True])
-def test_two_matched_objects_are_told_from_each_other(exchanged):
+@pytest.mark.parametrize("swapped", [False, True])
+def test_two_matched_objects_are_told_from_each_other(swapped):
     pair = [SQUARE, SQUARE + np.array([4.0, 0.2])]
     scenes = [Scene.from_polygons(pair), Scene.from_polygons([*pair, 3 * SQUARE + [1, 40]])]
-    result = matched(*scenes[:: -1 if exchanged else 1])
+    result = matched(*scenes[:: -1 if swapped else 1])
     lines = {match.sketch_object: match.relation for match in result.matches}
     assert len(lines) == 2
     for (a, here), (b, there) in itertools.permutations(lines.items()):

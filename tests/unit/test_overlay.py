@@ -11,18 +11,18 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.io._overlay.canvas import Canvas, printable
-from sketchmatch.io._overlay.palette import mixed, pair_colour, readable_on
-from sketchmatch.io._overlay.places import badge_places, label_places
-from sketchmatch.io._overlay.underlay import known_area, painted_cells
-from sketchmatch.io.overlay import (
+from sketchmatch.model import OccupancyGrid, Scene
+from sketchmatch.pictures._canvas import Canvas, printable
+from sketchmatch.pictures._palette import mixed, pair_colour, readable_on
+from sketchmatch.pictures._places import badge_places, label_places
+from sketchmatch.pictures._underlay import known_area, painted_cells
+from sketchmatch.pictures.overlay import (
     OverlayMatch,
     check_picture_path,
     draw_overlay,
     draw_scene,
     save_overlay,
 )
-from sketchmatch.model import OccupancyGrid, Scene
 from sketchmatch.testing import simulate_sketch
 
 WHITE = (255, 255, 255)

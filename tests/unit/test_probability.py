@@ -17,7 +17,7 @@ from sketchmatch.pipeline.calibration import LEARNED, Calibration, calibrated, d
 from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
 from sketchmatch.pipeline.probability import likelihood
 from sketchmatch.pipeline.slices import finish
-from sketchmatch.pipeline.unmatched import Found, Part, Rival, omission_confidences, part_of
+from sketchmatch.pipeline.unmatched import Part, PartSearch, Rival, omission_confidences, part_of
 from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.searchers.exact import Exact
 from tests.strategies import random_table
@@ -70,7 +70,7 @@ def test_a_probability_is_a_share_of_all_odds(seed, few, more, left_out, doubt, 
     kept = sorted(rng.permutation(few)[left_out:].tolist())
     part = finish(part_of(Part.whole(table), kept))
     *_, last = Exact().search(MatchProblem(part.table, WEIGHTS), rng)
-    found = Found(part, last, Outcome.OPTIMAL)
+    found = PartSearch(part, last, Outcome.OPTIMAL)
     best = dict(zip(kept, found.mapped.partners.tolist(), strict=True))
     others = [random_map(rng, few, few + more) for _ in range(4)]
     others = [other for k, other in enumerate(others) if other not in (best, *others[:k])]

@@ -9,11 +9,18 @@ import numpy as np
 import pytest
 
 import sketchmatch
-from sketchmatch import InvalidInputError, Scene, SketchmatchError, force_histogram, match
+from sketchmatch import (
+    InvalidInputError,
+    Scene,
+    SketchmatchError,
+    force_histogram,
+    match,
+    read_scene,
+)
 from sketchmatch.api import Outcome
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH, LIVING_ROOM_TRUTH
 from sketchmatch.model import Stroke, StrokeSet
-from sketchmatch.pipeline.match import Progress
+from sketchmatch.pipeline.events import Progress
 from sketchmatch.pipeline.warmup import warm_up_others
 from sketchmatch.registry import default_registry
 from sketchmatch.testing import random_scene
@@ -72,7 +79,7 @@ def test_a_scene_read_from_a_file_is_the_scene_matched(living_room):
         (LIVING_ROOM_SKETCH, living_room.sketch),
         (str(LIVING_ROOM_MAP), living_room.map),
     ):
-        scene = Scene.from_file(path)
+        scene = read_scene(path)
         assert isinstance(scene, Scene)
         assert [item.area for item in scene.objects] == [item.area for item in used.objects]
         assert scene.labels == used.labels

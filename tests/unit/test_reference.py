@@ -7,10 +7,10 @@ import pytest
 from pydantic import Field
 
 from sketchmatch.api import Params, Similarity
+from sketchmatch.app import responses
 from sketchmatch.cli.reference import page
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.registry import OWN_DISTRIBUTION, Kind, Registered, Registry, discover
-from sketchmatch.server import responses
 from tests.tools import ROOT
 
 BUILT_IN = [item for item in discover().algorithms if item.distribution == OWN_DISTRIBUTION]

@@ -7,9 +7,9 @@ import pytest
 
 from sketchmatch import Scene
 from sketchmatch.errors import InvalidInputError
-from sketchmatch.io._overlay.palette import mixed, pair_colour
-from sketchmatch.io.overlay import MOST_PLOTS, OverlayRelation, draw_relations
 from sketchmatch.model import OccupancyGrid
+from sketchmatch.pictures._palette import mixed, pair_colour
+from sketchmatch.pictures.overlay import MOST_PLOTS, OverlayRelation, draw_relations
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 SCENE = Scene.from_polygons([SQUARE, SQUARE + 3], ["desk", ""])

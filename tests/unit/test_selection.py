@@ -250,7 +250,7 @@ def test_the_algorithms_of_a_request_are_told_without_setting_them_up():
     found = chosen_algorithms(
         default_registry(),
         {"map_segmenter": Choice(), "searcher": Choice(), "histogram": Choice("hybrid")},
-        {"map_segmenter": SOURCES["occupancy-grid"]},
+        {"map_segmenter": OccupancyGrid},
         defaults,
     )
     assert [item.name for item in found] == ["rooms", "easm", "hybrid"]

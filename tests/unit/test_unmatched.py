@@ -13,14 +13,15 @@ from sketchmatch.api import MatchProblem, Outcome
 from sketchmatch.config import builtin
 from sketchmatch.model import Fmap, object_pairs
 from sketchmatch.pipeline.correspond import fmap_confidence
-from sketchmatch.pipeline.match import Finished, Progress, run_match
+from sketchmatch.pipeline.events import Finished, Progress
+from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import Choice
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.pipeline.unmatched import (
     FEWEST,
-    Found,
     Part,
+    PartSearch,
     omission_confidences,
     part_of,
     trials,
@@ -77,7 +78,7 @@ def searched(table, price):
     while True:
         part = finish(part_of(whole, trial.kept))
         *_, last = Exact().search(MatchProblem(part.table, WEIGHTS), np.random.default_rng(0))
-        found.append(Found(part, last, Outcome.OPTIMAL))
+        found.append(PartSearch(part, last, Outcome.OPTIMAL))
         try:
             trial = plan.send(found[-1])
         except StopIteration:

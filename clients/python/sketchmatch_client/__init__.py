@@ -7,7 +7,7 @@ makes sketches and maps to hand to them.
 from sketchmatch_client import sources
 from sketchmatch_client._aio import AsyncClient
 from sketchmatch_client._match import Match, MatchCollector
-from sketchmatch_client._requests import MatchOptions
+from sketchmatch_client._requests import MatchOptions, match_request, segment_request
 from sketchmatch_client._sync import Client
 from sketchmatch_client.errors import (
     CallCancelledError,
@@ -36,6 +36,8 @@ __all__ = [
     "ServerFailedError",
     "ServerUnavailableError",
     "SketchmatchError",
+    "match_request",
+    "segment_request",
     "sources",
 ]
 

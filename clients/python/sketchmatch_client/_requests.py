@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import timedelta
-from typing import Any, TypedDict
+from typing import Any, TypedDict, Unpack
 
 from google.protobuf.duration_pb2 import Duration
 from google.protobuf.struct_pb2 import Struct
@@ -25,7 +25,11 @@ Weights = (
 )
 """Of similarity, rotation and dilation in ζ, perhaps of shape and size, and of distance in ζR."""
 
-_STAGES = ("sketch_segmenter", "map_segmenter", "histogram", "similarity", "searcher")
+_STAGES = tuple(
+    field.name
+    for field in Pipeline.DESCRIPTOR.fields
+    if field.message_type is AlgorithmSelection.DESCRIPTOR
+)
 
 
 class MatchOptions(TypedDict, total=False):
@@ -78,16 +82,7 @@ class MatchOptions(TypedDict, total=False):
 def match_request(
     sketch: Source,
     map: Source,  # noqa: A002
-    *,
-    params: Mapping[str, Mapping[str, Any]] | None = None,
-    seed: int | None = None,
-    time_budget: float | timedelta | None = None,
-    weights: Weights | None = None,
-    allow_unmatched: bool | None = None,
-    unmatched_price: float | None = None,
-    alternatives: int | None = None,
-    profile: str | None = None,
-    **names: str | None,
+    **options: Unpack[MatchOptions],
 ) -> MatchRequest:
     """Return the request for a match; see :class:`MatchOptions`.
 
@@ -96,51 +91,34 @@ def match_request(
     >>> match_request(Source(), Source(), searcher="easm", seed=7).pipeline.searcher.name
     'easm'
     """
-    request = MatchRequest(sketch=sketch, map=map, pipeline=_pipeline(names, params or {}))
-    if profile:
-        request.pipeline.profile = profile
-    if seed is not None:
-        with refused_as("INVALID_FIELD", "seed", "is not a whole number from 0 to 2**64 − 1"):
-            request.seed = seed
-    if time_budget is not None:
-        with refused_as("INVALID_FIELD", "time_budget", "is not a number of seconds"):
-            request.time_budget.CopyFrom(_duration(time_budget))
-    if weights is not None:
-        with refused_as(
-            "INVALID_FIELD",
-            "weights",
-            "is not three numbers, similarity, rotation, dilation, or five, with shape and size, "
-            "or six, with distance",
-        ):
-            request.weights.CopyFrom(_weights(*weights))
-    if allow_unmatched is not None:
-        with refused_as("INVALID_FIELD", "allow_unmatched", "is neither True nor False"):
-            request.allow_unmatched = allow_unmatched
-    if unmatched_price is not None:
-        with refused_as("INVALID_FIELD", "unmatched_price", "is not a number"):
-            request.unmatched_price = unmatched_price
-    if alternatives is not None:
-        with refused_as("INVALID_FIELD", "alternatives", "is not a whole number from 0 to 100"):
-            request.alternatives = alternatives
+    given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
+    names = {stage: given.pop(stage) for stage in _STAGES if stage in given}
+    pipeline = _pipeline(names, given.pop("params", {}))
+    pipeline.profile = given.pop("profile", "")
+    request = MatchRequest(sketch=sketch, map=map, pipeline=pipeline)
+    for name, value in given.items():
+        if name not in _FIELDS:
+            raise TypeError(f"unknown option {name!r}; MatchOptions lists those there are")
+        problem, converted = _FIELDS[name]
+        with refused_as("INVALID_FIELD", name, problem):
+            request.MergeFrom(MatchRequest(**{name: converted(value)}))
     return request
 
 
 def segment_request(
     source: Source,
-    segmenter: str | None,
-    params: Mapping[str, Any] | None,
+    segmenter: str | None = None,
+    params: Mapping[str, Any] | None = None,
     profile: str | None = None,
 ) -> SegmentRequest:
-    """Return the request for the objects of one source."""
+    """Return the request for the objects of one source; see :meth:`Client.segment`."""
     request = SegmentRequest(source=source, profile=profile or "")
     if segmenter or params:
         request.segmenter.CopyFrom(_selection("segmenter", segmenter or "", params or {}))
     return request
 
 
-def _pipeline(names: Mapping[str, str | None], params: Mapping[str, Mapping[str, Any]]) -> Pipeline:
-    if unknown := sorted(names.keys() - set(_STAGES)):
-        raise TypeError(f"unknown option {unknown[0]!r}; MatchOptions lists those there are")
+def _pipeline(names: Mapping[str, str], params: Mapping[str, Mapping[str, Any]]) -> Pipeline:
     if unknown := sorted(params.keys() - set(_STAGES)):
         raise InvalidRequestError(
             f"params has no stage {unknown[0]!r}; the stages are {', '.join(_STAGES)}",
@@ -165,21 +143,36 @@ def _selection(field: str, name: str, params: Mapping[str, Any]) -> AlgorithmSel
     return selection
 
 
-def _weights(similarity: float, rotation: float, dilation: float, *own: float) -> ConfidenceWeights:
-    names = ("shape", "size", "distance")
-    if len(own) not in (0, 2, 3):
+def _weights(weights: Weights) -> ConfidenceWeights:
+    if len(weights) not in (3, 5, 6):
         raise ValueError
-    return ConfidenceWeights(
-        similarity=similarity,
-        rotation=rotation,
-        dilation=dilation,
-        **dict(zip(names, own, strict=False)),
-    )
+    names = ("similarity", "rotation", "dilation", "shape", "size", "distance")
+    return ConfidenceWeights(**dict(zip(names, weights, strict=False)))
 
 
 def _duration(value: float | timedelta) -> Duration:
     duration = Duration()
-    if not isinstance(value, timedelta):
-        value = timedelta(seconds=value)
-    duration.FromTimedelta(value)
+    if isinstance(value, timedelta):
+        duration.FromTimedelta(value)
+    else:
+        duration.FromNanoseconds(round(value * 1e9))
     return duration
+
+
+def _same(value: Any) -> Any:
+    return value
+
+
+_FIELDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
+    "seed": ("is not a whole number from 0 to 2**64 − 1", _same),
+    "time_budget": ("is not a number of seconds", _duration),
+    "weights": (
+        "is not three numbers, similarity, rotation, dilation, or five, with shape and size, "
+        "or six, with distance",
+        _weights,
+    ),
+    "allow_unmatched": ("is neither True nor False", _same),
+    "unmatched_price": ("is not a number", _same),
+    "alternatives": ("is not a whole number from 0 to 100", _same),
+}
+"""Options that are fields of the request: what is said of a wrong value, and how one is written."""

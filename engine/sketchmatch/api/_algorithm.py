@@ -45,10 +45,15 @@ class Algorithm:
         What a request, a config file or a command line selects the algorithm by.
     summary
         One line for lists.
+    default
+        Whether it is used where nobody chooses an algorithm of its kind, or, for a segmenter, one
+        for the sources that it reads. Only a class of the engine's own distribution is that says
+        so itself: it is not inherited.
     """
 
     name: ClassVar[str]
     summary: ClassVar[str]
+    default: ClassVar[bool] = False
 
     class Params(Params):
         """No parameters, unless the algorithm defines its own."""
@@ -59,3 +64,8 @@ class Algorithm:
 
     def __init__(self, params: Any = None) -> None:
         self.params = self.Params() if params is None else params
+
+    @property
+    def identity(self) -> str:
+        """What it is and how it is set, the same for two that do the same."""
+        return f"{self.name} {self.params.model_dump_json()}"

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import shapely
+from pydantic import Field
 
+from sketchmatch.api.histogram import HistogramParams
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.kernels.constant_force import constant_force_histograms
 from sketchmatch.kernels.hybrid_force import hybrid_force_histograms
@@ -25,7 +28,9 @@ __all__ = [
     "MEETING",
     "OVERLAPPING",
     "TOUCHING",
+    "ForceParams",
     "about_object",
+    "exponent_field",
     "force_histograms",
     "hybrid_force_histograms",
     "object_name",
@@ -36,6 +41,23 @@ __all__ = [
 
 # Shares of two objects' extent, and of the smaller one's area, that are rounding, not geometry.
 _HAIR = 1e-12
+
+
+def exponent_field(default: float) -> Any:
+    """Return the parameter r of forces d^−r, with its bounds and text."""
+    return Field(
+        default,
+        ge=-10.0,
+        le=10.0,
+        description="The force at distance d is d^-r; objects may overlap for r < 1 and "
+        "touch for r < 2.",
+    )
+
+
+class ForceParams(HistogramParams):
+    """The number of directions, and the exponent."""
+
+    r: float = exponent_field(1.0)
 
 
 def relations_matter(r: float) -> bool:

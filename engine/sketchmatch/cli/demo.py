@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from sketchmatch.cli.options import MatchSettings, say
+from sketchmatch.cli.options import say
 
 __all__ = ["demo"]
 
@@ -34,14 +34,15 @@ def demo(
     """
     with _server() as server:
         # The server starts while this process loads what it needs.
-        from sketchmatch.cli import display, pictures, remote
+        from sketchmatch.cli import display, pictures
+        from sketchmatch.cli.answering import answerer
+        from sketchmatch.cli.sources import source_of
         from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 
         pictures.check_path(overlay)
-        events = remote.match_events(
-            _address(server), LIVING_ROOM_SKETCH, LIVING_ROOM_MAP, MatchSettings(seed=seed)
-        )
-        answer = display.watch(events)
+        with answerer(_address(server), None) as asked:
+            sources = source_of(LIVING_ROOM_SKETCH), source_of(LIVING_ROOM_MAP)
+            answer = display.watch(asked.events(*sources, seed=seed))
     display.show_match(answer)
     pictures.draw_match(answer, LIVING_ROOM_MAP, overlay)
     say(f"the picture is in {overlay}")

@@ -73,10 +73,9 @@ def describe(
         pictures.check_path(plot, "--plot")
     from sketchmatch.cli import relations
 
+    names = {"segmenter": segmenter, "histogram": histogram}
     with places.places_in(scene=scene):
-        found = relations.described(
-            scene, {"segmenter": segmenter, "histogram": histogram}, params, pairs, profile, config
-        )
+        found = relations.described(scene, names, params, pairs, profile, config)
     if json:
         display.print_document(_document(found))
     elif sys.stdout.isatty():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
@@ -12,7 +11,6 @@ from google.protobuf.json_format import MessageToJson
 from sketchmatch.cli.options import (
     Config,
     Json,
-    MatchSettings,
     Overlay,
     Profile,
     Server,
@@ -21,10 +19,10 @@ from sketchmatch.cli.options import (
     refuse_config,
 )
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
 if TYPE_CHECKING:
     from sketchmatch.model import RequestWeights
+    from sketchmatch_client import MatchOptions
 
 __all__ = ["match"]
 
@@ -85,48 +83,36 @@ def match(
     does.
     """
     from sketchmatch.cli import display, pictures, places
+    from sketchmatch.cli.answering import answerer
+    from sketchmatch.cli.sources import source_of
 
     refuse_config(config, server)
     if overlay is not None:
         pictures.check_path(overlay)
-    chosen = {
+    options: MatchOptions = {
         "sketch_segmenter": segmenter_sketch,
         "map_segmenter": segmenter_map,
         "histogram": histogram,
         "similarity": similarity,
         "searcher": searcher,
+        "params": parse_settings(settings),
+        "seed": seed,
+        "time_budget": time_budget,
+        "weights": None if weights is None else _weights(weights),
+        "allow_unmatched": allow_unmatched,
+        "unmatched_price": unmatched_price,
+        "alternatives": alternatives,
+        "profile": profile,
     }
-    how = MatchSettings(
-        names={stage: name for stage, name in chosen.items() if name},
-        params=parse_settings(settings),
-        seed=seed,
-        time_budget=time_budget,
-        weights=None if weights is None else _weights(weights),
-        allow_unmatched=allow_unmatched,
-        unmatched_price=unmatched_price,
-        alternatives=alternatives,
-        profile=profile,
-    )
-    with places.places_in(sketch=sketch, map=map_):
-        answer = display.watch(_events(server, config, sketch, map_, how))
+    with places.places_in(sketch=sketch, map=map_), answerer(server, config) as asked:
+        sources = source_of(sketch, "sketch"), source_of(map_, "map")
+        answer = display.watch(asked.events(*sources, **options))
     if json:
         typer.echo(MessageToJson(answer.result, **display.JSON_STYLE))
     else:
         display.show_match(answer)
     if overlay is not None:
         pictures.draw_match(answer, map_, overlay)
-
-
-def _events(
-    server: str | None, config: Path | None, sketch: Path, map_: Path, how: MatchSettings
-) -> Generator[MatchResponse, None, None]:
-    if server:
-        from sketchmatch.cli import remote
-
-        return remote.match_events(server, sketch, map_, how)
-    from sketchmatch.cli import local
-
-    return local.match_events(sketch, map_, how, config)
 
 
 def _weights(text: str) -> RequestWeights:

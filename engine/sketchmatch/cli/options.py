@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from sketchmatch.errors import InvalidInputError, Reason
-
-if TYPE_CHECKING:
-    from sketchmatch.model import RequestWeights
 
 __all__ = [
     "Config",
     "Histogram",
     "Json",
     "JsonDocument",
-    "MatchSettings",
     "Overlay",
     "Profile",
     "Server",
@@ -75,33 +70,6 @@ Histogram = Annotated[
 Overlay = Annotated[
     Path | None, typer.Option("--overlay", metavar="FILE", help="Draw the answer into a picture.")
 ]
-
-
-@dataclass(frozen=True)
-class MatchSettings:
-    """How to match, as the command line says it.
-
-    Attributes
-    ----------
-    names
-        Algorithm by stage; empty for the default.
-    params
-        Parameters by stage, where some were set.
-    seed, time_budget, weights, allow_unmatched, unmatched_price, alternatives
-        As in :class:`sketchmatch.pipeline.match.MatchRequest`.
-    profile
-        The pipeline to start from; empty for the default one.
-    """
-
-    names: Mapping[str, str] = field(default_factory=dict)
-    params: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    seed: int = 0
-    time_budget: float | None = None
-    weights: RequestWeights | None = None
-    allow_unmatched: bool | None = None
-    unmatched_price: float | None = None
-    alternatives: int | None = None
-    profile: str = ""
 
 
 def parse_settings(

@@ -9,7 +9,10 @@ import numpy as np
 
 from sketchmatch.cli.display import facts
 from sketchmatch.io import read_source
-from sketchmatch.io.overlay import (
+from sketchmatch.io.ros_bag import bag_and_topic, is_bag
+from sketchmatch.model import OccupancyGrid, Scene, SceneObject, StrokeSet
+from sketchmatch.model.arrays import frozen_floats
+from sketchmatch.pictures.overlay import (
     MOST_PLOTS,
     OverlayMatch,
     OverlayRelation,
@@ -19,9 +22,6 @@ from sketchmatch.io.overlay import (
     draw_scene,
     save_overlay,
 )
-from sketchmatch.io.ros_bag import bag_and_topic, is_bag
-from sketchmatch.model import OccupancyGrid, Scene, SceneObject
-from sketchmatch.model.arrays import frozen_floats
 from sketchmatch_client import Match
 from sketchmatch_proto.v1 import scene_pb2
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
@@ -50,10 +50,9 @@ def draw_match(match: Match, map_path: Path, target: Path) -> None:
     save_overlay(target, picture)
 
 
-def draw_segmentation(response: SegmentResponse, source: Path, target: Path) -> None:
-    """Draw the objects of one scene, numbered, and the route, and save the picture."""
+def draw_segmentation(response: SegmentResponse, source: Path, target: Path, pen: bool) -> None:
+    """Draw the objects of one scene, by a pen or not, numbered, and the route; save the picture."""
     grid = _grid(source)
-    pen = response.segmenter.name == "strokes"
     route = np.array([(point.x, point.y) for point in response.route]) if response.route else None
     picture = draw_scene(scene_of(response.scene), underlay=grid, pen=pen, route=route)
     save_overlay(target, picture)
@@ -75,7 +74,7 @@ def draw_description(found: Description, source: Path, target: Path) -> None:
         left_out=len(found.pairs) - len(relations),
         caption=f"{kind}, each drawn to its own peak; an arrow marks the main direction",
         underlay=_grid(source),
-        pen=found.segmenter.name == "strokes",
+        pen=isinstance(found.source, StrokeSet),
     )
     save_overlay(target, picture, "--plot")
 

@@ -12,7 +12,8 @@ from sketchmatch_client import InvalidRequestError
 __all__ = ["places_in"]
 
 _KINDS = ("stroke_set", "polygon_set", "occupancy_grid", "map_server_map", "image")
-_WHOLE = ("", "cells", "pixels", "data", "image", "yaml")
+_WHOLE = ("", "cells", "pixels", "data", "yaml")
+_ABOUT_PICTURES = ("INVALID_IMAGE", "LIMIT_EXCEEDED")
 
 
 @contextmanager
@@ -34,5 +35,7 @@ def places_in(**files: Path) -> Iterator[None]:
             raise
         problem = str(error).removeprefix(error.field).lstrip()
         place = place.removeprefix("yaml.")
-        field = str(files[side]) if place in _WHOLE else f"{files[side]}: {place}"
+        # What is found in a map's picture, or is not, is found in the map.
+        whole = place in _WHOLE or (place == "image" and error.reason not in _ABOUT_PICTURES)
+        field = str(files[side]) if whole else f"{files[side]}: {place}"
         raise InvalidInputError(Reason(error.reason), field, problem) from None

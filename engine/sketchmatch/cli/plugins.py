@@ -74,9 +74,9 @@ def reference(
     ] = "sketchmatch",
 ) -> None:
     """Write the reference page of a distribution's algorithms, in Markdown."""
+    from sketchmatch.app import responses
     from sketchmatch.cli import reference
     from sketchmatch.registry import discover
-    from sketchmatch.server import responses
 
     # Whatever the configuration says, the page tells what the classes say.
     print(reference.page(responses.catalogue(discover()), distribution), end="")
@@ -101,14 +101,11 @@ def _catalogue(kind: str, server: str | None, config: Path | None) -> ListAlgori
 
 
 def _everything(server: str | None, config: Path | None) -> ListAlgorithmsResponse:
+    from sketchmatch.cli.answering import answerer
+
     refuse_config(config, server)
-    if server:
-        from sketchmatch.cli import remote
-
-        return remote.algorithms(server)
-    from sketchmatch.cli import local
-
-    return local.algorithms(config)
+    with answerer(server, config) as asked:
+        return asked.algorithms()
 
 
 def _named(found: ListAlgorithmsResponse, name: str, kind: str) -> Algorithm:

@@ -20,7 +20,7 @@ from sketchmatch.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from sketchmatch.cli.relations import Comparison
+    from sketchmatch.cli.relations import Listing
     from sketchmatch.pipeline.result import Correspondence
 
 __all__ = ["relate"]
@@ -89,12 +89,12 @@ def relate(
         _print_lines(found)
 
 
-def _document(found: Comparison) -> dict[str, Any]:
+def _document(found: Listing) -> dict[str, Any]:
     """Return all that was found; each comparison as the contract's ``FmapEntry``."""
     from google.protobuf.json_format import MessageToDict
 
+    from sketchmatch.app import responses
     from sketchmatch.cli.display import chosen
-    from sketchmatch.server import responses
 
     return {
         "histogram": chosen(found.histogram),
@@ -109,7 +109,7 @@ def _document(found: Comparison) -> dict[str, Any]:
     }
 
 
-def _print_lines(found: Comparison) -> None:
+def _print_lines(found: Listing) -> None:
     names = ("a", "b", "c", "d")
     labels = [f"{name}_label" for name in names]
     print(*names, "similarity", "rotation_degrees", "dilation", *labels, sep="\t")
@@ -126,7 +126,7 @@ def _print_lines(found: Comparison) -> None:
         )
 
 
-def _show_table(found: Comparison) -> None:
+def _show_table(found: Listing) -> None:
     from rich.console import Console
     from rich.progress_bar import ProgressBar
     from rich.table import Table

@@ -1,41 +1,32 @@
-"""Describing and comparing relations in this process: what ``describe`` and ``relate`` show.
+"""What ``describe`` and ``relate`` show, asked of the engine in this process.
 
 Imported by the commands when they run: numba and OpenCV come with it.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from sketchmatch.api import Algorithm, Histogram, Segmentation, Segmenter, Similarity
+from sketchmatch.api import Histogram, Segmentation, Segmenter, Similarity
 from sketchmatch.cli import display
 from sketchmatch.cli.options import say
-from sketchmatch.config import load, open_registry
+from sketchmatch.config import load, open_engine
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
-from sketchmatch.model import FloatArray, Scene, SceneDescriptor, Source, object_pairs, pair_index
-from sketchmatch.model.limits import limited_to
-from sketchmatch.pipeline.describe import describe
-from sketchmatch.pipeline.limits import check_comparisons, check_histograms
-from sketchmatch.pipeline.plugins import blaming, segmented
-from sketchmatch.pipeline.reading import half_turned
-from sketchmatch.pipeline.relate import relate
+from sketchmatch.model import FloatArray, Scene, Source, object_pairs
 from sketchmatch.pipeline.result import Correspondence
-from sketchmatch.pipeline.selection import Choice, resolve, resolve_segmenter
+from sketchmatch.pipeline.selection import SIDES, Choice
 from sketchmatch.pipeline.warmup import announcing_compilation
 from sketchmatch.pipeline.words import DirectionalRelation, directional_relations
-from sketchmatch.registry import Registry
 
-__all__ = ["Comparison", "Description", "compared", "described"]
+__all__ = ["Description", "Listing", "compared", "described"]
 
 Pairs = Sequence[tuple[int, int]]
-_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True)
@@ -44,8 +35,8 @@ class Description:
 
     Attributes
     ----------
-    scene
-        The objects.
+    scene, source
+        The objects, and what they were found in.
     segmenter, histogram
         What found and described them.
     pairs
@@ -59,6 +50,7 @@ class Description:
     """
 
     scene: Scene
+    source: Source
     segmenter: Segmenter
     histogram: Histogram
     pairs: Pairs
@@ -68,8 +60,8 @@ class Description:
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """How pairs of a sketch compare with pairs of a map.
+class Listing:
+    """The most similar relations of a sketch and a map.
 
     Attributes
     ----------
@@ -106,23 +98,22 @@ def described(
     InvalidInputError
         If the file, an algorithm, a parameter or a pair cannot be used.
     """
-    configuration = load(config)
-    registry, defaults = open_registry(configuration), configuration.defaults
+    engine = open_engine(load(config))
     chosen = _choices(("segmenter", "histogram"), names, params)
-    with limited_to(configuration.limits), announcing_compilation(say):
+    with engine.limited(), announcing_compilation(say):
         source = read_source(file)
-        segmenter = resolve_segmenter(registry, chosen["segmenter"], source, defaults, profile)
-        selection = {"histogram": chosen["histogram"]}
-        histogram = resolve(registry, selection, defaults=defaults, profile=profile).histogram
-        scene = _found(registry, source, segmenter, "scene", "").scene
+        segmenter = engine.resolve_segmenter(chosen.pop("segmenter"), source, profile)
+        histogram = engine.resolve(chosen, profile=profile).histogram
+        scene = _told(engine.segment(source, segmenter, f"scene.{source.field}"))
         _check_pairs(pairs, scene, "--pair", "scene")
-        check_histograms("scene", scene, histogram)
-        descriptor = _described(registry, scene, histogram, "", "describing relations")
-    pairs = pairs or _all_pairs(scene)
-    rows = _rows(descriptor, pairs)
+        work = engine.describe(scene, histogram)
+        descriptor = display.follow(work, "describing relations")
+    pairs = pairs or [(a, b) for a, b in object_pairs(len(scene)).tolist()]
+    rows = np.stack([descriptor.histogram(a, b) for a, b in pairs])
     turns = np.exp(2j * np.pi * np.arange(rows.shape[1]) / rows.shape[1])
     return Description(
         scene,
+        source,
         segmenter,
         histogram,
         pairs,
@@ -142,55 +133,38 @@ def compared(
     limit: int,
     profile: str = "",
     config: Path | None = None,
-) -> Comparison:
+) -> Listing:
     """Compare pairs of a sketch with pairs of a map, all pairs a < b where none are chosen.
-
-    They are compared as in a match: the scene with fewer objects is the template.
 
     Raises
     ------
     InvalidInputError
         If a file, an algorithm, a parameter or a pair cannot be used.
     """
-    configuration = load(config)
-    registry = open_registry(configuration)
-    stages = ("sketch_segmenter", "map_segmenter", "histogram", "similarity")
-    chosen = _choices(stages, names, params)
-    with limited_to(configuration.limits), announcing_compilation(say):
+    engine = open_engine(load(config))
+    with engine.limited(), announcing_compilation(say):
         sources = (read_source(sketch), read_source(map_))
-        pipeline = resolve(registry, chosen, *sources, configuration.defaults, profile)
-        assert pipeline.sketch_segmenter is not None
-        assert pipeline.map_segmenter is not None
-        histogram, similarity = pipeline.histogram, pipeline.similarity
-        drawn = _found(registry, sources[0], pipeline.sketch_segmenter, "sketch", "sketch").scene
-        mapped = _found(registry, sources[1], pipeline.map_segmenter, "map", "map").scene
+        pipeline = engine.resolve(_choices((*names,), names, params), *sources, profile)
+        drawn, mapped = (
+            _told(engine.segment_side(side, source, pipeline), side)
+            for side, source in zip(SIDES, sources, strict=True)
+        )
         _check_pairs(sketch_pairs, drawn, "--sketch-pair", "sketch")
         _check_pairs(map_pairs, mapped, "--map-pair", "map")
-        for side, scene in (("sketch", drawn), ("map", mapped)):
-            check_histograms(side, scene, histogram)
-        check_comparisons(drawn, mapped)
-        first = _described(registry, drawn, histogram, "sketch", "describing the sketch")
-        second = _described(registry, mapped, histogram, "map", "describing the map")
-        exchanged = len(drawn) > len(mapped)
-        template, argument = (second, first) if exchanged else (first, second)
-        work = relate(template, argument, similarity)
-        table = _watched(registry, similarity, work, "comparing relations")
-    values = [table.similarity, table.rotation, table.dilation]
-    if exchanged:
-        values = [table.similarity.T, -table.rotation.T, 1.0 / table.dilation.T]
-    sketch_pairs, map_pairs = sketch_pairs or _all_pairs(drawn), map_pairs or _all_pairs(mapped)
-    cells = np.ix_(_indices(sketch_pairs, len(drawn)), _indices(map_pairs, len(mapped)))
-    sigma, rotation, dilation = (value[cells] for value in values)
-    best = np.argsort(-sigma, axis=None, kind="stable")[:limit]
-    entries = []
-    for i, j in zip(*np.unravel_index(best, sigma.shape), strict=True):
-        (a, b), (c, d) = sketch_pairs[i], map_pairs[j]
-        dual = (a > b) != (c > d)
-        turn = half_turned(float(rotation[i, j]) + (math.pi if dual else 0.0))
-        entries.append(
-            Correspondence((a, b), (c, d), float(sigma[i, j]), turn, float(dilation[i, j]))
-        )
-    return Comparison(drawn, mapped, histogram, similarity, tuple(entries), sigma.size)
+        work = engine.compare((drawn, mapped), pipeline.histogram, pipeline.similarity)
+        found = display.follow(work, "describing and comparing relations")
+    counts = [
+        len(pairs) or len(object_pairs(len(scene)))
+        for pairs, scene in ((sketch_pairs, drawn), (map_pairs, mapped))
+    ]
+    return Listing(
+        drawn,
+        mapped,
+        pipeline.histogram,
+        pipeline.similarity,
+        found.most_similar(sketch_pairs, map_pairs, limit),
+        counts[0] * counts[1],
+    )
 
 
 def _choices(
@@ -199,30 +173,10 @@ def _choices(
     return {stage: Choice(names.get(stage, ""), params.get(stage, {})) for stage in stages}
 
 
-def _found(
-    registry: Registry, source: Source, segmenter: Segmenter, field: str, side: str
-) -> Segmentation:
-    """Find the objects of a source and tell what was left out."""
-    found = segmented(source, segmenter, registry, f"{field}.{source.field}")
+def _told(found: Segmentation, side: str = "") -> Scene:
+    """Return the objects that were found, and tell what was left out."""
     display.say_warnings(side, found.warnings)
-    return found
-
-
-def _described(
-    registry: Registry, scene: Scene, histogram: Histogram, side: str, what: str
-) -> SceneDescriptor:
-    try:
-        return _watched(registry, histogram, describe(scene, histogram), what)
-    except InvalidInputError as error:
-        raise error.within(side) from None
-
-
-def _watched(
-    registry: Registry, algorithm: Algorithm, work: Generator[float, None, _Value], what: str
-) -> _Value:
-    """Run an algorithm's stage to its end, showing how far it is."""
-    with blaming(algorithm, registry):
-        return display.follow(work, what)
+    return found.scene
 
 
 def _check_pairs(pairs: Pairs, scene: Scene, option: str, what: str) -> None:
@@ -235,19 +189,3 @@ def _check_pairs(pairs: Pairs, scene: Scene, option: str, what: str) -> None:
                     f"'{pair[0] + 1},{pair[1] + 1}' names object {index + 1}; "
                     f"the {what} has objects 1 … {len(scene)}, as `sketchmatch segment` shows them",
                 )
-
-
-def _all_pairs(scene: Scene) -> Pairs:
-    return [(a, b) for a, b in object_pairs(len(scene)).tolist()]
-
-
-def _rows(descriptor: SceneDescriptor, pairs: Pairs) -> FloatArray:
-    """Return the histograms of pairs in either order, shape (m, n)."""
-    rows = descriptor.histograms[_indices(pairs, descriptor.objects)]
-    duals = np.array([a > b for a, b in pairs])
-    rows[duals] = np.roll(rows[duals], descriptor.directions // 2, axis=1)
-    return rows
-
-
-def _indices(pairs: Pairs, objects: int) -> list[int]:
-    return [pair_index(min(pair), max(pair), objects) for pair in pairs]

@@ -18,7 +18,6 @@ from sketchmatch.cli.options import (
     parse_settings,
     refuse_config,
 )
-from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 
 __all__ = ["segment"]
 
@@ -45,6 +44,8 @@ def segment(
     from 1, as the overlay does; in a pipe the lines count from 0, as the API does.
     """
     from sketchmatch.cli import display, pictures, places
+    from sketchmatch.cli.answering import answerer
+    from sketchmatch.cli.sources import source_of
     from sketchmatch.io import scene_files
 
     refuse_config(config, server)
@@ -52,31 +53,15 @@ def segment(
         pictures.check_path(overlay)
     if out is not None:
         scene_files.check_scene_path(out, "--out")
-    with places.places_in(source=file):
-        found = _segmented(server, config, file, segmenter, settings, profile)
+    parameters = parse_settings(settings, ("segmenter",)).get("segmenter", {})
+    with places.places_in(source=file), answerer(server, config) as asked:
+        source = source_of(file)
+        found = asked.segment(source, segmenter=segmenter, params=parameters, profile=profile)
     if json:
         typer.echo(MessageToJson(found, **display.JSON_STYLE))
     else:
         display.show_scene(found)
     if overlay is not None:
-        pictures.draw_segmentation(found, file, overlay)
+        pictures.draw_segmentation(found, file, overlay, pen=source.HasField("stroke_set"))
     if out is not None:
         scene_files.save_scene(out, pictures.scene_of(found.scene), "--out")
-
-
-def _segmented(
-    server: str | None,
-    config: Path | None,
-    file: Path,
-    segmenter: str,
-    settings: list[str] | None,
-    profile: str,
-) -> SegmentResponse:
-    parameters = parse_settings(settings, ("segmenter",)).get("segmenter", {})
-    if server:
-        from sketchmatch.cli import remote
-
-        return remote.segmented(server, file, segmenter, parameters, profile)
-    from sketchmatch.cli import local
-
-    return local.segmented(file, segmenter, parameters, profile, config)

@@ -9,8 +9,8 @@ import typer
 from sketchmatch.cli.options import Config, say
 
 if TYPE_CHECKING:
+    from sketchmatch.app.setup import Setup
     from sketchmatch.config import Configuration
-    from sketchmatch.server.setup import Setup
 
 __all__ = ["serve"]
 
@@ -104,10 +104,10 @@ def serve(
 
 def _setup(configuration: Configuration) -> Setup:
     """Return what requests are answered with; plugins are looked for anew."""
+    from sketchmatch.app.setup import Isolation, RequestLimits, Setup
     from sketchmatch.config import refuse_faults
+    from sketchmatch.pipeline.engine import Engine
     from sketchmatch.registry import discover
-    from sketchmatch.server.limits import Limits
-    from sketchmatch.server.setup import Isolation, Setup
 
     registry = discover(rules=configuration.rules)
     if configuration.strict:
@@ -115,13 +115,11 @@ def _setup(configuration: Configuration) -> Setup:
     refuse_faults(configuration, registry)
     server = configuration.settings.server
     return Setup(
-        registry=registry,
-        defaults=configuration.defaults,
-        limits=Limits(
+        Engine(registry, configuration.defaults, configuration.limits),
+        RequestLimits(
             max_request_bytes=server.max_request_mib * _MIB,
-            max_concurrent_matches=server.max_matches or Limits.max_concurrent_matches,
+            max_concurrent_matches=server.max_matches or RequestLimits.max_concurrent_matches,
             max_time_budget=server.max_time_budget_seconds,
-            sources=configuration.limits,
         ),
-        isolation=Isolation(configuration.trusted, configuration.patience),
+        Isolation(configuration.trusted, configuration.patience),
     )

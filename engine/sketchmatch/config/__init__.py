@@ -10,6 +10,7 @@ from sketchmatch.config.configuration import (
     builtin,
     check,
     load,
+    open_engine,
     open_registry,
     refuse_faults,
 )
@@ -24,6 +25,7 @@ __all__ = [
     "check",
     "entries",
     "load",
+    "open_engine",
     "open_registry",
     "refuse_faults",
     "shown_file",

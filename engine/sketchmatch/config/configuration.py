@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
@@ -29,7 +29,6 @@ from sketchmatch.config.settings import Settings, keys_of, static_paths
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.pipeline.selection import (
-    DEFAULTS,
     STAGES,
     Choice,
     Defaults,
@@ -41,9 +40,20 @@ from sketchmatch.pipeline.selection import (
     set_up,
 )
 from sketchmatch.registry import Kind, PluginRules, Registry, default_registry
-from sketchmatch.registry.plugins import canonical
+from sketchmatch.registry.distributions import canonical
 
-__all__ = ["Configuration", "builtin", "check", "load", "open_registry", "refuse_faults"]
+if TYPE_CHECKING:
+    from sketchmatch.pipeline.engine import Engine
+
+__all__ = [
+    "Configuration",
+    "builtin",
+    "check",
+    "load",
+    "open_engine",
+    "open_registry",
+    "refuse_faults",
+]
 
 _NO_FLAGS: Mapping[str, Any] = MappingProxyType({})
 
@@ -172,6 +182,20 @@ def open_registry(configuration: Configuration) -> Registry:
     registry = default_registry(configuration.rules)
     refuse_faults(configuration, registry)
     return registry
+
+
+def open_engine(configuration: Configuration) -> Engine:
+    """Return the engine as a configuration sets it up.
+
+    Raises
+    ------
+    InvalidInputError
+        As :func:`open_registry` does.
+    """
+    from sketchmatch.pipeline.engine import Engine  # numba comes with it
+
+    registry = open_registry(configuration)
+    return Engine(registry, configuration.defaults, configuration.limits)
 
 
 def refuse_faults(configuration: Configuration, registry: Registry) -> None:
@@ -336,7 +360,8 @@ def _faults_in_force(configuration: Configuration, registry: Registry) -> Iterat
 
 def _stage_faults(configuration: Configuration, registry: Registry) -> Iterator[_Fault]:
     for stage, choice in configuration.defaults.pipeline.items():
-        whole = Choice(choice.name or DEFAULTS[kind_of(stage)][0], choice.parameters)
+        name = choice.name or registry.default(kind_of(stage))
+        whole = Choice(name, choice.parameters)
         for error in _set_up_faults(registry, stage, whole):
             yield ("pipeline", *error.field.split(".")), error
 

@@ -15,7 +15,8 @@ from typing import Any
 
 from sketchmatch.config.settings import annotation_of, static_paths
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.pipeline.selection import DEFAULTS
+from sketchmatch.pipeline.selection import kind_of
+from sketchmatch.registry import Kind, PluginRules, default_registry
 
 __all__ = [
     "Layer",
@@ -36,7 +37,7 @@ _PREFIX = "SKETCHMATCH_"
 _NAMING_FILE = "SKETCHMATCH_CONFIG"
 _NO_SETTINGS = (_NAMING_FILE, "SKETCHMATCH_DEBUG")
 _SECTION = "__"
-_BUILT_IN = {str(kind): names[0] for kind, names in DEFAULTS.items() if len(names) == 1}
+_OWN_ALONE = PluginRules.of(allow=())
 _BUILTIN = Path(__file__).with_name("builtin.toml")
 
 
@@ -170,12 +171,11 @@ def without_overruled(layers: Sequence[Layer]) -> list[dict[str, Any]]:
     """
     fit = [_copied(layer.values) for layer in layers]
     for path in {path for values in fit for path in _stages_in(values)}:
-        built_in = _BUILT_IN.get(path[-1], "")
-        name, weaker = built_in if path[0] == "pipeline" else "", list[dict[str, Any]]()
-        for values in reversed(fit):
-            table = _at(values, path)
-            if not isinstance(table, dict):
-                continue
+        tables = [table for values in reversed(fit) if isinstance(table := _at(values, path), dict)]
+        if len(tables) == 1:
+            continue
+        name, weaker = _unsaid(path), list[dict[str, Any]]()
+        for table in tables:
             if table.get("name", "") not in ("", name):
                 name = table["name"]
                 for overruled in weaker:
@@ -252,6 +252,13 @@ def _put(values: dict[str, Any], path: Sequence[str], value: Any, label: str) ->
             problem = f"is set beside {variable_of(path[: path.index(part) + 1])}; drop one of them"
             raise InvalidInputError(Reason.INVALID_PARAMETER, label, problem)
     values[last] = value
+
+
+def _unsaid(path: tuple[str, ...]) -> str:
+    """Return which algorithm does a stage where no layer names one; empty where that depends."""
+    if path[0] != "pipeline" or kind_of(path[-1]) is Kind.SEGMENTER:
+        return ""
+    return default_registry(_OWN_ALONE).default(kind_of(path[-1]))
 
 
 def _stages_in(values: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:

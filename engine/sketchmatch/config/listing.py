@@ -12,7 +12,7 @@ from typing import Any
 from sketchmatch.config.configuration import Configuration, builtin
 from sketchmatch.config.layers import Origin
 from sketchmatch.config.settings import Settings
-from sketchmatch.pipeline.selection import DEFAULTS, STAGES, kind_of
+from sketchmatch.pipeline.selection import STAGES, kind_of
 from sketchmatch.registry import Kind, Registry
 
 __all__ = ["Entry", "entries", "shown_file", "template"]
@@ -66,7 +66,7 @@ def entries(configuration: Configuration, registry: Registry) -> list[Entry]:
         The algorithms, whose parameters are settings too.
     """
     found = (
-        *_sections(configuration),
+        *_sections(configuration, registry),
         *_algorithms(configuration, registry),
         *_profiles(configuration),
     )
@@ -106,7 +106,7 @@ def shown_file(configuration: Configuration, registry: Registry) -> str:
 _Found = Iterator[tuple[tuple[str, ...], Any, str]]
 
 
-def _sections(configuration: Configuration) -> _Found:
+def _sections(configuration: Configuration, registry: Registry) -> _Found:
     """Yield the settings that every configuration has."""
     settings = configuration.settings
     profile = Settings.model_fields["profile"].description or ""
@@ -114,7 +114,7 @@ def _sections(configuration: Configuration) -> _Found:
     for stage in STAGES:
         choice = getattr(settings.pipeline, stage)
         kind = kind_of(stage)
-        default = None if kind is Kind.SEGMENTER else DEFAULTS[kind][0]
+        default = None if kind is Kind.SEGMENTER else registry.default(kind)
         text = f"Name of the {kind}"
         text += "; left out, that for the form of the source." if default is None else "."
         yield ("pipeline", stage, "name"), choice.name or default, text

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Self, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, create_model
 from pydantic_settings import (
     BaseSettings,
     InitSettingsSource,
@@ -15,6 +15,7 @@ from pydantic_settings import (
 
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
+from sketchmatch.pipeline.selection import STAGES
 
 __all__ = ["Settings", "annotation_of", "keys_of", "static_paths"]
 
@@ -55,12 +56,8 @@ class _Stage(_Section):
     parameters: _Parameters = Field({}, description="Values of some of its parameters.")
 
 
-class _Stages(_Section):
-    sketch_segmenter: _Stage = _Stage()
-    map_segmenter: _Stage = _Stage()
-    histogram: _Stage = _Stage()
-    similarity: _Stage = _Stage()
-    searcher: _Stage = _Stage()
+_EACH_STAGE: dict[str, Any] = {stage: (_Stage, _Stage()) for stage in STAGES}
+_Stages: Any = create_model("_Stages", __base__=_Section, **_EACH_STAGE)
 
 
 class _Pipeline(_Stages):

@@ -1,4 +1,4 @@
-"""Files: what people and robots have on disk, in, and pictures of results, out."""
+"""Files: what people and robots have on disk, in, and scenes and histograms, out."""
 
 from sketchmatch.io.files import read_source
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io.geojson import decode_geojson
@@ -14,7 +16,10 @@ from sketchmatch.io.stroke_json import decode_strokes
 from sketchmatch.model import Source
 from sketchmatch.model.limits import check_bytes, check_source, source_limits
 
-__all__ = ["read_source"]
+if TYPE_CHECKING:
+    from sketchmatch.io.ros_map import MapServerHeader
+
+__all__ = ["MAP_SUFFIXES", "PICTURE_SUFFIXES", "read_bytes", "read_map_server", "read_source"]
 
 _LONGEST_NAME = 500
 
@@ -41,16 +46,34 @@ def read_source(path: str | Path) -> Source:
         too large, or its contents cannot be used.
     """
     path = Path(path)
-    try:
+    with _placed_in(path):
         source = _decoded(path)
         check_source(source)
         return source
-    except InvalidInputError as error:
-        if error.field.startswith(str(path)):
-            raise
-        # A picture is all data: there is no place in it to name.
-        place = f"{path}: {error.field}" if error.field not in ("", "data") else str(path)
-        raise InvalidInputError(error.reason, place, error.problem) from None
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read a plain file as it is.
+
+    Raises
+    ------
+    InvalidInputError
+        In one sentence that begins with the path, if it is missing or too large.
+    """
+    return _read(path, str(path))
+
+
+def read_map_server(path: Path) -> tuple[str, bytes]:
+    """Read the two files of a robot's map as they are: the text of its YAML, and its picture.
+
+    Raises
+    ------
+    InvalidInputError
+        As :func:`read_source` does, but for what is wrong with the picture.
+    """
+    with _placed_in(path):
+        text = _text(_read(path, str(path)))
+        return text, _parsed(path, text)[1]
 
 
 def _decoded(path: Path) -> Source:
@@ -62,6 +85,19 @@ def _decoded(path: Path) -> Source:
         kinds = " ".join(sorted((*_DECODERS, *SUFFIXES)))
         raise _invalid(str(path), f"is of no known kind; give a file that ends in one of {kinds}")
     return decode(path, _read(path, str(path)))
+
+
+@contextmanager
+def _placed_in(path: Path) -> Iterator[None]:
+    """Let what is said of a file's contents begin with the file's path."""
+    try:
+        yield
+    except InvalidInputError as error:
+        if error.field.startswith(str(path)):
+            raise
+        # A picture is all data: there is no place in it to name.
+        place = f"{path}: {error.field}" if error.field not in ("", "data") else str(path)
+        raise InvalidInputError(error.reason, place, error.problem) from None
 
 
 def _read(path: Path, field: str) -> bytes:
@@ -98,13 +134,19 @@ def _text(data: bytes) -> str:
 
 
 def _map_server(path: Path, data: bytes) -> Source:
+    header, picture = _parsed(path, _text(data))
+    return header.grid(picture)
+
+
+def _parsed(path: Path, text: str) -> tuple[MapServerHeader, bytes]:
+    """Return what a map's YAML says, and the bytes of its picture."""
     from sketchmatch.io.ros_map import parse_header
 
-    header = parse_header(_text(data))
+    header = parse_header(text)
     picture = path.parent / header.image
     name = str(picture)
     shown = name if name.isprintable() and len(name) <= _LONGEST_NAME else quoted(header.image)
-    return header.grid(_read(picture, f"{path}: image {shown}"))
+    return header, _read(picture, f"{path}: image {shown}")
 
 
 def _picture(_: Path, data: bytes) -> Source:
@@ -131,13 +173,17 @@ def _invalid(field: str, problem: str) -> InvalidInputError:
     return InvalidInputError(Reason.INVALID_FILE, field, problem)
 
 
+MAP_SUFFIXES = (".yaml", ".yml")
+"""Of a robot's map that map_server saved."""
+PICTURE_SUFFIXES = (
+    *(".bmp", ".jpeg", ".jpg", ".pbm", ".pgm"),
+    *(".png", ".pnm", ".ppm", ".tif", ".tiff"),
+)
+"""Of pictures."""
 _DECODERS: dict[str, Callable[[Path, bytes], Source]] = {
     ".svg": _svg,
     ".json": _strokes,
     ".geojson": _polygons,
-    **dict.fromkeys((".yaml", ".yml"), _map_server),
-    **dict.fromkeys(
-        (".bmp", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff"),
-        _picture,
-    ),
+    **dict.fromkeys(MAP_SUFFIXES, _map_server),
+    **dict.fromkeys(PICTURE_SUFFIXES, _picture),
 }

@@ -91,11 +91,18 @@ class SceneDescriptor:
         N, the number of objects.
     exponent
         r of the forces.
+    described_by
+        The identity of the algorithm that made them, with its parameters; empty where they were
+        made by hand.
+    scene
+        The identity of the scene; empty where there is none.
     """
 
     histograms: FloatArray
     objects: int
     exponent: float
+    described_by: str = ""
+    scene: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "histograms", frozen_floats(self.histograms))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from os import PathLike, fspath
+from hashlib import sha256
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -185,19 +185,6 @@ class Scene:
                 raise error.within(f"polygons[{k}]") from None
         return cls(tuple(objects))
 
-    @classmethod
-    def from_file(cls, path: str | PathLike[str]) -> Self:
-        """Read a scene from a file: SVG, stroke JSON, GeoJSON, ROS map YAML or bag, image.
-
-        Raises
-        ------
-        InvalidInputError
-            If the file cannot be read or holds fewer than two objects.
-        """
-        from sketchmatch.public import read_scene  # the one way up: the model stays light
-
-        return cls(read_scene(fspath(path)).objects)
-
     def __len__(self) -> int:
         return len(self.objects)
 
@@ -211,6 +198,27 @@ class Scene:
             sealed(np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])),
             sealed(np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)),
         )
+
+    @cached_property
+    def identity(self) -> str:
+        """A hash of the outlines, in hexadecimal: the same for scenes that match alike.
+
+        Labels, which never influence a match, are no part of it.
+
+        Examples
+        --------
+        >>> square, far = [[0, 0], [1, 0], [1, 1]], [[5, 5], [6, 5], [6, 6]]
+        >>> named = Scene.from_polygons([square, far], labels=["desk", "plant"])
+        >>> named.identity == Scene.from_polygons([square, far]).identity
+        True
+        """
+        content = sha256()
+        for item in self.objects:
+            content.update(b"object")
+            for ring in item.rings:
+                content.update(len(ring).to_bytes(8, "little"))
+                content.update(np.ascontiguousarray(ring, dtype="<f8").tobytes())
+        return content.hexdigest()
 
     @property
     def labels(self) -> tuple[str, ...]:

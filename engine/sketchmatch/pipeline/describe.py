@@ -8,12 +8,35 @@ from collections.abc import Generator
 import numpy as np
 
 from sketchmatch.api import Histogram
-from sketchmatch.model import FloatArray, Scene, SceneDescriptor, object_pairs
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.model import FloatArray, Scene, SceneDescriptor, object_pairs, pair_count
 from sketchmatch.model.arrays import sealed
-from sketchmatch.pipeline.plugins import checked_array
+from sketchmatch.pipeline.guard import blamed, checked_array, inspecting
 from sketchmatch.pipeline.slices import in_slices
+from sketchmatch.registry import Registry
 
-__all__ = ["describe"]
+__all__ = ["check_histograms", "describe", "described"]
+
+# What 400 MB hold: the histograms of 700 objects in 180 directions.
+_MAX_HISTOGRAM_VALUES = 50_000_000
+
+
+def check_histograms(field: str, scene: Scene, histogram: Histogram) -> None:
+    """Refuse a scene whose histograms would not fit into memory.
+
+    Raises
+    ------
+    InvalidInputError
+        With ``field`` as its path.
+    """
+    values = pair_count(len(scene)) * histogram.params.directions
+    if values > _MAX_HISTOGRAM_VALUES:
+        raise InvalidInputError(
+            Reason.LIMIT_EXCEEDED,
+            field,
+            f"has {len(scene)} objects, whose relations take {values} numbers, more than the "
+            f"limit of {_MAX_HISTOGRAM_VALUES}; leave out small objects",
+        )
 
 
 def describe(scene: Scene, histogram: Histogram) -> Generator[float, None, SceneDescriptor]:
@@ -49,7 +72,33 @@ def describe(scene: Scene, histogram: Histogram) -> Generator[float, None, Scene
             force = a.area * b.area * distance ** (-1.0 - histogram.exponent)
             angle = float(np.arctan2(offset[1], offset[0]))
             histograms[index] = _point_histogram(angle, force, histograms.shape[1])
-    return SceneDescriptor(sealed(histograms), len(scene), histogram.exponent)
+    return SceneDescriptor(
+        sealed(histograms), len(scene), histogram.exponent, histogram.identity, scene.identity
+    )
+
+
+def described(
+    scene: Scene, histogram: Histogram, registry: Registry, side: str
+) -> Generator[float, None, SceneDescriptor]:
+    """Describe every pair of a scene by an algorithm that is not trusted.
+
+    Yields
+    ------
+    float
+        The share that is done.
+
+    Raises
+    ------
+    InvalidInputError
+        With a path that begins with ``side``, if the scene cannot be described so.
+    PluginError
+        If the histogram breaks its contract.
+    """
+    try:
+        with inspecting(histogram, registry, scene):
+            return (yield from blamed(describe(scene, histogram), histogram, registry))
+    except InvalidInputError as error:
+        raise error.within(side) from None
 
 
 def _point_histogram(angle: float, force: float, directions: int) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from sketchmatch.model import BoolArray, FloatArray
 from sketchmatch.pipeline.calibration import Calibration
-from sketchmatch.pipeline.unmatched import Found, Rival, net_confidence
+from sketchmatch.pipeline.unmatched import PartSearch, Rival, net_confidence
 
 __all__ = ["UNKNOWN", "Likelihood", "likelihood"]
 
@@ -34,7 +34,7 @@ UNKNOWN = Likelihood()
 
 
 def likelihood(
-    found: Found,
+    found: PartSearch,
     exchanges: FloatArray,
     omissions: FloatArray | None,
     rivals: Iterable[Rival],
@@ -87,7 +87,7 @@ def likelihood(
     return Likelihood(float(1.0 / total), np.asarray(1.0 - against / total))
 
 
-def _is_news(rival: Rival, found: Found) -> bool:
+def _is_news(rival: Rival, found: PartSearch) -> bool:
     """Whether a map is neither an exchange nor an omission away from the best."""
     agree = _agreement(rival, found)
     differing = np.flatnonzero(~agree)
@@ -102,7 +102,7 @@ def _is_news(rival: Rival, found: Found) -> bool:
     return not (ours[g] == theirs[h] and ours[h] == theirs[g])
 
 
-def _agreement(rival: Rival, found: Found) -> BoolArray:
+def _agreement(rival: Rival, found: PartSearch) -> BoolArray:
     """Return on which objects of the best map another one agrees, shape (k,)."""
     known = dict(zip(rival.kept.tolist(), rival.mapped.partners.tolist(), strict=True))
     ours = zip(found.part.kept.tolist(), found.mapped.partners.tolist(), strict=True)

@@ -16,7 +16,7 @@ _UNKNOWN: Mapping[int, ObjectRelation] = MappingProxyType({})
 
 def matches(
     mapped: ObjectMap,
-    exchanged: bool,
+    swapped: bool,
     kept: IntArray,
     margins: FloatArray | None = None,
     probabilities: FloatArray | None = None,
@@ -28,7 +28,7 @@ def matches(
     ----------
     mapped
         From kept objects of the template to the argument.
-    exchanged
+    swapped
         Whether the template is the map.
     kept
         Shape (k,), which template objects these are.
@@ -38,7 +38,7 @@ def matches(
         By sketched object, where known.
     """
     partners = mapped.partners.tolist()
-    pairs = ((h, g) if exchanged else (g, h) for g, h in zip(kept.tolist(), partners, strict=True))
+    pairs = ((h, g) if swapped else (g, h) for g, h in zip(kept.tolist(), partners, strict=True))
     unknown = [None] * len(partners)
     lines = zip(
         pairs,
@@ -55,7 +55,7 @@ def matches(
 
 
 def correspondences(
-    fmap: Fmap, table: RelationTable, exchanged: bool, kept: IntArray
+    fmap: Fmap, table: RelationTable, swapped: bool, kept: IntArray
 ) -> tuple[Correspondence, ...]:
     """Return the entries of a histogram map of kept objects, in the order of their pairs."""
     half = table.argument_pairs
@@ -69,11 +69,11 @@ def correspondences(
         dilation = float(table.dilation[i, column])
         entries.append(
             Correspondence(
-                sketch_pair=(c, d) if exchanged else (a, b),
-                map_pair=(a, b) if exchanged else (c, d),
+                sketch_pair=(c, d) if swapped else (a, b),
+                map_pair=(a, b) if swapped else (c, d),
                 similarity=float(table.similarity[i, column]),
-                rotation=half_turned(-rotation if exchanged else rotation),
-                dilation=1.0 / dilation if exchanged else dilation,
+                rotation=half_turned(-rotation if swapped else rotation),
+                dilation=1.0 / dilation if swapped else dilation,
             )
         )
     return tuple(entries)

@@ -25,7 +25,7 @@ from sketchmatch.kernels.alignment import (
 )
 from sketchmatch.model import FloatArray, IntArray, RelationTable, SceneDescriptor
 from sketchmatch.model.arrays import sealed
-from sketchmatch.pipeline.plugins import checked_array
+from sketchmatch.pipeline.guard import checked_array
 from sketchmatch.pipeline.slices import in_slices
 
 ComplexArray = np.ndarray[Any, np.dtype[np.complex128]]
@@ -84,9 +84,11 @@ def relate(
     Raises
     ------
     InvalidInputError
-        If no dilation follows from forces of this exponent.
+        If no dilation follows from forces of this exponent, or the two are described by different
+        histograms.
     """
     check_exponent(template.exponent)
+    _check_alike(template, argument)
     rows = Histograms.of(template.histograms)
     shape = (len(rows), len(argument.histograms))
     sigma, rotation, dilation = (np.empty(shape) for _ in range(3))
@@ -100,6 +102,25 @@ def relate(
     return RelationTable(
         sealed(sigma), sealed(rotation), sealed(dilation), template.objects, argument.objects
     )
+
+
+def _check_alike(template: SceneDescriptor, argument: SceneDescriptor) -> None:
+    """Refuse histograms of two kinds: what came of them would mean nothing."""
+    kinds = [
+        (
+            each.described_by or f"histograms of forces of exponent {each.exponent:g}",
+            each.directions,
+        )
+        for each in (template, argument)
+    ]
+    if kinds[0] != kinds[1]:
+        (ours, our_directions), (theirs, their_directions) = kinds
+        raise InvalidInputError(
+            Reason.INVALID_PARAMETER,
+            "argument",
+            f"is described by {theirs} in {their_directions} directions and the template by "
+            f"{ours} in {our_directions}; describe both by the same histogram",
+        )
 
 
 def _fill(

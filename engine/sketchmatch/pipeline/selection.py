@@ -9,8 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from dataclasses import dataclass, field, fields
 from typing import Any, cast
 
 from pydantic import ValidationError
@@ -25,11 +24,11 @@ from sketchmatch.model import (
     Source,
     StrokeSet,
 )
-from sketchmatch.pipeline.plugins import blaming
+from sketchmatch.pipeline.guard import blaming
 from sketchmatch.registry import Kind, Registered, Registry
 
 __all__ = [
-    "DEFAULTS",
+    "SIDES",
     "STAGES",
     "UNCONFIGURED",
     "Choice",
@@ -49,33 +48,21 @@ __all__ = [
     "stage_of",
 ]
 
-STAGES = ("sketch_segmenter", "map_segmenter", "histogram", "similarity", "searcher")
-"""The stages of a match, by the names that requests, options and errors use."""
+SIDES = ("sketch", "map")
+"""The two sources of a match, by the names that requests and errors use."""
 
 _LONGEST_NAME = 60
-_DEFAULT_SEGMENTERS: dict[type[Any], str] = {
-    StrokeSet: "strokes",
-    PolygonSet: "polygons",
-    OccupancyGrid: "occupancy-grid",
-    Image: "image",
-}
-DEFAULTS: Mapping[Kind, tuple[str, ...]] = MappingProxyType(
-    {
-        Kind.SEGMENTER: tuple(_DEFAULT_SEGMENTERS.values()),
-        Kind.HISTOGRAM: ("constant",),
-        Kind.SIMILARITY: ("cross-correlation",),
-        Kind.SEARCHER: ("auto",),
-    }
-)
-"""What is used where nobody chooses anything: a segmenter for each type of source."""
 
 # A source alone, without a match, is taken for what such a source mostly is.
-_SIDES: dict[type[Any], str] = {
+_MOSTLY: dict[type[Any], str] = {
     StrokeSet: "sketch_segmenter",
     PolygonSet: "map_segmenter",
     OccupancyGrid: "map_segmenter",
     Image: "sketch_segmenter",
 }
+
+
+_SOURCES = tuple(_MOSTLY)
 
 
 @dataclass(frozen=True)
@@ -174,15 +161,23 @@ class Pipeline:
     searcher: Searcher
     profile: str = ""
 
+    def segmenter(self, side: str) -> Segmenter | None:
+        """Return the segmenter of the sketch or of the map."""
+        return {"sketch": self.sketch_segmenter, "map": self.map_segmenter}[side]
+
     def stages(self) -> dict[str, Algorithm]:
         """Return the algorithm of each stage that there is."""
         chosen = {stage: getattr(self, stage) for stage in STAGES}
         return {stage: algorithm for stage, algorithm in chosen.items() if algorithm is not None}
 
 
-def stage_of(source: Source) -> str:
-    """Return the stage that a source is mostly segmented in, for one that is not to be matched."""
-    return _SIDES[type(source)]
+STAGES = tuple(each.name for each in fields(Pipeline) if each.name != "profile")
+"""The stages of a match, by the names that requests, options and errors use."""
+
+
+def stage_of(source: type[Source]) -> str:
+    """Return the stage that sources of a type are mostly segmented in, where nothing is matched."""
+    return _MOSTLY[source]
 
 
 def kind_of(stage: str) -> Kind:
@@ -275,13 +270,13 @@ def resolve_segmenter(
     """
     levels = _Levels(registry, defaults, profile)
     levels.check_profile()
-    return levels.segmenter(stage_of(source), choice, source, "segmenter")
+    return levels.segmenter(stage_of(type(source)), choice, source, "segmenter")
 
 
 def chosen_algorithms(
     registry: Registry,
     selection: Selection,
-    sources: Mapping[str, Source],
+    sources: Mapping[str, type[Source]],
     defaults: Defaults = UNCONFIGURED,
     profile: str = "",
 ) -> tuple[Registered, ...]:
@@ -292,7 +287,7 @@ def chosen_algorithms(
     registry, selection, defaults, profile
         As in :func:`resolve`.
     sources
-        What will be segmented, by the stage that does it.
+        Of which type is what will be segmented, by the stage that does it.
 
     Raises
     ------
@@ -343,7 +338,7 @@ def default_names(registry: Registry, defaults: Defaults) -> Mapping[Kind, tuple
         Kind.SEGMENTER: tuple(
             dict.fromkeys(
                 levels.folded(stage, Choice(), source).name
-                for source in _DEFAULT_SEGMENTERS
+                for source in _SOURCES
                 for stage in ("sketch_segmenter", "map_segmenter")
             )
         ),
@@ -365,7 +360,7 @@ def default_parameters(
     if not issubclass(item.algorithm, Segmenter):
         return levels.folded(item.kind, named).parameters
     source = item.algorithm.sources[0]
-    return levels.folded(_SIDES[source], named, source).parameters
+    return levels.folded(_MOSTLY[source], named, source).parameters
 
 
 def fault_of(given: Any, message: str) -> str:
@@ -403,7 +398,7 @@ class _Levels:
         for stage, choice in self.below[-1].items():
             kind = kind_of(stage)
             levels = [level.get(stage, Choice()) for level in self.below]
-            name = "" if kind is Kind.SEGMENTER else DEFAULTS[kind][0]
+            name = "" if kind is Kind.SEGMENTER else self.registry.default(kind)
             chosen = _folded(name, levels, self.parameters.get(kind, {}))
             if chosen.name and (choice.name or choice.parameters):
                 try:
@@ -414,15 +409,17 @@ class _Levels:
     def folded(self, stage: str, choice: Choice, source: type[Any] | None = None) -> Choice:
         """Return what all levels together choose in a stage."""
         kind = kind_of(stage)
-        name = DEFAULTS[kind][0] if source is None else _DEFAULT_SEGMENTERS[source]
+        name = self.registry.default(kind, source)
         below = [level.get(stage, Choice()) for level in self.below]
         if source is not None:
             below = [level for level in below if self._reads(level, source)]
         return _folded(name, (*below, choice), self.parameters.get(kind, {}))
 
-    def registered(self, stage: str, selection: Selection, source: Source | None) -> Registered:
+    def registered(
+        self, stage: str, selection: Selection, source: type[Source] | None
+    ) -> Registered:
         """Return the algorithm that is chosen in a stage."""
-        choice = self.folded(stage, selection[stage], None if source is None else type(source))
+        choice = self.folded(stage, selection[stage], source)
         try:
             return self.registry.find(kind_of(stage), choice.name)
         except InvalidInputError as error:
@@ -439,7 +436,7 @@ class _Levels:
             fitting = ", ".join(
                 item.name
                 for item in self.registry.of_kind(Kind.SEGMENTER)
-                if issubclass(type(source), cast(type[Segmenter], item.algorithm).sources)
+                if item.reads(type(source))
             )
             raise InvalidInputError(
                 Reason.WRONG_ALGORITHM,
@@ -454,10 +451,9 @@ class _Levels:
         if not choice.name:
             return True
         try:
-            found = self.registry.find(Kind.SEGMENTER, choice.name).algorithm
+            return self.registry.find(Kind.SEGMENTER, choice.name).reads(source)
         except InvalidInputError:
             return True  # it is refused when it is set up
-        return issubclass(source, cast(type[Segmenter], found).sources)
 
     @contextmanager
     def _blaming_profile(self) -> Iterator[None]:

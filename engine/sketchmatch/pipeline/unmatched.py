@@ -30,8 +30,8 @@ from sketchmatch.pipeline.slices import in_slices
 
 __all__ = [
     "FEWEST",
-    "Found",
     "Part",
+    "PartSearch",
     "Rival",
     "Trial",
     "net_confidence",
@@ -105,7 +105,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class PartSearch:
     """What the search of a part has come to.
 
     Attributes
@@ -174,7 +174,7 @@ def net_confidence(confidence: float, left_out: int, objects: int, price: float)
     return confidence - price * left_out / objects
 
 
-def trials(objects: int, weights: Weights, price: float) -> Generator[Trial, Found, None]:
+def trials(objects: int, weights: Weights, price: float) -> Generator[Trial, PartSearch, None]:
     """Say which parts of a template to search, given what came of those before.
 
     First comes all of it. Then each object is left out in turn, or, of more than ten, the five
@@ -288,7 +288,7 @@ class _Lead:
     without: tuple[float, ...]
 
     @classmethod
-    def of(cls, found: Found, weights: Weights, price: float) -> _Lead:
+    def of(cls, found: PartSearch, weights: Weights, price: float) -> _Lead:
         without = omission_confidences(found.best.fmap, found.part.table, weights)
         return cls(
             tuple(found.part.kept.tolist()),

@@ -3,7 +3,7 @@
 from functools import cache
 
 from sketchmatch.registry.discovery import discover
-from sketchmatch.registry.plugins import (
+from sketchmatch.registry.distributions import (
     EVERY_PLUGIN,
     OWN_DISTRIBUTION,
     PluginRules,

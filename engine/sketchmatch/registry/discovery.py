@@ -15,7 +15,7 @@ import pluggy
 from sketchmatch.api import API_VERSION, Algorithm, Params, Segmenter
 from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
 from sketchmatch.registry import hookspecs
-from sketchmatch.registry.plugins import EVERY_PLUGIN, PluginRules, PluginState, PluginStatus
+from sketchmatch.registry.distributions import EVERY_PLUGIN, PluginRules, PluginState, PluginStatus
 from sketchmatch.registry.registry import Kind, Registered, Registry
 
 __all__ = ["ENTRY_POINT_GROUP", "discover"]

@@ -11,7 +11,7 @@ from typing import Any
 
 from sketchmatch.api import Algorithm, Histogram, Searcher, Segmenter, Similarity
 from sketchmatch.errors import InvalidInputError, PluginError, Reason, quoted
-from sketchmatch.registry.plugins import OWN_DISTRIBUTION, PluginState, PluginStatus
+from sketchmatch.registry.distributions import OWN_DISTRIBUTION, PluginState, PluginStatus
 
 __all__ = ["Conflict", "Kind", "Registered", "Registry"]
 
@@ -84,6 +84,10 @@ class Registered:
         _, _, after = self.description.partition("\nReferences\n----------\n")
         section = re.split(r"\n\S[^\n]*\n-{3,}\n", after)[0]
         return " ".join(section.replace(".. ", "").split())
+
+    def reads(self, source: type[Any]) -> bool:
+        """Whether it is a segmenter for sources of a type."""
+        return issubclass(self.algorithm, Segmenter) and issubclass(source, self.algorithm.sources)
 
     @property
     def schema(self) -> dict[str, Any]:
@@ -216,6 +220,22 @@ class Registry:
                 raise InvalidInputError(Reason.UNKNOWN_ALGORITHM, "name", problem)
         problem = f"is {quoted(name)}, which is no {kind}; {self._known(kind)}"
         raise InvalidInputError(Reason.UNKNOWN_ALGORITHM, "name", problem)
+
+    def default(self, kind: Kind, source: type[Any] | None = None) -> str:
+        """Return the name of what is used where nobody chooses; empty if there is nothing.
+
+        Parameters
+        ----------
+        kind
+            The kind of algorithm.
+        source
+            For a segmenter, the type of source that it shall read.
+        """
+        for item in self.of_kind(kind):
+            ours = item.distribution == OWN_DISTRIBUTION and vars(item.algorithm).get("default")
+            if ours and (source is None or item.reads(source)):
+                return item.name
+        return ""
 
     def _with_conflicts(self, status: PluginStatus) -> PluginStatus:
         """Return a status that tells which names of the plugin cannot be selected."""

@@ -14,12 +14,12 @@ from sketchmatch.errors import (
     PluginError,
     Reason,
     SketchmatchError,
+    TooBusyError,
 )
 
-__all__ = ["Refusal", "is_fault", "refusal", "too_busy"]
+__all__ = ["Refusal", "is_fault", "refusal"]
 
 _DOMAIN = "sketchmatch"
-_RETRY_SECONDS = 1
 # All of a refusal travels in trailers, for which gRPC has 8 KiB.
 _LONGEST = 500
 
@@ -35,16 +35,21 @@ class Refusal:
 
 def refusal(error: BaseException) -> Refusal:
     """Return the status for an error; one that nobody foresaw says no more than that."""
-    if isinstance(error, InvalidInputError):
-        violation = error_details_pb2.BadRequest.FieldViolation(
-            field=_cut(error.field), description=_cut(error.problem)
-        )
-        bad_request = error_details_pb2.BadRequest(field_violations=[violation])
-        return _refusal(grpc.StatusCode.INVALID_ARGUMENT, str(error), error.reason, bad_request)
-    if isinstance(error, AnswerUnavailableError):
-        return _refusal(grpc.StatusCode.DEADLINE_EXCEEDED, str(error), error.reason)
-    if isinstance(error, PluginError):
-        return _refusal(grpc.StatusCode.INTERNAL, str(error), error.reason)
+    match error:
+        case InvalidInputError():
+            violation = error_details_pb2.BadRequest.FieldViolation(
+                field=_cut(error.field), description=_cut(error.problem)
+            )
+            detail = error_details_pb2.BadRequest(field_violations=[violation])
+            return _refusal(grpc.StatusCode.INVALID_ARGUMENT, error, error.reason, detail)
+        case TooBusyError():
+            delay = duration_pb2.Duration(seconds=error.retry_seconds)
+            retry = error_details_pb2.RetryInfo(retry_delay=delay)
+            return _refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, error, error.reason, retry)
+        case AnswerUnavailableError():
+            return _refusal(grpc.StatusCode.DEADLINE_EXCEEDED, error, error.reason)
+        case PluginError():
+            return _refusal(grpc.StatusCode.INTERNAL, error, error.reason)
     return Refusal(
         grpc.StatusCode.INTERNAL,
         "the server failed in a way nobody foresaw; its log has the details, please report them",
@@ -56,24 +61,14 @@ def is_fault(error: BaseException) -> bool:
     return isinstance(error, PluginError) or not isinstance(error, SketchmatchError)
 
 
-def too_busy(running: int) -> Refusal:
-    """Return the status for a request that there is no room for now."""
-    retry = error_details_pb2.RetryInfo(retry_delay=duration_pb2.Duration(seconds=_RETRY_SECONDS))
-    return _refusal(
-        grpc.StatusCode.RESOURCE_EXHAUSTED,
-        f"the server runs {running} requests already, which is its limit; "
-        f"send the request again in {_RETRY_SECONDS} s",
-        Reason.LIMIT_EXCEEDED,
-        retry,
-    )
-
-
 def _cut(text: str) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
 
 
-def _refusal(code: grpc.StatusCode, message: str, reason: Reason, *details: object) -> Refusal:
-    message = _cut(message)
+def _refusal(
+    code: grpc.StatusCode, error: BaseException, reason: Reason, *details: object
+) -> Refusal:
+    message = _cut(str(error))
     info = error_details_pb2.ErrorInfo(reason=reason.value, domain=_DOMAIN)
     status = status_pb2.Status(code=code_pb2.Code.Value(code.name), message=message)
     for detail in (info, *details):

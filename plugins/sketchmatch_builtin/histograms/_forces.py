@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from sketchmatch.api import Histogram
 from sketchmatch.api.forces import (
@@ -19,18 +17,7 @@ from sketchmatch.api.forces import (
 )
 from sketchmatch.model import FloatArray, IntArray, Scene
 
-__all__ = ["ForceHistogram", "PowerForce", "exponent_field"]
-
-
-def exponent_field(default: float) -> Any:
-    """Return the parameter r of forces d^−r, with its bounds and text."""
-    return Field(
-        default,
-        ge=-10.0,
-        le=10.0,
-        description="The force at distance d is d^-r; objects may overlap for r < 1 and "
-        "touch for r < 2.",
-    )
+__all__ = ["ForceHistogram", "PowerForce"]
 
 
 class ForceHistogram(Histogram):

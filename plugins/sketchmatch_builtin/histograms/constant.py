@@ -22,4 +22,5 @@ class ConstantForce(PowerForce):
 
     name = "constant"
     summary = "Exact constant-force histogram (r = 0) of polygons."
+    default = True
     exponent = 0.0

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sketchmatch.api import HistogramParams
-from sketchmatch_builtin.histograms._forces import PowerForce, exponent_field
+from sketchmatch.api.forces import ForceParams
+from sketchmatch_builtin.histograms._forces import PowerForce
 
 __all__ = ["Force"]
 
@@ -23,10 +23,8 @@ class Force(PowerForce):
     name = "force"
     summary = "Exact histogram of the forces d^-r of polygons, for any real r."
 
-    class Params(HistogramParams):
+    class Params(ForceParams):
         """The number of directions, and the exponent."""
-
-        r: float = exponent_field(1.0)
 
     params: Params
 

@@ -8,10 +8,16 @@ import numpy as np
 from pydantic import Field
 
 from sketchmatch.api import HistogramParams, Reason
-from sketchmatch.api.forces import about_object, force_histograms, object_name, refuse_infinite
+from sketchmatch.api.forces import (
+    about_object,
+    exponent_field,
+    force_histograms,
+    object_name,
+    refuse_infinite,
+)
 from sketchmatch.api.pixels import PixelObject, outlines, pixel_relations, rasterised
 from sketchmatch.model import Edges, FloatArray, IntArray, Scene
-from sketchmatch_builtin.histograms._forces import ForceHistogram, exponent_field
+from sketchmatch_builtin.histograms._forces import ForceHistogram
 
 __all__ = ["RasterForce"]
 

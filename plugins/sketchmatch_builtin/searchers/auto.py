@@ -33,6 +33,7 @@ class Auto(Searcher):
 
     name = "auto"
     summary = "The default: exact where a proof comes fast, else direct, with a proof if it can."
+    default = True
 
     class Params(Params):
         """Parameters of the choice."""

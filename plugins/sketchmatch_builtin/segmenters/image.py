@@ -48,6 +48,7 @@ class ImageSegmenter(Segmenter):
 
     name = "image"
     summary = "Dark shapes or outlines on light paper, scanned, photographed or drawn to scale."
+    default = True
     sources = (Image,)
 
     class Params(Params):

@@ -61,6 +61,7 @@ class OccupancyGridSegmenter(Segmenter):
 
     name = "occupancy-grid"
     summary = "Objects standing in the free space of a robot's occupancy grid."
+    default = True
     sources = (OccupancyGrid,)
 
     class Params(Params):

@@ -23,6 +23,7 @@ class PolygonSegmenter(Segmenter):
 
     name = "polygons"
     summary = "Every polygon is one object."
+    default = True
     sources = (PolygonSet,)
 
     def segment(self, source: PolygonSet) -> Segmentation:

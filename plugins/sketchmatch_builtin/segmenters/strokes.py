@@ -67,6 +67,7 @@ class StrokeSegmenter(Segmenter):
 
     name = "strokes"
     summary = "Objects drawn with one pen stroke or several; gaps and tails are mended."
+    default = True
     sources = (StrokeSet,)
 
     class Params(Params):

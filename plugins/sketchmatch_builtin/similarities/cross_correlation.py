@@ -23,6 +23,7 @@ class CrossCorrelation(ProductSimilarity):
 
     name = "cross-correlation"
     summary = "Normalised cross-correlation of the aligned histograms."
+    default = True
 
     def combine(
         self, product: FloatArray, template_square: FloatArray, argument_square: FloatArray

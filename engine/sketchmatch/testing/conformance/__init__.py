@@ -1,11 +1,11 @@
 """The contracts that every algorithm keeps, each as a check that any class can be put to."""
 
-from sketchmatch.testing.conformance.contract import ContractViolationError, PluginCheck
-from sketchmatch.testing.conformance.plugins import (
+from sketchmatch.testing.conformance.checking import (
     check_plugin,
     parametrize_plugins,
     plugin_checks,
 )
+from sketchmatch.testing.conformance.contract import ContractViolationError, PluginCheck
 from sketchmatch.testing.conformance.report import SearchReport, search_report
 
 __all__ = [

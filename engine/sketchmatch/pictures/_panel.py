@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from sketchmatch.io._overlay.canvas import Box, Canvas, printable
-from sketchmatch.io._overlay.palette import Colour, mixed, pair_colour, readable_on
-from sketchmatch.io._overlay.places import Place, badge_places, label_places
-from sketchmatch.io._overlay.underlay import known_area, painted_cells
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene
+from sketchmatch.pictures._canvas import Box, Canvas, printable
+from sketchmatch.pictures._palette import Colour, mixed, pair_colour, readable_on
+from sketchmatch.pictures._places import Place, badge_places, label_places
+from sketchmatch.pictures._underlay import known_area, painted_cells
 
 __all__ = [
     "BORDER",

@@ -11,8 +11,8 @@ from itertools import product
 import numpy as np
 from PIL import Image, ImageChops, ImageDraw, ImageFont
 
-from sketchmatch.io._overlay.palette import Colour
 from sketchmatch.model import FloatArray
+from sketchmatch.pictures._palette import Colour
 
 __all__ = ["Box", "Canvas", "printable"]
 

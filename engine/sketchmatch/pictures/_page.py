@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from PIL import Image
 
-from sketchmatch.io._overlay.canvas import Box, Canvas, printable
-from sketchmatch.io._overlay.palette import Colour, mixed, pair_colour
-from sketchmatch.io._overlay.panel import (
+from sketchmatch.pictures._canvas import Box, Canvas, printable
+from sketchmatch.pictures._palette import Colour, mixed, pair_colour
+from sketchmatch.pictures._panel import (
     BORDER,
     INK,
     PADDING,
@@ -21,7 +21,7 @@ from sketchmatch.io._overlay.panel import (
     draw_object,
     draw_panel,
 )
-from sketchmatch.io._overlay.places import Place
+from sketchmatch.pictures._places import Place
 
 __all__ = [
     "GUTTER",

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from PIL import Image
 
-from sketchmatch.io._overlay.canvas import Box, Canvas, printable
-from sketchmatch.io._overlay.page import (
+from sketchmatch.model import FloatArray
+from sketchmatch.pictures._canvas import Box, Canvas, printable
+from sketchmatch.pictures._page import (
     GUTTER,
     HEADER,
     MARGIN,
@@ -22,10 +23,9 @@ from sketchmatch.io._overlay.page import (
     draw_header,
     panel_height,
 )
-from sketchmatch.io._overlay.palette import mixed, pair_colour
-from sketchmatch.io._overlay.panel import BORDER, INK, WHITE, Panel, draw_badge, draw_panel
-from sketchmatch.io._overlay.places import Place
-from sketchmatch.model import FloatArray
+from sketchmatch.pictures._palette import mixed, pair_colour
+from sketchmatch.pictures._panel import BORDER, INK, WHITE, Panel, draw_badge, draw_panel
+from sketchmatch.pictures._places import Place
 
 __all__ = ["MOST_PLOTS", "Plot", "RelationsPage"]
 

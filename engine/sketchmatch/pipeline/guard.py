@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Generator, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import is_dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sketchmatch.api import Algorithm, MatchProblem, SearchProgress, Segmentation, Segmenter
-from sketchmatch.errors import InvalidInputError, PluginError, SketchmatchError, quoted
+from sketchmatch.api import Algorithm, MatchProblem, SearchProgress
+from sketchmatch.errors import PluginError, SketchmatchError, quoted
 from sketchmatch.model import FloatArray, Fmap, RelationTable, Scene, Source
-from sketchmatch.model.limits import check_objects, check_source
 from sketchmatch.registry import Registry
 
-__all__ = ["blaming", "checked_array", "checked_progress", "inspecting", "segmented"]
+__all__ = ["blamed", "blaming", "checked_array", "checked_progress", "inspecting"]
 
+_Told = TypeVar("_Told")
+_Value = TypeVar("_Value")
 _LONGEST = 200
 _ROUNDING = 1e-9
 _DOUBT = 1e-6
@@ -44,6 +45,23 @@ def blaming(algorithm: Algorithm | type[Algorithm], registry: Registry) -> Itera
         raise PluginError(
             f"{registry.whose(algorithm)} failed ({cause}); tell its author or choose another"
         ) from error
+
+
+def blamed(
+    work: Generator[_Told, None, _Value], algorithm: Algorithm, registry: Registry
+) -> Generator[_Told, None, _Value]:
+    """Go on with work of an algorithm, which is to blame for what the work raises.
+
+    What is raised where the work is watched, between two steps, passes.
+    """
+    with closing(work):
+        while True:
+            with blaming(algorithm, registry):
+                try:
+                    told = next(work)
+                except StopIteration as stop:
+                    return stop.value  # type: ignore[no-any-return]
+            yield told
 
 
 def checked_array(values: Any, shape: tuple[int, ...], most: float = math.inf) -> FloatArray:
@@ -156,38 +174,3 @@ def _checksum(array: NDArray[Any]) -> int:
     whole = len(octets) - len(octets) % _ROW
     sums = octets[:whole].view(np.uint64).reshape(-1, _ROW // 8).sum(axis=0, dtype=np.uint64)
     return hash((sums.tobytes(), octets[whole:].tobytes()))
-
-
-def segmented(source: Source, segmenter: Segmenter, registry: Registry, field: str) -> Segmentation:
-    """Find the objects of a source.
-
-    Raises
-    ------
-    InvalidInputError
-        If nothing usable is in it, or too much, with a path that begins with ``field``.
-    PluginError
-        If the segmenter breaks its contract.
-    """
-    check_source(source, field)
-    with blaming(segmenter, registry):
-        try:
-            with inspecting(segmenter, registry, source):
-                found = segmenter.segment(source)
-        except InvalidInputError as error:
-            raise error.within(field) from None
-        if not isinstance(found, Segmentation):
-            raise TypeError(f"it returned a {type(found).__name__}, not a Segmentation")
-        if not isinstance(found.scene, Scene):
-            raise TypeError(f"it found a {type(found.scene).__name__}, not a Scene")
-        if found.route is not None:
-            _check_route(found.route)
-        if not all(isinstance(warning, str) for warning in found.warnings):
-            raise TypeError("its warnings are not all strings")
-    check_objects(len(found.scene), field)
-    return found
-
-
-def _check_route(route: Any) -> None:
-    points = np.asarray(route, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-        raise ValueError(f"its route has shape {points.shape}, not (k, 2), or is not finite")

@@ -14,12 +14,12 @@ from pathlib import Path
 from PIL import Image
 
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.io._overlay.canvas import printable
-from sketchmatch.io._overlay.page import Entry, Page
-from sketchmatch.io._overlay.panel import Panel, badge_size
-from sketchmatch.io._overlay.relations import MOST_PLOTS, Plot, RelationsPage
 from sketchmatch.io._targets import check_target, writing
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene
+from sketchmatch.pictures._canvas import printable
+from sketchmatch.pictures._page import Entry, Page
+from sketchmatch.pictures._panel import Panel, badge_size
+from sketchmatch.pictures._plots import MOST_PLOTS, Plot, RelationsPage
 
 __all__ = [
     "MOST_PLOTS",

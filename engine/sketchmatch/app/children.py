@@ -3,7 +3,7 @@
 A thread cannot be stopped from outside, a loop in plain Python holds up all threads of its
 process, and a crash ends them. So a request that uses an algorithm of a distribution which is not
 the engine's own is answered in a child process: it reads the request, runs the very same pipeline,
-and sends the responses, serialised, through a pipe. A child that gives no sign of life for too
+and sends the responses through a pipe. A child that gives no sign of life for too
 long, or does not end when its time is over, is killed, and the request fails with the names of
 plugin and distribution. A child that behaved is kept for the next request.
 """
@@ -19,20 +19,25 @@ from dataclasses import dataclass
 from multiprocessing.connection import wait
 from typing import TYPE_CHECKING
 
+from google.protobuf.message import Message
+
+from sketchmatch.app.child import STOP, Answer, Ended, Failed, Ready, Task, live
+from sketchmatch.app.jobs import Job, algorithms, time_budget
+from sketchmatch.app.setup import Setup
 from sketchmatch.errors import PluginError
-from sketchmatch.server.child import STOP, Answer, Ended, Failed, Job, Ready, live
 
 if TYPE_CHECKING:
     from multiprocessing.context import SpawnProcess
 
     from sketchmatch.registry import Registered
 
-__all__ = ["Children", "IsolatedFailureError", "Watch"]
+__all__ = ["ChildError", "Children"]
 
 _LOOK = 0.05
 _STOPPING = 0.5
 _OVERTIME = 2.0
 _STARTING = 60.0
+_WARMING = 120.0
 _IDLE = 2
 _NAMED = 5
 _REMEDY = "tell its author or choose another"
@@ -41,23 +46,12 @@ _Key = frozenset[str]
 _spawning = multiprocessing.get_context("spawn")
 
 
-class IsolatedFailureError(Exception):
-    """A request failed in a child process.
-
-    Parameters
-    ----------
-    failed
-        What it ends with.
-    """
-
-    def __init__(self, failed: Failed) -> None:
-        super().__init__(failed.refusal.message)
-        self.refusal = failed.refusal
-        self.log = failed.log
+class ChildError(Exception):
+    """Something that nobody foresaw happened in a child process; it says where."""
 
 
 @dataclass(frozen=True)
-class Watch:
+class _Watch:
     """How a child is watched while it answers.
 
     Attributes
@@ -95,27 +89,46 @@ class Children:
         self._lock = threading.Lock()
         self._closed = False
 
-    def answer(self, job: Job, watch: Watch, stop: threading.Event) -> Iterator[bytes]:
+    def answers(self, job: Job, setup: Setup, stop: threading.Event) -> Iterator[Message]:
         """Let a child do a job, and yield its responses.
 
         Parameters
         ----------
-        job
-            What it does.
-        watch
-            How it is watched.
+        job, setup
+            What it does, and with what.
         stop
             Ends the job from another thread.
 
         Raises
         ------
-        IsolatedFailureError
-            If the request fails as it would in this process.
+        SketchmatchError
+            As the job does in this process.
         PluginError
             If the child crashes, or has to be killed.
+        ChildError
+            If it fails in a way that nobody foresaw.
         """
+        strangers = setup.isolation.strangers(algorithms(job, setup))
+        watch = _Watch(strangers, setup.isolation.patience, time_budget(job, setup))
+        yield from self._done(_task(job, setup, watch.patience), watch, stop)
+
+    def warm_up(
+        self, strangers: tuple[Registered, ...], setup: Setup, stop: threading.Event
+    ) -> None:
+        """Let a child compile what some algorithms need.
+
+        Raises
+        ------
+        PluginError, ChildError
+            As :meth:`answers` does.
+        """
+        watch = _Watch(strangers, _WARMING)
+        for _ in self._done(_task(None, setup, _WARMING), watch, stop):
+            pass
+
+    def _done(self, task: Task, watch: _Watch, stop: threading.Event) -> Iterator[Message]:
         with self._child(watch, stop) as child:
-            yield from child.answer(job, watch, stop)
+            yield from child.answers(task, watch, stop)
 
     def close(self) -> None:
         """End the children that wait; those at work end with their requests."""
@@ -127,7 +140,7 @@ class Children:
             child.kill()
 
     @contextmanager
-    def _child(self, watch: Watch, stop: threading.Event) -> Iterator[_Child]:
+    def _child(self, watch: _Watch, stop: threading.Event) -> Iterator[_Child]:
         """Lend a child; one that is not done in the end is killed."""
         child = self._waiting(watch.distributions) or _Child(watch.distributions)
         try:
@@ -181,7 +194,7 @@ class _Child:
         self._process.join()
         self._connection.close()
 
-    def wait_until_ready(self, watch: Watch, stop: threading.Event) -> None:
+    def wait_until_ready(self, watch: _Watch, stop: threading.Event) -> None:
         """Wait until it has loaded its plugins, or is no longer wanted."""
         deadline = time.monotonic() + _STARTING + watch.patience
         while not (self._ready or stop.is_set()):
@@ -189,12 +202,12 @@ class _Child:
             if time.monotonic() > deadline:
                 raise _silent(watch, "did not load in its own process")
 
-    def answer(self, job: Job, watch: Watch, stop: threading.Event) -> Iterator[bytes]:
-        """Do a job; one that is given up or stopped is over, if the child obeys."""
+    def answers(self, task: Task, watch: _Watch, stop: threading.Event) -> Iterator[Message]:
+        """Do a task; one that is given up or stopped is over, if the child obeys."""
         if stop.is_set():
             return
         self.done = False
-        self._send(job, watch)
+        self._send(task, watch)
         try:
             yield from self._responses(watch, stop)
         except GeneratorExit:
@@ -203,8 +216,8 @@ class _Child:
         if not self.done:
             self._stop(watch)
 
-    def _responses(self, watch: Watch, stop: threading.Event) -> Iterator[bytes]:
-        """Yield responses until the job is done or to be stopped."""
+    def _responses(self, watch: _Watch, stop: threading.Event) -> Iterator[Message]:
+        """Yield responses until the task is done or to be stopped."""
         started = heard = time.monotonic()
         while not stop.is_set():
             message = self._received(watch)
@@ -216,9 +229,11 @@ class _Child:
                 case Ended():
                     self.done = True
                     return
-                case Failed():
+                case Failed(error, log):
                     self.done = True
-                    raise IsolatedFailureError(message)
+                    failure = error or ChildError("a request failed in a child process")
+                    failure.add_note(log)
+                    raise failure
             if now - heard > watch.patience:
                 raise _silent(watch, f"gave no sign of life for {watch.patience:g} s")
             if watch.time_budget is not None and now - started > watch.time_budget + _OVERTIME:
@@ -227,7 +242,7 @@ class _Child:
                     f"did not end {_OVERTIME:g} s after its time budget of {watch.time_budget:g} s",
                 )
 
-    def _stop(self, watch: Watch) -> None:
+    def _stop(self, watch: _Watch) -> None:
         """Ask it to stop; it is done if it does so in time."""
         deadline = time.monotonic() + _STOPPING
         with suppress(PluginError):
@@ -235,13 +250,13 @@ class _Child:
             while not self.done and time.monotonic() < deadline:
                 self.done = isinstance(self._received(watch), Ended | Failed)
 
-    def _send(self, message: object, watch: Watch) -> None:
+    def _send(self, message: object, watch: _Watch) -> None:
         try:
             self._connection.send(message)
         except OSError:
             raise self._gone(watch) from None
 
-    def _received(self, watch: Watch) -> object:
+    def _received(self, watch: _Watch) -> object:
         """Return the next message, or None if there is none for a moment."""
         ready = wait([self._connection, self._process.sentinel], _LOOK)
         if not ready:
@@ -251,15 +266,20 @@ class _Child:
                 return self._connection.recv()
         raise self._gone(watch)
 
-    def _gone(self, watch: Watch) -> PluginError:
+    def _gone(self, watch: _Watch) -> PluginError:
         self._process.join()
         ending = _ending(self._process.exitcode)
         return PluginError(f"{watch.culprits} ended its process ({ending}); {_REMEDY}")
 
 
-def _silent(watch: Watch, what: str) -> PluginError:
+def _silent(watch: _Watch, what: str) -> PluginError:
     return PluginError(f"{watch.culprits} {what} and was stopped; {_REMEDY}")
 
 
 def _ending(code: int | None) -> str:
     return f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+
+
+def _task(job: Job | None, setup: Setup, patience: float) -> Task:
+    engine = setup.engine
+    return Task(job, engine.defaults, engine.limits, setup.limits, patience)

@@ -1,16 +1,40 @@
-"""What a server works with; all of it may be exchanged while it runs."""
+"""What requests are answered with; all of it may be exchanged while a server runs."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from sketchmatch.pipeline.selection import Defaults
-from sketchmatch.registry import OWN_DISTRIBUTION, Registered, Registry
-from sketchmatch.registry.plugins import canonical
-from sketchmatch.server.limits import Limits
+from sketchmatch.pipeline.engine import Engine
+from sketchmatch.registry import OWN_DISTRIBUTION, Registered
+from sketchmatch.registry.distributions import canonical
 
-__all__ = ["Current", "Isolation", "Setup"]
+__all__ = ["Isolation", "RequestLimits", "Setup"]
+
+
+@dataclass(frozen=True)
+class RequestLimits:
+    """What one request, and all requests together, may ask for.
+
+    Attributes
+    ----------
+    max_request_bytes
+        Size of one request. A little more passes the transport, so that the refusal can be clear.
+    max_concurrent_matches
+        Matches and segmentations that run at the same time.
+    max_time_budget
+        Seconds that one match may take, or None for no limit.
+    """
+
+    max_request_bytes: int = 64 * 1024 * 1024
+    max_concurrent_matches: int = 4 * (os.cpu_count() or 1)
+    max_time_budget: float | None = None
+
+    @property
+    def transport_bytes(self) -> int:
+        """Size above which the transport itself refuses a message."""
+        return 4 * self.max_request_bytes
 
 
 @dataclass(frozen=True)
@@ -43,24 +67,14 @@ class Setup:
 
     Attributes
     ----------
-    registry
-        The algorithms.
-    defaults
-        What is taken where a request chooses nothing, and the profiles that it can name.
+    engine
+        Algorithms, defaults, and how large sources may be.
     limits
         What requests may ask for.
     isolation
         Which plugins run in processes of their own.
     """
 
-    registry: Registry
-    defaults: Defaults = field(default_factory=Defaults)
-    limits: Limits = field(default_factory=Limits)
+    engine: Engine
+    limits: RequestLimits = field(default_factory=RequestLimits)
     isolation: Isolation = field(default_factory=Isolation)
-
-
-class Current:
-    """Holds the setup in force; a request takes it once and keeps it to its end."""
-
-    def __init__(self, setup: Setup) -> None:
-        self.setup = setup

@@ -7,7 +7,9 @@ from typing import Any
 
 from google.protobuf.duration_pb2 import Duration
 
-from sketchmatch.api import Algorithm, Segmentation, Segmenter
+import sketchmatch
+from sketchmatch.api import API_VERSION, Algorithm, Segmentation, Segmenter
+from sketchmatch.app.setup import Setup
 from sketchmatch.model import (
     Confidence,
     ConfidenceWeights,
@@ -19,7 +21,7 @@ from sketchmatch.model import (
     Scene,
     StrokeSet,
 )
-from sketchmatch.pipeline.match import Accepted, Finished, MatchEvent, Progress, Segmented
+from sketchmatch.pipeline.events import Accepted, Finished, MatchEvent, Progress, Segmented
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import Correspondence, MatchResult, ObjectMatch, ObjectRelation
 from sketchmatch.pipeline.selection import (
@@ -49,6 +51,7 @@ __all__ = [
     "scene",
     "segmented",
     "selection",
+    "server_info",
 ]
 
 _SOURCE_KINDS = {
@@ -207,6 +210,25 @@ def catalogue(
         ],
         plugins=[_plugin(status) for status in registry.statuses],
         profiles=[_profile(profile, profile.name == defaults.profile) for profile in profiles],
+    )
+
+
+def server_info(setup: Setup, uptime: float) -> catalog_service_pb2.GetServerInfoResponse:
+    """Return versions and limits as a message; ``uptime`` in seconds."""
+    given = setup.limits
+    limits = catalog_service_pb2.ServerLimits(
+        max_request_bytes=given.max_request_bytes,
+        max_objects=setup.engine.limits.max_objects,
+        max_concurrent_matches=given.max_concurrent_matches,
+    )
+    if given.max_time_budget is not None:
+        limits.max_time_budget.FromMilliseconds(round(1e3 * given.max_time_budget))
+    return catalog_service_pb2.GetServerInfoResponse(
+        version=sketchmatch.__version__,
+        api_version="sketchmatch.v1",
+        plugin_api_version=API_VERSION,
+        limits=limits,
+        uptime=Duration(seconds=int(uptime)),
     )
 
 

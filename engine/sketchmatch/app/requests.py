@@ -16,6 +16,7 @@ from sketchmatch.io.ros_map import decode_map_server
 from sketchmatch.model import (
     ConfidenceWeights,
     FloatArray,
+    Image,
     LabelledPolygon,
     OccupancyGrid,
     PolygonSet,
@@ -25,7 +26,7 @@ from sketchmatch.model import (
 )
 from sketchmatch.model.limits import check_objects, check_pixels, check_vertices
 from sketchmatch.pipeline.request import MatchRequest
-from sketchmatch.pipeline.selection import STAGES, Choice
+from sketchmatch.pipeline.selection import STAGES, Choice, Selection
 from sketchmatch_proto.v1 import (
     match_pb2,
     match_service_pb2,
@@ -34,9 +35,26 @@ from sketchmatch_proto.v1 import (
     source_pb2,
 )
 
-__all__ = ["choice", "match_request", "paths_of", "source"]
+__all__ = [
+    "choice",
+    "match_request",
+    "paths_of",
+    "selection",
+    "source",
+    "source_type",
+    "time_budget",
+]
 
 _KINDS = "stroke_set, polygon_set, occupancy_grid, map_server_map or image"
+_OPTIONS = ("alternatives", "allow_unmatched", "unmatched_price")
+"""Fields that mean the same as those of that name in the engine's request."""
+_TYPES: dict[str, type[Source]] = {
+    "stroke_set": StrokeSet,
+    "polygon_set": PolygonSet,
+    "occupancy_grid": OccupancyGrid,
+    "map_server_map": OccupancyGrid,
+    "image": Image,
+}
 
 
 def match_request(
@@ -52,21 +70,24 @@ def match_request(
     return MatchRequest(
         sketch=source(request.sketch, "sketch", request.HasField("sketch")),
         map=source(request.map, "map", request.HasField("map")),
-        selection={stage: choice(getattr(request.pipeline, stage)) for stage in STAGES},
+        selection=selection(request),
         seed=request.seed,
-        time_budget=_time_budget(request, max_time_budget),
+        time_budget=time_budget(request, max_time_budget),
         weights=_weights(request.weights) if request.HasField("weights") else None,
-        alternatives=request.alternatives if request.HasField("alternatives") else None,
         profile=request.pipeline.profile,
-        allow_unmatched=request.allow_unmatched if request.HasField("allow_unmatched") else None,
-        unmatched_price=request.unmatched_price if request.HasField("unmatched_price") else None,
+        **{field.name: value for field, value in request.ListFields() if field.name in _OPTIONS},
     )
 
 
-def choice(selection: pipeline_pb2.AlgorithmSelection) -> Choice:
+def selection(request: match_service_pb2.MatchRequest) -> Selection:
+    """Read what is asked for in each stage."""
+    return {stage: choice(getattr(request.pipeline, stage)) for stage in STAGES}
+
+
+def choice(message: pipeline_pb2.AlgorithmSelection) -> Choice:
     """Read what is asked for in one stage."""
-    fields = selection.parameters.fields
-    return Choice(selection.name, {name: _plain(value) for name, value in fields.items()})
+    fields = message.parameters.fields
+    return Choice(message.name, {name: _plain(value) for name, value in fields.items()})
 
 
 def source(message: source_pb2.Source, field: str, present: bool) -> Source:
@@ -107,6 +128,33 @@ def source(message: source_pb2.Source, field: str, present: bool) -> Source:
     raise AssertionError(kind)
 
 
+def source_type(message: source_pb2.Source) -> type[Source] | None:
+    """Return what :func:`source` makes of a sketch or a map; None where it is not set."""
+    return _TYPES.get(message.WhichOneof("kind") or "")
+
+
+def time_budget(
+    request: match_service_pb2.MatchRequest, max_time_budget: float | None
+) -> float | None:
+    """Read how many seconds a match may take, or None for no limit.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is no time.
+    """
+    if not request.HasField("time_budget"):
+        return max_time_budget
+    seconds = request.time_budget.seconds + request.time_budget.nanos / 1e9
+    if seconds <= 0:
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "time_budget",
+            f"is {seconds:g} s; give a positive time or none at all",
+        )
+    return min(seconds, max_time_budget or math.inf)
+
+
 @contextmanager
 def paths_of(
     request: match_service_pb2.MatchRequest | scene_service_pb2.SegmentRequest,
@@ -140,21 +188,6 @@ def _plain(value: struct_pb2.Value) -> Any:
 def _weights(message: match_pb2.ConfidenceWeights) -> ConfidenceWeights:
     """Read weights, of which any can be left out."""
     return ConfidenceWeights(**{field.name: value for field, value in message.ListFields()})
-
-
-def _time_budget(
-    request: match_service_pb2.MatchRequest, max_time_budget: float | None
-) -> float | None:
-    if not request.HasField("time_budget"):
-        return max_time_budget
-    seconds = request.time_budget.seconds + request.time_budget.nanos / 1e9
-    if seconds <= 0:
-        raise InvalidInputError(
-            Reason.INVALID_FIELD,
-            "time_budget",
-            f"is {seconds:g} s; give a positive time or none at all",
-        )
-    return min(seconds, max_time_budget or math.inf)
 
 
 def _stroke_set(message: source_pb2.StrokeSet) -> StrokeSet:

@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 from shapely.ops import polylabel
 
-from sketchmatch.io._overlay.canvas import Box
 from sketchmatch.model import FloatArray
+from sketchmatch.pictures._canvas import Box
 
 __all__ = ["Place", "badge_places", "label_places"]
 

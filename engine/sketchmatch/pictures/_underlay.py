@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from sketchmatch.io._overlay.canvas import Box
-from sketchmatch.io._overlay.palette import Colour, mixed
 from sketchmatch.model import FloatArray, OccupancyGrid
+from sketchmatch.pictures._canvas import Box
+from sketchmatch.pictures._palette import Colour, mixed
 
 __all__ = ["known_area", "painted_cells"]
 

@@ -1,0 +1,101 @@
+"""Who answers a command: a server, or the same application in this process.
+
+Either takes the client's options and gives the contract's messages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, Unpack, cast
+
+from sketchmatch.cli.options import say
+from sketchmatch.config import load, open_engine
+from sketchmatch.model.limits import limited_to
+from sketchmatch_client import Client, MatchOptions, match_request, segment_request
+from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsResponse
+from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+from sketchmatch_proto.v1.source_pb2 import Source
+
+if TYPE_CHECKING:
+    from sketchmatch.app.application import Application
+
+__all__ = ["Answerer", "answerer"]
+
+
+class Answerer(Protocol):
+    """What a command asks, as :class:`sketchmatch_client.Client` answers it."""
+
+    def events(
+        self,
+        sketch: Source,
+        map: Source,  # noqa: A002
+        **options: Unpack[MatchOptions],
+    ) -> Generator[MatchResponse, None, None]:
+        """Match a sketch with a map, event by event."""
+
+    def segment(
+        self,
+        source: Source,
+        *,
+        segmenter: str | None = None,
+        params: Mapping[str, Any] | None = None,
+        profile: str | None = None,
+    ) -> SegmentResponse:
+        """Find the objects of one source."""
+
+    def algorithms(self) -> ListAlgorithmsResponse:
+        """Return what there is to choose from."""
+
+
+@contextmanager
+def answerer(server: str | None, config: Path | None) -> Iterator[Answerer]:
+    """Yield the server at an address, or this process; files may be as large as it says."""
+    configuration = load(config)
+    with limited_to(configuration.limits):
+        if server:
+            with Client(server) as client:
+                yield client
+        else:
+            from sketchmatch.app.application import Application
+            from sketchmatch.app.setup import Isolation, Setup
+
+            engine = open_engine(configuration)
+            everybody = Isolation(trusted=frozenset("*"))
+            yield _Here(Application(Setup(engine, isolation=everybody)))
+
+
+class _Here:
+    """Answers in this process."""
+
+    def __init__(self, app: Application) -> None:
+        self._app = app
+
+    def events(
+        self,
+        sketch: Source,
+        map: Source,  # noqa: A002
+        **options: Unpack[MatchOptions],
+    ) -> Generator[MatchResponse, None, None]:
+        from sketchmatch.pipeline.warmup import announcing_compilation
+
+        request = match_request(sketch, map, **options)
+        with announcing_compilation(say), closing(self._app.answers(request)) as responses:
+            for response in responses:
+                yield cast(MatchResponse, response)
+
+    def segment(
+        self,
+        source: Source,
+        *,
+        segmenter: str | None = None,
+        params: Mapping[str, Any] | None = None,
+        profile: str | None = None,
+    ) -> SegmentResponse:
+        (response,) = self._app.answers(segment_request(source, segmenter, params, profile))
+        return cast(SegmentResponse, response)
+
+    def algorithms(self) -> ListAlgorithmsResponse:
+        return self._app.algorithms()

@@ -1,0 +1,67 @@
+"""Files as sources of requests: as they are, where the contract has room for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from sketchmatch.cli.options import say
+from sketchmatch.io.files import (
+    MAP_SUFFIXES,
+    PICTURE_SUFFIXES,
+    read_bytes,
+    read_map_server,
+    read_source,
+)
+from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
+from sketchmatch_client import sources
+from sketchmatch_proto.v1.source_pb2 import MapServerMap, Source
+
+__all__ = ["source_of"]
+
+
+def source_of(path: Path, side: str = "") -> Source:
+    """Return a file as a source: pictures and maps as they are, others as what they hold.
+
+    Parameters
+    ----------
+    path
+        The file.
+    side
+        What it is to a person, to begin notes with.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be read; what is in pictures and maps is looked at where they are decoded.
+    """
+    suffix = path.suffix.lower()
+    if suffix in MAP_SUFFIXES:
+        text, picture = read_map_server(path)
+        return Source(map_server_map=MapServerMap(yaml=text, image=picture))
+    if suffix in PICTURE_SUFFIXES:
+        return sources.image(read_bytes(path))
+    match read_source(path):
+        case OccupancyGrid(cells, resolution, origin, notes):
+            # Of a bag, whose notes have no room in the message.
+            for note in notes:
+                say(f"{side}: {note}" if side else note)
+            return sources.occupancy_grid(cells, resolution, origin)
+        case StrokeSet(strokes):
+            return sources.strokes(
+                [_timed(stroke.points, stroke.times) for stroke in strokes],
+                [stroke.label for stroke in strokes],
+            )
+        case PolygonSet(polygons):
+            return sources.polygons(
+                [[ring.tolist() for ring in polygon.rings] for polygon in polygons],
+                [polygon.label for polygon in polygons],
+            )
+        case Image():
+            raise AssertionError("pictures pass as they are")
+
+
+def _timed(points: Any, times: Any) -> list[Any]:
+    if times is None:
+        return list(points.tolist())
+    return [(*point, time) for point, time in zip(points.tolist(), times.tolist(), strict=True)]

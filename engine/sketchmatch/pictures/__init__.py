@@ -1,0 +1,1 @@
+"""Drawings of scenes, matches and relations; ``overlay`` is what others use."""

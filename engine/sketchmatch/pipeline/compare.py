@@ -1,0 +1,200 @@
+"""A sketch compared with a map: the middle of a match, from which every search begins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from sketchmatch.api import Similarity
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.kernels.evidence import SelfRelations
+from sketchmatch.model import (
+    ConfidenceWeights,
+    RelationTable,
+    Scene,
+    SceneDescriptor,
+    object_pairs,
+    pair_count,
+    pair_index,
+)
+from sketchmatch.pipeline.evidence import compare_objects, rotation_weights, weigh_objects
+from sketchmatch.pipeline.guard import blamed
+from sketchmatch.pipeline.reading import half_turned
+from sketchmatch.pipeline.relate import check_exponent, relate
+from sketchmatch.pipeline.result import Correspondence
+from sketchmatch.registry import Registry
+
+__all__ = ["Comparison", "check_comparisons", "compare"]
+
+# What 2 GB hold: 100 × 100 objects.
+_MAX_COMPARISONS = 30_000_000
+
+Pairs = Sequence[tuple[int, int]]
+_Value = TypeVar("_Value")
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """How the relations within a sketch compare with those on a map.
+
+    The scene with fewer objects, or else the sketch, is the template of the table, the other one
+    the argument.
+
+    Attributes
+    ----------
+    sketch, map
+        The scenes.
+    sketch_descriptor, map_descriptor
+        Their histograms.
+    table
+        How every pair of the template compares with every pair of the argument.
+    own
+        How the objects themselves compare; None where shapes and sizes have no weight.
+    """
+
+    sketch: Scene
+    map: Scene
+    sketch_descriptor: SceneDescriptor
+    map_descriptor: SceneDescriptor
+    table: RelationTable
+    own: SelfRelations | None = None
+
+    @property
+    def swapped(self) -> bool:
+        """Whether the template is the map: it has fewer objects than the sketch."""
+        return _swapped(self.sketch, self.map)
+
+    def most_similar(
+        self, sketch_pairs: Pairs = (), map_pairs: Pairs = (), limit: int | None = None
+    ) -> tuple[Correspondence, ...]:
+        """Return how pairs of sketched objects compare with pairs of mapped ones, σ first.
+
+        Parameters
+        ----------
+        sketch_pairs, map_pairs
+            Ordered pairs of indices, from 0; all pairs (a, b), a < b, where there are none.
+        limit
+            How many at most; all where it is None.
+        """
+        table = self.table
+        values = [table.similarity, table.rotation, table.dilation]
+        if self.swapped:
+            values = [table.similarity.T, -table.rotation.T, 1.0 / table.dilation.T]
+        sketch_pairs = sketch_pairs or _all_pairs(self.sketch)
+        map_pairs = map_pairs or _all_pairs(self.map)
+        cells = np.ix_(_rows(sketch_pairs, self.sketch), _rows(map_pairs, self.map))
+        sigma, rotation, dilation = (value[cells] for value in values)
+        best = np.argsort(-sigma, axis=None, kind="stable")[:limit]
+        found = []
+        for i, j in zip(*np.unravel_index(best, sigma.shape), strict=True):
+            (a, b), (c, d) = sketch_pairs[i], map_pairs[j]
+            turn = float(rotation[i, j]) + (math.pi if (a > b) != (c > d) else 0.0)
+            found.append(
+                Correspondence(
+                    (a, b),
+                    (c, d),
+                    float(sigma[i, j]),
+                    half_turned(turn),
+                    float(dilation[i, j]),
+                )
+            )
+        return tuple(found)
+
+
+def check_comparisons(sketch: Scene, map_: Scene) -> None:
+    """Refuse two scenes whose relation table would not fit into memory.
+
+    Raises
+    ------
+    InvalidInputError
+        With the path ``sketch``.
+    """
+    comparisons = pair_count(len(sketch)) * pair_count(len(map_))
+    if comparisons > _MAX_COMPARISONS:
+        raise InvalidInputError(
+            Reason.LIMIT_EXCEEDED,
+            "sketch",
+            f"has {len(sketch)} objects and the map {len(map_)}, which makes {comparisons} "
+            f"comparisons of relations, more than the limit of {_MAX_COMPARISONS}; "
+            "leave out small objects",
+        )
+
+
+def compare(
+    scenes: tuple[Scene, Scene],
+    descriptors: tuple[SceneDescriptor, SceneDescriptor],
+    similarity: Similarity,
+    registry: Registry,
+    weights: ConfidenceWeights = ConfidenceWeights(),  # noqa: B008
+) -> Generator[float, None, Comparison]:
+    """Compare a sketch with a map, objects too where these have weight.
+
+    Parameters
+    ----------
+    scenes, descriptors
+        Of the sketch and of the map, described by the same histogram.
+    similarity
+        How alike two histograms are.
+    registry
+        Where the measure comes from, to blame it by name.
+    weights
+        Of ζ: what objects count for, and distance, are part of the table.
+
+    Yields
+    ------
+    float
+        The share that is done.
+
+    Raises
+    ------
+    InvalidInputError
+        If the scenes are too large for each other, or are described by different histograms.
+    PluginError
+        If the measure breaks its contract.
+    """
+    check_comparisons(*scenes)
+    check_exponent(descriptors[0].exponent)
+    (template, argument), related = scenes, descriptors
+    if _swapped(*scenes):
+        (argument, template), related = scenes, (descriptors[1], descriptors[0])
+    share = 0.4 if weights.of_objects else 1.0
+    work = blamed(relate(*related, similarity), similarity, registry)
+    table = yield from _part(work, 0.0, share)
+    if weights.distance:
+        table = replace(table, rotation_weights=rotation_weights(template, weights.distance))
+    own = None
+    if weights.of_objects:
+        comparing = compare_objects(template, argument, descriptors[0].directions)
+        own = yield from _part(comparing, 0.4, 0.5)
+        table = yield from _part(weigh_objects(table, own, weights), 0.5, 1.0)
+    return Comparison(*scenes, *descriptors, table, own)
+
+
+def _swapped(sketch: Scene, map_: Scene) -> bool:
+    return len(sketch) > len(map_)
+
+
+def _part(
+    work: Generator[float, None, _Value], begin: float, end: float
+) -> Generator[float, None, _Value]:
+    """Go on with work that is a part of more, telling shares of the whole."""
+    with closing(work):
+        while True:
+            try:
+                share = next(work)
+            except StopIteration as stop:
+                return stop.value  # type: ignore[no-any-return]
+            yield begin + (end - begin) * share
+
+
+def _all_pairs(scene: Scene) -> Pairs:
+    return [(a, b) for a, b in object_pairs(len(scene)).tolist()]
+
+
+def _rows(pairs: Pairs, scene: Scene) -> list[int]:
+    return [pair_index(min(pair), max(pair), len(scene)) for pair in pairs]

@@ -1,0 +1,131 @@
+"""The engine as a whole: algorithms, what a configuration says of them, and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from sketchmatch.api import Histogram, Searcher, Segmentation, Segmenter, Similarity
+from sketchmatch.model import ConfidenceWeights, Scene, SceneDescriptor, Source
+from sketchmatch.model.limits import SourceLimits, limited_to
+from sketchmatch.pipeline.clock import Clock
+from sketchmatch.pipeline.compare import Comparison, check_comparisons, compare
+from sketchmatch.pipeline.describe import check_histograms, described
+from sketchmatch.pipeline.events import MatchEvent
+from sketchmatch.pipeline.match import run_match
+from sketchmatch.pipeline.request import MatchRequest
+from sketchmatch.pipeline.search import Goal, Search, search
+from sketchmatch.pipeline.segment import segment, segment_side
+from sketchmatch.pipeline.selection import (
+    SIDES,
+    UNCONFIGURED,
+    Choice,
+    Defaults,
+    Pipeline,
+    Selection,
+    resolve,
+    resolve_segmenter,
+)
+from sketchmatch.registry import Registry
+
+__all__ = ["Engine"]
+
+
+@dataclass(frozen=True)
+class Engine:
+    """What Python, the command line and the server ask.
+
+    Long steps are generators that yield the share that is done and return their value; whoever
+    drives them shows progress, and stops them by closing them.
+
+    Attributes
+    ----------
+    registry
+        The algorithms at hand.
+    defaults
+        What is taken where a request chooses nothing, and the profiles that it can name.
+    limits
+        How large a sketch or a map may be.
+    """
+
+    registry: Registry
+    defaults: Defaults = UNCONFIGURED
+    limits: SourceLimits = field(default_factory=SourceLimits)
+
+    @contextmanager
+    def limited(self) -> Iterator[None]:
+        """Put the limits in force for what is read within the block."""
+        with limited_to(self.limits):
+            yield
+
+    def match(self, request: MatchRequest, match_id: str = "") -> Generator[MatchEvent, None, None]:
+        """Match, event by event, as :func:`sketchmatch.pipeline.match.run_match` does."""
+        return run_match(request, self.registry, self.defaults, self.limits, match_id)
+
+    def resolve(
+        self,
+        selection: Selection,
+        sketch: Source | None = None,
+        map: Source | None = None,  # noqa: A002
+        profile: str = "",
+    ) -> Pipeline:
+        """Set up the algorithms of a match, as :func:`~sketchmatch.pipeline.selection.resolve`."""
+        return resolve(self.registry, selection, sketch, map, self.defaults, profile)
+
+    def resolve_segmenter(self, choice: Choice, source: Source, profile: str = "") -> Segmenter:
+        """Set up the segmenter for one source that is not to be matched."""
+        return resolve_segmenter(self.registry, choice, source, self.defaults, profile)
+
+    def segment(self, source: Source, segmenter: Segmenter, field: str) -> Segmentation:
+        """Find the objects of a source, as :func:`~sketchmatch.pipeline.segment.segment` does."""
+        with self.limited():
+            return segment(source, segmenter, self.registry, field)
+
+    def segment_side(self, side: str, given: Source | Scene, pipeline: Pipeline) -> Segmentation:
+        """Find the objects of the sketch or of the map of a match."""
+        with self.limited():
+            return segment_side(side, given, pipeline, self.registry)
+
+    def describe(
+        self, scene: Scene, histogram: Histogram, side: str = ""
+    ) -> Generator[float, None, SceneDescriptor]:
+        """Describe every pair of a scene, once it is known to fit into memory."""
+        check_histograms(side or "scene", scene, histogram)
+        return described(scene, histogram, self.registry, side)
+
+    def compare(
+        self,
+        scenes: tuple[Scene, Scene],
+        histogram: Histogram,
+        similarity: Similarity,
+        weights: ConfidenceWeights = ConfidenceWeights(),  # noqa: B008 (frozen)
+    ) -> Generator[float, None, Comparison]:
+        """Compare a sketch with a map, once they are known to fit into memory.
+
+        The weights say whether objects and distances count.
+        """
+        for side, scene in zip(SIDES, scenes, strict=True):
+            check_histograms(side, scene, histogram)
+        check_comparisons(*scenes)
+        return self._compared(scenes, histogram, similarity, weights)
+
+    def search(
+        self, comparison: Comparison, searcher: Searcher, goal: Goal, clock: Clock | None = None
+    ) -> Generator[Search, None, Search]:
+        """Look for the best map, as :func:`~sketchmatch.pipeline.search.search` does."""
+        return search(comparison, searcher, goal, self.registry, clock or Clock())
+
+    def _compared(
+        self,
+        scenes: tuple[Scene, Scene],
+        histogram: Histogram,
+        similarity: Similarity,
+        weights: ConfidenceWeights,
+    ) -> Generator[float, None, Comparison]:
+        drawn, mapped = (
+            described(scene, histogram, self.registry, side)
+            for side, scene in zip(SIDES, scenes, strict=True)
+        )
+        descriptors = ((yield from drawn), (yield from mapped))
+        return (yield from compare(scenes, descriptors, similarity, self.registry, weights))

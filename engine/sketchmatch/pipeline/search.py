@@ -1,0 +1,190 @@
+"""From a comparison to the best map, of all objects or of those that have a partner."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sketchmatch.api import MatchProblem, Outcome, Searcher, SearchProgress
+from sketchmatch.model import ConfidenceWeights
+from sketchmatch.pipeline.clock import Clock
+from sketchmatch.pipeline.compare import Comparison
+from sketchmatch.pipeline.guard import blaming, checked_progress, inspecting
+from sketchmatch.pipeline.unmatched import Part, PartSearch, Rival, part_of, trials
+from sketchmatch.registry import Registry
+
+__all__ = ["Goal", "Search", "search"]
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is sought.
+
+    Attributes
+    ----------
+    weights
+        Of the parts of ζ.
+    price
+        Of leaving all objects of the template out; infinite where none may be left out.
+    alternatives
+        How many maps beside the best are wanted.
+    seed
+        Of everything random.
+    """
+
+    weights: ConfidenceWeights
+    price: float = math.inf
+    alternatives: int = 0
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What a search has come to.
+
+    Attributes
+    ----------
+    best
+        The map that is worth most.
+    iterations, evaluations
+        Of the searcher, in all parts together.
+    rivals
+        The best maps of the other parts.
+    """
+
+    best: PartSearch
+    iterations: int = 0
+    evaluations: int = 0
+    rivals: tuple[Rival, ...] = ()
+
+
+def search(
+    comparison: Comparison, searcher: Searcher, goal: Goal, registry: Registry, clock: Clock
+) -> Generator[Search, None, Search]:
+    """Search all that is to be searched.
+
+    Yields
+    ------
+    Search
+        What it has come to, at each step of the searcher.
+
+    Returns
+    -------
+    Search
+        The end of it, with ``Outcome.TIME_BUDGET`` if that was the end of the clock's budget.
+
+    Raises
+    ------
+    PluginError
+        If the searcher breaks its contract.
+    """
+    whole = Part.whole(comparison.table, comparison.own)
+    weights = goal.weights.searched
+    plan = trials(whole.objects, weights, goal.price)
+    trial, so_far, rivals = next(plan), None, list[Rival]()
+    while True:
+        part = yield from _cut(whole, trial.kept, so_far)
+        share = trial.share * clock.left()
+        found, total = yield from _searched(part, searcher, goal, registry, share, so_far)
+        if so_far is not None:
+            worse = so_far.best if total.best is found else found
+            rivals.append(worse.rival(weights))
+        so_far = replace(total, rivals=tuple(rivals))
+        try:
+            trial = plan.send(found)
+        except StopIteration:
+            return so_far
+        if clock.left() <= 0.0:
+            return replace(so_far, best=replace(so_far.best, outcome=Outcome.TIME_BUDGET))
+
+
+def _cut(
+    whole: Part, kept: tuple[int, ...], so_far: Search | None
+) -> Generator[Search, None, Part]:
+    """Return a part of what is to be searched."""
+    work = part_of(whole, kept)
+    while True:
+        try:
+            next(work)
+        except StopIteration as stop:
+            return stop.value  # type: ignore[no-any-return]
+        if so_far is not None:
+            yield so_far
+
+
+def _searched(
+    part: Part,
+    searcher: Searcher,
+    goal: Goal,
+    registry: Registry,
+    seconds: float,
+    so_far: Search | None,
+) -> Generator[Search, None, tuple[PartSearch, Search]]:
+    """Run the searcher on a part until it ends, or its time does.
+
+    Returns
+    -------
+    PartSearch, Search
+        What came of the part, and of it and of what was searched before.
+    """
+    problem = _problem(part, goal, seconds)
+    until = time.monotonic() + seconds
+    found: PartSearch | None = None
+    with _searching(searcher, problem, goal.seed, registry) as work:
+        while True:
+            with blaming(searcher, registry):
+                try:
+                    before = None if found is None else found.best
+                    best = checked_progress(next(work), problem, before)
+                except StopIteration as stop:
+                    if found is None:
+                        raise ValueError("it ended without any answer") from None
+                    found = replace(found, outcome=Outcome(stop.value or Outcome.CONVERGED))
+                    return found, _total(so_far, found, goal.price)
+            found = PartSearch(part, best)
+            total = _total(so_far, found, goal.price)
+            if time.monotonic() > until:
+                return found, total
+            yield total
+
+
+def _problem(part: Part, goal: Goal, seconds: float) -> MatchProblem:
+    table = part.table
+    there_are = math.perm(table.argument_objects, table.template_objects) - 1
+    return MatchProblem(
+        table,
+        goal.weights.searched,
+        min(goal.alternatives, there_are),
+        seconds if seconds < math.inf else None,
+    )
+
+
+def _total(so_far: Search | None, found: PartSearch, price: float) -> Search:
+    """Return what a search has come to with the search of one more part."""
+    done = (found.best.iteration, found.best.evaluations)
+    if so_far is None:
+        return Search(found, *done)
+    better = found if found.value(price) > so_far.best.value(price) else so_far.best
+    return Search(better, so_far.iterations + done[0], so_far.evaluations + done[1])
+
+
+@contextmanager
+def _searching(
+    searcher: Searcher, problem: MatchProblem, seed: int, registry: Registry
+) -> Iterator[Generator[SearchProgress, None, Outcome]]:
+    """Start a search, and stop it in the end."""
+    with blaming(searcher, registry):
+        work = searcher.search(problem, np.random.default_rng(seed))
+        if not isinstance(work, Generator):
+            raise TypeError(f"its search is a {type(work).__name__}, not a generator")
+    with inspecting(searcher, registry, problem.table):
+        try:
+            yield work
+        finally:
+            with blaming(searcher, registry):
+                work.close()

@@ -1,0 +1,73 @@
+"""From a source to the scene in it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sketchmatch.api import Segmentation, Segmenter
+from sketchmatch.errors import InvalidInputError
+from sketchmatch.model import Scene, Source
+from sketchmatch.model.limits import check_objects, check_source
+from sketchmatch.pipeline.guard import blaming, inspecting
+from sketchmatch.pipeline.selection import Pipeline
+from sketchmatch.registry import Registry
+
+__all__ = ["segment", "segment_side"]
+
+
+def segment(source: Source, segmenter: Segmenter, registry: Registry, field: str) -> Segmentation:
+    """Find the objects of a source.
+
+    Raises
+    ------
+    InvalidInputError
+        If nothing usable is in it, or too much, with a path that begins with ``field``.
+    PluginError
+        If the segmenter breaks its contract.
+    """
+    check_source(source, field)
+    with blaming(segmenter, registry):
+        try:
+            with inspecting(segmenter, registry, source):
+                found = segmenter.segment(source)
+        except InvalidInputError as error:
+            raise error.within(field) from None
+        _check_contract(found)
+    check_objects(len(found.scene), field)
+    return found
+
+
+def segment_side(
+    side: str, given: Source | Scene, pipeline: Pipeline, registry: Registry
+) -> Segmentation:
+    """Find the objects of one side of a match; a scene is what it is.
+
+    Raises
+    ------
+    InvalidInputError, PluginError
+        As :func:`segment` does.
+    """
+    if isinstance(given, Scene):
+        return Segmentation(given)
+    segmenter = pipeline.segmenter(side)
+    assert segmenter is not None
+    return segment(given, segmenter, registry, f"{side}.{given.field}")
+
+
+def _check_contract(found: Any) -> None:
+    if not isinstance(found, Segmentation):
+        raise TypeError(f"it returned a {type(found).__name__}, not a Segmentation")
+    if not isinstance(found.scene, Scene):
+        raise TypeError(f"it found a {type(found.scene).__name__}, not a Scene")
+    if found.route is not None:
+        _check_route(found.route)
+    if not all(isinstance(warning, str) for warning in found.warnings):
+        raise TypeError("its warnings are not all strings")
+
+
+def _check_route(route: Any) -> None:
+    points = np.asarray(route, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+        raise ValueError(f"its route has shape {points.shape}, not (k, 2), or is not finite")
