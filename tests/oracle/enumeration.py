@@ -21,6 +21,16 @@ def every_confidence(table, weights=(1.0, 1.0, 1.0)):
 
 def best_of_all(table, weights=(1.0, 1.0, 1.0)):
     """Return the highest ζ of all object maps, the first map that has it, and how many maps."""
+    return _extreme(table, weights, 1.0)
+
+
+def worst_of_all(table, weights=(1.0, 1.0, 1.0)):
+    """Return the lowest ζ of all object maps, the first map that has it, and how many maps."""
+    value, partners, count = _extreme(table, weights, -1.0)
+    return -value, partners, count
+
+
+def _extreme(table, weights, sign):
     partners = np.empty(table.template_objects, dtype=np.int64)
     relations = (table.entry_evidence, table.cosine, table.sine, table.normalized_dilation)
     value, count = _enumerate(
@@ -28,13 +38,14 @@ def best_of_all(table, weights=(1.0, 1.0, 1.0)):
         correspondences(table.argument_objects),
         *relations,
         np.array(weights, dtype=np.float64),
+        sign,
         partners,
     )
     return value, partners, count
 
 
 @kernel
-def _enumerate(pairs, columns, evidence, cosine, sine, dilation, weights, best):
+def _enumerate(pairs, columns, evidence, cosine, sine, dilation, weights, sign, best):
     objects, others = best.size, columns.shape[0]
     entries = np.empty(pairs.shape[0], dtype=np.int64)
     scratch = np.empty(pairs.shape[0])
@@ -46,6 +57,7 @@ def _enumerate(pairs, columns, evidence, cosine, sine, dilation, weights, best):
             for i in range(entries.size):
                 entries[i] = columns[partners[pairs[i, 0]], partners[pairs[i, 1]]]
             value = fmap_confidence(entries, scratch, evidence, cosine, sine, dilation, weights)[0]
+            value *= sign
             count += 1
             if value > highest:
                 highest = value

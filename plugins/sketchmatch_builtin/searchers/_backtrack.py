@@ -22,10 +22,16 @@ from sketchmatch_builtin.searchers._cells import ROUNDING, TOLERANCE
 from sketchmatch_builtin.searchers._ranking import Ranking
 from sketchmatch_builtin.searchers._relations import Relations, offer
 
-__all__ = ["DEPTH", "LEAVES", "STEPS", "Path", "backtrack", "first_path"]
+__all__ = ["DEPTH", "EVIDENCE", "LEAVES", "STEPS", "Path", "backtrack", "first_path"]
 
 DEPTH, STEPS, LEAVES = range(3)
 """Where a search is: how many objects are fixed, −1 at the end; steps, and maps evaluated."""
+
+EVIDENCE, COSINE, SINE, DILATION = range(4)
+"""What is known at each depth of the fixed entries: three sums, and a bound of ζL."""
+
+OMEGA = 1
+"""Beside EVIDENCE, what is summed over all other pairs."""
 
 
 class Path(NamedTuple):
@@ -43,11 +49,13 @@ class Path(NamedTuple):
     used
         Shape (N',): which partners are taken.
     sums
-        Shape (N + 1, 4): Σe, Σ ω cos R and Σ ω sin R over the fixed entries, and a bound of ζL.
+        Shape (N + 1, 4): EVIDENCE, COSINE and SINE, which are Σe, Σ ω cos R and Σ ω sin R over the
+        fixed entries, and DILATION, a bound of ζL.
     levels
         Shape (N + 1, P): their L̂ in order.
     rest
-        Shape (2, N + 1): the sums of the greatest e, and of ω, of all other pairs.
+        Shape (2, N + 1): EVIDENCE and OMEGA, the sums of the greatest e, and of ω, of all other
+        pairs.
     place
         Shape (3,): DEPTH, STEPS and LEAVES.
     """
@@ -94,6 +102,10 @@ def first_path(relations: Relations, argument_objects: int, evaluations: int) ->
         evidence = np.where(turned > 0.0, evidence, np.roll(evidence, half, axis=1))
     most = (evidence.max(axis=1), relations.rotation_weights[rows])
     rest = np.array([np.bincount(later, values, objects + 1) for values in most])
+    sums = np.zeros((objects + 1, 4))
+    sums[:, DILATION] = 1.0
+    place = np.zeros(3, dtype=np.int64)
+    place[LEAVES] = evaluations
     return Path(
         order=order,
         evidence=evidence,
@@ -102,10 +114,10 @@ def first_path(relations: Relations, argument_objects: int, evaluations: int) ->
         dilation=relations.dilation[rows],
         partners=np.full(objects, -1, dtype=np.int64),
         used=np.zeros(argument_objects, dtype=np.bool_),
-        sums=np.array([[0.0, 0.0, 0.0, 1.0]]).repeat(objects + 1, axis=0),
+        sums=sums,
         levels=np.zeros((objects + 1, len(low))),
         rest=rest[:, ::-1].cumsum(axis=1)[:, ::-1].copy(),
-        place=np.array([0, 0, evaluations]),
+        place=place,
     )
 
 
@@ -124,7 +136,7 @@ def backtrack(  # noqa: PLR0912, PLR0915
     # All arrays are taken out of their tuples first: in the loop that would take half of the time.
     evidence, cosine, sine, dilation = path.evidence, path.cosine, path.sine, path.dilation
     columns = relations.columns
-    w_s, w_r, w_l = relations.weights[0], relations.weights[1], relations.weights[2]
+    w_s, w_r, w_l = relations.shares
     order, partners, used = path.order, path.partners, path.used
     sums, levels, rest, place = path.sums, path.levels, path.rest, path.place
     objects, others = partners.size, used.size
@@ -132,9 +144,8 @@ def backtrack(  # noqa: PLR0912, PLR0915
     pairs, half = cosine.shape
     folded = 2 * half - evidence.shape[1]
     scale = 2.0 / max(1.0, pairs * (pairs - 1.0))
-    total = w_s + w_r + w_l
     depth, steps = place[DEPTH], 0
-    needed = (found.values[-1] + TOLERANCE - ROUNDING) * total
+    needed = found.values[-1] + TOLERANCE - ROUNDING
     while depth >= 0 and steps < budget:
         c = partners[depth]
         if c >= 0:
@@ -151,7 +162,7 @@ def backtrack(  # noqa: PLR0912, PLR0915
         below, old = depth + 1, depth * (depth - 1) // 2
         count = old + depth
         left = pairs - count
-        similar, x, y = sums[depth, 0], sums[depth, 1], sums[depth, 2]
+        similar, x, y = sums[depth, EVIDENCE], sums[depth, COSINE], sums[depth, SINE]
         for k in range(depth):
             own = j = columns[partners[k], c]
             sign = 1.0
@@ -162,9 +173,10 @@ def backtrack(  # noqa: PLR0912, PLR0915
             similar += evidence[old + k, own]
             x += sign * cosine[old + k, j]
             y += sign * sine[old + k, j]
-        most = w_s * (similar + rest[0, below]) + w_r * (np.sqrt(x * x + y * y) + rest[1, below])
+        most = w_s * (similar + rest[EVIDENCE, below])
+        most += w_r * (np.sqrt(x * x + y * y) + rest[OMEGA, below])
         least = needed - most / pairs
-        if sums[depth, 3] * w_l <= least:
+        if sums[depth, DILATION] * w_l <= least:
             continue
         for k in range(old):
             levels[below, k] = levels[depth, k]
@@ -182,9 +194,9 @@ def backtrack(  # noqa: PLR0912, PLR0915
         for k in range(count // 2):
             weight = count - 1.0 - 2.0 * k + left
             spread += weight * (levels[below, count - 1 - k] - levels[below, k])
-        sums[below, 0], sums[below, 1], sums[below, 2] = similar, x, y
-        sums[below, 3] = np.exp2(-scale * spread)
-        if sums[below, 3] * w_l <= least:
+        sums[below, EVIDENCE], sums[below, COSINE], sums[below, SINE] = similar, x, y
+        sums[below, DILATION] = np.exp2(-scale * spread)
+        if sums[below, DILATION] * w_l <= least:
             continue
         used[c] = True
         if below < objects:
@@ -193,7 +205,7 @@ def backtrack(  # noqa: PLR0912, PLR0915
             for k in range(objects):
                 whole[order[k]] = partners[k]
             offer(relations, found, whole, found.values[-1])
-            needed = (found.values[-1] + TOLERANCE - ROUNDING) * total
+            needed = found.values[-1] + TOLERANCE - ROUNDING
             place[LEAVES] += 1
     place[DEPTH] = depth
     place[STEPS] += steps

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from sketchmatch.api.kernels import kernel
 from sketchmatch.model import FloatArray, IntArray
 from sketchmatch_builtin.searchers._assignment import FORBIDDEN
 from sketchmatch_builtin.searchers._cells import ROUNDING, Cells, cell_terms, tolerated
-from sketchmatch_builtin.searchers._fixed import Fixed, fixed_loss
+from sketchmatch_builtin.searchers._fixed import Fixed, enter_cell, fixed_loss
 from sketchmatch_builtin.searchers._ranking import Ranking
 from sketchmatch_builtin.searchers._relations import Relations, offer
 from sketchmatch_builtin.searchers._residual import Tree, assign, fix, plant, sweep
 
-__all__ = ["CELL", "LEVEL", "NODES", "SWEEPS", "VISITED", "search_cells"]
+__all__ = ["CELL", "NODES", "VISITED", "first_place", "search_cells"]
 
 CELL, LEVEL, SWEEPS, NODES, VISITED = range(5)
 """Where a search is: the cell, the level in its tree (−1 before there is one), the sweeps left for
@@ -25,8 +27,15 @@ _WORTHWHILE = 0.1
 """A sweep that raises the bound by less than this share of what is missing is the last one."""
 
 
+def first_place(evaluations: int) -> IntArray:
+    """Return where a search begins, shape (5,): at the first cell, before there is a tree."""
+    place = np.zeros(5, dtype=np.int64)
+    place[LEVEL], place[VISITED] = -1, evaluations
+    return place
+
+
 @kernel
-def search_cells(  # noqa: PLR0912, PLR0915
+def search_cells(  # noqa: PLR0912
     relations: Relations,
     found: Ranking,
     spread: float,
@@ -49,7 +58,7 @@ def search_cells(  # noqa: PLR0912, PLR0915
     tree, fixed
         The present node and those above it: their problems, and what is fixed.
     place
-        Shape (5,): CELL, LEVEL, SWEEPS, NODES and VISITED; 0, −1, 0, 0, 0 to begin with.
+        What :func:`first_place` returned, changed in place.
     given_up
         Shape (1,): the highest bound of what there was no memory for.
     budget
@@ -68,9 +77,8 @@ def search_cells(  # noqa: PLR0912, PLR0915
                 leave = not plant(relations, tree, terms, cells.allowed[cell])
                 if leave:
                     given_up[0] = max(given_up[0], cells.bounds[cell])
-                tree.bounds[0] = terms.base[0]
-                fixed.rate[0] = terms.rates[1]
-                fixed.turn[:] = terms.turn
+                tree.bounds[0] = terms.base
+                enter_cell(fixed, terms)
                 place[LEVEL], place[SWEEPS] = 0, _ROOT_SWEEPS
                 place[NODES] += 1
                 work += relations.cosine.size + tree.ends[0]

@@ -48,18 +48,30 @@ from sketchmatch_builtin.searchers._ranking import Ranking
 from sketchmatch_builtin.searchers._relations import Relations, offer
 
 __all__ = [
+    "COSINE",
     "END",
     "EVALUATIONS",
+    "FIRST_QUANTILE",
+    "HALF",
+    "HALF_COSINE",
+    "HALF_SINE",
+    "HIGH",
+    "LOW",
+    "MIDDLE",
     "NEXT",
     "PAIR",
     "QUANTILES",
+    "ROTATION",
     "ROUNDING",
+    "SINE",
     "TOLERANCE",
     "CellTerms",
     "Cells",
     "cell_terms",
     "divide_cells",
     "first_cell",
+    "first_place",
+    "halve",
     "list_candidates",
     "pair_costs",
     "room_for_costs",
@@ -79,25 +91,40 @@ NEXT, END, PAIR, EVALUATIONS = range(4)
 """Where a division is: the next cell in the queue, its end, the next pair in that cell; and how
 many maps were evaluated."""
 
+ROTATION, FIRST_QUANTILE = range(2)
+"""The sides of a box: θ, and then one for each of the :data:`QUANTILES`."""
+
+MIDDLE, HALF = range(2)
+"""What a box says of θ: its middle, and half of its width."""
+
+LOW, HIGH = range(2)
+"""What a box says of a quantile: the ends of its interval."""
+
+COSINE, SINE, HALF_COSINE, HALF_SINE = range(4)
+"""What the bounds in a cell take from its θ: of the middle, and of half the width."""
+
 
 class CellTerms(NamedTuple):
     """What the bounds in a cell depend on.
 
     Attributes
     ----------
-    rates
-        Shape (3,): what an entry loses for 1 − e, ω (1 − cosmax) and a unit of φ.
-    turn
-        Shape (4,): cosine and sine of the middle of θ and of half its width.
+    similarity_rate, rotation_rate, dilation_rate
+        What an entry loses for 1 − e, ω (1 − cosmax) and a unit of φ.
     base
-        Shape (1,): what any map of the cell loses beside its entries.
+        What any map of the cell loses beside its entries.
+    turn
+        Shape (4,): COSINE, SINE, HALF_COSINE and HALF_SINE; cos of half the width is −2 where it
+        is all around.
     hinges
         Shape (2, h, 2): places and slopes of the hinges of φ to the left and to the right.
     """
 
-    rates: FloatArray
+    similarity_rate: float
+    rotation_rate: float
+    dilation_rate: float
+    base: float
     turn: FloatArray
-    base: FloatArray
     hinges: FloatArray
 
 
@@ -107,8 +134,8 @@ class Cells(NamedTuple):
     Attributes
     ----------
     boxes
-        Shape (room, 2 + 2K): the middle of θ and half its width, and for each of the K
-        :data:`QUANTILES` the ends of its interval, which rise from quantile to quantile.
+        Shape (room, 1 + K, 2): MIDDLE and HALF of θ, and for each of the K :data:`QUANTILES` LOW
+        and HIGH, the ends of its interval, which rise from quantile to quantile.
     bounds
         Shape (room,): a bound of ζ in each cell; −∞ where the cell was halved.
     allowed
@@ -130,8 +157,15 @@ def first_cell(shape: tuple[int, int], least: float, most: float) -> Cells:
     least, most
         Of all L̂.
     """
-    box = np.array([[0.0, np.pi, *(least, most) * len(QUANTILES)]])
-    return Cells(box, np.ones(1), np.ones((1, *shape), dtype=np.bool_))
+    box = np.array([(0.0, np.pi), *[(least, most)] * len(QUANTILES)])
+    return Cells(box[None], np.ones(1), np.ones((1, *shape), dtype=np.bool_))
+
+
+def first_place(evaluations: int) -> IntArray:
+    """Return where a division begins, shape (4,): at the one cell that holds all maps."""
+    place = np.zeros(4, dtype=np.int64)
+    place[END], place[EVALUATIONS] = 1, evaluations
+    return place
 
 
 @kernel
@@ -143,24 +177,25 @@ def tolerated(found: Ranking) -> float:
 @kernel
 def cell_terms(relations: Relations, incumbent: float, spread: float, box: FloatArray) -> CellTerms:
     """Return what the bounds in a cell depend on; ``spread`` is that of all L̂."""
-    weights, count = relations.weights, relations.pairs.shape[0]
-    total = weights[0] + weights[1] + weights[2]
-    terms = CellTerms(np.zeros(3), np.zeros(4), np.zeros(1), np.zeros((2, box.size - 2, 2)))
-    terms.rates[0] = weights[0] / (total * count)
+    share_s, share_r, share_l = relations.shares
+    count = relations.pairs.shape[0]
+    hinges = np.zeros((2, 2 * (box.shape[0] - FIRST_QUANTILE), 2))
+    rotation_rate = dilation_rate = base = 0.0
     if count > 1:
-        terms.rates[1] = weights[1] / (total * count)
-        most, room = spread, (1.0 - incumbent) * total
-        if room < weights[2]:
-            most = min(most, -np.log2(1.0 - room / weights[2]))
-        least = _write_hinges(box, terms.hinges) * count / (count - 1.0)
+        rotation_rate = share_r / count
+        most, room = spread, 1.0 - incumbent
+        if room < share_l:
+            most = min(most, -np.log2(1.0 - room / share_l))
+        least = _write_hinges(box, hinges) * count / (count - 1.0)
         low, high = np.exp2(-least), np.exp2(-most)
         slope = (low - high) / (most - least) if most > least + 1e-6 else np.log(2.0) * high
-        terms.rates[2] = weights[2] * slope / (total * (count - 1.0))
-        terms.base[0] = weights[2] * (1.0 - low) / total
-    terms.turn[0], terms.turn[1] = np.cos(box[0]), np.sin(box[0])
-    terms.turn[2] = np.cos(box[1]) if box[1] < np.pi else -2.0
-    terms.turn[3] = np.sin(box[1])
-    return terms
+        dilation_rate = share_l * slope / (count - 1.0)
+        base = share_l * (1.0 - low)
+    turn, (middle, half) = np.empty(4), box[ROTATION]
+    turn[COSINE], turn[SINE] = np.cos(middle), np.sin(middle)
+    turn[HALF_COSINE] = np.cos(half) if half < np.pi else -2.0
+    turn[HALF_SINE] = np.sin(half)
+    return CellTerms(share_s / count, rotation_rate, dilation_rate, base, turn, hinges)
 
 
 @kernel
@@ -171,12 +206,13 @@ def _write_hinges(box: FloatArray, hinges: FloatArray) -> float:
     beginning no less. Where l + h < 1 the chord is integrated in F, elsewhere in 1 − F; then φ is
     0 where the one goes over into the other, and no part of it negative.
     """
-    count = (box.size - 2) // 2
+    ends = box[FIRST_QUANTILE:]
+    count = ends.shape[0]
     low, high, least, most = 0, 0, 0.0, QUANTILES[0]
-    constant, before, left, right = 0.0, box[2], 0, 0
+    constant, before, left, right = 0.0, ends[0, LOW], 0, 0
     while high < count:
-        opens = low < count and box[2 + 2 * low] <= box[3 + 2 * high]
-        place = box[2 + 2 * low] if opens else box[3 + 2 * high]
+        opens = low < count and ends[low, LOW] <= ends[high, HIGH]
+        place = ends[low, LOW] if opens else ends[high, HIGH]
         total = least + most
         level = least * most if total < 1.0 else (1.0 - least) * (1.0 - most)
         constant += 2.0 * (place - before) * level
@@ -210,8 +246,9 @@ def pair_costs(
     costs
         Shape (last − first or more, Q').
     """
-    rate_s, rate_r, rate_l = terms.rates
-    turn_c, turn_s, half_c, half_s = terms.turn
+    rate_s, rate_r, rate_l = terms.similarity_rate, terms.rotation_rate, terms.dilation_rate
+    turn_c, turn_s = terms.turn[COSINE], terms.turn[SINE]
+    half_c, half_s = terms.turn[HALF_COSINE], terms.turn[HALF_SINE]
     hinges, half = terms.hinges, relations.cosine.shape[1]
     directed = relations.evidence.shape[1] > half
     for row in range(last - first):
@@ -289,7 +326,7 @@ def divide_cells(
     smallest
         Shape (1 + K,): half the widths in θ and in quantiles from which on a cell is not halved.
     place
-        Shape (4,): NEXT, END, PAIR and EVALUATIONS; 0, 1, 0, 0 to begin with.
+        What :func:`first_place` returned, changed in place.
     budget
         Entries to cost in this call, which ends early where the queue needs more room.
 
@@ -323,7 +360,7 @@ def divide_cells(
             return work
         place[NEXT] += 1
         place[PAIR] = 0
-        bound = terms.base[0] + reduce_by_assignment(leaders, candidates, sizes, holders)
+        bound = terms.base + reduce_by_assignment(leaders, candidates, sizes, holders)
         cells.bounds[cell] = min(cells.bounds[cell], 1.0 - bound + ROUNDING)
         if bound < tolerated(found):
             for c in range(others):
@@ -336,7 +373,7 @@ def divide_cells(
                 for x in range(sizes[a]):
                     if leaders[a, x] >= room:
                         cells.allowed[cell, a, candidates[a, x]] = False
-            _halve(cells, cell, smallest, place)
+            halve(cells, cell, smallest, place)
     return work
 
 
@@ -377,31 +414,36 @@ def _lead(
 
 
 @kernel
-def _halve(cells: Cells, cell: int, smallest: FloatArray, place: IntArray) -> None:
-    """Replace a cell by its halves at the end of the queue, if it is too wide."""
+def halve(cells: Cells, cell: int, smallest: FloatArray, place: IntArray) -> None:
+    """Replace a cell by its halves at the end of the queue, if it is too wide.
+
+    ``smallest`` and ``place`` are those of :func:`divide_cells`; there must be room for two cells.
+    """
     boxes = cells.boxes
     widest, excess = -1, 1.0
-    for k in range(smallest.size):
-        half = boxes[cell, 1] if k == 0 else 0.5 * (boxes[cell, 2 * k + 1] - boxes[cell, 2 * k])
-        if half > excess * smallest[k]:
-            widest, excess = k, half / smallest[k]
+    for side in range(smallest.size):
+        half = boxes[cell, ROTATION, HALF]
+        if side != ROTATION:
+            half = 0.5 * (boxes[cell, side, HIGH] - boxes[cell, side, LOW])
+        if half > excess * smallest[side]:
+            widest, excess = side, half / smallest[side]
     if widest < 0:
         return
     for upper in range(2):
         new = place[END]
         box = boxes[new]
-        for k in range(box.size):
-            box[k] = boxes[cell, k]
-        if widest == 0:
-            box[0] += (upper - 0.5) * boxes[cell, 1]
-            box[1] *= 0.5
+        box[:] = boxes[cell]
+        if widest == ROTATION:
+            box[ROTATION, MIDDLE] += (upper - 0.5) * boxes[cell, ROTATION, HALF]
+            box[ROTATION, HALF] *= 0.5
         else:
-            box[2 * widest + 1 - upper] = 0.5 * (box[2 * widest] + box[2 * widest + 1])
+            middle = 0.5 * (box[widest, LOW] + box[widest, HIGH])
+            box[widest, LOW if upper else HIGH] = middle
         # The quantiles rise. That never leaves an interval empty: its ends rise as well.
-        for k in range(2, smallest.size):
-            box[2 * k] = max(box[2 * k], box[2 * k - 2])
-        for k in range(smallest.size - 2, 0, -1):
-            box[2 * k + 1] = min(box[2 * k + 1], box[2 * k + 3])
+        for side in range(FIRST_QUANTILE + 1, smallest.size):
+            box[side, LOW] = max(box[side, LOW], box[side - 1, LOW])
+        for side in range(smallest.size - 2, ROTATION, -1):
+            box[side, HIGH] = min(box[side, HIGH], box[side + 1, HIGH])
         cells.bounds[new] = cells.bounds[cell]
         cells.allowed[new] = cells.allowed[cell]
         place[END] += 1

@@ -18,9 +18,19 @@ import numpy as np
 
 from sketchmatch.api.kernels import kernel
 from sketchmatch.model import FloatArray, IntArray
+from sketchmatch_builtin.searchers._cells import (
+    COSINE,
+    HALF_COSINE,
+    HALF_SINE,
+    SINE,
+    CellTerms,
+)
 from sketchmatch_builtin.searchers._relations import Relations
 
-__all__ = ["Fixed", "empty_fixed", "fixed_loss"]
+__all__ = ["Fixed", "empty_fixed", "enter_cell", "fixed_loss"]
+
+X, Y, GREATEST = range(3)
+"""What is summed over the entries between fixed objects."""
 
 
 class Fixed(NamedTuple):
@@ -31,11 +41,12 @@ class Fixed(NamedTuple):
     objects, partners
         Shape (N,): the k-th object fixed, and its partner.
     sums
-        Shape (N + 1, 3): Σ ω cos R, Σ ω sin R and Σ ω cosmax over the entries of each level.
+        Shape (N + 1, 3): X, Y and GREATEST over the entries of each level: Σ ω cos R, Σ ω sin R
+        and Σ ω cosmax.
     losses
         Shape (N + 1,): the loss beyond the bound at each level.
     rate, turn
-        Shapes (1,) and (4,): what an entry loses for ω (1 − cosmax) in this cell, and its θ, as in
+        Shapes (1,) and (4,): the rotation rate of this cell and its θ, as in
         :class:`~sketchmatch_builtin.searchers._cells.CellTerms`.
     """
 
@@ -61,9 +72,17 @@ def empty_fixed(template_objects: int) -> Fixed:
 
 
 @kernel
+def enter_cell(fixed: Fixed, terms: CellTerms) -> None:
+    """Count losses as a cell does; nothing is fixed in it yet."""
+    fixed.rate[0] = terms.rotation_rate
+    fixed.turn[:] = terms.turn
+
+
+@kernel
 def fixed_loss(relations: Relations, fixed: Fixed, level: int, a: int, c: int) -> float:
     """Fix a → c below a level, and return by how much the loss beyond the bound rises."""
-    x, y, greatest = fixed.sums[level]
+    sums = fixed.sums
+    x, y, greatest = sums[level, X], sums[level, Y], sums[level, GREATEST]
     fixed.objects[level], fixed.partners[level] = a, c
     for k in range(level):
         i, j, sign = _entry(relations, a, fixed.objects[k], c, fixed.partners[k])
@@ -71,7 +90,7 @@ def fixed_loss(relations: Relations, fixed: Fixed, level: int, a: int, c: int) -
         x, y = x + cosine, y + sine
         greatest += _greatest(cosine, sine, relations.rotation_weights[i], fixed.turn)
     below = level + 1
-    fixed.sums[below, 0], fixed.sums[below, 1], fixed.sums[below, 2] = x, y, greatest
+    sums[below, X], sums[below, Y], sums[below, GREATEST] = x, y, greatest
     most = _greatest(x, y, np.sqrt(x * x + y * y), fixed.turn)
     fixed.losses[below] = fixed.rate[0] * (greatest - most)
     return float(fixed.losses[below] - fixed.losses[level])
@@ -80,8 +99,11 @@ def fixed_loss(relations: Relations, fixed: Fixed, level: int, a: int, c: int) -
 @kernel
 def _greatest(x: float, y: float, length: float, turn: FloatArray) -> float:
     """Return the greatest component of a vector in a direction within the cell."""
-    along, across = x * turn[0] + y * turn[1], abs(y * turn[0] - x * turn[1])
-    return length if along >= turn[2] * length else float(along * turn[2] + across * turn[3])
+    along = x * turn[COSINE] + y * turn[SINE]
+    across = abs(y * turn[COSINE] - x * turn[SINE])
+    if along >= turn[HALF_COSINE] * length:
+        return length
+    return float(along * turn[HALF_COSINE] + across * turn[HALF_SINE])
 
 
 @kernel

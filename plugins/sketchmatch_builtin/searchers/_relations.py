@@ -32,8 +32,8 @@ class Relations(NamedTuple):
         Shape (Q, Q'/2): cos R and sin R, times the rotation weight of each pair, and L̂.
     rotation_weights
         Shape (Q,): what R of each template pair counts for in ζR, 1 on average.
-    weights
-        Shape (3,), of ζσ, ζR and ζL.
+    shares
+        Shape (3,): the weights of ζσ, ζR and ζL divided by their sum.
     """
 
     pairs: IntArray
@@ -43,7 +43,7 @@ class Relations(NamedTuple):
     sine: FloatArray
     dilation: FloatArray
     rotation_weights: FloatArray
-    weights: FloatArray
+    shares: FloatArray
 
 
 def read_slices(
@@ -87,7 +87,7 @@ def offer(relations: Relations, found: Ranking, partners: IntArray, floor: float
         relations.cosine,
         relations.sine,
         relations.dilation,
-        relations.weights,
+        relations.shares,
     )[0]
     insert(found, partners, value)
     return float(value)

@@ -17,19 +17,30 @@ from sketchmatch.model import (
     object_pairs,
 )
 from sketchmatch.model.arrays import sealed
-from sketchmatch_builtin.searchers._backtrack import DEPTH, LEAVES, STEPS, backtrack, first_path
+from sketchmatch_builtin.searchers._backtrack import (
+    DEPTH,
+    EVIDENCE,
+    LEAVES,
+    STEPS,
+    backtrack,
+    first_path,
+)
 from sketchmatch_builtin.searchers._branch import CELL, NODES, VISITED, search_cells
+from sketchmatch_builtin.searchers._branch import first_place as first_descent
 from sketchmatch_builtin.searchers._cells import (
     END,
     EVALUATIONS,
+    FIRST_QUANTILE,
     NEXT,
     QUANTILES,
+    ROTATION,
     ROUNDING,
     TOLERANCE,
     Cells,
     divide_cells,
     first_cell,
 )
+from sketchmatch_builtin.searchers._cells import first_place as first_division
 from sketchmatch_builtin.searchers._fixed import empty_fixed
 from sketchmatch_builtin.searchers._ranking import ranked_fmaps
 from sketchmatch_builtin.searchers._relations import Relations, read_slices
@@ -188,7 +199,8 @@ class _Search:
             sine=np.empty(shape),
             dilation=np.empty(shape),
             rotation_weights=self.table.rotation_weights,
-            weights=np.array(problem.weights, dtype=np.float64),
+            # Products of losses with tiny weights would lose all digits.
+            shares=np.array(problem.weights) / sum(problem.weights),
         )
         self.iterations, self.evaluations = start.iterations, start.evaluations
         self.upper_bound = 1.0
@@ -218,10 +230,8 @@ class _Search:
     def backtrack(self) -> Iterator[None]:
         """Search all maps depth first."""
         path = first_path(self.relations, self.table.argument_objects, self.evaluations)
-        w_s, w_r, w_l = self.relations.weights
-        self.upper_bound = (w_s * path.rest[0, 0] / len(path.levels[0]) + w_r + w_l) / (
-            w_s + w_r + w_l
-        )
+        w_s, w_r, w_l = self.relations.shares
+        self.upper_bound = w_s * path.rest[EVIDENCE, 0] / len(path.levels[0]) + w_r + w_l
         before = self.iterations
         while path.place[DEPTH] >= 0 and self.iterations < self.last_iteration:
             steps = min(_STEPS, self.last_iteration - self.iterations)
@@ -237,7 +247,7 @@ class _Search:
         """Bound cells and halve those that stay open, until they are small."""
         leaders = np.empty(self.cells.allowed.shape[1:])
         smallest, done = self._smallest_cell(), self.iterations
-        place, work = np.array([0, 1, 0, self.evaluations]), 0
+        place, work = first_division(self.evaluations), 0
         while place[NEXT] < place[END] and self.iterations < self.last_iteration:
             if place[END] + 2 > len(self.cells.bounds):
                 open_ = np.flatnonzero(self.cells.bounds[: place[END]] > self._best)
@@ -274,7 +284,7 @@ class _Search:
             return
         tree = empty_tree(*self.cells.allowed.shape[1:])
         fixed = empty_fixed(self.table.template_objects)
-        place = np.array([0, -1, 0, 0, self.evaluations])
+        place = first_descent(self.evaluations)
         before = self.iterations
         limit = self.last_iteration - before
         while place[CELL] < len(self.cells.bounds) and place[NODES] < limit:
@@ -326,13 +336,13 @@ class _Search:
         angle = math.radians(self.params.cell_angle)
         dilation = max(self.params.cell_dilation, self.spread / _MOST_LAYERS)
         smallest = np.full(1 + len(QUANTILES), dilation)
-        smallest[0] = angle
+        smallest[ROTATION] = angle
         smallest *= 0.5 * factor * (1.0 + ROUNDING)
-        weights = self.relations.weights
-        if self.table.template_pairs == 1 or weights[1] == 0.0:
-            smallest[0] = math.inf
-        if self.table.template_pairs == 1 or weights[2] == 0.0:
-            smallest[1:] = math.inf
+        _, share_r, share_l = self.relations.shares
+        if self.table.template_pairs == 1 or share_r == 0.0:
+            smallest[ROTATION] = math.inf
+        if self.table.template_pairs == 1 or share_l == 0.0:
+            smallest[FIRST_QUANTILE:] = math.inf
         return smallest
 
     def _keep(self, which: IntArray) -> None:

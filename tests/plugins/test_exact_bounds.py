@@ -1,0 +1,365 @@
+"""The parts of ``exact`` on their own: each bound and whatever is left out, against enumeration."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sketchmatch.api import MatchProblem, Outcome
+from sketchmatch.pipeline.slices import finish
+from sketchmatch_builtin.searchers import _cells, _fixed, _residual
+from sketchmatch_builtin.searchers import exact as module
+from sketchmatch_builtin.searchers._assignment import FORBIDDEN, reduce_by_assignment
+from sketchmatch_builtin.searchers._ranking import Ranking
+from sketchmatch_builtin.searchers.direct import Evolved
+from sketchmatch_builtin.searchers.exact import Exact
+from tests.oracle import maps as oracle
+from tests.oracle.enumeration import every_confidence
+from tests.searching import WEIGHTS
+from tests.strategies import floats, random_table, with_rotation_weights
+
+SEEDS = st.integers(0, 2**32)
+QUANTILES = len(_cells.QUANTILES)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _warm():
+    # Kernels compile here, and not while hypothesis counts the time of an example.
+    Exact.warm_up()
+
+
+def relations_of(table, weights):
+    """Return the relations as the kernels read them, and the spread of all L̂."""
+    begin = Ranking(np.zeros((1, table.template_objects), dtype=np.int64), np.zeros(1))
+    search = module._Search(
+        MatchProblem(table, weights), Evolved(Outcome.CONVERGED, begin, 0, 0), Exact.Params()
+    )
+    finish(search.read())
+    return search.relations, search.spread
+
+
+def some_box(rng):
+    """Return a cell that some maps belong to."""
+    middles = np.sort(rng.uniform(-1.5, 1.5, QUANTILES))
+    widths = rng.choice([0.05, 1.0]) * rng.uniform(0.0, 1.0, QUANTILES)
+    ends = np.maximum.accumulate(np.stack([middles - widths, middles + widths], axis=1))
+    return np.array([(rng.uniform(0, 6), rng.uniform(0, 1.5)), *ends])
+
+
+def belongs(table, partners, box):
+    """Return whether the direction and the quantiles of a map lie in a cell."""
+    looked_up = [
+        (*oracle.look_up(table, i, pair), weight)
+        for i, (pair, weight) in enumerate(
+            zip(oracle.induced(partners), table.rotation_weights, strict=True)
+        )
+    ]
+    direction = np.angle(sum(weight * np.exp(1j * r) for _, r, _, weight in looked_up))
+    levels = np.sort([1.5 / np.log(2) * np.log(d) for _, _, d, _ in looked_up])
+    (middle, half), *ends = box
+    within = [
+        low <= levels[math.ceil(share * len(levels)) - 1] <= high
+        for share, (low, high) in zip(_cells.QUANTILES, ends, strict=True)
+    ]
+    return abs(np.angle(np.exp(1j * (direction - middle)))) <= half and all(within)
+
+
+@st.composite
+def boxes(draw):
+    """Return a cell, of any width, and how far cells are halved."""
+    ends = np.sort(draw(st.lists(floats(-3.0, 3.0), min_size=4, max_size=4))).reshape(2, 2)
+    if draw(st.booleans()):  # intervals that overlap
+        ends[0, 1], ends[1, 0] = ends[1, 0], ends[0, 1]
+    box = np.array([(draw(floats(0.0, 6.0)), draw(floats(0.0, np.pi))), *ends])
+    smallest = draw(st.lists(st.sampled_from([0.1, 0.5, np.inf]), min_size=3, max_size=3))
+    return box, np.array(smallest)
+
+
+@given(boxes(), st.data())
+@settings(max_examples=200)
+def test_the_halves_of_a_cell_cover_it(case, data):
+    box, smallest = case
+    allowed = np.array([[True, False, True]])
+    cells = _cells.Cells(
+        np.stack([box, np.zeros_like(box), np.zeros_like(box)]),
+        np.array([0.7, -np.inf, -np.inf]),
+        np.array([allowed[0], [False] * 3, [False] * 3])[:, None],
+    )
+    place = _cells.first_place(0)
+    _cells.halve(cells, 0, smallest, place)
+    widths = [box[0, 1], *(0.5 * (box[1:, 1] - box[1:, 0]))]
+    if (np.array(widths) <= smallest).all():
+        assert (place[_cells.END], cells.bounds[0]) == (1, 0.7)
+        return
+    assert (place[_cells.END], cells.bounds.tolist()) == (3, [-np.inf, 0.7, 0.7])
+    assert (cells.allowed == allowed).all()
+    angle = box[0, 0] + data.draw(st.sampled_from([-1.0, 1.0]) | floats(-1.0, 1.0)) * box[0, 1]
+    shares = st.sampled_from([0.0, 0.5, 1.0]) | floats(0.0, 1.0)
+    low = box[1, 0] + data.draw(shares) * (box[1, 1] - box[1, 0])
+    high = max(low, box[2, 0]) + data.draw(shares) * (box[2, 1] - max(low, box[2, 0]))
+    inside = [
+        abs(angle - middle) <= half + 1e-12
+        and all(
+            least - 1e-12 <= level <= most + 1e-12
+            for level, (least, most) in zip((low, high), ends, strict=True)
+        )
+        for (middle, half), *ends in cells.boxes[1:]
+    ]
+    assert any(inside)
+
+
+@pytest.mark.parametrize("turned", [True, False])
+def test_a_half_is_half_as_wide_and_no_wider_elsewhere(turned):
+    box = np.array([(1.0, 0.8), (-1.0, 1.0), (0.0, 2.0)])
+    cells = _cells.Cells(np.stack([box] * 3), np.ones(3), np.ones((3, 1, 1), dtype=np.bool_))
+    smallest = np.array([0.1, np.inf, np.inf] if turned else [np.inf, np.inf, 0.1])
+    _cells.halve(cells, 0, smallest, _cells.first_place(0))
+    expected = (
+        [[(0.6, 0.4), (-1.0, 1.0), (0.0, 2.0)], [(1.4, 0.4), (-1.0, 1.0), (0.0, 2.0)]]
+        if turned
+        else [[(1.0, 0.8), (-1.0, 1.0), (0.0, 1.0)], [(1.0, 0.8), (-1.0, 1.0), (1.0, 2.0)]]
+    )
+    assert cells.boxes[1:].tolist() == pytest.approx(np.array(expected))
+
+
+@pytest.mark.parametrize("weights", WEIGHTS)
+def test_a_candidate_dropped_from_a_cell_is_on_no_better_map(weights):
+    tried = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        objects = 2 + seed % 3
+        table = random_table(rng, objects, objects + 1)
+        relations, spread = relations_of(table, weights)
+        every = every_confidence(table, weights)
+        worst = np.array([min(every, key=every.get)])
+        smallest = np.array([0.5, 0.8, 0.8])
+        # A hair below each map that may be the best: nothing is left out too late.
+        for value in sorted(every.values())[-3:]:
+            found = Ranking(worst.copy(), np.array([value - 1e-6]))
+            cells = _roomy_cell(relations, objects, objects + 1, spread)
+            place = _cells.first_place(0)
+            leaders = np.empty((objects, objects + 1))
+            _cells.divide_cells(relations, found, spread, cells, leaders, smallest, place, 10**5)
+            left = slice(0, place[_cells.END])
+            for partners, zeta in every.items():
+                if zeta <= found.values[0] + _cells.TOLERANCE:
+                    continue
+                tried += 1
+                covering = [
+                    allowed[np.arange(objects), partners].all()
+                    for box, bound, allowed in zip(*(part[left] for part in cells), strict=True)
+                    if bound > -np.inf and belongs(table, partners, box + _slack(box))
+                ]
+                assert any(covering)
+    assert tried > 10
+
+
+def _roomy_cell(relations, objects, others, spread):
+    """Return the cell of all maps, with room for many more."""
+    least = float(relations.dilation.min())
+    first = _cells.first_cell((objects, others), least, least + spread)
+    room = 1000
+    return _cells.Cells(
+        np.concatenate([first.boxes, np.zeros((room, *first.boxes.shape[1:]))]),
+        np.concatenate([first.bounds, np.full(room, -np.inf)]),
+        np.concatenate([first.allowed, np.zeros((room, objects, others), dtype=np.bool_)]),
+    )
+
+
+def _slack(box):
+    """Return what makes a box wider by more than rounding."""
+    slack = np.tile([-1e-9, 1e-9], (len(box), 1))
+    slack[0, 0] = 0.0
+    return slack
+
+
+@given(SEEDS, st.integers(2, 4), st.integers(0, 2), st.sampled_from(WEIGHTS), st.integers(0, 3))
+@settings(max_examples=150)
+def test_a_candidate_dropped_from_a_node_is_on_no_map_below_the_limit(
+    seed, objects, more, weights, sweeps
+):
+    """What is left says of every map below the limit no more than its costs, and no less if it can.
+
+    Only what maps leave over may take something away: the duals of partners that have no object.
+    """
+    rng = np.random.default_rng(seed)
+    table = random_table(rng, objects, objects + more)
+    relations, spread = relations_of(table, weights)
+    terms = _cells.cell_terms(relations, 0.3, spread, some_box(rng))
+    before = {
+        partners: terms.base + sum(_costs(relations, terms, partners))
+        for partners in itertools.permutations(range(objects + more), objects)
+    }
+    for target in sorted(before.values())[:6]:
+        limit = target + 1e-9
+        tree = _residual.empty_tree(objects, objects + more)
+        everything = np.ones((objects, objects + more), dtype=np.bool_)
+        assert _residual.plant(relations, tree, terms, everything)
+        tree.bounds[0] = terms.base
+        open_ = _residual.assign(tree, 0, limit)
+        for _ in range(sweeps):
+            if open_:
+                _residual.sweep(tree, 0, limit)
+                open_ = _residual.assign(tree, 0, limit)
+        assert open_
+        for partners, cost in before.items():
+            if cost < limit:
+                _assert_says(tree, 0, partners, cost)
+        _assert_children_keep(tree, before, limit)
+
+
+def _assert_children_keep(tree, before, limit):
+    """Fix the first open object to each of its candidates, and look at all maps below the limit."""
+    first = np.arange(tree.sizes[0, 0])
+    for x in first:
+        assert _residual.fix(tree, 0, 0, int(x), 0.0, limit)
+        for partners, cost in before.items():
+            if partners[0] == tree.candidates[0, 0, x] and cost < limit:
+                assert tree.bounds[1] < limit
+                _assert_says(tree, 1, partners, cost)
+
+
+def _costs(relations, terms, partners):
+    """Return what each entry of a map loses in a cell."""
+    costs = np.empty((len(relations.pairs), 2 * relations.cosine.shape[1]))
+    _cells.pair_costs(relations, 0, len(costs), terms, costs)
+    return [
+        costs[i, relations.columns[pair]] for i, pair in enumerate(oracle.induced(tuple(partners)))
+    ]
+
+
+def _assert_says(tree, level, partners, cost):
+    """Compare what a node says of a map, which is K, its leaders and its pairs, with its cost."""
+    count, total = tree.counts[level], tree.bounds[level]
+    chosen = []
+    for k in range(count):
+        candidates = tree.candidates[level, k, : tree.sizes[level, k]].tolist()
+        chosen.append(candidates.index(partners[tree.objects[level, k]]))
+        total += tree.leaders[level, k, chosen[k]]
+    for k, other in itertools.combinations(range(count), 2):
+        start = tree.starts[level, k, other] + chosen[k] * tree.sizes[level, other]
+        total += tree.blocks[start + chosen[other]]
+    assert total <= cost + 1e-11
+    if tree.candidates.shape[1] == tree.candidates.shape[2]:
+        assert total >= cost - 1e-11
+
+
+@given(SEEDS, st.integers(2, 5), st.sampled_from([(0.0, 1.0, 0.0), *WEIGHTS]))
+@settings(max_examples=150)
+def test_what_fixed_objects_lose_is_never_more_than_any_direction_of_the_cell_costs(
+    seed, objects, weights
+):
+    rng = np.random.default_rng(seed)
+    table = with_rotation_weights(rng, random_table(rng, objects, objects + 1))
+    relations, spread = relations_of(table, weights)
+    box = some_box(rng)
+    terms = _cells.cell_terms(relations, 0.3, spread, box)
+    partners, order = rng.permutation(objects + 1)[:objects], rng.permutation(objects)
+    fixed = _fixed.empty_fixed(objects)
+    _fixed.enter_cell(fixed, terms)
+    middle, half = box[0]
+    directions = middle + half * np.linspace(-1.0, 1.0, 2001)
+    share = weights[1] / sum(weights) / table.template_pairs if objects > 2 else 0.0
+    lost, vectors = 0.0, []
+    for level, a in enumerate(order):
+        lost += _fixed.fixed_loss(relations, fixed, level, a, partners[a])
+        for b in order[:level]:
+            i = oracle.pairs(objects).index((min(a, b), max(a, b)))
+            pair = (partners[min(a, b)], partners[max(a, b)])
+            turn = oracle.look_up(table, i, pair)[1]
+            vectors.append(table.rotation_weights[i] * np.exp(1j * turn))
+        components = np.array([(v * np.exp(-1j * directions)).real for v in vectors])
+        true = 0.0
+        if vectors:
+            true = share * (components.max(axis=1).sum() - components.sum(axis=0).max())
+        # Among so many directions each maximum is missed by less than 1e-6 of its length.
+        assert lost == pytest.approx(true, abs=2e-6)
+
+
+@given(SEEDS, st.integers(3, 4), st.booleans())
+@settings(max_examples=100)
+def test_where_rotation_is_all_costs_and_losses_of_a_whole_map_are_its_loss(seed, objects, heavy):
+    rng = np.random.default_rng(seed)
+    table = random_table(rng, objects, objects + 1)
+    if heavy:
+        table = with_rotation_weights(rng, table)
+    weights = (0.0, 1.0, 0.0)
+    relations, spread = relations_of(table, weights)
+    for partners, value in every_confidence(table, weights).items():
+        box = some_box(rng)
+        box[0, 1] += 0.5
+        box[1:] = [(-9.0, 9.0)] * QUANTILES
+        terms = _cells.cell_terms(relations, 0.0, spread, box)
+        fixed = _fixed.empty_fixed(objects)
+        _fixed.enter_cell(fixed, terms)
+        loss = sum(_costs(relations, terms, partners))
+        for level, (a, c) in enumerate(enumerate(partners)):
+            loss += _fixed.fixed_loss(relations, fixed, level, a, c)
+        assert loss >= 1.0 - value - 1e-12
+        if belongs(table, partners, box):
+            assert loss == pytest.approx(1.0 - value, abs=1e-12)
+
+
+@given(st.integers(1, 6), st.integers(0, 4), st.integers(0, 2**32))
+@settings(max_examples=150)
+def test_the_assignment_is_the_cheapest_and_its_reduced_costs_are_a_proof(rows, more, seed):
+    rng = np.random.default_rng(seed)
+    columns = rows + more
+    kinds = [rng.uniform(0.0, 1.0, (rows, columns)), rng.integers(0, 3, (rows, columns))]
+    costs = rng.choice(kinds)
+    present = rng.uniform(0.0, 1.0, costs.shape) < rng.choice([0.5, 1.0])
+    candidates = np.zeros((rows, columns), dtype=np.int64)
+    listed, sizes = np.zeros((rows, columns)), present.sum(axis=1)
+    for k in range(rows):
+        candidates[k, : sizes[k]] = np.flatnonzero(present[k])
+        listed[k, : sizes[k]] = costs[k, present[k]]
+    holders = np.empty(columns, dtype=np.int64)
+    found = reduce_by_assignment(listed, candidates, sizes, holders)
+    totals = {
+        p: sum(costs[k, c] for k, c in enumerate(p))
+        for p in itertools.permutations(range(columns), rows)
+        if all(present[k, c] for k, c in enumerate(p))
+    }
+    if not totals:
+        assert found == FORBIDDEN
+        return
+    assert found == pytest.approx(min(totals.values()), abs=1e-12)
+    taken = {int(k): c for c, k in enumerate(holders) if k >= 0}
+    assert totals[tuple(taken[k] for k in range(rows))] == pytest.approx(found, abs=1e-12)
+    reduced = np.zeros(costs.shape)
+    for k in range(rows):
+        reduced[k, present[k]] = listed[k, : sizes[k]]
+    assert reduced.min() >= 0.0
+    for p, total in totals.items():
+        assert total >= found + sum(reduced[k, c] for k, c in enumerate(p)) - 1e-12
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_no_map_of_a_cell_loses_less_than_its_costs(seed):
+    """The bound of a cell, entry by entry, against ζ of every map that belongs to it."""
+    rng = np.random.default_rng(seed)
+    table = random_table(rng, 4, 5)
+    weights = WEIGHTS[seed % len(WEIGHTS)]
+    every = every_confidence(table, weights)
+    first = next(iter(every))
+    incumbent = every[first]
+    relations, spread = relations_of(table, weights)
+    box = some_box(rng)
+    terms = _cells.cell_terms(relations, incumbent, spread, box)
+    belonging = 0
+    for partners, value in every.items():
+        if value > incumbent and belongs(table, partners, box):
+            belonging += 1
+            loss = terms.base + sum(_costs(relations, terms, partners))
+            assert 1.0 - value >= loss - 1e-12
+    test_no_map_of_a_cell_loses_less_than_its_costs.belonging += belonging
+
+
+test_no_map_of_a_cell_loses_less_than_its_costs.belonging = 0
+
+
+def test_cells_had_maps():
+    assert test_no_map_of_a_cell_loses_less_than_its_costs.belonging > 20
