@@ -29,6 +29,20 @@ class Auto(Searcher):
     tries to prove that there is none better, or finds it: for as long as the time budget lasts,
     or for ``proof_nodes`` where there is none. Beyond, ``direct`` is all. The result's note says
     what was done.
+
+    Examples
+    --------
+    The note says what it did:
+
+    >>> from sketchmatch.testing import matching_problem
+    >>> problem, truth = matching_problem(np.random.default_rng(0), objects=5)
+    >>> *_, last = Auto().search(problem, np.random.default_rng(0))
+    >>> last.note
+    'exact tried all maps that could be better'
+    >>> problem, truth = matching_problem(np.random.default_rng(0), objects=12)
+    >>> *_, last = Auto().search(problem, np.random.default_rng(0))
+    >>> last.note
+    'direct searched, then exact proved that no object map is better'
     """
 
     name = "auto"

@@ -57,6 +57,19 @@ class Easm(Searcher):
     ----------
     "Scene Matching Between a Quantitative Map and a Qualitative Hand Drawn Sketch", thesis,
     section 3.8.
+
+    Examples
+    --------
+    A small population finds the truth about a sketch of four things on a map of five:
+
+    >>> from sketchmatch.testing import mapped_pairs, matching_problem
+    >>> problem, truth = matching_problem(np.random.default_rng(0), objects=5, missing=1)
+    >>> searcher = Easm(Easm.Params(population=20, patience=20))
+    >>> *_, last = searcher.search(problem, np.random.default_rng(0))
+    >>> truth.tolist(), mapped_pairs(last.fmap, problem.table)[:3]
+    ([4, 1, 3, 0], [(4, 1), (4, 3), (4, 0)])
+    >>> last.iteration, last.evaluations  # generations, and FMAPs judged
+    (30, 450)
     """
 
     name = "easm"

@@ -87,6 +87,24 @@ class Exact(Searcher):
        formulation", Operations Research 46(6), 1998.
     .. [4] R. Jonker, A. Volgenant, "A shortest augmenting path algorithm for dense and sparse
        linear assignment problems", Computing 38, 1987.
+
+    Examples
+    --------
+    A sketch of four of the five things on a map:
+
+    >>> from sketchmatch.testing import best_object_map, mapped_pairs, matching_problem
+    >>> problem, truth = matching_problem(np.random.default_rng(0), objects=5, missing=1)
+    >>> *_, last = Exact().search(problem, np.random.default_rng(0))
+    >>> bool(last.upper_bound == last.confidence)
+    True
+    >>> truth.tolist(), mapped_pairs(last.fmap, problem.table)[:3]
+    ([4, 1, 3, 0], [(4, 1), (4, 3), (4, 0)])
+
+    Nothing is better, as trying every object map says too:
+
+    >>> zeta, partners = best_object_map(problem.table)
+    >>> partners, abs(zeta - last.confidence) < 1e-9
+    ((4, 1, 3, 0), True)
     """
 
     name = "exact"
