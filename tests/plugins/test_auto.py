@@ -11,7 +11,7 @@ from sketchmatch.api import MatchProblem, Outcome
 from sketchmatch_builtin.searchers import auto as module
 from sketchmatch_builtin.searchers.auto import Auto
 from sketchmatch_builtin.searchers.direct import Direct
-from sketchmatch_builtin.searchers.exact import Exact
+from sketchmatch_builtin.searchers.exact import Exact, log_maps
 from tests.oracle import maps as oracle
 from tests.oracle.enumeration import best_of_all
 from tests.searching import drain
@@ -104,6 +104,26 @@ def test_no_proof_is_tried_of_very_many_maps_or_where_it_is_not_wanted():
     seen, outcome = run(some, searcher=Auto(Auto.Params(proof_nodes=0)))
     assert (outcome, seen[-1].upper_bound) == (Outcome.CONVERGED, None)
     assert "proof_nodes is 0" in seen[-1].note
+
+
+@pytest.mark.parametrize(
+    ("template", "argument", "bits", "note"),
+    [
+        (11, 11, 25.3, "exact tried all"),
+        (5, 38, 25.8, "exact tried all"),
+        (5, 39, 26.04, "no time for a proof"),
+        (20, 20, 61.1, "no time for a proof"),
+        (16, 24, 63.7, "no time for a proof"),
+        (12, 46, 64.01, "too many"),
+        (21, 21, 65.5, "too many"),
+    ],
+)
+def test_it_picks_by_the_number_of_maps(template, argument, bits, note):
+    table = random_table(np.random.default_rng(0), template, argument)
+    assert log_maps(table) == pytest.approx(bits, abs=0.05)
+    work = Auto().search(MatchProblem(table), np.random.default_rng(0))
+    assert note in next(work).note
+    work.close()
 
 
 def test_it_finds_what_the_searchers_find_that_it_picks():

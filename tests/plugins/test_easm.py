@@ -18,6 +18,7 @@ from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import default_registry
 from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.histograms.constant import ConstantForce
+from sketchmatch_builtin.searchers import easm as module
 from sketchmatch_builtin.searchers.easm import Easm
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from tests.oracle import maps as oracle
@@ -135,6 +136,33 @@ def test_patience_counts_generations_without_a_better_best():
     table = random_table(np.random.default_rng(0), 2, 2)
     seen, outcome = run(table, patience=7)
     assert (seen[-1].iteration, outcome) == (7, Outcome.CONVERGED)
+
+
+@BOTH
+def test_no_parent_crosses_with_itself(consistency):
+    table = random_table(np.random.default_rng(0), 20, 20)
+    params = {"population": 2, "generations": 1, "consistency": consistency}
+    rates = {"crossover_rate": 1.0, "exchange_rate": 0.5, "mutation_rate": 0.0}
+    evaluations = [run(table, seed, **params, **rates)[0][-1].evaluations for seed in range(40)]
+    # Only a child that is like neither is judged. Of one member both children would be like it,
+    # and it would be both parents half of the time; of two they seldom are.
+    assert evaluations.count(2) <= 4
+
+
+@BOTH
+def test_patience_begins_anew_with_every_better_best(consistency, monkeypatch):
+    monkeypatch.setattr(module, "_REPORT_EVERY", -1.0)
+    monkeypatch.setattr(module, "_SLICE_ENTRIES", 1)
+    table, patience, late = random_table(np.random.default_rng(3), 6, 7), 9, 0
+    for seed in range(5):
+        seen, outcome = run(table, seed, consistency=consistency, population=4, patience=patience)
+        better = [b.iteration for a, b in itertools.pairwise(seen) if b.confidence > a.confidence]
+        assert outcome is Outcome.CONVERGED
+        # Generations without a better best begin when the one that found it is over.
+        begin = better[-1] + 1 if better else 0
+        assert seen[-1].iteration == begin + patience
+        late += begin > patience
+    assert late > 0, "it got better when patience would have been at an end"
 
 
 @BOTH
