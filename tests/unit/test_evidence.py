@@ -153,6 +153,15 @@ def test_objects_around_one_centre_weigh_alike():
     assert match(scene, scene, weights=(1, 1, 1, 0, 0, 2)).fmap_confidence == pytest.approx(1.0)
 
 
+def test_objects_which_share_one_centre_count_as_if_a_hundredth_of_the_mean_apart():
+    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    frame = [3.0 * square, 2.0 * square[::-1]]
+    scene = Scene.from_polygons([[square], frame, [square + np.array([9.0, 0.0])]])
+    # The mean distance is 6.
+    assert rotation_weights(scene, 1.0).tolist() == pytest.approx([0.01, 1.5, 1.5])
+    assert rotation_weights(scene, 2.0).tolist() == pytest.approx([0.0001, 2.25, 2.25])
+
+
 def test_a_copy_is_as_alike_as_can_be():
     scene = random_scene(np.random.default_rng(1), 5)
     result = match(moved(scene, math.pi / 2, 3.0), scene, weights=(1, 1, 1, 1, 1))
