@@ -2,14 +2,16 @@
 
 import itertools
 import math
+import time
 
 import numpy as np
 import pytest
 
 from sketchmatch import Scene, directional_relation, force_histogram
-from sketchmatch.api import Outcome, Searcher, SearchProgress
+from sketchmatch.api import Outcome, Searcher, SearchProgress, Segmentation, Segmenter
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError, Reason
-from sketchmatch.model import Fmap, LabelledPolygon, OccupancyGrid, PolygonSet
+from sketchmatch.model import Fmap, LabelledPolygon, OccupancyGrid, PolygonSet, SceneObject
+from sketchmatch.pipeline import match as match_module
 from sketchmatch.pipeline.events import Accepted, Finished, Phase, Progress, Segmented
 from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.request import MatchRequest
@@ -384,6 +386,71 @@ def test_very_small_objects_very_far_apart_still_match():
     assert result.object_map == {k: k for k in range(4)}
     assert math.degrees(result.rotation) == pytest.approx(-40.0, abs=0.01)
     assert result.scale == pytest.approx(0.2, rel=1e-6)
+
+
+class Slow(Segmenter):
+    """A segmenter that takes a moment, and counts how often it is asked."""
+
+    name = "slow"
+    summary = "Takes a moment."
+    sources = (PolygonSet,)
+    asked = 0
+
+    def segment(self, source):
+        Slow.asked += 1
+        time.sleep(0.05)
+        return Segmentation(Scene(tuple(SceneObject.from_rings(p.rings) for p in source.polygons)))
+
+
+def test_a_time_budget_that_ends_with_the_sketch_leaves_the_map_alone():
+    offered = Registered(Kind.SEGMENTER, Slow, "acme-slow", "1.0")
+    registry = Registry([*default_registry().algorithms, offered])
+    choices = dict.fromkeys(("sketch_segmenter", "map_segmenter"), Choice("slow"))
+    Slow.asked = 0
+    with pytest.raises(AnswerUnavailableError, match="ended in phase segment"):
+        list(
+            events(source(seven()), source(seven()), registry, selection=choices, time_budget=0.02)
+        )
+    assert Slow.asked == 1
+
+
+def test_what_is_in_progress_is_let_go_when_the_time_ends(monkeypatch):
+    ended = []
+
+    def describing(scene, histogram, registry, side):  # noqa: ARG001
+        try:
+            while True:
+                time.sleep(0.01)
+                yield 0.5
+        finally:
+            ended.append(side)
+
+    monkeypatch.setattr(match_module, "described", describing)
+    running = events(seven(), seven(), time_budget=0.05)
+    with pytest.raises(AnswerUnavailableError, match="phase describe") as caught:
+        list(running)
+    # The error's traceback still holds the frames: what is let go is let go at once.
+    assert caught.value is not None
+    assert ended == ["sketch"]
+
+
+def test_nothing_is_left_running_where_the_events_are_closed(monkeypatch):
+    ended = []
+
+    def describing(scene, histogram, registry, side):  # noqa: ARG001
+        try:
+            while True:
+                time.sleep(0.01)
+                yield 0.5
+        finally:
+            ended.append(side)
+
+    monkeypatch.setattr(match_module, "described", describing)
+    running = events(seven(), seven())
+    while not (isinstance(event := next(running), Progress) and event.phase is Phase.DESCRIBE):
+        pass
+    running.close()
+    assert ended == ["sketch"]
 
 
 class Odd(Searcher):

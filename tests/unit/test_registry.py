@@ -7,7 +7,17 @@ from importlib.metadata import DistributionFinder, MetadataPathFinder, entry_poi
 import pytest
 
 from sketchmatch.errors import InvalidInputError, PluginError, Reason
-from sketchmatch.registry import Kind, PluginRules, PluginState, discover
+from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
+from sketchmatch.registry import (
+    Kind,
+    PluginRules,
+    PluginState,
+    Registered,
+    Registry,
+    default_registry,
+    discover,
+)
+from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 
 HEADER = """
 from sketchmatch.api import Histogram, Params, Searcher, Similarity, hookimpl
@@ -306,3 +316,33 @@ def sketchmatch_register_similarities():
 def test_without_any_plugin_nothing_can_be_chosen():
     with pytest.raises(InvalidInputError, match="choose one of: none"):
         discover([]).find(Kind.SEARCHER, "easm")
+
+
+def test_an_algorithm_of_the_engines_own_is_the_default_that_says_so_itself():
+    class Usual(CrossCorrelation):
+        name = "usual"
+        default = True
+
+    class Inherits(Usual):
+        name = "inherits"
+
+    def registry(*owned):
+        return Registry(Registered(Kind.SIMILARITY, each, owner, "1.0") for each, owner in owned)
+
+    both = registry((Inherits, "sketchmatch"), (Usual, "sketchmatch"))
+    assert both.default(Kind.SIMILARITY) == "usual"
+    assert registry((Usual, "acme-search")).default(Kind.SIMILARITY) == ""
+    assert registry((Inherits, "sketchmatch")).default(Kind.SIMILARITY) == ""
+
+
+@pytest.mark.parametrize(
+    ("source", "name"),
+    [
+        (StrokeSet, "strokes"),
+        (PolygonSet, "polygons"),
+        (OccupancyGrid, "occupancy-grid"),
+        (Image, "image"),
+    ],
+)
+def test_each_form_of_source_has_its_default_segmenter(source, name):
+    assert default_registry().default(Kind.SEGMENTER, source) == name

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sketchmatch import InvalidInputError, Scene, match
-from sketchmatch.api import MatchProblem, Outcome
+from sketchmatch.api import MatchProblem, Outcome, Searcher, SearchProgress
 from sketchmatch.config import builtin
 from sketchmatch.model import Fmap, object_pairs
 from sketchmatch.pipeline.correspond import fmap_confidence
@@ -27,7 +27,7 @@ from sketchmatch.pipeline.unmatched import (
     trials,
 )
 from sketchmatch.pipeline.warmup import warm_up, warm_up_others
-from sketchmatch.registry import default_registry
+from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.searchers.exact import Exact
 from tests.strategies import random_table, with_evidence, with_rotation_weights
@@ -254,3 +254,39 @@ def test_what_makes_no_sense_is_refused(settings, sentence):
     scene = random_scene(np.random.default_rng(0), 4)
     with pytest.raises(InvalidInputError, match=sentence):
         match(scene, scene, **settings)
+
+
+def test_each_search_gets_its_share_of_the_time_that_is_left():
+    given = []
+
+    class Frugal(Searcher):
+        name = "frugal"
+        summary = "Ends at once, and keeps what time it was given."
+
+        def search(self, problem, rng):  # noqa: ARG002
+            given.append(problem.time_budget)
+            table = problem.table
+            fmap = Fmap.from_object_map(np.arange(table.template_objects), table.argument_objects)
+            confidence = fmap_confidence(fmap, table, problem.weights).total
+            yield SearchProgress(fmap, confidence, 1, 1)
+            return Outcome.CONVERGED
+
+    scene = random_scene(np.random.default_rng(5), 5)
+    registry = Registry(
+        [*default_registry().algorithms, Registered(Kind.SEARCHER, Frugal, "acme", "1.0")]
+    )
+    request = MatchRequest(
+        scene,
+        scene,
+        selection={"searcher": Choice("frugal")},
+        time_budget=1000.0,
+        allow_unmatched=True,
+        unmatched_price=0.5,
+    )
+    *_, last = run_match(request, registry)
+    assert isinstance(last, Finished)
+    # Half of it for all objects, then equal shares for the five that leave one of them out.
+    whole, *parts = given[:6]
+    assert whole == pytest.approx(500.0, rel=0.02)
+    shares = [1 / 6, 1 / 5, 1 / 4, 1 / 3, 1 / 2]
+    assert parts == pytest.approx([1000.0 * share for share in shares], rel=0.05)

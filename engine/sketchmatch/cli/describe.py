@@ -19,7 +19,7 @@ from sketchmatch.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from sketchmatch.cli.relations import Description
+    from sketchmatch.cli.inspection import Description
 
 __all__ = ["describe"]
 
@@ -71,11 +71,11 @@ def describe(
         from sketchmatch.cli import pictures
 
         pictures.check_path(plot, "--plot")
-    from sketchmatch.cli import relations
+    from sketchmatch.cli import inspection
 
     names = {"segmenter": segmenter, "histogram": histogram}
     with places.places_in(scene=scene):
-        found = relations.described(scene, names, params, pairs, profile, config)
+        found = inspection.described(scene, names, params, pairs, profile, config)
     if json:
         display.print_document(_document(found))
     elif sys.stdout.isatty():

@@ -27,7 +27,7 @@ from sketchmatch_proto.v1 import scene_pb2
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 
 if TYPE_CHECKING:
-    from sketchmatch.cli.relations import Description
+    from sketchmatch.cli.inspection import Description
 
 __all__ = ["check_path", "draw_description", "draw_match", "draw_segmentation", "scene_of"]
 

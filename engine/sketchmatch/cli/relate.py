@@ -20,12 +20,10 @@ from sketchmatch.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from sketchmatch.cli.relations import Listing
+    from sketchmatch.cli.inspection import Listing
     from sketchmatch.pipeline.result import Correspondence
 
 __all__ = ["relate"]
-
-_STAGES = ("sketch_segmenter", "map_segmenter", "histogram", "similarity")
 
 
 def relate(
@@ -73,14 +71,17 @@ def relate(
     from sketchmatch.cli import places
 
     pairs = (parse_pairs(sketch_pair, "--sketch-pair"), parse_pairs(map_pair, "--map-pair"))
-    params = parse_settings(settings, _STAGES)
-    names = dict(
-        zip(_STAGES, (segmenter_sketch, segmenter_map, histogram, similarity), strict=True)
-    )
-    from sketchmatch.cli import display, relations
+    names = {
+        "sketch_segmenter": segmenter_sketch,
+        "map_segmenter": segmenter_map,
+        "histogram": histogram,
+        "similarity": similarity,
+    }
+    params = parse_settings(settings, tuple(names))
+    from sketchmatch.cli import display, inspection
 
     with places.places_in(sketch=sketch, map=map_):
-        found = relations.compared(sketch, map_, names, params, *pairs, limit, profile, config)
+        found = inspection.compared(sketch, map_, names, params, *pairs, limit, profile, config)
     if json:
         display.print_document(_document(found))
     elif sys.stdout.isatty():

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sketchmatch.api.kernels import fmap_confidence_above, kernel
 from sketchmatch.model import FloatArray, IntArray
 
-__all__ = ["Evolution", "evolve", "found"]
+__all__ = ["Evolution", "evolve", "populate"]
 
 GENERATION, STALE, EVALUATIONS, MEMBERS, TRIAL, BRED, JUDGED = range(7)
 
@@ -84,7 +84,7 @@ class Evolution(NamedTuple):
 
 
 @kernel
-def found(evolution: Evolution, allowance: int) -> bool:
+def populate(evolution: Evolution, allowance: int) -> bool:
     """Fill the population with random individuals.
 
     Parameters
@@ -130,7 +130,7 @@ def evolve(evolution: Evolution, generations: int, patience: int, allowance: int
     generations, patience
         Limits on all generations, and on those without a better best.
     allowance
-        As for :func:`found`; a generation may be left and resumed at any point.
+        As for :func:`populate`; a generation may be left and resumed at any point.
 
     Returns
     -------

@@ -29,7 +29,7 @@ from sketchmatch_builtin.searchers._evolution import (
     TRIAL,
     Evolution,
     evolve,
-    found,
+    populate,
 )
 from sketchmatch_builtin.searchers._relations import read_slices
 
@@ -154,7 +154,7 @@ class Easm(Searcher):
         yield
         for _ in read_slices(table, evolution.cosine, evolution.sine, evolution.dilation):
             yield
-        while not found(evolution, _SLICE_ENTRIES):
+        while not populate(evolution, _SLICE_ENTRIES):
             yield
         limits = (self.params.generations, self.params.patience)
         while not evolve(evolution, *limits, _SLICE_ENTRIES):
