@@ -193,7 +193,7 @@ def compare(
     >>> box, bar = [[0, 0], [2, 0], [2, 2], [0, 2]], [[5, 0], [9, 0], [9, 1]]
     >>> scene = Scene.from_polygons([box, bar, [[1, 6], [2, 6], [2, 7]]])
     >>> found = compare(scene, scene)
-    >>> [(each.sketch_pair, each.map_pair) for each in found.most_similar(limit=3)]
+    >>> sorted((each.sketch_pair, each.map_pair) for each in found.most_similar(limit=3))
     [((0, 1), (0, 1)), ((0, 2), (0, 2)), ((1, 2), (1, 2))]
     """
     engine = _engine(config)
