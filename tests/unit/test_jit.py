@@ -171,6 +171,35 @@ print(*names)
     assert done.stdout.split() == []
 
 
+def test_the_first_match_compiles_nothing_that_the_warm_up_did_not():
+    code = """
+import gc
+import sketchmatch
+from numba.core.dispatcher import Dispatcher
+from sketchmatch.pipeline.warmup import warm_up, warm_up_others
+from sketchmatch.registry import Kind, default_registry
+from tests.server.harness import shapes
+
+def compiled():
+    kernels = [item for item in gc.get_objects() if isinstance(item, Dispatcher)]
+    ours = [one for one in kernels if one.py_func.__module__.startswith("sketchmatch")]
+    return {f"{one.py_func.__name__}{types}" for one in ours for types in one.signatures}
+
+registry = default_registry()
+warm_up(registry)
+warm_up_others(registry)
+warm = compiled()
+scene = sketchmatch.Scene.from_polygons(shapes(4))
+for item in registry.algorithms:
+    if item.kind in (Kind.HISTOGRAM, Kind.SIMILARITY):
+        sketchmatch.match(scene, scene, **{item.kind.value: item.name})
+print(*(compiled() - warm), sep="\\n")
+"""
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
+    assert done.stdout.split() == []
+
+
 def test_the_cache_lies_where_the_environment_says(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert _jit._cache_folder(without_text).parent == tmp_path

@@ -42,7 +42,7 @@ from sketchmatch.kernels.projection import (
     project,
     separating_directions,
 )
-from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray
+from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray, frozen
 
 __all__ = ["pair_sweep", "sum_over_edges", "sweep_pairs"]
 
@@ -73,8 +73,11 @@ def sweep_pairs(
     middle = 0.5 * (starts.min(axis=0) + starts.max(axis=0))
     used = np.zeros(offsets.size - 1, dtype=np.bool_)
     used[pairs] = True
-    room = empty_projection(offsets)
-    return sweep(room, starts - middle, ends - middle, used, pairs, directions, law)
+    # One type each, whoever gives them: the kernel is compiled once, by a warm-up, and not again by
+    # the first request.
+    offsets, pairs = frozen(offsets), frozen(pairs)
+    starts, ends = (np.ascontiguousarray(points - middle) for points in (starts, ends))
+    return sweep(empty_projection(offsets), starts, ends, used, pairs, directions, law)
 
 
 def pair_sweep(pair_force: Callable[..., Any], sections: bool) -> Callable[..., FloatArray]:
