@@ -110,7 +110,7 @@ def test_a_fault_is_named_with_its_path_and_the_remedy(case):
 def test_deep_nesting_is_refused():
     with pytest.raises(InvalidInputError, match="nested too deeply"):
         decode_geojson('{"type":"GeometryCollection","geometries":[' * 50_000)
-    deep = '{"type":"GeometryCollection","geometries":[' * 480 + json.dumps(polygon()) + "]}" * 480
+    deep = '{"type":"GeometryCollection","geometries":[' * 600 + json.dumps(polygon()) + "]}" * 600
     with pytest.raises(InvalidInputError, match="nested too deeply"):
         decode_geojson(deep)
 
