@@ -1,74 +1,115 @@
 # `make demo` and `make test` set up all they need in .venv (Python 3.11 or newer).
 PYTHON ?= python3
-BIN := .venv/bin
+VENV := .venv
+BIN := $(VENV)/bin
 PROTO_BIN := .venv-proto/bin
 PIP := -m pip --disable-pip-version-check install --quiet
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 OURS := engine plugins clients/python proto tests
 
-.PHONY: demo test lint proto bench bench-histograms bench-searchers bench-startup experiments fuzz reference serve clean
+# Two at a time, each file by one of them: the servers of a file are started once.
+PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+# What compares kernels with their definitions, and how much of the kernels it must go through.
+KERNEL_TESTS := $(addprefix tests/unit/test_,alignment confidence correspond incremental relations)
+KERNEL_SHARE := 50
+says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 
-demo: .venv/runtime
+.PHONY: demo test test-slow test-all test-units test-interpreted mutation lint proto bench \
+  bench-histograms bench-searchers bench-startup experiments fuzz reference serve clean
+
+demo: $(VENV)/runtime
 	@$(BIN)/sketchmatch demo
 
-# Two at a time, each file by one of them: the servers of a file are started once.
-test: lint
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+test: $(VENV)/dev
+	$(call says,lint and all tests but the slow ones,4 minutes)
+	@$(MAKE) --no-print-directory lint
+	$(PYTEST) -m "not slow"
 
-lint: .venv/dev .venv-proto/tools
+test-slow: $(VENV)/dev
+	$(call says,the slow tests,6 minutes)
+	$(PYTEST) -m slow
+
+# With examples that no run had before; the others draw the same ones each time.
+test-all: $(VENV)/dev
+	$(call says,lint and all tests,10 minutes)
+	@$(MAKE) --no-print-directory lint
+	$(PYTEST) --hypothesis-profile new
+
+test-units: $(VENV)/dev
+	$(call says,the quick tests of engine plugins and server,3 minutes)
+	$(PYTEST) -m "not slow" tests/unit tests/plugins tests/server
+
+test-interpreted: $(VENV)/dev
+	$(call says,tests of the kernels as plain Python,2 minutes)
+	NUMBA_DISABLE_JIT=1 $(PYTEST) --cov sketchmatch.kernels --cov-fail-under $(KERNEL_SHARE) $(KERNEL_TESTS)
+
+mutation: $(VENV)/dev
+	@$(BIN)/python -m tests.mutation $(ARGS)
+
+lint: $(VENV)/dev .venv-proto/tools
 	$(BIN)/ruff check $(OURS)
 	$(BIN)/ruff format --check --quiet $(OURS)
 	$(BIN)/mypy
-	$(BIN)/lint-imports --no-cache > .venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
+	$(BIN)/lint-imports --no-cache > $(VENV)/lint-imports.log || { cat $(VENV)/lint-imports.log; exit 1; }
 	@if [ -x $(PROTO_BIN)/buf ]; then $(PROTO_BIN)/buf lint proto; fi
 
 proto: .venv-proto/tools
 	$(PROTO_BIN)/buf lint proto
 	$(PROTO_BIN)/python proto/generate.py
 
-bench: .venv/dev
+bench: $(VENV)/dev
 	@$(BIN)/python -m tests.benchmarks.stages
 
-bench-histograms: .venv/dev
+bench-histograms: $(VENV)/dev
 	@$(BIN)/python -m tests.benchmarks.histograms
 
-bench-searchers: .venv/bench
+bench-searchers: $(VENV)/bench
 	@$(BIN)/python -m tests.benchmarks.searchers $(ARGS)
 
-bench-startup: .venv/dev
+bench-startup: $(VENV)/dev
 	@$(BIN)/python -m tests.benchmarks.startup
 
-experiments: .venv/dev
+experiments: $(VENV)/dev
 	@$(BIN)/python -m tests.experiments $(ARGS)
 
-reference: .venv/runtime
+reference: $(VENV)/runtime
 	$(BIN)/sketchmatch plugins reference > plugins/REFERENCE.md.new
 	mv plugins/REFERENCE.md.new plugins/REFERENCE.md
 
 MINUTES ?= 10
-fuzz: .venv/dev
+fuzz: $(VENV)/dev
 	@$(BIN)/python -m tests.fuzz --minutes $(MINUTES) $(ARGS)
 
-serve: .venv/runtime
+serve: $(VENV)/runtime
 	@$(BIN)/sketchmatch serve $(ARGS)
 
 clean:
-	rm -rf .venv .venv-proto
+	rm -rf .venv .venv-newest .venv-proto
 
-.venv/runtime: pyproject.toml clients/python/pyproject.toml constraints.txt
+# Naming another Python than that of the environment makes the environment anew.
+version = $(shell $(1) -c 'import sys; print(sys.version)' 2>/dev/null)
+ifneq ($(origin PYTHON),file)
+  ifneq ($(call version,$(PYTHON)),$(call version,$(BIN)/python))
+    .PHONY: $(VENV)/runtime
+    OTHER := yes
+  endif
+endif
+
+$(VENV)/runtime: pyproject.toml clients/python/pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "sketchmatch needs Python 3.11 or newer; say which with make PYTHON=python3.12"; exit 1; }
-	@echo "installing into .venv (once, about a minute)"
-	@$(PYTHON) -m venv .venv
+	@echo "installing into $(VENV) (once, about a minute)"
+	@$(if $(OTHER),rm -rf $(VENV))
+	@[ -x $(BIN)/python ] || $(PYTHON) -m venv $(VENV)
 	@$(BIN)/python $(PIP) --editable clients/python --editable .
 	@touch $@
 
-.venv/dev: .venv/runtime
+$(VENV)/dev: $(VENV)/runtime
 	@$(BIN)/python $(PIP) --editable '.[dev]'
 	@touch $@
 
 # Without a wheel for this Python the benchmark leaves the peers out and says so.
-.venv/bench: .venv/dev
+$(VENV)/bench: $(VENV)/dev
 	@$(BIN)/python $(PIP) --editable '.[bench]' || echo "the peers cannot be installed here"
 	@touch $@
 

@@ -3,6 +3,7 @@
 import os
 import pty
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -30,6 +31,16 @@ def sketchmatch(*arguments, timeout=200, **options) -> subprocess.CompletedProce
         check=False,
         **options,
     )
+
+
+def let_children_be_interrupted() -> None:
+    """See that processes which are started from now on heed SIGINT.
+
+    A shell starts what runs in the background with SIGINT ignored, and so would be all that the
+    tests start. A handler of this process is none of its children's.
+    """
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, lambda *_: None)
 
 
 def children_of(pid: int) -> list[int]:

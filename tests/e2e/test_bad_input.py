@@ -629,6 +629,7 @@ def test_on_the_command_line_it_is_exit_code_2_and_one_line_with_the_remedy(
     assert_refused(done, case, tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["one stroke", "self-crossing polygon", "resolution 0", "picture missing", "no weight"]
 )
@@ -760,6 +761,7 @@ def test_a_request_that_is_too_large_is_refused_over_grpc(small_server, large):
         ).object_map
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["match", "segment"])
 def test_a_file_that_is_too_large_is_refused_on_the_command_line(
     command_line, small_server, large, tmp_path, command

@@ -13,6 +13,8 @@ from sketchmatch import read_scene
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_TRUTH
 from tests.processes import Terminal, sketchmatch
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def truth():

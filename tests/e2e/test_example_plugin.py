@@ -12,7 +12,7 @@ from tests.shell import steps
 from tests.tools import ROOT
 
 # An environment is made and kernels are compiled in it.
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 EXAMPLE = ROOT / "plugins" / "sketchmatch-example-searcher"
 TUTORIAL = re.search(

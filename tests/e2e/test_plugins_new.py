@@ -11,7 +11,7 @@ from sketchmatch.registry import Kind
 from tests.tools import ROOT
 
 # An environment is made and kernels are compiled in it.
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 KINDS = [str(kind) for kind in Kind]
 EXAMPLES = ROOT / "engine" / "sketchmatch" / "examples"

@@ -32,6 +32,7 @@ def test_the_seeds_can_be_read_and_are_small(kind, tmp_path):
         check(kind, data, tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_broken_files_are_read_or_refused_in_one_sentence(kind, tmp_path):
     rng, originals = random.Random(0), seeds(kind)
@@ -44,6 +45,7 @@ def test_what_was_found_stays_mended(path, tmp_path):
     check(path.suffix[1:], path.read_bytes(), tmp_path)
 
 
+@pytest.mark.slow
 def test_no_small_file_takes_a_gigabyte():
     # In a process of its own, whose memory is its own as well.
     script = (
@@ -210,6 +212,7 @@ def xml(element):
     return f"<{name}{written}>{''.join(map(xml, children))}</{name}>"
 
 
+@pytest.mark.slow
 @given(st.lists(ELEMENTS, max_size=5))
 @settings(max_examples=300)
 def test_svg_of_any_structure_is_read_or_refused(elements):

@@ -67,6 +67,7 @@ def test_more_maps_are_searched_and_then_proved(monkeypatch):
         assert "exact proved" in seen[-1].note
 
 
+@pytest.mark.slow
 def test_without_a_time_budget_a_proof_is_given_up_in_the_end():
     # Random relations of 13 objects are far beyond a proof.
     table = random_table(np.random.default_rng(1), 13, 14)

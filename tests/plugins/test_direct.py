@@ -469,6 +469,7 @@ def a_hundred_objects():
     return random_table(np.random.default_rng(9), 100, 100)
 
 
+@pytest.mark.slow
 def test_every_step_at_a_hundred_objects_is_cut_into_slices(a_hundred_objects):
     work = start(a_hundred_objects, alternatives=5, population=2, offspring=4)
     last, gaps, seen = time.thread_time(), [], []

@@ -226,6 +226,7 @@ def a_hundred_objects():
     return random_table(np.random.default_rng(9), 100, 100)
 
 
+@pytest.mark.slow
 @BOTH
 def test_every_step_at_a_hundred_objects_is_cut_into_slices(consistency, a_hundred_objects):
     work = start(a_hundred_objects, consistency=consistency)
@@ -277,6 +278,7 @@ def test_it_finds_the_best_object_map_of_small_scenes(sketches):
     assert found >= 38
 
 
+@pytest.mark.slow
 def test_free_pairs_seldom_do_worse_than_object_maps(sketches):
     better = [
         run(table, seed, consistency="pairwise")[0][-1].confidence

@@ -98,6 +98,7 @@ def both_ways(request, monkeypatch):
     monkeypatch.setattr(module, "FEW", np.inf if request.param == "depth first" else 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("seed", range(60))
 def test_random_relations(seed):
@@ -150,6 +151,7 @@ def test_sketches(seed):
     assert_proved(table, WEIGHTS[0] if seed % 4 else WEIGHTS[seed % len(WEIGHTS)], seed)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("seed", range(6))
 def test_seven_objects_in_eight(seed):
@@ -181,6 +183,7 @@ def test_objects_that_are_all_alike(template, argument, weights):
     assert_proved(table, weights)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("seed", range(9))
 def test_near_duplicates(seed):
@@ -191,6 +194,7 @@ def test_near_duplicates(seed):
     assert_proved(table, seed=seed)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("both_ways")
 def test_dilations_of_any_range():
     rng = np.random.default_rng(5)
@@ -230,6 +234,7 @@ def test_the_bound_is_true_whenever_one_looks(seed, monkeypatch):
     assert_sound(seen, table, best)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "params",
     [

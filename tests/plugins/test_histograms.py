@@ -430,6 +430,7 @@ BOXED = Scene.from_polygons(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("r", [-1.0, 0.0, 0.5, 1.5, 2.5])
 @pytest.mark.parametrize("pixels", [8, 16])
 def test_raster_is_the_force_between_pixels_with_their_centre_inside(pixels, r):

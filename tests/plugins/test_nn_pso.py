@@ -101,6 +101,7 @@ def test_the_numbers_of_the_thesis_are_the_defaults():
     assert (FsnnPso.Params().alpha, FsnnPso.Params().k) == (10, 1)
 
 
+@pytest.mark.slow
 def test_a_swarm_seldom_does_worse_than_as_many_random_seed_points():
     better = 0
     for seed in range(20):

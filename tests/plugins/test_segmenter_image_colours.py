@@ -65,6 +65,7 @@ def test_areas_of_equal_lightness_are_one_object_or_each_its_own(how):
     assert widths == pytest.approx([81, 81, 100, 120], abs=5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["clean", "blurred", "jpeg"])
 @pytest.mark.parametrize("pale", [(200, 200, 200), (255, 200, 210), (170, 210, 255)])
 @pytest.mark.parametrize("dark", [BLACK, YELLOW, GREEN])
@@ -85,6 +86,7 @@ def outlined(pen, sheet=WHITE):
     return pixels
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", DISTURBED)
 @pytest.mark.parametrize("pen", [YELLOW, (0, 255, 255), (255, 160, 190), (150, 255, 120)])
 def test_light_pens_are_seen(pen, how):

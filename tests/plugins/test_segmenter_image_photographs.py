@@ -13,6 +13,8 @@ from sketchmatch.testing import random_scene
 from sketchmatch.testing.photographs import photograph
 from sketchmatch_builtin.segmenters.image import ImageSegmenter
 
+pytestmark = pytest.mark.slow
+
 DISTURBANCES = {
     "clean": {"texture": 0.0},
     "filled": {"fill": 0.9, "darkness": 0.9, "texture": 0.0},

@@ -44,6 +44,7 @@ def missed_and_invented(sketch, found):
     return len(sketch.truth) - len(recovered), len(shapes) - len(recovered)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sloppiness", "recovered", "marks", "invented"),
     [
@@ -165,6 +166,7 @@ def test_a_labelled_route_may_be_short_and_anywhere():
     assert len(found.warnings) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["arcs", "words", "one place"])
 def test_two_thousand_strokes_are_quick(kind):
     rng = np.random.default_rng(0)
@@ -180,6 +182,7 @@ def test_two_thousand_strokes_are_quick(kind):
         assert len(found_in(*strokes).scene) >= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["apart", "one place", "tangles"])
 def test_two_thousand_scribbles_are_quick_and_objects_among_them_are_found(kind):
     rng = np.random.default_rng(0)

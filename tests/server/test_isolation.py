@@ -194,6 +194,7 @@ def fails(client, plugin) -> None:
     assert str(raised.value).endswith("; tell its author or choose another")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "plugins",
     [tuple(BROKEN), *((plugin,) for plugin in UNSTOPPABLE)],

@@ -12,6 +12,8 @@ from tests.benchmarks import histograms, peers, searchers
 from tests.strategies import random_table
 from tests.tools import require
 
+pytestmark = pytest.mark.slow
+
 
 def table_with_answer(partners, others):
     """Return a table where σ is 1 for what an object map implies and small elsewhere."""

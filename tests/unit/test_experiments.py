@@ -39,6 +39,8 @@ from tests.experiments.scenes import PLACES, charted, place_named, truth_by_over
 from tests.experiments.study import Style, sketch
 from tests.processes import assert_all_end, children_of
 
+pytestmark = pytest.mark.slow
+
 NEAT = Person(0.3)
 
 

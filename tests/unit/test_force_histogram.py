@@ -101,6 +101,7 @@ def test_it_agrees_with_the_definition_between_objects_in_touch(r, shapes):
     assert_same(computed(*shapes, r), by_definition(*shapes, r), *shapes, r)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("r", BELOW_ONE)
 @given(shapes=pairs_in_overlap())
 @settings(max_examples=15)
@@ -108,6 +109,7 @@ def test_it_agrees_with_the_definition_between_objects_in_overlap(r, shapes):
     assert_same(computed(*shapes, r), by_definition(*shapes, r), *shapes, r)
 
 
+@pytest.mark.slow
 @given(beside(), exponents)
 @few
 def test_it_agrees_with_the_definition_in_60_directions(shapes, r):

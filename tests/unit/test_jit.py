@@ -73,6 +73,7 @@ def run_outer(folder, cache=None):
     return done.stdout.strip()
 
 
+@pytest.mark.slow
 def test_a_change_in_another_file_is_compiled_anew(tmp_path):
     write(tmp_path, PACKAGE)
 
@@ -143,6 +144,7 @@ print(walk(1))
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "before", "after"),
     [("maker.py", "step(step(x))", "step(step(step(x)))"), ("step.py", "+ 1", "+ 2")],
@@ -154,6 +156,7 @@ def test_a_change_in_what_makes_a_kernel_is_compiled_anew(tmp_path, name, before
     assert run_outer(tmp_path) == {"maker.py": "4", "step.py": "5"}[name]
 
 
+@pytest.mark.slow
 def test_a_second_process_finds_all_histograms_compiled():
     code = """
 import sketchmatch_builtin

@@ -16,6 +16,8 @@ from tests.experiments.study import STRENGTH
 from tests.oracle import maps
 from tests.searching import relations_of
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def found():

@@ -164,6 +164,7 @@ def test_confidence_is_the_length_of_its_bar():
     assert lengths[0] / lengths[1] == pytest.approx(4.0, rel=0.2)
 
 
+@pytest.mark.slow
 def test_hundred_objects_are_all_seen():
     rng = np.random.default_rng(7)
     spots = [(3.0 * (k % 10), 3.0 * (k // 10)) for k in range(100)]
