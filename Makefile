@@ -10,7 +10,9 @@ OURS := engine plugins clients/python proto tests
 # Two at a time, each file by one of them: the servers of a file are started once.
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 # What compares kernels with their definitions, and how much of the kernels it must go through.
-KERNEL_TESTS := $(addprefix tests/unit/test_,alignment confidence correspond incremental relations)
+KERNEL_TESTS := tests/plugins/test_histograms.py tests/plugins/test_similarities.py \
+  $(patsubst %,tests/unit/test_%.py,alignment confidence constant_force correspond describe evidence \
+  force_histogram incremental relate)
 KERNEL_SHARE := 50
 says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 
