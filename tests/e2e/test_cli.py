@@ -135,6 +135,7 @@ def test_a_terminal_shows_the_search_while_it_runs_and_then_a_table(where):
     assert "to the left of round table" in terminal.shown, "the piano, in the sketch"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["segment", "match", "describe"])
 def test_a_label_that_looks_like_markup_is_shown_as_it_is(command, tmp_path):
     def feature(name, x, size):
@@ -522,6 +523,7 @@ def test_ctrl_c_ends_a_long_match_soon_and_quietly(where):
     assert terminal.shown.rstrip().endswith("sketchmatch: interrupted")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [["match", *ROOM], ["plugins", "list", "--json"]])
 def test_a_reader_who_has_had_enough_is_no_error(command, where):
     line = shlex.join([*processes.COMMAND, *map(str, command), *where])
@@ -544,6 +546,7 @@ def test_help_and_version(command_line):
     assert "--time-budget" in command_line("match", "--help").stdout
 
 
+@pytest.mark.slow
 def test_the_installed_program_is_the_same_as_the_module():
     program = Path(sys.executable).with_name("sketchmatch")
     done = subprocess.run([program, "--version"], capture_output=True, text=True, check=True)

@@ -244,6 +244,7 @@ def test_a_command_names_a_profile_of_the_server(command_line, address):
     assert "is 'best', which is no profile" in line
 
 
+@pytest.mark.slow
 def test_a_profile_without_its_plugin_does_not_keep_a_server_from_starting(mine):
     mine.write_text("[profiles.other.searcher]\nname = 'annealing'\n")
     sketch = sources.polygons(SQUARES)

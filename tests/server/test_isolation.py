@@ -236,6 +236,7 @@ def test_no_process_outlives_its_server(host):
     assert process_of(found) not in {child.pid for child in multiprocessing.active_children()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("searcher", ["guessing", "lockingsearcher"])
 def test_no_process_outlives_a_server_that_is_killed(site, tmp_path, monkeypatch, searcher):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(site), str(Path.cwd()))))
@@ -256,6 +257,7 @@ def test_no_process_outlives_a_server_that_is_killed(site, tmp_path, monkeypatch
         assert_all_end(children)
 
 
+@pytest.mark.slow
 def test_strict_plugins_keep_a_server_from_starting_and_a_denied_one_is_no_problem(
     site, tmp_path, monkeypatch
 ):

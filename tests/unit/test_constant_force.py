@@ -46,6 +46,7 @@ def test_it_agrees_with_the_definition(shapes, directions):
     assert_same(computed, by_definition(*shapes, directions), *shapes)
 
 
+@pytest.mark.slow
 @given(pairs_of_rings())
 @settings(max_examples=12)
 def test_it_agrees_with_the_definition_in_180_directions(shapes):

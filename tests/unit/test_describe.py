@@ -24,6 +24,7 @@ def square(x, y, side=1.0):
     return side * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) + [x - side / 2, y - side / 2]
 
 
+@pytest.mark.slow
 @given(scenes(most=4))
 @settings(max_examples=15)
 def test_every_pair_is_described_in_its_place(scene):

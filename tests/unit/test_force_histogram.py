@@ -388,6 +388,7 @@ def pairs_of_masks(draw, overlap):
     return a, b
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("r", [-1.0, 0.0, 0.5, 0.99])
 @given(masks=pairs_of_masks(overlap=True))
 @few

@@ -42,6 +42,7 @@ def assert_same(one, other):
             assert np.array_equal(ring, again)
 
 
+@pytest.mark.slow
 @given(scenes())
 def test_reading_what_was_saved_gives_the_same_scene(tmp_path_factory, scene):
     path = tmp_path_factory.mktemp("scene") / "scene.geojson"

@@ -94,6 +94,7 @@ def write(folder, package):
         (folder / name).write_text(text, encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_same_source_elsewhere_is_not_compiled_again(tmp_path):
     require(hasattr(numba.config, "CACHE_LOCATOR_CLASSES"), "a numba that asks where code is kept")
     for folder, printed in (("here", "20 walk step"), ("there", "20")):
@@ -101,6 +102,7 @@ def test_the_same_source_elsewhere_is_not_compiled_again(tmp_path):
         assert run_outer(tmp_path / folder, tmp_path / "cache") == printed
 
 
+@pytest.mark.slow
 def test_a_module_of_the_same_source_and_another_name_has_its_own(tmp_path):
     write(tmp_path, PACKAGE)
     assert run_outer(tmp_path) == "20 walk step"

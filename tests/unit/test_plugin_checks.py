@@ -849,6 +849,7 @@ def test_it_keeps_the_contract(check):
 """
 
 
+@pytest.mark.slow
 def test_in_pytest_expected_failures_are_strict(tmp_path):
     (tmp_path / "half.py").write_text(PLUGIN)
     (tmp_path / "test_half.py").write_text(TESTS)
@@ -864,6 +865,7 @@ def test_in_pytest_expected_failures_are_strict(tmp_path):
     assert ran.returncode == 1
 
 
+@pytest.mark.slow
 def test_no_pytest_is_needed_to_check(tmp_path):
     (tmp_path / "half.py").write_text(PLUGIN)
     code = (

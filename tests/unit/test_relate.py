@@ -69,6 +69,7 @@ def assert_entry(found, expected):
     assert found[2] == pytest.approx(dilation, rel=1e-9)
 
 
+@pytest.mark.slow
 @given(scenes(most=3), scenes(most=3))
 @settings(max_examples=15)
 def test_two_scenes_compare_as_their_definition_says(first, second):

@@ -164,6 +164,7 @@ def four_mapped():
     return Fmap.from_object_map(np.arange(4), 4), table, WEIGHTS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("searcher", SEARCHERS)
 @pytest.mark.parametrize("turned", [False, True])
 def test_what_the_map_lacks_stays_without_partner(searcher, turned):
