@@ -69,26 +69,20 @@ def watch(events: Generator[MatchResponse, None, None]) -> Match:
 
 def follow(work: Generator[float, None, _Value], what: str) -> _Value:
     """Run a generator of shares done to its end, showing it where standard error is a terminal."""
+    from sketchmatch.pipeline.slices import finish, retold  # what asks a server does without
+
     console = Console(stderr=True)
     if not console.is_terminal:
-        return _finished(work, None)
+        return finish(work)
     grid, bar = Table.grid(padding=(0, 2)), ProgressBar(total=1.0, width=24)
     grid.add_row(Spinner("dots", what), bar)
+
+    def shown(share: float) -> Iterable[None]:
+        bar.update(share)
+        return ()
+
     with Live(grid, console=console, transient=True):
-        return _finished(work, bar.update)
-
-
-def _finished(
-    work: Generator[float, None, _Value], on_share: Callable[[float], object] | None
-) -> _Value:
-    with closing(work):
-        while True:
-            try:
-                share = next(work)
-            except StopIteration as stop:
-                return stop.value  # type: ignore[no-any-return]
-            if on_share is not None:
-                on_share(share)
+        return finish(retold(work, shown))
 
 
 def _collected(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Sequence
-from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -27,6 +26,7 @@ from sketchmatch.pipeline.guard import blamed
 from sketchmatch.pipeline.reading import half_turned
 from sketchmatch.pipeline.relate import check_exponent, relate
 from sketchmatch.pipeline.result import Correspondence
+from sketchmatch.pipeline.slices import retold
 from sketchmatch.registry import Registry
 
 __all__ = ["Comparison", "check_comparisons", "compare"]
@@ -183,13 +183,7 @@ def _part(
     work: Generator[float, None, _Value], begin: float, end: float
 ) -> Generator[float, None, _Value]:
     """Go on with work that is a part of more, telling shares of the whole."""
-    with closing(work):
-        while True:
-            try:
-                share = next(work)
-            except StopIteration as stop:
-                return stop.value  # type: ignore[no-any-return]
-            yield begin + (end - begin) * share
+    return retold(work, lambda share: (begin + (end - begin) * share,))
 
 
 def _all_pairs(scene: Scene) -> Pairs:

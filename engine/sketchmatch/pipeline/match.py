@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import uuid
-from collections.abc import Generator
-from contextlib import closing
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -36,6 +35,7 @@ from sketchmatch.pipeline.request import (
 from sketchmatch.pipeline.search import Goal, Search, search
 from sketchmatch.pipeline.segment import segment_side
 from sketchmatch.pipeline.selection import SIDES, UNCONFIGURED, Defaults, Pipeline, resolve
+from sketchmatch.pipeline.slices import retold
 from sketchmatch.registry import Kind, Registry
 
 __all__ = ["run_match"]
@@ -189,35 +189,33 @@ def _watched(
     work: Generator[float, None, _Value], phase: Phase, clock: Clock
 ) -> Generator[MatchEvent, None, _Value]:
     """Go on with a phase to its end, or that of the time, passing its progress on."""
-    with closing(work):
-        while True:
-            clock.check(phase)
-            try:
-                share = next(work)
-            except StopIteration as stop:
-                return stop.value  # type: ignore[no-any-return]
-            if clock.is_time_to_tell():
-                yield Progress(phase, clock.elapsed(), share)
+
+    def tell(share: float) -> Iterator[Progress]:
+        if clock.is_time_to_tell():
+            yield Progress(phase, clock.elapsed(), share)
+        clock.check(phase)
+
+    clock.check(phase)
+    return retold(work, tell)
 
 
 def _watched_search(
     work: Generator[Search, None, Search], swapped: bool, clock: Clock
 ) -> Generator[MatchEvent, None, Search]:
     """Go on with a search to its end, passing on what it has come to."""
-    with closing(work):
-        while True:
-            try:
-                so_far = next(work)
-            except StopIteration as stop:
-                return stop.value  # type: ignore[no-any-return]
-            if clock.is_time_to_tell():
-                best = so_far.best
-                yield Progress(
-                    Phase.SEARCH,
-                    clock.elapsed(),
-                    iteration=so_far.iterations,
-                    evaluations=so_far.evaluations,
-                    confidence=best.best.confidence,
-                    upper_bound=best.best.upper_bound,
-                    matches=reading.matches(best.mapped, swapped, best.part.kept),
-                )
+
+    def tell(so_far: Search) -> Iterator[Progress]:
+        if not clock.is_time_to_tell():
+            return
+        best = so_far.best
+        yield Progress(
+            Phase.SEARCH,
+            clock.elapsed(),
+            iteration=so_far.iterations,
+            evaluations=so_far.evaluations,
+            confidence=best.best.confidence,
+            upper_bound=best.best.upper_bound,
+            matches=reading.matches(best.mapped, swapped, best.part.kept),
+        )
+
+    return retold(work, tell)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -15,6 +15,7 @@ from sketchmatch.model import ConfidenceWeights
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison
 from sketchmatch.pipeline.guard import blaming, checked_progress, inspecting
+from sketchmatch.pipeline.slices import retold
 from sketchmatch.pipeline.unmatched import Part, PartSearch, Rival, part_of, trials
 from sketchmatch.registry import Registry
 
@@ -88,7 +89,7 @@ def search(
     plan = trials(whole.objects, weights, goal.price)
     trial, so_far, rivals = next(plan), None, list[Rival]()
     while True:
-        part = yield from _cut(whole, trial.kept, so_far)
+        part = yield from retold(part_of(whole, trial.kept), _still(so_far))
         share = trial.share * clock.left()
         found, total = yield from _searched(part, searcher, goal, registry, share, so_far)
         if so_far is not None:
@@ -103,18 +104,9 @@ def search(
             return replace(so_far, best=replace(so_far.best, outcome=Outcome.TIME_BUDGET))
 
 
-def _cut(
-    whole: Part, kept: tuple[int, ...], so_far: Search | None
-) -> Generator[Search, None, Part]:
-    """Return a part of what is to be searched."""
-    work = part_of(whole, kept)
-    while True:
-        try:
-            next(work)
-        except StopIteration as stop:
-            return stop.value  # type: ignore[no-any-return]
-        if so_far is not None:
-            yield so_far
+def _still(so_far: Search | None) -> Callable[[float], Iterable[Search]]:
+    """Return what tells of a search that it stands where it stood."""
+    return lambda _: () if so_far is None else (so_far,)
 
 
 def _searched(

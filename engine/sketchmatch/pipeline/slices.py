@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import closing
 from typing import Any, TypeVar
 
-__all__ = ["finish", "in_slices"]
+__all__ = ["finish", "in_slices", "retold"]
 
+_Step = TypeVar("_Step")
+_Told = TypeVar("_Told")
 _Value = TypeVar("_Value")
 _SLICE_SECONDS = 0.02
 _MOST_THREADS = 4
@@ -54,6 +57,27 @@ def finish(work: Generator[Any, None, _Value]) -> _Value:
             next(work)
         except StopIteration as stop:
             return stop.value  # type: ignore[no-any-return]
+
+
+def retold(
+    work: Generator[_Step, None, _Value], tell: Callable[[_Step], Iterable[_Told]]
+) -> Generator[_Told, None, _Value]:
+    """Go on with a generator to its end, yielding what ``tell`` makes of each step instead.
+
+    Closing this one closes it, and so does what ``tell`` raises.
+
+    Examples
+    --------
+    >>> list(retold(in_slices(1, lambda first, last: None), lambda share: (100 * share,)))
+    [100.0]
+    """
+    with closing(work):
+        while True:
+            try:
+                step = next(work)
+            except StopIteration as stop:
+                return stop.value  # type: ignore[no-any-return]
+            yield from tell(step)
 
 
 def _in_threads(
