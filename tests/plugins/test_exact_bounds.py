@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from sketchmatch.api import MatchProblem, Outcome
 from sketchmatch.pipeline.slices import finish
-from sketchmatch_builtin.searchers import _cells, _fixed, _residual
+from sketchmatch_builtin.searchers import _branch, _cells, _fixed, _residual
 from sketchmatch_builtin.searchers import exact as module
 from sketchmatch_builtin.searchers._assignment import FORBIDDEN, reduce_by_assignment
 from sketchmatch_builtin.searchers._ranking import Ranking
@@ -21,6 +21,7 @@ from tests.oracle.enumeration import every_confidence
 from tests.searching import WEIGHTS
 from tests.strategies import floats, random_table, with_rotation_weights
 
+TRUE = _cells.TOLERANCE
 SEEDS = st.integers(0, 2**32)
 QUANTILES = len(_cells.QUANTILES)
 
@@ -232,7 +233,15 @@ def _costs(relations, terms, partners):
 
 
 def _assert_says(tree, level, partners, cost):
-    """Compare what a node says of a map, which is K, its leaders and its pairs, with its cost."""
+    """Compare what a node says of a map with its cost."""
+    said = _said(tree, level, partners)
+    assert said <= cost + 1e-11
+    if tree.candidates.shape[1] == tree.candidates.shape[2]:
+        assert said >= cost - 1e-11
+
+
+def _said(tree, level, partners):
+    """Return what a node says that a map loses: K, its leaders and the costs of its pairs."""
     count, total = tree.counts[level], tree.bounds[level]
     chosen = []
     for k in range(count):
@@ -242,9 +251,50 @@ def _assert_says(tree, level, partners, cost):
     for k, other in itertools.combinations(range(count), 2):
         start = tree.starts[level, k, other] + chosen[k] * tree.sizes[level, other]
         total += tree.blocks[start + chosen[other]]
-    assert total <= cost + 1e-11
-    if tree.candidates.shape[1] == tree.candidates.shape[2]:
-        assert total >= cost - 1e-11
+    return total
+
+
+def test_no_node_of_a_search_says_more_of_a_map_than_it_loses():
+    assert sum(_look_at_nodes(seed) for seed in range(120)) > 100
+
+
+def _look_at_nodes(seed):
+    """Search a cell step by step, and hold all better maps of each node against what it says.
+
+    Returns
+    -------
+    int
+        How often there was a map to look at where objects are fixed.
+    """
+    rng = np.random.default_rng(seed)
+    objects = 3 + seed % 2
+    table = random_table(rng, objects, objects + seed // 2 % 2)
+    weights = ((0.0, 1.0, 0.0), (1.0, 1.0, 1.0), (0.3, 2.0, 0.0))[seed // 4 % 3]
+    relations, spread = relations_of(table, weights)
+    box = np.array([(rng.uniform(0.0, 6.0), rng.uniform(0.5, 1.5)), *[(-9.0, 9.0)] * QUANTILES])
+    every = every_confidence(table, weights)
+    inside = {partners: zeta for partners, zeta in every.items() if belongs(table, partners, box)}
+    if not inside:
+        return 0
+    beaten = sorted(inside.values())[-min(5, len(inside))] - 1e-6
+    found = Ranking(np.array([min(every, key=every.get)]), np.array([beaten]))
+    shape = (objects, table.argument_objects)
+    cells = _cells.Cells(box[None], np.ones(1), np.ones((1, *shape), dtype=np.bool_))
+    tree, fixed = _residual.empty_tree(*shape), _fixed.empty_fixed(objects)
+    place, given_up, looked_at = _branch.first_place(0), np.full(1, -np.inf), 0
+    search = (relations, found, spread, cells, tree, fixed, place, given_up)
+    while place[_branch.CELL] == 0:
+        _branch.search_cells(*search, 1, 10**6)
+        level = place[_branch.LEVEL]
+        if place[_branch.CELL] > 0 or place[_branch.SWEEPS] == 0:
+            continue
+        for partners, zeta in inside.items():
+            held = zip(fixed.objects[:level], fixed.partners[:level], strict=True)
+            if zeta > found.values[0] + TRUE and all(partners[a] == c for a, c in held):
+                looked_at += level > 0
+                assert _said(tree, level, partners) <= 1.0 - zeta + 1e-11
+    assert found.values[0] >= max(inside.values()) - TRUE
+    return int(looked_at)
 
 
 @given(SEEDS, st.integers(2, 5), st.sampled_from([(0.0, 1.0, 0.0), *WEIGHTS]))
