@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import sketchmatch
@@ -19,6 +19,7 @@ from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Kind, default_registry
 from sketchmatch.testing import random_scene
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+from tests.interpreted import examples
 from tests.oracle.laws import facing_force, force, hybrid, law_histogram
 from tests.oracle.pixels import mask_histogram
 from tests.strategies import FRAME, pairs_apart, pairs_in_overlap, pairs_in_touch, scenes, slivers
@@ -84,7 +85,7 @@ def test_it_is_registered_with_its_exponent_and_directions(name):
 
 @each
 @given(scene=scenes(most=4), half=st.integers(2, 45))
-@settings(max_examples=8)
+@examples(8)
 def test_rows_are_finite_and_not_negative(name, scene, half):
     rows = described(name, scene, directions=2 * half)
     assert rows.shape == (len(object_pairs(len(scene))), 2 * half)
@@ -110,7 +111,7 @@ def test_more_directions_read_the_same_values_between(name):
 
 @each
 @given(scene=scenes(least=2, most=3))
-@settings(max_examples=8)
+@examples(8)
 def test_the_dual_of_a_pair_is_its_histogram_turned_by_half(name, scene):
     forward, backward = described(name, scene, [(0, 1), (1, 0)], directions=60)
     tolerance = 1e-9 * forward.max()
@@ -149,7 +150,7 @@ def test_whole_scenes_are_described_with_its_exponent(name):
 
 @each
 @given(factor=st.floats(1e-3, 1e3))
-@settings(max_examples=8)
+@examples(8)
 def test_scaling_the_scene_multiplies_it_by_its_power(name, factor):
     # The raster's lattice lies on the scene's bounding box, and so grows with it; a power of two
     # keeps the centres of pixels on their side of every border.
@@ -185,7 +186,7 @@ def test_relations_that_eight_directions_meet_survive_any_turn(name, seed):
 
 @pytest.mark.parametrize("name", EXACT)
 @given(scene=scenes(least=3, most=4), angle=st.floats(0.0, math.tau), factor=st.floats(0.3, 3.0))
-@settings(max_examples=6)
+@examples(6)
 def test_small_objects_need_more_directions_to_match_themselves(name, scene, angle, factor):
     # Seen from the other end of the scene they are hardly 2° wide.
     result = sketchmatch.match(
@@ -255,28 +256,28 @@ def assert_as_defined(name, first, second, tolerance=1e-9):
 
 @pytest.mark.parametrize("name", EXACT)
 @given(shapes=pairs_apart())
-@settings(max_examples=20)
+@examples(20)
 def test_it_agrees_with_its_definition_between_objects_apart(name, shapes):
     assert_as_defined(name, *shapes)
 
 
 @pytest.mark.parametrize("name", EXACT)
 @given(shapes=slivers())
-@settings(max_examples=20)
+@examples(20)
 def test_it_agrees_with_its_definition_between_slivers(name, shapes):
     assert_as_defined(name, *shapes, tolerance=1e-8)
 
 
 @pytest.mark.parametrize("name", [name for name in EXACT if name not in INFINITE_IN_TOUCH])
 @given(shapes=pairs_in_touch())
-@settings(max_examples=20)
+@examples(20)
 def test_it_agrees_with_its_definition_between_objects_in_touch(name, shapes):
     assert_as_defined(name, *shapes)
 
 
 @pytest.mark.parametrize("name", [name for name in EXACT if name in FINITE_IN_OVERLAP])
 @given(shapes=pairs_in_overlap())
-@settings(max_examples=20)
+@examples(20)
 def test_it_agrees_with_its_definition_between_objects_in_overlap(name, shapes):
     assert_as_defined(name, *shapes)
 
@@ -406,7 +407,7 @@ def test_hybrid_of_unit_squares_in_touch(near):
 
 
 @given(st.one_of(pairs_apart(), pairs_in_touch(), pairs_in_overlap()), st.floats(0.05, 2.0))
-@settings(max_examples=40)
+@examples(40)
 def test_hybrid_agrees_with_its_definition_at_any_reach(shapes, near):
     scene = Scene.from_polygons(shapes)
     expected = law_histogram(*shapes, hybrid(*shapes, near, 0.5), 8)

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch import Scene, match
@@ -17,6 +17,7 @@ from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from sketchmatch_builtin.similarities.overlap import Overlap
 from sketchmatch_builtin.similarities.pappis import Pappis
 from sketchmatch_builtin.similarities.santini_jain import SantiniJain
+from tests.interpreted import compiled_only, examples
 from tests.oracle import relations as oracle
 
 LOPSIDED = SantiniJain(SantiniJain.Params(alpha=2.0, beta=0.25))
@@ -61,7 +62,7 @@ def test_values_by_hand():
 
 @each_measure
 @given(rows())
-@settings(max_examples=60)
+@examples(60)
 def test_values_are_those_of_the_definition(measure, definition, rows):
     first, second = rows
     (found,) = measure.compare(first[None], second[None])
@@ -107,6 +108,7 @@ def test_weights_that_make_everything_equal_are_refused():
     assert raised.value.field == "pipeline.similarity.parameters"
 
 
+@compiled_only
 @pytest.mark.parametrize(
     ("name", "least_sigma", "least_zeta"),
     [

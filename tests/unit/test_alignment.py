@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch.kernels.alignment import (
@@ -14,6 +14,7 @@ from sketchmatch.kernels.alignment import (
     split_turns,
     turned_rows,
 )
+from tests.interpreted import examples
 from tests.oracle import relations as oracle
 from tests.strategies import floats
 
@@ -27,7 +28,7 @@ def turned(histogram, rotation):
 
 
 @given(SEEDS, SIZES, st.lists(floats(0.0, 2 * math.pi), min_size=1, max_size=5))
-@settings(max_examples=100)
+@examples(100)
 def test_rows_turn_as_the_definition_says(seed, bins, rotations):
     histogram = np.random.default_rng(seed).random(bins)
     rows = turned_rows(histogram, *split_turns(np.array(rotations), bins))
@@ -60,7 +61,7 @@ def test_angles_about_a_full_turn_split_within_bounds(angle):
 
 
 @given(SEEDS, SIZES, floats(0.0, 1.0))
-@settings(max_examples=50)
+@examples(50)
 def test_the_sum_of_squares_between_bins_follows_from_the_roughness(seed, bins, rest):
     histogram = np.random.default_rng(seed).random(bins)
     (row,) = turned_rows(histogram, np.zeros(1, np.int64), np.array([rest]))
@@ -70,7 +71,7 @@ def test_the_sum_of_squares_between_bins_follows_from_the_roughness(seed, bins, 
 
 
 @given(SEEDS, SIZES)
-@settings(max_examples=50)
+@examples(50)
 def test_the_main_direction_is_that_of_the_mean_vector(seed, bins):
     # Twice as much weight on one side keeps the direction well defined.
     rng = np.random.default_rng(seed)

@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch.kernels.confidence import mean_absolute_difference
 from sketchmatch.model import Fmap, RelationTable
 from sketchmatch.pipeline.correspond import fmap_confidence
+from tests.interpreted import examples
 from tests.oracle import maps as oracle
 from tests.strategies import floats, tables
 
@@ -17,7 +18,7 @@ WEIGHTS = st.tuples(floats(0.1, 5.0), floats(0.0, 5.0), floats(0.0, 5.0))
 
 
 @given(st.data(), tables(), WEIGHTS)
-@settings(max_examples=150)
+@examples(150)
 def test_it_agrees_with_double_loops_on_any_fmap(data, table, weights):
     count = 2 * table.argument_pairs
     size = table.template_pairs
@@ -31,7 +32,7 @@ def test_it_agrees_with_double_loops_on_any_fmap(data, table, weights):
 
 
 @given(st.lists(floats(-1e6, 1e6), min_size=1, max_size=150))
-@settings(max_examples=150)
+@examples(150)
 def test_the_mean_difference_is_that_of_all_pairs(values):
     gaps = [abs(x - y) for k, x in enumerate(values) for y in values[:k]]
     expected = math.fsum(gaps) / len(gaps) if gaps else 0.0

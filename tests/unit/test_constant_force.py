@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sketchmatch import force_histogram
+from tests.interpreted import examples
 from tests.oracle.forces import force_histogram as by_definition
 from tests.strategies import (
     FRAME,
@@ -19,7 +20,7 @@ from tests.strategies import (
     star_rings,
 )
 
-checked = settings(max_examples=60)
+checked = examples(60)
 
 
 def assert_same(computed, expected, first, second):
@@ -40,7 +41,7 @@ def turned(rings, angle):
 
 
 @given(pairs_of_rings(), st.sampled_from([4, 8, 12]))
-@settings(max_examples=400)
+@examples(400)
 def test_it_agrees_with_the_definition(shapes, directions):
     computed = force_histogram(*shapes, directions=directions)
     assert_same(computed, by_definition(*shapes, directions), *shapes)
@@ -48,13 +49,13 @@ def test_it_agrees_with_the_definition(shapes, directions):
 
 @pytest.mark.slow
 @given(pairs_of_rings())
-@settings(max_examples=12)
+@examples(12)
 def test_it_agrees_with_the_definition_in_180_directions(shapes):
     assert_same(force_histogram(*shapes), by_definition(*shapes, 180), *shapes)
 
 
 @given(cornered_rings(), cornered_rings(), st.tuples(st.integers(-4, 4), st.integers(-4, 4)))
-@settings(max_examples=200)
+@examples(200)
 def test_it_agrees_where_edges_lie_on_each_other_and_along_the_direction(first, second, offset):
     second = [ring + offset for ring in second]
     computed = force_histogram(first, second, directions=8)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch.model import Fmap, Occm, RelationTable
@@ -15,10 +15,11 @@ from sketchmatch.pipeline.correspond import (
     object_map,
     occm,
 )
+from tests.interpreted import examples
 from tests.oracle import maps as oracle
 from tests.strategies import tables, tables_and_object_maps
 
-checked = settings(max_examples=120)
+checked = examples(120)
 
 
 def table_of(similarity, template_objects, argument_objects, rotation=0.0, dilation=1.0):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from sketchmatch import Scene, force_histogram
 from sketchmatch.kernels.alignment import main_directions
@@ -12,6 +12,7 @@ from sketchmatch.model import object_pairs
 from sketchmatch.pipeline.describe import describe
 from sketchmatch.pipeline.slices import finish
 from sketchmatch_builtin.histograms.constant import ConstantForce
+from tests.interpreted import examples
 from tests.oracle.relations import descriptor as by_definition
 from tests.strategies import scenes
 
@@ -26,7 +27,7 @@ def square(x, y, side=1.0):
 
 @pytest.mark.slow
 @given(scenes(most=4))
-@settings(max_examples=15)
+@examples(15)
 def test_every_pair_is_described_in_its_place(scene):
     found = finish(describe(scene, constant(24)))
     assert (found.objects, found.exponent, found.directions) == (len(scene), 0.0, 24)

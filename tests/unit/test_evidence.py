@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch import InvalidInputError, match
@@ -14,6 +14,7 @@ from sketchmatch.pipeline.correspond import fmap_confidence
 from sketchmatch.pipeline.evidence import compare_objects, rotation_weights, weigh_objects
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.testing import random_scene, simulate_sketch
+from tests.interpreted import compiled_only, examples
 from tests.oracle import evidence as oracle
 from tests.oracle import maps
 from tests.searching import relations_of
@@ -47,7 +48,7 @@ def sketched(seed, objects=5, drawn=4, **drawing):
 
 
 @given(scenes(most=3), scenes(least=3, most=4), WEIGHTS, st.sampled_from([4, 10, 36, 180]))
-@settings(max_examples=40)
+@examples(40)
 def test_the_evidence_is_what_the_definition_says(template, argument, weights, directions):
     table, _ = weighed(template, argument, weights, directions)
     drawn, mapped = (oracle.own_histograms(scene, directions) for scene in (template, argument))
@@ -93,7 +94,7 @@ def test_zeta_is_the_weighted_mean_of_its_five_parts(seed):
     st.sampled_from([1e-6, 0.3, 1.0, 7.0, 1e6]),
     WEIGHTS,
 )
-@settings(max_examples=25)
+@examples(25)
 def test_turning_and_scaling_the_sketch_changes_nothing(seed, bins, factor, weights):
     sketch, scene = sketched(seed)
     searched = ConfidenceWeights(*weights).searched
@@ -105,6 +106,7 @@ def test_turning_and_scaling_the_sketch_changes_nothing(seed, bins, factor, weig
     assert totals[0] == pytest.approx(totals[1], abs=1e-7)
 
 
+@compiled_only
 @pytest.mark.parametrize("searcher", ["auto", "exact", "direct", "easm", "nn", "fsnn-pso"])
 @pytest.mark.parametrize("exchanged", [False, True])
 def test_rotations_of_distant_pairs_count_for_more(searcher, exchanged):
@@ -124,7 +126,7 @@ def test_rotations_of_distant_pairs_count_for_more(searcher, exchanged):
 
 
 @given(scenes(most=5), floats(0.0, 4.0))
-@settings(max_examples=60)
+@examples(60)
 def test_rotation_weights_are_powers_of_distances(scene, distance):
     apart = [
         math.dist(scene.objects[a].centroid, scene.objects[b].centroid)
@@ -183,6 +185,7 @@ def test_objects_tell_apart_what_their_places_cannot():
     assert partners == {k: k for k in range(4)}
 
 
+@compiled_only
 @pytest.mark.parametrize("searcher", ["auto", "exact", "direct", "easm"])
 @pytest.mark.parametrize("exchanged", [False, True])
 def test_every_searcher_of_object_maps_finds_the_best(searcher, exchanged):
@@ -202,6 +205,7 @@ def test_every_searcher_of_object_maps_finds_the_best(searcher, exchanged):
     assert result.omap_confidence == pytest.approx(found.similarity)
 
 
+@compiled_only
 @pytest.mark.parametrize("searcher", ["auto", "direct", "easm", "nn"])
 def test_without_weights_for_objects_the_answer_is_the_thesis_s(searcher):
     sketch, scene = sketched(5)

@@ -6,11 +6,12 @@ import re
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import sketchmatch
 from sketchmatch import InvalidInputError, force_histogram
+from tests.interpreted import examples
 from tests.oracle.forces import force_histogram as constant_by_definition
 from tests.oracle.laws import PI, REAL, facing_force, force, law_histogram
 from tests.oracle.pixels import angle_counts, mask_histogram
@@ -29,8 +30,8 @@ from tests.strategies import (
     star_rings,
 )
 
-checked = settings(max_examples=20)
-few = settings(max_examples=12)
+checked = examples(20)
+few = examples(12)
 
 BELOW_ONE = [-3.0, -1.0, -0.5, 0.0, 0.5, 0.99, 1 - 1e-9]
 BELOW_TWO = [*BELOW_ONE, 1.0, 1 + 1e-9, 1.25, 1.5, 1.75, 2 - 1e-9]
@@ -68,19 +69,19 @@ def turned(rings, angle):
 
 @pytest.mark.parametrize("r", EXPONENTS)
 @given(shapes=pairs_apart())
-@settings(max_examples=15)
+@examples(15)
 def test_it_agrees_with_the_definition_between_objects_apart(r, shapes):
     assert_same(computed(*shapes, r), by_definition(*shapes, r), *shapes, r)
 
 
 @given(pairs_apart(), floats(-8.0, 10.0))
-@settings(max_examples=40)
+@examples(40)
 def test_it_agrees_with_the_definition_at_any_exponent(shapes, r):
     assert_same(computed(*shapes, r), by_definition(*shapes, r), *shapes, r)
 
 
 @given(slivers(), st.one_of(exponents, floats(-4.0, 10.0)))
-@settings(max_examples=60)
+@examples(60)
 def test_slivers_keep_eight_digits(shapes, r):
     # What a force makes of a width w is a second difference: w² of its digits are lost.
     assert_same(computed(*shapes, r), by_definition(*shapes, r), *shapes, r, tolerance=1e-8)
@@ -96,7 +97,7 @@ def test_slivers_along_each_other_keep_eight_digits(r):
 
 @pytest.mark.parametrize("r", BELOW_TWO)
 @given(shapes=pairs_in_touch())
-@settings(max_examples=15)
+@examples(15)
 def test_it_agrees_with_the_definition_between_objects_in_touch(r, shapes):
     assert_same(computed(*shapes, r), by_definition(*shapes, r), *shapes, r)
 
@@ -104,7 +105,7 @@ def test_it_agrees_with_the_definition_between_objects_in_touch(r, shapes):
 @pytest.mark.slow
 @pytest.mark.parametrize("r", BELOW_ONE)
 @given(shapes=pairs_in_overlap())
-@settings(max_examples=15)
+@examples(15)
 def test_it_agrees_with_the_definition_between_objects_in_overlap(r, shapes):
     assert_same(computed(*shapes, r), by_definition(*shapes, r), *shapes, r)
 
@@ -319,14 +320,14 @@ def assert_refused(*arguments, **options):
 
 @pytest.mark.parametrize("r", [1.0, 1 + 1e-9, 1.5, 2.0, 3.0, 10.0])
 @given(shapes=pairs_in_overlap())
-@settings(max_examples=5)
+@examples(5)
 def test_overlap_is_refused_where_the_force_would_be_infinite(r, shapes):
     assert_refused(*shapes, r=r, directions=8)
 
 
 @pytest.mark.parametrize("r", [2.0, 2.5, 3.0, 10.0])
 @given(shapes=pairs_in_touch())
-@settings(max_examples=5)
+@examples(5)
 def test_contact_is_refused_where_the_force_would_be_infinite(r, shapes):
     assert_refused(*shapes, r=r, directions=8)
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sketchmatch.api.kernels import (
@@ -17,6 +17,7 @@ from sketchmatch.api.kernels import (
     place_map,
     total_distance,
 )
+from tests.interpreted import examples
 from tests.oracle import maps as oracle
 from tests.strategies import random_table, tables_and_object_maps
 
@@ -88,7 +89,7 @@ def assert_same_state(state, table):
 
 
 @given(tables_and_object_maps(), kinds, weightings)
-@settings(max_examples=150)
+@examples(150)
 def test_a_placed_map_has_its_confidence(case, kind, weights):
     table, partners = case
     table = of_kind(table, kind)
@@ -104,7 +105,7 @@ def test_a_placed_map_has_its_confidence(case, kind, weights):
 
 
 @given(tables_and_object_maps(most=6), kinds, weightings)
-@settings(max_examples=120)
+@examples(120)
 def test_confidence_after_any_move_is_foreseen(case, kind, weights):
     table, partners = case
     table = of_kind(table, kind)
@@ -119,7 +120,7 @@ def test_confidence_after_any_move_is_foreseen(case, kind, weights):
 
 
 @given(tables_and_object_maps(), kinds, weightings, st.integers(0, 2**32))
-@settings(max_examples=100)
+@examples(100)
 def test_moves_in_a_row_lead_where_they_say(case, kind, weights, seed):
     table, partners = case
     table = of_kind(table, kind)
@@ -174,7 +175,7 @@ def test_equal_dilations_agree_wholly():
 
 
 @given(tables_and_object_maps(most=5), st.data())
-@settings(max_examples=60)
+@examples(60)
 def test_an_entry_is_found_in_any_order_of_the_objects(case, data):
     table, partners = case
     state = placed(table, partners)
@@ -193,7 +194,7 @@ def test_an_entry_is_found_in_any_order_of_the_objects(case, data):
 @given(st.integers(2, 20), kinds, st.integers(0, 2**32))
 @example(20, "equal but for rounding", 0)
 @example(20, "close with outliers", 0)
-@settings(max_examples=60)
+@examples(60)
 def test_total_distance_to_values_within_and_beyond(objects, kind, seed):
     rng = np.random.default_rng(seed)
     table = of_kind(random_table(rng, objects, objects), kind, seed)

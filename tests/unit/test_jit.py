@@ -12,6 +12,7 @@ import pytest
 from sketchmatch.kernels import _jit
 from sketchmatch.kernels.confidence import fmap_confidence, mean_absolute_difference
 from sketchmatch.kernels.projection import project
+from tests.interpreted import compiled_only
 from tests.tools import ROOT, require
 
 NUMBA = re.compile(r"\b(numba|n?jit)\b")
@@ -31,12 +32,14 @@ def without_text(source):
     return re.sub(r'""".*?"""|#[^\n]*', "", source, flags=re.S)
 
 
+@compiled_only
 @pytest.mark.parametrize("function", [fmap_confidence, mean_absolute_difference, project])
 def test_kernels_run_without_the_gil_and_without_fast_math(function):
     assert function.targetoptions["nogil"] is True
     assert not function.targetoptions.get("fastmath")
 
 
+@compiled_only
 def test_a_kernel_computes_what_its_python_does():
     values = np.array([3.0, -1.0, 4.0, 1.5])
     assert mean_absolute_difference(values.copy()) == mean_absolute_difference.py_func(values)
@@ -74,6 +77,7 @@ def run_outer(folder, cache=None):
 
 
 @pytest.mark.slow
+@compiled_only
 def test_a_change_in_another_file_is_compiled_anew(tmp_path):
     write(tmp_path, PACKAGE)
 
@@ -95,6 +99,7 @@ def write(folder, package):
 
 
 @pytest.mark.slow
+@compiled_only
 def test_the_same_source_elsewhere_is_not_compiled_again(tmp_path):
     require(hasattr(numba.config, "CACHE_LOCATOR_CLASSES"), "a numba that asks where code is kept")
     for folder, printed in (("here", "20 walk step"), ("there", "20")):
@@ -103,6 +108,7 @@ def test_the_same_source_elsewhere_is_not_compiled_again(tmp_path):
 
 
 @pytest.mark.slow
+@compiled_only
 def test_a_module_of_the_same_source_and_another_name_has_its_own(tmp_path):
     write(tmp_path, PACKAGE)
     assert run_outer(tmp_path) == "20 walk step"
@@ -112,6 +118,7 @@ def test_a_module_of_the_same_source_and_another_name_has_its_own(tmp_path):
     assert run_outer(tmp_path) == "20 walk step"
 
 
+@compiled_only
 def test_a_cache_that_cannot_be_written_keeps_nothing_from_running(tmp_path):
     write(tmp_path, PACKAGE)
     (tmp_path / "file").write_bytes(b"")
@@ -147,6 +154,7 @@ print(walk(1))
 
 
 @pytest.mark.slow
+@compiled_only
 @pytest.mark.parametrize(
     ("name", "before", "after"),
     [("maker.py", "step(step(x))", "step(step(step(x)))"), ("step.py", "+ 1", "+ 2")],
@@ -213,6 +221,7 @@ def test_the_cache_lies_where_the_environment_says(tmp_path, monkeypatch):
     assert before == numba.config.CACHE_DIR, "kernels of other programs go where they went"
 
 
+@compiled_only
 def test_compilation_is_announced_by_name_and_loading_is_not(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sketchmatch.api import Alignment, Similarity
@@ -19,6 +19,7 @@ from sketchmatch_builtin.histograms.constant import ConstantForce
 from sketchmatch_builtin.similarities.circular_peak import CircularPeak
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from sketchmatch_builtin.similarities.pappis import Pappis
+from tests.interpreted import compiled_only, examples
 from tests.oracle import relations as oracle
 from tests.oracle.maps import look_up
 from tests.strategies import scenes
@@ -71,7 +72,7 @@ def assert_entry(found, expected):
 
 @pytest.mark.slow
 @given(scenes(most=3), scenes(most=3))
-@settings(max_examples=15)
+@examples(15)
 def test_two_scenes_compare_as_their_definition_says(first, second):
     template, argument = sorted((first, second), key=len)
     histograms = [oracle.descriptor(scene, 24) for scene in (template, argument)]
@@ -89,7 +90,7 @@ def test_two_scenes_compare_as_their_definition_says(first, second):
 
 
 @given(st.integers(0, 2**32), st.sampled_from([0.0, 1.0, 2.0]), st.sampled_from([4, 8, 12, 180]))
-@settings(max_examples=60)
+@examples(60)
 def test_histograms_of_any_force_compare_as_the_definition_says(seed, exponent, directions):
     rng = np.random.default_rng(seed)
     objects = sorted(rng.integers(2, 5, 2))
@@ -133,7 +134,10 @@ TWINS = {"main": (CrossCorrelation, RowByRow), "peak": (CircularPeak, RowByRowAt
 
 
 @pytest.mark.parametrize(("quick", "slow"), TWINS.values(), ids=TWINS)
-@pytest.mark.parametrize("directions", [4, 6, 36, 180, 3600])
+@pytest.mark.parametrize(
+    "directions",
+    [4, 6, 36, pytest.param(180, marks=compiled_only), pytest.param(3600, marks=compiled_only)],
+)
 def test_products_of_matrices_give_what_comparing_row_by_row_gives(quick, slow, directions):
     rng = np.random.default_rng(directions)
     scenes_ = [
@@ -184,7 +188,7 @@ def test_the_peak_lies_between_bins_where_that_is_better():
 
 @pytest.mark.parametrize("similarity", [CrossCorrelation, CircularPeak, Pappis])
 @given(st.integers(0, 2**32), st.integers(0, 35))
-@settings(max_examples=15)
+@examples(15)
 def test_turning_the_template_by_bins_shifts_the_rotation_alone(similarity, seed, steps):
     first, second = np.random.default_rng(seed).random((2, 6, 36)) ** 3
     before = related(descriptor(first), descriptor(second), similarity)
@@ -251,6 +255,7 @@ def test_a_table_in_panels_is_the_same_but_for_rounding(similarity, monkeypatch)
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-12)
 
 
+@compiled_only
 @pytest.mark.parametrize("similarity", [CrossCorrelation, CircularPeak, Pappis])
 def test_large_tables_come_in_slices(similarity):
     rng = np.random.default_rng(3)

@@ -1,0 +1,122 @@
+"""What is mutated, and which tests speak of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from tests.tools import ROOT
+
+_FORCES = "unit/test_constant_force unit/test_force_histogram"
+_MATCHED = "unit/test_match unit/test_public"
+
+_GROUPS = {
+    "kernels": (
+        "engine/sketchmatch/kernels",
+        {
+            "_jit": "unit/test_jit",
+            "alignment": "unit/test_alignment unit/test_relate",
+            "confidence": "unit/test_confidence",
+            "constant_force": "unit/test_constant_force",
+            "evidence": "unit/test_evidence",
+            "exchange": "unit/test_alternatives",
+            "hybrid_force": "plugins/test_histograms",
+            "incremental": "unit/test_incremental",
+            "pairs": "unit/test_relations unit/test_incremental",
+            "power_force": "unit/test_force_histogram",
+            "projection": _FORCES,
+            "raster": "unit/test_force_histogram plugins/test_histograms",
+            "similarity": "plugins/test_similarities",
+            "sweep": _FORCES,
+        },
+    ),
+    "pipeline": (
+        "engine/sketchmatch/pipeline",
+        {
+            "calibration": "unit/test_probability unit/test_learning",
+            "limits": "unit/test_limits",
+            "match": _MATCHED,
+            "plugins": f"unit/test_registry {_MATCHED}",
+            "reading": _MATCHED,
+            "request": f"unit/test_selection {_MATCHED}",
+            "result": _MATCHED,
+            "warmup": "unit/test_startup unit/test_match",
+        },
+    ),
+    "searchers": (
+        "plugins/sketchmatch_builtin/searchers",
+        {
+            "_assignment": "plugins/test_exact",
+            "_backtrack": "plugins/test_exact",
+            "_branch": "plugins/test_exact",
+            "_cells": "plugins/test_exact",
+            "_evolution": "plugins/test_easm",
+            "_fixed": "plugins/test_exact",
+            "_growers": "plugins/test_fsnn_pso",
+            "_memetic": "plugins/test_direct",
+            "_moves": "plugins/test_direct",
+            "_neighbours": "plugins/test_nn plugins/test_nn_pso plugins/test_fsnn_pso",
+            "_ranking": "plugins/test_direct plugins/test_exact",
+            "_relations": "plugins/test_exact",
+            "_residual": "plugins/test_exact",
+            "_swarm": "plugins/test_nn_pso plugins/test_fsnn_pso",
+            "auto": "plugins/test_auto",
+            "direct": "plugins/test_direct",
+            "easm": "plugins/test_easm",
+            "exact": "plugins/test_exact",
+            "fsnn_pso": "plugins/test_fsnn_pso",
+            "nn": "plugins/test_nn",
+            "nn_pso": "plugins/test_nn_pso",
+        },
+    ),
+}
+
+_COMPILED = {"_jit"}
+
+
+@dataclass(frozen=True)
+class Module:
+    """A module that is mutated.
+
+    Attributes
+    ----------
+    group
+        What it counts for.
+    path
+        Its file, from the root of the repository.
+    tests
+        Files whose tests run until one fails; first its own examples, if it has any.
+    interpreted
+        Whether its kernels run as plain Python, so that none is compiled anew for each mutant.
+    """
+
+    group: str
+    path: str
+    tests: tuple[str, ...]
+    interpreted: bool
+
+    @cached_property
+    def source(self) -> str:
+        """Its text, as it was at first."""
+        return (ROOT / self.path).read_text(encoding="utf-8")
+
+
+def modules() -> list[Module]:
+    """Return all modules that are mutated, group by group."""
+    found = []
+    for group, (folder, named) in _GROUPS.items():
+        for file in sorted((ROOT / folder).glob("*.py")):
+            names = named.get(file.stem, f"unit/test_{file.stem}").split()
+            tests = [f"tests/{name}.py" for name in names]
+            path = file.relative_to(ROOT).as_posix()
+            if ">>>" in file.read_text(encoding="utf-8"):
+                tests.insert(0, path)
+            interpreted = group != "pipeline" and file.stem not in _COMPILED
+            if file.stem != "__init__":
+                found.append(Module(group, path, tuple(tests), interpreted))
+    return found
+
+
+EQUIVALENT = Path(__file__).with_name("equivalent.toml")
+"""Mutants that change no result, with the reason for each."""
