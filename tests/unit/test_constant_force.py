@@ -156,8 +156,12 @@ def test_right_is_direction_zero_and_up_is_a_quarter():
 
 def test_distance_neither_weakens_a_constant_force_nor_costs_digits():
     leaf = np.array([[0.13, 0.02], [1.71, 0.38], [0.97, 1.23], [0.31, 0.91]])
-    near, far = (by_direction(leaf + np.array([x, 0.1]), leaf, 4)[0] for x in (10.0, 1e6))
-    assert near == pytest.approx(far, rel=1e-9)
+    for order in (1, -1):
+        near, far = (
+            by_direction(*(leaf + np.array([x, 0.1]), leaf)[::order], 4) for x in (10.0, 1e6)
+        )
+        assert max(near) > 0.0
+        assert near == pytest.approx(far, rel=1e-9)
 
 
 def test_an_object_on_itself_pulls_half_of_its_sections_each_way():

@@ -130,6 +130,14 @@ def test_an_empty_histogram_compares_with_none():
     assert table.rotation[1, 2] == pytest.approx(math.pi / 2)
 
 
+@pytest.mark.parametrize("similarity", [CrossCorrelation, RowByRow, Pappis])
+def test_a_turn_backwards_by_less_than_a_rounding_is_none(similarity):
+    template, argument = np.array([[1.0, 1e-20, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0, 0.0]])
+    table = related(descriptor(template), descriptor(argument), similarity)
+    assert table.rotation.tolist() == [[0.0]]
+    assert table.similarity[0, 0] == pytest.approx(1.0)
+
+
 TWINS = {"main": (CrossCorrelation, RowByRow), "peak": (CircularPeak, RowByRowAtPeak)}
 
 

@@ -10,6 +10,7 @@
 - Beneath these: :func:`map_entry` (evidence, cos R, sin R and L̂ of one entry) and
   :func:`map_evidence` (the first alone), :func:`total_distance` and
   :func:`mean_absolute_difference` (ζL).
+- Rows of a relation table by objects: :func:`pair_index`.
 - Rows of histograms: :func:`contrast_rows`, :func:`overlap_rows`.
 
 Evidence is what an entry counts for beside rotation and dilation: σ, or more where a request weighs
@@ -55,6 +56,7 @@ from sketchmatch.kernels.incremental import (
     place_map,
     total_distance,
 )
+from sketchmatch.kernels.pairs import pair_index
 from sketchmatch.kernels.similarity import contrast_rows, overlap_rows
 
 __all__ = [
@@ -71,6 +73,7 @@ __all__ = [
     "map_evidence",
     "mean_absolute_difference",
     "overlap_rows",
+    "pair_index",
     "place_map",
     "total_distance",
 ]

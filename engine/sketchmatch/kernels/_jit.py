@@ -26,6 +26,23 @@ def kernel(function: _Function) -> _Function:
     """Compile a function with numba: without the GIL, cached on disk, no fast-math.
 
     Fast-math stays off because it would reorder sums and break agreement with the oracles.
+
+    Parameters
+    ----------
+    function
+        Of a file: what is compiled is kept by the content of that file and of those it uses.
+
+    Returns
+    -------
+    callable
+        The same function, compiled at its first call; with ``NUMBA_DISABLE_JIT=1`` the function
+        itself.
+
+    Examples
+    --------
+    >>> from sketchmatch.model import pair_count
+    >>> kernel(pair_count)(8)
+    28
     """
     with _caching_in(_cache_folder(function)):
         compiled: _Function = numba.njit(function, cache=True, nogil=True, error_model="numpy")
@@ -36,7 +53,20 @@ def kernel(function: _Function) -> _Function:
 def on_compile(listener: Callable[[str], None]) -> Iterator[None]:
     """Call ``listener`` with a function's name whenever numba starts to compile it anew.
 
-    Machine code that is loaded from the cache does not count.
+    Machine code that is loaded from the cache, or in memory already, does not count.
+
+    Examples
+    --------
+    >>> from sketchmatch.model import pair_count
+    >>> count = kernel(pair_count)
+    >>> count(8)
+    28
+    >>> names = []
+    >>> with on_compile(names.append):
+    ...     count(9)
+    36
+    >>> names
+    []
     """
 
     class Listener(event.Listener):

@@ -39,6 +39,13 @@ def main_directions(histograms: FloatArray) -> FloatArray:
     -------
     ndarray
         Shape (k,), radians within (−π, π]; 0 for a histogram without any main direction.
+
+    Examples
+    --------
+    Up, and half-way between right and up:
+
+    >>> np.degrees(main_directions(np.array([[0.0, 3.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0]])))
+    array([90., 45.])
     """
     angles = 2.0 * np.pi * np.arange(histograms.shape[1]) / histograms.shape[1]
     directions: FloatArray = np.arctan2(histograms @ np.sin(angles), histograms @ np.cos(angles))
@@ -46,14 +53,49 @@ def main_directions(histograms: FloatArray) -> FloatArray:
 
 
 def split_turns(angles: FloatArray, bins: int) -> tuple[IntArray, FloatArray]:
-    """Return angles as whole bins, within 0 … ``bins`` − 1, and rests of a bin, within [0, 1)."""
+    """Return angles as whole bins and rests of a bin.
+
+    Parameters
+    ----------
+    angles
+        Any shape, in radians.
+    bins
+        n, how many bins make a full turn.
+
+    Returns
+    -------
+    whole, rest
+        Of the same shape: whole bins within 0 … ``bins`` − 1, and rests within [0, 1).
+
+    Examples
+    --------
+    >>> whole, rest = split_turns(np.radians([0.0, 100.0, -45.0]), 4)
+    >>> whole, rest.round(3)
+    (array([0, 1, 3]), array([0.   , 0.111, 0.5  ]))
+    """
     places = np.mod(angles, 2.0 * np.pi) * bins / (2.0 * np.pi)
     whole = np.floor(places)
     return whole.astype(np.int64) % bins, places - whole
 
 
 def roughness(histograms: FloatArray) -> FloatArray:
-    """Return D = ½ Σ (h[m] − h[m−1])² of each histogram, shape (k,)."""
+    """Return D = ½ Σ (h[m] − h[m−1])² of each histogram, the last bin being next to the first.
+
+    Parameters
+    ----------
+    histograms
+        Shape (k, n).
+
+    Returns
+    -------
+    ndarray
+        Shape (k,), 0 for a histogram that is the same in all directions.
+
+    Examples
+    --------
+    >>> roughness(np.array([[0.0, 3.0, 0.0, 0.0], [2.0, 2.0, 2.0, 2.0]]))
+    array([9., 0.])
+    """
     steps = histograms - np.roll(histograms, 1, axis=1)
     halves: FloatArray = 0.5 * np.einsum("kn,kn->k", steps, steps)
     return halves
@@ -82,6 +124,14 @@ def main_turns(
     -------
     whole, rest
         Shape (k, l).
+
+    Examples
+    --------
+    From 3½ bins to half a bin it is one bin on, past the last of four; the other way three:
+
+    >>> template, argument = (np.array([3]), np.array([0.5])), (np.array([0]), np.array([0.5]))
+    >>> main_turns(*template, *argument, 4), main_turns(*argument, *template, 4)
+    ((array([[1]]), array([[0.]])), (array([[3]]), array([[0.]])))
     """
     shape = (template_whole.size, argument_whole.size)
     whole, rest = np.empty(shape, np.int64), np.empty(shape)
@@ -115,6 +165,15 @@ def interpolated_products(
     -------
     ndarray
         Shape (k, l).
+
+    Examples
+    --------
+    C is 2 one bin before, 6 at the whole turn and 4 one bin after. A quarter of a bin further on
+    it is 6 and a quarter of the way to 4, and as far back a quarter of the way to 2:
+
+    >>> products = np.array([[[2.0, 2.0], [6.0, 6.0], [4.0, 4.0]]])
+    >>> interpolated_products(products, np.array([0.5]), np.array([0.75, 0.25]))
+    array([[5.5, 5. ]])
     """
     count, width = template_rest.size, products.shape[2]
     result = np.empty((count, argument_rest.size))
@@ -156,6 +215,15 @@ def peak_turns(
         Shape (k, l).
     product
         Shape (k, l): Σ h₂h' there.
+
+    Examples
+    --------
+    One spike against two that are as high, in bins 1 and 2: half-way between them is best.
+
+    >>> template, argument = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 1.0, 1.0, 0.0])
+    >>> products = np.array([[[np.roll(template, w) @ argument for w in range(4)]]])
+    >>> peak_turns(products, np.array([1.0]), roughness(template[None]))
+    (array([[1]]), array([[0.5]]), array([[1.]]))
     """
     shape, bins = products.shape[:2], products.shape[2]
     whole, rest, product = np.zeros(shape, np.int64), np.zeros(shape), np.empty(shape)
@@ -184,7 +252,26 @@ def peak_turns(
 
 @kernel
 def rolled_rows(histograms: FloatArray, whole: IntArray) -> FloatArray:
-    """Return each histogram, shape (k, n), turned by its own number of whole bins, shape (k,)."""
+    """Return each histogram turned by its own number of whole bins.
+
+    Parameters
+    ----------
+    histograms
+        Shape (k, n).
+    whole
+        Shape (k,), any whole numbers.
+
+    Returns
+    -------
+    ndarray
+        Shape (k, n).
+
+    Examples
+    --------
+    >>> rolled_rows(np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0]]), np.array([1, -1]))
+    array([[3., 1., 2.],
+           [2., 3., 1.]])
+    """
     rows = np.empty(histograms.shape)
     bins = histograms.shape[1]
     for k in range(histograms.shape[0]):
@@ -210,6 +297,14 @@ def turned_rows(histogram: FloatArray, whole: IntArray, rest: FloatArray) -> Flo
     -------
     ndarray
         Shape (k, n).
+
+    Examples
+    --------
+    A turn by a bin and a quarter leaves three quarters of a spike one bin further on:
+
+    >>> turned_rows(np.array([4.0, 0.0, 0.0]), np.array([1, 2]), np.array([0.25, 0.0]))
+    array([[0., 3., 1.],
+           [0., 0., 4.]])
     """
     n = histogram.size
     # Entry m is h[m − 1], for two rounds, so that no turn meets an end.

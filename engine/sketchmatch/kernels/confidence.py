@@ -44,6 +44,17 @@ def fmap_confidence(
     -------
     tuple of float
         ζ = (w1 ζσ + w2 ζR + w3 ζL) / (w1 + w2 + w3) and its three parts.
+
+    Examples
+    --------
+    Of two entries the second is a dual, so that its turn of 180° is one of 0° as the other is;
+    their L̂ are 1 apart, which halves ζL.
+
+    >>> entries, scratch = np.array([0, 1]), np.empty(2)
+    >>> evidence, levels = np.array([[0.9], [0.7]]), np.array([[0.0], [1.0]])
+    >>> cosine, sine, weights = np.array([[1.0], [-1.0]]), np.zeros((2, 1)), np.array([1.0, 1, 2])
+    >>> np.array(fmap_confidence(entries, scratch, evidence, cosine, sine, levels, weights))
+    array([0.7, 0.8, 1. , 0.5])
     """
     return fmap_confidence_above(
         -np.inf, entries, scratch, evidence, cosine, sine, normalized_dilation, weights
@@ -65,6 +76,29 @@ def fmap_confidence_above(
 
     ζL, which costs most, is at most 1. Where ζ would not be above ``floor`` even so, that upper
     bound of ζ is returned with ζL = 1.
+
+    Parameters
+    ----------
+    floor
+        What ζ is to exceed.
+    entries, scratch, evidence, cosine, sine, normalized_dilation, weights
+        As in :func:`fmap_confidence`; shapes (Q,), (Q,), (Q, Q'/2) or (Q, Q'), (Q, Q'/2) three
+        times and (3,).
+
+    Returns
+    -------
+    tuple of float
+        ζ and its three parts, or a bound of ζ that is at most ``floor``, ζσ, ζR and 1.
+
+    Examples
+    --------
+    Two entries whose L̂ are 1 apart: ζ is 0.7, and 0.95 if their dilations agreed.
+
+    >>> evidence, cosine, sine = np.full((2, 1), 0.8), np.ones((2, 1)), np.zeros((2, 1))
+    >>> levels, weights = np.array([[0.0], [1.0]]), np.array([1.0, 1.0, 2.0])
+    >>> rest = np.array([0, 0]), np.empty(2), evidence, cosine, sine, levels, weights
+    >>> [float(fmap_confidence_above(floor, *rest)[0]) for floor in (0.9, 0.95)]
+    [0.7, 0.95]
     """
     count, half = entries.size, cosine.shape[1]
     folded = 2 * half - evidence.shape[1]
@@ -105,6 +139,13 @@ def mean_absolute_difference(values: FloatArray) -> float:
     -------
     float
         0 if there is only one value.
+
+    Examples
+    --------
+    The gaps are 3, 1 and 2:
+
+    >>> float(mean_absolute_difference(np.array([4.0, 1.0, 2.0])))
+    2.0
     """
     count = values.size
     if count < 2:

@@ -132,5 +132,19 @@ def constant_force_histograms(
     -------
     ndarray
         Shape (p, n), in units of length to the third power.
+
+    Examples
+    --------
+    A unit square and another one 4 further right: each line along x meets both in a length of 1,
+    over a height of 1.
+
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> starts = np.concatenate([corners, corners + [4.0, 0.0]])
+    >>> ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in (starts[:4], starts[4:])])
+    >>> offsets, pairs = np.array([0, 4, 8]), np.array([[1, 0], [0, 1]])
+    >>> constant_force_histograms(starts, ends, offsets, pairs, 4)
+    array([[1., 0., 0., 0.],
+           [0., 0., 1., 0.]])
     """
     return sweep_pairs(_sweep, starts, ends, offsets, pairs, directions, None)

@@ -65,6 +65,18 @@ def weigh_entries(
         Shape (3,), of σ, shape and size; their sum is 1.
     evidence
         Shape (Q, Q'), written: the weighted mean of the three, of an entry and of its dual.
+
+    Examples
+    --------
+    Two objects on two, of which the first is like the first alone and the second like the second
+    alone, of the same sizes. σ is 0.6; the entry is wholly alike in shape, and its dual not at all.
+
+    >>> own = SelfRelations(np.eye(2)[:, :, None] * np.ones(2), np.zeros(2), np.zeros((2, 2)))
+    >>> pairs, evidence = (np.array([[0, 1]]), np.array([[0, 1]])), np.empty((1, 2))
+    >>> relations = np.array([[0.6]]), np.array([[0.0]]), np.array([[1.0]])
+    >>> weigh_entries(0, 1, pairs, relations, own, np.array([0.5, 0.25, 0.25]), evidence)
+    >>> evidence
+    array([[0.8 , 0.55]])
     """
     template, argument = pairs
     similarity, rotation, dilation = relations
@@ -89,7 +101,30 @@ def mean_parts(
     dilation: FloatArray,
     own: SelfRelations,
 ) -> tuple[float, float]:
-    """Return ζS and ζM of an FMAP: the means of shape and size over its entries."""
+    """Return ζS and ζM of an FMAP: the means of shape and size over its entries.
+
+    Parameters
+    ----------
+    entries
+        int64, shape (Q,), each within [0, Q').
+    pairs
+        Shapes (Q, 2) and (Q'/2, 2): those of the template and of the argument.
+    rotation, dilation
+        Shape (Q, Q'/2): R and L.
+    own
+        How every template object compares with every argument object.
+
+    Examples
+    --------
+    The dual of the only pair of two on two: no object is shaped like its partner, and each is
+    of its size, but the relation is twice as large, for which L̂ = 1.5.
+
+    >>> own = SelfRelations(np.eye(2)[:, :, None] * np.ones(2), np.zeros(2), np.zeros((2, 2)))
+    >>> pairs, rotation = (np.array([[0, 1]]), np.array([[0, 1]])), np.array([[0.0]])
+    >>> shape, size = mean_parts(np.array([1]), pairs, rotation, np.array([[2.0]]), own)
+    >>> float(shape), round(float(size), 6)
+    (0.0, 0.353553)
+    """
     template, argument = pairs
     shapes = sizes = 0.0
     for i in range(entries.size):

@@ -36,6 +36,18 @@ def exchange_confidences(
     ndarray
         Shape (N, N'): entry (g, h) is for g with partner h, whose holder, if there is one, takes
         what g had; −inf where g has h already.
+
+    Examples
+    --------
+    Two objects on three, all that counts being σ of the one entry (0, 1) → (c, d):
+
+    >>> from sketchmatch.model import correspondences
+    >>> sigma = np.array([[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]])
+    >>> rest = np.ones((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)), np.array([1.0, 0.0, 0.0])
+    >>> pairs = np.array([[0, 1]])
+    >>> exchange_confidences(np.array([0, 1]), pairs, correspondences(3), (sigma, *rest))
+    array([[-inf,  0.4,  0.6],
+           [ 0.4, -inf,  0.2]])
     """
     objects = partners.size
     result = np.full((objects, columns.shape[0]), -np.inf)

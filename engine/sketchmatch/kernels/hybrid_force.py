@@ -136,6 +136,22 @@ def hybrid_force_histograms(
     -------
     ndarray
         Shape (p, n), in units of length.
+
+    Examples
+    --------
+    Two unit squares, 1 apart along x. Up to a distance of 4 the force is constantly 1/16; where
+    it is d^−2 at once it is ln 4 − ln 3, as lines meet both in a length of 1.
+
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> starts = np.concatenate([corners, corners + [2.0, 0.0]])
+    >>> ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in (starts[:4], starts[4:])])
+    >>> offsets, pairs = np.array([0, 4, 8]), np.array([[1, 0], [1, 0]])
+    >>> radii, relations = np.array([4.0, 0.0]), np.array([3, 3])
+    >>> found = hybrid_force_histograms(starts, ends, offsets, pairs, 4, radii, relations)
+    >>> found.round(6)
+    array([[0.0625  , 0.      , 0.      , 0.      ],
+           [0.287682, 0.      , 0.      , 0.      ]])
     """
     law = _HybridLaw(radii, power_law(2.0, relations))
     return sweep_pairs(_sweep, starts, ends, offsets, pairs, directions, law)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sketchmatch.kernels._jit import kernel
+from sketchmatch.kernels.pairs import pair_index
 from sketchmatch.model.arrays import FloatArray, IntArray
 from sketchmatch.model.maps import Weights
 from sketchmatch.model.relations import DILATION_SCALE, RelationTable
@@ -77,7 +78,22 @@ class MapState(NamedTuple):
 
 
 def empty_map_state(table: RelationTable, weights: Weights) -> MapState:
-    """Return room for an object map; :func:`place_map` fills it."""
+    """Return room for an object map; :func:`place_map` fills it.
+
+    Parameters
+    ----------
+    table
+        Of N template and N' argument objects.
+    weights
+        Of ζσ, ζR and ζL, in any unit.
+
+    Examples
+    --------
+    >>> table = RelationTable([[0.9]], [[0.0]], [[1.0]], 2, 2)
+    >>> state = empty_map_state(table, (1.0, 2.0, 1.0))
+    >>> state.holders.tolist(), state.weights.tolist()
+    ([-1, -1], [0.25, 0.5, 0.25, 1.0])
+    """
     objects, pairs = table.template_objects, table.template_pairs
     return MapState(
         evidence=table.entry_evidence,
@@ -97,7 +113,26 @@ def empty_map_state(table: RelationTable, weights: Weights) -> MapState:
 
 @kernel
 def place_map(state: MapState, partners: IntArray) -> float:
-    """Make an injective object map, shape (N,), the current one and return its ζ."""
+    """Make an injective object map the current one and return its ζ, in O(Q log Q).
+
+    Parameters
+    ----------
+    state
+        Room, whatever map is in it.
+    partners
+        int64, shape (N,), all different.
+
+    Examples
+    --------
+    One pair on one: σ = 0.9, and the dual turns by 180° as a whole, which costs nothing.
+
+    >>> table = RelationTable([[0.9]], [[0.0]], [[1.0]], 2, 2)
+    >>> state = empty_map_state(table, (1.0, 0.0, 0.0))
+    >>> float(place_map(state, np.array([1, 0])))
+    0.9
+    >>> state.entries[0, 1, [COSINE, DILATION]]
+    array([-1.,  0.])
+    """
     for c in range(state.holders.size):
         state.holders[c] = -1
     count = 0
@@ -114,7 +149,17 @@ def place_map(state: MapState, partners: IntArray) -> float:
 
 @kernel
 def map_confidence(state: MapState) -> float:
-    """Return ζ of the current map."""
+    """Return ζ of the current map, in O(1).
+
+    Examples
+    --------
+    >>> table = RelationTable([[0.7]], [[0.0]], [[1.0]], 2, 2)
+    >>> state = empty_map_state(table, (1.0, 1.0, 1.0))
+    >>> bool(place_map(state, np.array([0, 1])) == map_confidence(state))
+    True
+    >>> round(float(map_confidence(state)), 6)  # a single pair turns and grows as it does itself
+    0.9
+    """
     sums = state.sums
     return _confidence(
         state.weights,
@@ -144,6 +189,21 @@ def confidence_after(state: MapState, a: int, c: int) -> float:
     -------
     float
         The same as :func:`make_move` would, but for rounding.
+
+    Examples
+    --------
+    If 0 and 1 exchange their partners, pair (0, 1) is the dual of what it was, (0, 2) → (1, 2)
+    and (1, 2) → (0, 2): (0.9 + 0.2 + 0.1) / 3.
+
+    >>> similarity = np.array([[0.9, 0.2, 0.3], [0.1, 0.8, 0.2], [0.3, 0.1, 0.7]])
+    >>> table = RelationTable(similarity, np.zeros((3, 3)), np.ones((3, 3)), 3, 3)
+    >>> state = empty_map_state(table, (1.0, 0.0, 0.0))
+    >>> round(float(place_map(state, np.array([0, 1, 2]))), 6)
+    0.8
+    >>> round(float(confidence_after(state, 0, 1)), 6)
+    0.4
+    >>> state.partners.tolist()
+    [0, 1, 2]
     """
     entries, partners = state.entries, state.partners
     leaving, coming = state.room[0], state.room[1]
@@ -179,6 +239,28 @@ def make_move(state: MapState, a: int, c: int) -> float:
     """Give object a the partner c, as :func:`confidence_after` imagines it, and return ζ.
 
     All sums are taken anew, in O(Q), so that no rounding builds up over many moves.
+
+    Parameters
+    ----------
+    state
+        The current map, which changes.
+    a
+        A template object.
+    c
+        An argument object other than a's partner. If another template object has it, that one
+        takes a's partner.
+
+    Examples
+    --------
+    The first object takes what nobody had, and then what the second has:
+
+    >>> table = RelationTable([[0.9, 0.4, 0.7]], np.zeros((1, 3)), np.ones((1, 3)), 2, 3)
+    >>> state = empty_map_state(table, (1.0, 0.0, 0.0))
+    >>> first = place_map(state, np.array([0, 1]))
+    >>> float(make_move(state, 0, 2)), state.partners.tolist(), state.holders.tolist()
+    (0.7, [2, 1], [-1, 1, 0])
+    >>> float(make_move(state, 0, 1)), state.partners.tolist(), state.holders.tolist()
+    (0.7, [1, 2], [-1, 0, 1])
     """
     partners, entries = state.partners, state.entries
     leaving, coming = state.room[0], state.room[1]
@@ -206,6 +288,25 @@ def map_entry(state: MapState, a: int, b: int, c: int, d: int) -> tuple[float, f
     """Return evidence, cos R, sin R and L̂ of the entry (a, b) → (c, d), objects in any order.
 
     Cosine and sine are times the rotation weight of the pair.
+
+    Parameters
+    ----------
+    state
+        Any map; it counts for nothing.
+    a, b
+        Two template objects.
+    c, d
+        Two argument objects.
+
+    Examples
+    --------
+    R is a quarter turn, and three quarters for the dual; L = 2 makes L̂ = 1.5.
+
+    >>> table = RelationTable([[0.9]], [[np.pi / 2]], [[2.0]], 2, 2)
+    >>> state = empty_map_state(table, (1.0, 1.0, 1.0))
+    >>> np.round([map_entry(state, 0, 1, 0, 1), map_entry(state, 0, 1, 1, 0)], 6) + 0.0
+    array([[ 0.9,  0. ,  1. ,  1.5],
+           [ 0.9,  0. , -1. ,  1.5]])
     """
     i, j, sign = _place(state, a, b, c, d)
     rotation = state.rotation[i, j]
@@ -216,7 +317,22 @@ def map_entry(state: MapState, a: int, b: int, c: int, d: int) -> tuple[float, f
 
 @kernel
 def map_evidence(state: MapState, a: int, b: int, c: int, d: int) -> float:
-    """Return the evidence of the entry (a, b) → (c, d) alone."""
+    """Return the evidence of the entry (a, b) → (c, d) alone.
+
+    Parameters
+    ----------
+    state, a, b, c, d
+        As in :func:`map_entry`.
+
+    Examples
+    --------
+    An entry and its dual may have evidence of their own:
+
+    >>> table = RelationTable([[0.9]], [[0.0]], [[1.0]], 2, 2, evidence=[[0.8, 0.5]])
+    >>> state = empty_map_state(table, (1.0, 1.0, 1.0))
+    >>> [float(map_evidence(state, a, 1 - a, 0, 1)) for a in (0, 1)]
+    [0.8, 0.5]
+    """
     i, j, sign = _place(state, a, b, c, d)
     return _evidence(state, i, j, sign)
 
@@ -225,7 +341,25 @@ def map_evidence(state: MapState, a: int, b: int, c: int, d: int) -> float:
 def total_distance(
     levels: FloatArray, prefix: FloatArray, buckets: IntArray, value: float
 ) -> float:
-    """Return f, the sum of the distances from a value to all levels of a state."""
+    """Return f, the sum of the distances from a value to all levels of a state, in O(log Q).
+
+    Parameters
+    ----------
+    levels, prefix, buckets
+        Of a :class:`MapState`; shapes (Q,), (Q+1,) and (Q+1,).
+    value
+        Any number.
+
+    Examples
+    --------
+    The L̂ of three pairs are 0, 1.5 and 3:
+
+    >>> table = RelationTable(np.ones((3, 3)), np.zeros((3, 3)), [[1] * 3, [2] * 3, [4] * 3], 3, 3)
+    >>> state = empty_map_state(table, (1.0, 1.0, 1.0))
+    >>> zeta = place_map(state, np.array([0, 1, 2]))
+    >>> [total_distance(state.levels, state.prefix, state.buckets, x) for x in (-1.0, 1.5, 2.0)]
+    [7.5, 3.0, 3.5]
+    """
     bucket = _bucket(levels, value)
     low, high = buckets[bucket], buckets[bucket + 1]
     while low < high:
@@ -260,7 +394,7 @@ def _place(state: MapState, a: int, b: int, c: int, d: int) -> tuple[int, int, f
     if c > d:
         c, d = d, c
         sign = -sign
-    return a * n - a * (a + 3) // 2 + b - 1, c * m - c * (c + 3) // 2 + d - 1, sign
+    return pair_index(a, b, n), pair_index(c, d, m), sign
 
 
 @kernel

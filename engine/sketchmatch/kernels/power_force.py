@@ -301,6 +301,18 @@ def power_force_histograms(
     -------
     ndarray
         Shape (p, n), in units of length to the power 3 − r.
+
+    Examples
+    --------
+    Two unit squares, 1 apart along x: for r = 2 the force is Ψ(3) − 2Ψ(2) + Ψ(1) = ln 4/3 along
+    x, and none meets both along y.
+
+    >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> starts = np.concatenate([corners, corners + [2.0, 0.0]])
+    >>> ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in (starts[:4], starts[4:])])
+    >>> offsets, pairs, relations = np.array([0, 4, 8]), np.array([[1, 0]]), np.array([APART])
+    >>> power_force_histograms(starts, ends, offsets, pairs, 4, 2.0, relations).round(6)
+    array([[0.287682, 0.      , 0.      , 0.      ]])
     """
     law = power_law(exponent, relations)
     return sweep_pairs(_sweep, starts, ends, offsets, pairs, directions, law)

@@ -102,6 +102,18 @@ def direction_cosines(direction: int, directions: int) -> tuple[float, float]:
     """Return cosine and sine of direction k of n, exact along the axes.
 
     Edges along an axis are common, and nothing but exactness tells that they meet no line.
+
+    Parameters
+    ----------
+    direction, directions
+        k and n, n > 0.
+
+    Examples
+    --------
+    >>> direction_cosines(1, 4), direction_cosines(2, 4)
+    ((-0.0, 1.0), (-1.0, -0.0))
+    >>> [round(float(part), 6) for part in direction_cosines(1, 12)]
+    [0.866025, 0.5]
     """
     quarter, rest = divmod(4 * direction, directions)
     angle = 0.5 * np.pi * rest / directions
@@ -112,7 +124,21 @@ def direction_cosines(direction: int, directions: int) -> tuple[float, float]:
 
 
 def empty_projection(offsets: IntArray) -> tuple[Projection, Scratch]:
-    """Return room for the projection of objects with these offsets."""
+    """Return room for the projection of objects with these offsets, and to sort their edges.
+
+    Parameters
+    ----------
+    offsets
+        Shape (objects + 1,): object k owns the edges offsets[k] … offsets[k+1].
+
+    Examples
+    --------
+    A triangle and a square:
+
+    >>> projection, scratch = empty_projection(np.array([0, 3, 7]))
+    >>> projection.edges.shape, projection.segments.shape, scratch.edges.shape
+    ((7, 5), (9, 3), (4, 5))
+    """
     objects = offsets.size - 1
     edges = int(offsets[objects])
     longest = int(np.diff(offsets).max())
@@ -146,10 +172,28 @@ def project(
 
     Parameters
     ----------
+    projection, scratch
+        Room of :func:`empty_projection`; edges, counts and spans are written.
     starts, ends
         Shape (e, 2): edges of all objects, outer rings counter-clockwise, holes clockwise.
     used
         Shape (objects,): which objects to project.
+    cosine, sine
+        Of the direction.
+
+    Examples
+    --------
+    Along x a line that grows enters a triangle through its left edge, which leans to the right,
+    and leaves through the upright one; the one at the bottom meets no line.
+
+    >>> corners = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]])
+    >>> room = empty_projection(np.array([0, 3]))
+    >>> project(*room, corners, np.roll(corners, -1, axis=0), np.array([True]), 1.0, 0.0)
+    >>> int(room[0].counts[0, EDGES]), room[0].spans.tolist()
+    (2, [[0.0, 2.0, 0.0, 1.0]])
+    >>> room[0].edges[:2]
+    array([[ 0.,  1.,  2.,  0., -1.],
+           [ 0.,  1.,  0.,  2.,  1.]])
     """
     offsets, edges, spans = projection.offsets, projection.edges, projection.spans
     raw, places = scratch.edges, scratch.places
@@ -246,7 +290,26 @@ def _find_runs(edges: FloatArray, count: int, places: IntArray, runs: IntArray) 
 
 @kernel
 def measure_sections(projection: Projection, used: BoolArray) -> None:
-    """Take the length of each projected object's section with a line as a function of its v."""
+    """Take the length of each projected object's section with a line as a function of its v.
+
+    Parameters
+    ----------
+    projection
+        After :func:`project`; segments and their counts are written.
+    used
+        Shape (objects,): which objects were projected.
+
+    Examples
+    --------
+    Sections of a triangle along x are 2 long at the bottom, where v = 0, and 0 at the top:
+
+    >>> corners = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]])
+    >>> room, used = empty_projection(np.array([0, 3])), np.array([True])
+    >>> project(*room, corners, np.roll(corners, -1, axis=0), used, 1.0, 0.0)
+    >>> measure_sections(room[0], used)
+    >>> room[0].segments[0], float(room[0].segments[1, BREAK])
+    (array([0., 2., 0.]), 1.0)
+    """
     edges, segments, active = projection.edges, projection.segments, projection.active
     for k in range(used.size):
         if not used[k]:
@@ -296,6 +359,18 @@ def separating_directions(
     Two objects with such a direction follow each other in the same order on every line of any
     direction that meets both.
 
+    Parameters
+    ----------
+    starts
+        Shape (e, 2): where the edges of all objects start.
+    offsets, pairs
+        Shapes (objects + 1,) and (p, 2), as in
+        :func:`~sketchmatch.kernels.constant_force.constant_force_histograms`.
+    used
+        Shape (objects,): which objects the pairs have.
+    directions
+        n, even.
+
     Returns
     -------
     separating
@@ -303,6 +378,16 @@ def separating_directions(
         direction has a gap of at least 0.
     orders
         Shape (p,): 1 if the first object lies further along that direction, −1 if the second.
+
+    Examples
+    --------
+    Of three squares the second lies above the first, and the third half within both:
+
+    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> starts = np.concatenate([square, square + [0.0, 2.0], 3.0 * square])
+    >>> offsets, used = np.array([0, 4, 8, 12]), np.array([True] * 3)
+    >>> separating_directions(starts, offsets, used, np.array([[0, 1], [1, 0], [0, 2]]), 4)
+    (array([ 1,  1, -1]), array([-1,  1,  0]))
     """
     objects, half = offsets.size - 1, directions // 2
     separating = np.full(pairs.shape[0], -1, dtype=np.int64)

@@ -25,6 +25,15 @@ def filled_pixels(starts: FloatArray, ends: FloatArray, rows: int, columns: int)
     -------
     ndarray
         Shape (rows, columns), row 0 at the bottom.
+
+    Examples
+    --------
+    A triangle over three by two pixels:
+
+    >>> corners = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 2.0]])
+    >>> filled_pixels(corners, np.roll(corners, -1, axis=0), 2, 3).astype(int)
+    array([[1, 1, 0],
+           [1, 0, 0]])
     """
     inside = np.zeros((rows, columns), dtype=np.bool_)
     for e in range(starts.shape[0]):
@@ -56,6 +65,17 @@ def pixel_edges(mask: BoolArray) -> tuple[FloatArray, FloatArray]:
     -------
     starts, ends
         Shape (e, 2): the directed edges, the pixels on their left, as long as they go straight.
+
+    Examples
+    --------
+    Two pixels beside each other are a rectangle of four edges:
+
+    >>> starts, ends = pixel_edges(np.array([[True, True, False]]))
+    >>> np.concatenate([starts, ends], axis=1)
+    array([[0., 1., 0., 0.],
+           [2., 0., 2., 1.],
+           [0., 0., 2., 0.],
+           [2., 1., 0., 1.]])
     """
     padded = np.pad(mask, 1).astype(np.int8)
     # −1 where an edge runs down or to the left, 1 where it runs up or to the right.

@@ -32,6 +32,14 @@ def contrast_rows(
     -------
     ndarray
         Shape (k,), within [0, 1].
+
+    Examples
+    --------
+    Both have 2, the first has 1 alone and the second 3: 2 / (2 + 1 + 0.5·3).
+
+    >>> first, second = np.array([[3.0, 0.0]]), np.array([[2.0, 3.0]])
+    >>> contrast_rows(first, second, 1.0, 0.5).round(6)
+    array([0.444444])
     """
     result = np.empty(first.shape[0])
     for k in range(first.shape[0]):
@@ -88,6 +96,13 @@ def overlap_rows(first: FloatArray, second: FloatArray) -> FloatArray:
     -------
     ndarray
         Shape (k,), within [0, 1].
+
+    Examples
+    --------
+    Of four bins one is empty in both, so it is the mean of 1/2, 1 and 0:
+
+    >>> overlap_rows(np.array([[1.0, 3.0, 0.0, 0.0]]), np.array([[2.0, 3.0, 0.0, 5.0]]))
+    array([0.5])
     """
     result = np.empty(first.shape[0])
     for k in range(first.shape[0]):

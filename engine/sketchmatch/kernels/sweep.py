@@ -67,6 +67,22 @@ def sweep_pairs(
         As in :func:`~sketchmatch.kernels.constant_force.constant_force_histograms`.
     law
         What the family wants to know.
+
+    Returns
+    -------
+    ndarray
+        Shape (p, directions).
+
+    Examples
+    --------
+    Constant forces between two unit squares, the second 4 further right:
+
+    >>> from sketchmatch.kernels.constant_force import _sweep
+    >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> starts = np.concatenate([corners, corners + [4.0, 0.0]])
+    >>> ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in (starts[:4], starts[4:])])
+    >>> sweep_pairs(_sweep, starts, ends, np.array([0, 4, 8]), np.array([[1, 0]]), 4, None)
+    array([[1., 0., 0., 0.]])
     """
     # Floats are finest about the origin. The middle is that of all objects, so that a histogram
     # does not depend on which others are asked for.
@@ -98,6 +114,19 @@ def pair_sweep(pair_force: Callable[..., Any], sections: bool) -> Callable[..., 
         ``(room, starts, ends, used, pairs, directions, law) -> histograms``: room for a
         projection, the edges about the origin, which objects the pairs use, and the rest as in
         :func:`sweep_pairs`.
+
+    Examples
+    --------
+    Constant forces of a unit square on one 4 further right:
+
+    >>> from sketchmatch.kernels.constant_force import _pair_force
+    >>> sweep = pair_sweep(_pair_force, sections=True)
+    >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> starts = np.concatenate([corners, corners + [4.0, 0.0]])
+    >>> ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in (starts[:4], starts[4:])])
+    >>> room, used = empty_projection(np.array([0, 4, 8])), np.array([True, True])
+    >>> sweep(room, starts, ends, used, np.array([[0, 1]]), 4, None)
+    array([[0., 0., 1., 0.]])
     """
 
     @kernel
@@ -151,6 +180,20 @@ def sum_over_edges(edge_force: Callable[..., Any]) -> Callable[..., tuple[float,
     -------
     callable
         ``(projection, a, b, law) -> (forward, backward)``.
+
+    Examples
+    --------
+    Constant forces along x between two unit squares, the second 4 further right:
+
+    >>> from sketchmatch.kernels.constant_force import _edge_force
+    >>> add_up = sum_over_edges(_edge_force)
+    >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> starts = np.concatenate([corners, corners + [4.0, 0.0]])
+    >>> ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in (starts[:4], starts[4:])])
+    >>> room = empty_projection(np.array([0, 4, 8]))
+    >>> project(*room, starts, ends, np.array([True, True]), 1.0, 0.0)
+    >>> np.array(add_up(room[0], 1, 0, None)), np.array(add_up(room[0], 0, 1, None))
+    (array([1., 0.]), array([0., 1.]))
     """
 
     @kernel

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sketchmatch.model.arrays import FloatArray, IntArray, frozen, frozen_floats
-from sketchmatch.model.relations import object_pairs, pair_index
+from sketchmatch.model.relations import object_pairs, pair_count, pair_index
 
 __all__ = [
     "MAX_DISTANCE",
@@ -121,15 +121,14 @@ class Fmap:
         >>> Fmap.from_object_map(np.array([2, 0, 1]), 3).entries
         array([4, 5, 0])
         """
-        half = argument_objects * (argument_objects - 1) // 2
+        half = pair_count(argument_objects)
         c, d = np.asarray(partners, dtype=np.int64)[object_pairs(len(partners))].T
-        low, high = np.minimum(c, d), np.maximum(c, d)
-        column = low * argument_objects - low * (low + 1) // 2 + high - low - 1
+        column = pair_index(np.minimum(c, d), np.maximum(c, d), argument_objects)
         return cls(np.where(c < d, column, column + half))
 
     def object_pair(self, i: int, argument_objects: int) -> tuple[int, int]:
         """Return the argument objects (c, d) that template pair i is mapped to, in order."""
-        half = argument_objects * (argument_objects - 1) // 2
+        half = pair_count(argument_objects)
         column = int(self.entries[i]) % half
         c, d = (int(k) for k in object_pairs(argument_objects)[column])
         assert pair_index(c, d, argument_objects) == column

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,6 +24,8 @@ __all__ = [
     "pair_count",
     "pair_index",
 ]
+
+_Index = TypeVar("_Index", int, IntArray)
 
 DILATION_SCALE = 1.5 / math.log(2.0)
 """C in L̂ = C·ln L (thesis 3.3: 2.164)."""
@@ -39,13 +42,24 @@ def pair_count(objects: int) -> int:
     return objects * (objects - 1) // 2
 
 
-def pair_index(a: int, b: int, objects: int) -> int:
+def pair_index(a: _Index, b: _Index, objects: int) -> _Index:
     """Return the index of pair (a, b), a < b, among ``objects`` objects, all from 0.
+
+    Compiled code calls ``pair_index`` of :mod:`sketchmatch.api.kernels`, which is this function.
+
+    Parameters
+    ----------
+    a, b
+        Two objects, or arrays of one shape that hold those of many pairs.
+    objects
+        How many objects there are.
 
     Examples
     --------
     >>> [pair_index(a, b, 3) for a, b in [(0, 1), (0, 2), (1, 2)]]
     [0, 1, 2]
+    >>> pair_index(np.array([0, 2]), np.array([3, 3]), 4)
+    array([2, 5])
     """
     return a * objects - a * (a + 1) // 2 + b - a - 1
 
