@@ -102,7 +102,7 @@ def mutants(path: str, source: str) -> list[Mutant]:
     found, seen = [], dict[tuple[str, str], int]()
     changes = sorted({(*text.span(node), new) for node, new in _changes(ast.parse(source), text)})
     for start, end, new in changes:
-        first, last = source.rfind("\n", 0, start) + 1, source.find("\n", end)
+        first, last = source.rfind("\n", 0, start) + 1, f"{source}\n".index("\n", end)
         before = _in_one_line(source[first:last])
         after = _in_one_line(source[first:start] + new + source[end:last])
         repeat = seen[before, after] = seen.get((before, after), -1) + 1
