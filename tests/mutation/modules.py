@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tests.tools import ROOT
 
+_EXACT = "plugins/test_exact_bounds plugins/test_exact"
 _FORCES = "unit/test_constant_force unit/test_force_histogram"
 _MATCHED = "unit/test_match unit/test_public"
 
@@ -34,37 +35,43 @@ _GROUPS = {
     "pipeline": (
         "engine/sketchmatch/pipeline",
         {
+            "answer": f"unit/test_alternatives unit/test_probability {_MATCHED}",
             "calibration": "unit/test_probability unit/test_learning",
-            "limits": "unit/test_limits",
+            "clock": _MATCHED,
+            "compare": "unit/test_compare unit/test_relate unit/test_evidence",
+            "engine": "unit/test_compare unit/test_public",
+            "events": _MATCHED,
+            "guard": f"unit/test_registry {_MATCHED}",
             "match": _MATCHED,
-            "plugins": f"unit/test_registry {_MATCHED}",
             "reading": _MATCHED,
             "request": f"unit/test_selection {_MATCHED}",
             "result": _MATCHED,
+            "search": f"unit/test_unmatched {_MATCHED}",
+            "segment": _MATCHED,
             "warmup": "unit/test_startup unit/test_match",
         },
     ),
     "searchers": (
         "plugins/sketchmatch_builtin/searchers",
         {
-            "_assignment": "plugins/test_exact",
-            "_backtrack": "plugins/test_exact",
-            "_branch": "plugins/test_exact",
-            "_cells": "plugins/test_exact",
+            "_assignment": _EXACT,
+            "_backtrack": _EXACT,
+            "_branch": _EXACT,
+            "_cells": _EXACT,
             "_evolution": "plugins/test_easm",
-            "_fixed": "plugins/test_exact",
+            "_fixed": _EXACT,
             "_growers": "plugins/test_fsnn_pso",
             "_memetic": "plugins/test_direct",
             "_moves": "plugins/test_direct",
             "_neighbours": "plugins/test_nn plugins/test_nn_pso plugins/test_fsnn_pso",
-            "_ranking": "plugins/test_direct plugins/test_exact",
-            "_relations": "plugins/test_exact",
-            "_residual": "plugins/test_exact",
+            "_ranking": f"plugins/test_direct {_EXACT}",
+            "_relations": _EXACT,
+            "_residual": _EXACT,
             "_swarm": "plugins/test_nn_pso plugins/test_fsnn_pso",
             "auto": "plugins/test_auto",
             "direct": "plugins/test_direct",
             "easm": "plugins/test_easm",
-            "exact": "plugins/test_exact",
+            "exact": _EXACT,
             "fsnn_pso": "plugins/test_fsnn_pso",
             "nn": "plugins/test_nn",
             "nn_pso": "plugins/test_nn_pso",

@@ -167,6 +167,7 @@ def test_a_change_in_what_makes_a_kernel_is_compiled_anew(tmp_path, name, before
 
 
 @pytest.mark.slow
+@compiled_only
 def test_a_second_process_finds_all_histograms_compiled():
     code = """
 import sketchmatch_builtin
@@ -184,6 +185,7 @@ print(*names)
     assert done.stdout.split() == []
 
 
+@compiled_only
 def test_the_first_match_compiles_nothing_that_the_warm_up_did_not():
     code = """
 import gc
