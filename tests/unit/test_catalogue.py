@@ -3,7 +3,7 @@
 import pytest
 from google.protobuf.struct_pb2 import Struct
 
-from sketchmatch.cli import local
+from sketchmatch.app.application import Application
 from sketchmatch.cli.app import main
 from sketchmatch.cli.catalogue import Parameter, parameters
 from sketchmatch.cli.listing import show_catalogue
@@ -96,7 +96,7 @@ def show(monkeypatch, capsys):
 
     def said(*distributions):
         found = catalog.ListAlgorithmsResponse(algorithms=map(algorithm, distributions))
-        monkeypatch.setattr(local, "algorithms", lambda _: found)
+        monkeypatch.setattr(Application, "algorithms", lambda _: found)
         monkeypatch.setattr("sys.argv", ["sketchmatch", "plugins", "show", "hill-climb"])
         with pytest.raises(SystemExit) as left:
             main()

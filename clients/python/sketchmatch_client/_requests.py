@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Callable, Mapping
 from datetime import timedelta
 from typing import Any, TypedDict, Unpack
@@ -99,8 +100,8 @@ def match_request(
     for name, value in given.items():
         if name not in _FIELDS:
             raise TypeError(f"unknown option {name!r}; MatchOptions lists those there are")
-        problem, converted = _FIELDS[name]
-        with refused_as("INVALID_FIELD", name, problem):
+        remedy, converted = _FIELDS[name]
+        with refused_as("INVALID_FIELD", name, f"is {reprlib.repr(value)}; {remedy}"):
             request.MergeFrom(MatchRequest(**{name: converted(value)}))
     return request
 
@@ -164,15 +165,16 @@ def _same(value: Any) -> Any:
 
 
 _FIELDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
-    "seed": ("is not a whole number from 0 to 2**64 − 1", _same),
-    "time_budget": ("is not a number of seconds", _duration),
+    "seed": ("give an integer 0 … 2**64 − 1", _same),
+    "time_budget": ("give a positive time in seconds, or none at all", _duration),
     "weights": (
-        "is not three numbers, similarity, rotation, dilation, or five, with shape and size, "
+        "give three numbers, similarity, rotation, dilation, or five, with shape and size, "
         "or six, with distance",
         _weights,
     ),
-    "allow_unmatched": ("is neither True nor False", _same),
-    "unmatched_price": ("is not a number", _same),
-    "alternatives": ("is not a whole number from 0 to 100", _same),
+    "allow_unmatched": ("give True or False", _same),
+    "unmatched_price": ("give a number", _same),
+    "alternatives": ("give a whole number from 0 to 100", _same),
 }
-"""Options that are fields of the request: what is said of a wrong value, and how one is written."""
+"""Options that are fields of the request: what to give instead of a wrong value, and how to write
+one."""
