@@ -129,7 +129,7 @@ class TestRequest:
             ({"weights": "abc"}, "weights is 'abc'; give three numbers"),
             (
                 {"weights": (1, 1, 1, 1)},
-                "weights is (1, 1, 1, 1); give three numbers, similarity, rotation, dilation, or five",
+                "weights is (1, 1, 1, 1); give three numbers, similarity, rotation, dilation, or",
             ),
             ({"weights": (1,) * 7}, "weights is (1, 1, 1, 1, 1, 1, ...); give three numbers"),
             ({"params": {"serch": {}}}, "params has no stage 'serch'; the stages are sketch_seg"),
