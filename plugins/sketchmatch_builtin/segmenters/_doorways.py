@@ -50,29 +50,66 @@ def divided(free: Mask, door: float, least: float) -> Mask:
 
 def _bodies(free: Mask, width: _Widths, radius: float) -> _Labels:
     """Return which discs of a radius cover each cell, one label for discs that are joined."""
-    outside_cores = (width <= radius).astype(np.uint8)
-    if outside_cores.all():
+    cores = (width > radius).astype(np.uint8)
+    if not cores.any():
         return np.zeros(free.shape, np.int32)
-    distance, nearest = cv2.distanceTransformWithLabels(
-        outside_cores, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
-    )
+    distance = cv2.distanceTransform(1 - cores, cv2.DIST_L2, cv2.DIST_MASK_5)
+    nearest = _nearest(_numbered(cores, 8)[0])
     # A core's disc is free, so that within it the nearest core lies on this side of all walls.
     nearest[(distance > radius - 0.5) | (free == 0)] = 0
-    return np.asarray(nearest, dtype=np.int32)
+    return nearest
+
+
+def _nearest(labels: _Labels) -> _Labels:
+    """Return for each cell the label of the nearest one that has one, of several the highest."""
+    found = np.zeros_like(labels)
+    # Which of several OpenCV takes depends on the direction, and so all four are asked.
+    for turns in range(4):
+        turned = np.ascontiguousarray(np.rot90(labels, turns))
+        rest = (turned == 0).astype(np.uint8)
+        _, regions = cv2.distanceTransformWithLabels(
+            rest, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
+        )
+        label_of = np.zeros(int(regions.max()) + 1, np.int32)
+        label_of[regions[rest == 0]] = turned[rest == 0]
+        np.maximum(found, np.rot90(label_of[regions], -turns), out=found)
+    return found
 
 
 def _with_narrow_rooms(free: Mask, labels: _Labels, least: float) -> _Labels:
     """Add as rooms what is free, without a label, and large: corridors as narrow as a door."""
     rest = (free > 0) & (labels == 0)
-    _, parts, statistics, _ = cv2.connectedComponentsWithStats(rest.view(np.uint8), connectivity=4)
-    large = statistics[:, cv2.CC_STAT_AREA] >= least
+    parts, sizes = _numbered(rest.view(np.uint8), 4)
+    large = sizes >= least
     large[0] = False
     narrow = np.where(large, np.cumsum(large) + labels.max(), 0).astype(np.int32)
     return np.asarray(labels + narrow[parts], dtype=np.int32)
 
 
+def _numbered(mask: Mask, connectivity: int) -> tuple[_Labels, IntArray]:
+    """Return a mask's components, numbered from 1, and how many cells each number has.
+
+    The highest number wins a cell that is as near to another, and so must not depend on how the
+    map lies: the smallest come first, and of equal ones those in the middle of the map.
+    """
+    _, parts, statistics, centroids = cv2.connectedComponentsWithStats(
+        mask, connectivity=connectivity
+    )
+    sizes = statistics[:, cv2.CC_STAT_AREA].astype(np.int64)
+    sizes[0] = 0
+    middle = (np.array(mask.shape[::-1]) - 1.0) / 2.0
+    away = np.hypot(*(centroids - middle).T).round(6)
+    order = np.lexsort((away, sizes))
+    numbers = np.empty(len(order), np.int32)
+    numbers[order] = np.arange(len(order))
+    return numbers[parts], sizes[order]
+
+
 def _grow(free: Mask, labels: _Labels) -> None:
-    """Give free cells without a label that of the nearest, in steps from side to side."""
+    """Give free cells without a label that of the nearest, in steps from side to side.
+
+    Of several that are as near it is the highest.
+    """
     flat = labels.reshape(-1)
     rest = np.flatnonzero((free > 0) & (labels == 0))
     steps = (1, -1, labels.shape[1], -labels.shape[1])

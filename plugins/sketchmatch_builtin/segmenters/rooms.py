@@ -149,7 +149,7 @@ def _polygon(mask: Mask, corner: tuple[int, int]) -> shapely.Polygon:
 
 def _simplified(outlines: list[shapely.Polygon], tolerance: float) -> list[shapely.Polygon]:
     """Return the outlines simplified, and those left as they are that would then overlap."""
-    result = np.array([exact.simplify(tolerance) for exact in outlines], dtype=object)
+    result = np.array([_begun(exact).simplify(tolerance) for exact in outlines], dtype=object)
     kept = np.zeros(len(result), dtype=bool)
     while True:
         a, b = shapely.STRtree(result).query(result, predicate="intersects")
@@ -158,6 +158,25 @@ def _simplified(outlines: list[shapely.Polygon], tolerance: float) -> list[shape
             return list(result)
         kept[touching] = True
         result[touching] = [outlines[k] for k in touching]
+
+
+def _begun(room: shapely.Polygon) -> shapely.Polygon:
+    """Return a room whose rings begin at their farthest corners, wherever they began.
+
+    What is left of a ring depends on where it begins, and must not depend on how the map lies.
+    """
+    outer, *inner = (_from_farthest(ring) for ring in _rings(room))
+    return shapely.Polygon(outer, inner)
+
+
+def _from_farthest(ring: FloatArray) -> FloatArray:
+    """Return a closed ring begun where it is farthest from the mean of its corners."""
+    corners = ring[:-1]
+    # As many times as there are corners: whole numbers and halves, and so without rounding.
+    away = ((len(corners) * corners - corners.sum(axis=0)) ** 2).sum(axis=1)
+    farthest = np.flatnonzero(away == away.max()).tolist()
+    first = max(farthest, key=lambda k: np.roll(away, -k).tolist())
+    return np.roll(corners, -first, axis=0)
 
 
 def _rings(room: shapely.Polygon) -> list[FloatArray]:
