@@ -4,7 +4,7 @@ import contextlib
 
 import numpy as np
 import pytest
-import shapely
+import shapely.affinity
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -190,7 +190,7 @@ def apart_when_turned(cells, turns, **params):
     for _ in range(turns):
         # A point (x, y) comes to (y, width − x).
         polygons = [
-            shapely.transform(polygon, lambda p: p[:, ::-1] * (1, -1) + (0, width))
+            shapely.affinity.affine_transform(polygon, (0, 1, -1, 0, 0, width))
             for polygon in polygons
         ]
         height, width = width, height

@@ -89,6 +89,15 @@ def test_use_repeats_what_it_names_where_it_says():
     ]
 
 
+def test_x_and_y_of_use_are_within_its_transform():
+    body = (
+        '<defs><path id="a" d="M0 0 1 0"/></defs><g transform="translate(100 0)">'
+        '<use href="#a" x="3" y="4" transform="rotate(90) scale(2)"/></g>'
+    )
+    # (0, 0) → (3, 4) → (6, 8) → (−8, 6) → (92, 6) and (1, 0) → … → (92, 8), then y up.
+    assert np.allclose(points(body), [[92, -6], [92, -8]])
+
+
 def test_every_subpath_is_a_stroke():
     found = strokes('<path id="pair" d="M0 1 L1 1 M5 5 L6 5 6 6 Z L9 9"/>')
     assert [stroke.points.tolist() for stroke in found] == [

@@ -15,7 +15,16 @@ from sketchmatch.io import read_source
 from sketchmatch.io.images import decode_image
 from sketchmatch.io.svg import decode_svg
 from sketchmatch.model import Image, LabelledPolygon, OccupancyGrid, PolygonSet, Stroke, StrokeSet
-from sketchmatch.model.limits import SourceLimits, check_source, limited_to, source_limits
+from sketchmatch.model.limits import (
+    SourceLimits,
+    check_bytes,
+    check_objects,
+    check_pixels,
+    check_source,
+    check_vertices,
+    limited_to,
+    source_limits,
+)
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
 
@@ -58,6 +67,42 @@ def test_values_made_in_python_have_the_same_limits(source, limits, words):
     (limit,) = limits.values()
     with limited_to(SourceLimits(**dict.fromkeys(limits, limit + 1))):
         check_source(source)
+
+
+@pytest.mark.parametrize(
+    ("name", "check"),
+    [
+        ("max_bytes", lambda size: check_bytes(size, "sketch")),
+        ("max_pixels", lambda count: check_pixels(count, 1, "sketch")),
+        ("max_side", lambda side: check_pixels(side, 1, "sketch")),
+        ("max_side", lambda side: check_pixels(1, side, "sketch")),
+        ("max_vertices", lambda count: check_vertices(count, "sketch")),
+        ("max_objects", lambda count: check_objects(count, "sketch")),
+    ],
+)
+def test_as_much_as_the_limit_passes_and_one_more_does_not(name, check):
+    with limited_to(SourceLimits(**{name: 9})):
+        check(9)
+    refused(lambda: check(10), **{name: 9})
+
+
+@pytest.mark.parametrize(
+    ("name", "least"),
+    [("max_bytes", 1), ("max_pixels", 1), ("max_side", 1), ("max_vertices", 1), ("max_objects", 2)],
+)
+def test_a_limit_lets_something_pass_at_least(name, least):
+    assert getattr(SourceLimits(**{name: least}), name) == least
+    with pytest.raises(InvalidInputError, match=f"{name} is {least - 1}; .* at least {least}"):
+        SourceLimits(**{name: least - 1})
+
+
+def test_a_drawing_has_one_element_for_every_ten_vertices():
+    shapes = "<circle r='0'/>" * 4  # and the root
+    with limited_to(SourceLimits(max_vertices=50)), pytest.raises(InvalidInputError) as caught:
+        decode_svg(f"<svg>{shapes}</svg>".encode())
+    assert caught.value.reason == Reason.INVALID_FILE  # nothing is drawn, but it was looked at
+    refused(lambda: decode_svg(f"<svg>{shapes}</svg>".encode()), max_vertices=49)
+    assert SourceLimits(max_vertices=9).max_elements == 1
 
 
 def test_a_scene_of_too_many_objects_is_refused(tmp_path):
