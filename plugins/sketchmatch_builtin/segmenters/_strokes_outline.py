@@ -22,9 +22,8 @@ _MAIN_LOOP = 0.5
 # times as long as the ends are apart: a half circle's arc is π/2 times its chord.
 _END = 1.0 / 3.0
 _BEND = 1.6
+# Shares of a length, and of a squared size, that are nothing but rounding.
 _ROUNDING = 1e-9
-# Enclosed area, as a share of the squared size, below which a stroke is a line there and back.
-_LINE = 1e-3
 # Crossings of strokes with themselves that are looked at in one sketch, about 25 µs each; a
 # thousand objects drawn by hand have a tenth of them. Where pairs of segments are more than
 # _PAIRS, so many of them stand for all.
@@ -44,7 +43,7 @@ def enclosed_by(stroke: Trace, max_gap: float) -> list[shapely.Polygon]:
     if not areas or total_of(areas) < _MAIN_LOOP * total_of(areas_of(_joined(stroke.points))):
         closed = _closed(stroke, max_gap * stroke.size)
         areas = [] if closed is None else areas_of(closed)
-    return areas if total_of(areas) >= _LINE * stroke.size**2 else []
+    return areas if total_of(areas) > _ROUNDING * stroke.size**2 else []
 
 
 def tangled(strokes: Sequence[Trace]) -> set[int]:
