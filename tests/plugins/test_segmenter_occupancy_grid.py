@@ -133,6 +133,25 @@ def test_a_gap_as_wide_as_close_gaps_is_closed_and_no_wider(cells):
     assert leaking.area == pytest.approx(0.44 - 0.1 * 0.1 * cells, rel=0.2)
 
 
+@pytest.mark.parametrize(("close_gaps", "closed"), [(0.3, True), (0.24, False)])
+def test_close_gaps_is_the_nearest_number_of_cells(close_gaps, closed):
+    # 0.3 / 0.1 is a little less than 3.
+    found = segmented(gapped(3), close_gaps=close_gaps).scene.objects[0]
+    assert (found.area == pytest.approx(1.44)) == closed
+
+
+def test_what_a_closed_gap_encloses_counts_for_min_size():
+    # Its outline alone has 43 cells of 0.1 m.
+    assert len(segmented(gapped(1), min_size=1.0).scene) == 2
+
+
+def test_close_gaps_may_be_wider_than_a_room_is_high():
+    grid = room((4, 10, 4, 6), (4, 61, 4, 6), shape=(12, 80), resolution=0.02)
+    assert len(segmented(grid, close_gaps=0.88, min_size=0.0).scene) == 2
+    with pytest.raises(InvalidInputError, match="has only one object"):
+        segmented(grid, close_gaps=0.9, min_size=0.0)
+
+
 @pytest.mark.parametrize("cells", [1, 2, 3])
 def test_objects_as_near_as_close_gaps_are_one(cells):
     grid = room((10, 10, 6, 6), (10, 16 + cells, 6, 6), (25, 40, 6, 6))
