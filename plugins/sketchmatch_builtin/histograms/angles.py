@@ -18,6 +18,19 @@ class Angles(PowerForce):
     ----------
     K. Miyajima, A. Ralescu, "Spatial organization in 2D segmented images: representation
     and recognition of primitive spatial relations", Fuzzy Sets and Systems 65(2–3), 1994.
+
+    Examples
+    --------
+    Over the full turn, the product of the areas: here 1 × 4.
+
+    >>> import numpy as np
+    >>> from sketchmatch.model import Scene
+    >>> square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    >>> scene = Scene.from_polygons([square, 2 * square + [3, 0]])
+    >>> params = Angles.Params(directions=360)
+    >>> histograms = Angles(params).describe(scene, np.array([[1, 0]]))
+    >>> round(float(histograms.sum() * np.radians(1.0)), 2)
+    4.0
     """
 
     name = "angles"

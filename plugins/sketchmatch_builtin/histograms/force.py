@@ -18,6 +18,18 @@ class Force(PowerForce):
     ----------
     P. Matsakis, L. Wendling, "A new way to represent the relative position between areal
     objects", IEEE TPAMI 21(7), 1999.
+
+    Examples
+    --------
+    Of unit squares 3 apart, 10 ln 2 − 6 ln 3 in direction 0 for r = 1.
+
+    >>> import numpy as np
+    >>> from sketchmatch.model import Scene
+    >>> square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    >>> scene = Scene.from_polygons([square, square + [3, 0]])
+    >>> params = Force.Params(directions=4, r=1.0)
+    >>> Force(params).describe(scene, np.array([[1, 0]])).round(4).tolist()
+    [[0.3398, 0.0, 0.0, 0.0]]
     """
 
     name = "force"

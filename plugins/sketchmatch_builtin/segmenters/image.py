@@ -44,6 +44,20 @@ class ImageSegmenter(Segmenter):
     .. [2] J. Bernsen, "Dynamic thresholding of gray-level images", ICPR 1986.
     .. [3] S. Suzuki, K. Abe, "Topological structural analysis of digitized binary images by
        border following", Computer Vision, Graphics, and Image Processing 30(1), 1985.
+
+    Examples
+    --------
+    A filled box, and the outline of another one, which counts as what it encloses.
+
+    >>> import numpy as np
+    >>> from sketchmatch.model import Image
+    >>> pixels = np.full((100, 120), 255, np.uint8)
+    >>> pixels[20:40, 20:60] = pixels[60:90, 70:100] = 0
+    >>> pixels[64:86, 74:96] = 255
+    >>> params = ImageSegmenter.Params(blur=0.0)
+    >>> scene = ImageSegmenter(params).segment(Image(pixels)).scene
+    >>> [item.area for item in scene.objects]
+    [800.0, 900.0]
     """
 
     name = "image"

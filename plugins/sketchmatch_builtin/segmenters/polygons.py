@@ -19,6 +19,15 @@ class PolygonSegmenter(Segmenter):
     ----------
     OpenGIS Implementation Standard for Geographic information: Simple feature access, part 1,
     OGC 06-103r4, 2011.
+
+    Examples
+    --------
+    >>> from sketchmatch.model import LabelledPolygon, PolygonSet
+    >>> desk = LabelledPolygon(([[0, 0], [2, 0], [2, 1], [0, 1]],), "desk")
+    >>> rug = LabelledPolygon(([[5, 0], [9, 0], [9, 4]],))
+    >>> scene = PolygonSegmenter().segment(PolygonSet((desk, rug))).scene
+    >>> [(item.label, item.area) for item in scene.objects]
+    [('desk', 2.0), ('', 8.0)]
     """
 
     name = "polygons"

@@ -63,6 +63,19 @@ class StrokeSegmenter(Segmenter):
        2.1).
     .. [2] E. Saund, "Finding perceptually closed paths in sketches and drawings", IEEE
        Transactions on Pattern Analysis and Machine Intelligence 25(4), 2003.
+
+    Examples
+    --------
+    A square whose pen stroke goes on past its corner, and one drawn with two strokes.
+
+    >>> import numpy as np
+    >>> from sketchmatch.model import Stroke, StrokeSet
+    >>> desk = Stroke(np.array([[0.0, -1], [0, 4], [4, 4], [4, 0], [-1, 0]]), label="desk")
+    >>> sides = Stroke(np.array([[8.0, 0], [8, 4], [12, 4]]))
+    >>> others = Stroke(np.array([[12, 3.8], [12, 0], [8.2, 0]]))
+    >>> scene = StrokeSegmenter().segment(StrokeSet((desk, sides, others))).scene
+    >>> [(item.label, item.area) for item in scene.objects]
+    [('desk', 16.0), ('', 16.0)]
     """
 
     name = "strokes"

@@ -18,6 +18,16 @@ class CircularPeak(CrossCorrelation):
     ----------
     P. Matsakis, J. M. Keller, O. Sjahputera, J. Marjamaa, "The use of force histograms for
     affine-invariant relative position description", IEEE TPAMI 26(1), 2004.
+
+    Examples
+    --------
+    The measure is that of ``cross-correlation``; the host aligns the histograms otherwise.
+
+    >>> import numpy as np
+    >>> CircularPeak.alignment.value
+    'peak'
+    >>> CircularPeak().compare(np.array([[2.0, 2, 0, 0]]), np.array([[3.0, 1, 0, 0]])).round(3)
+    array([0.894])
     """
 
     name = "circular-peak"

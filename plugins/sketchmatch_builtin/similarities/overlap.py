@@ -23,6 +23,16 @@ class Overlap(Similarity):
     ----------
     W.-J. Wang, "New similarity measures on fuzzy sets and on elements", Fuzzy Sets and
     Systems 85(3), 1997.
+
+    Examples
+    --------
+    Of the second histograms 2/3 and 1/2 in the two directions in which there is something.
+
+    >>> import numpy as np
+    >>> template = np.array([[2.0, 2, 0, 0], [2, 2, 0, 0], [2, 2, 0, 0]])
+    >>> argument = np.array([[2.0, 2, 0, 0], [3, 1, 0, 0], [0, 0, 2, 2]])
+    >>> Overlap().compare(template, argument).round(3).tolist()
+    [1.0, 0.583, 0.0]
     """
 
     name = "overlap"

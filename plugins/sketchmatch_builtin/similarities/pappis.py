@@ -18,6 +18,16 @@ class Pappis(Similarity):
     ----------
     C. P. Pappis, N. I. Karacapilidis, "A comparative assessment of measures of similarity
     of fuzzy values", Fuzzy Sets and Systems 56(2), 1993.
+
+    Examples
+    --------
+    Equal histograms, some with 3 of 5 in common, and some with nothing.
+
+    >>> import numpy as np
+    >>> template = np.array([[2.0, 2, 0, 0], [2, 2, 0, 0], [2, 2, 0, 0]])
+    >>> argument = np.array([[2.0, 2, 0, 0], [3, 1, 0, 0], [0, 0, 2, 2]])
+    >>> Pappis().compare(template, argument).tolist()
+    [1.0, 0.6, 0.0]
     """
 
     name = "pappis"

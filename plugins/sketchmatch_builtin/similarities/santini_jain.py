@@ -25,6 +25,18 @@ class SantiniJain(Similarity):
     ----------
     .. [1] S. Santini, R. Jain, "Similarity measures", IEEE TPAMI 21(9), 1999.
     .. [2] A. Tversky, "Features of similarity", Psychological Review 84(4), 1977.
+
+    Examples
+    --------
+    The second histograms have c = 3 in common and a = b = 1 apart: 3 / (3 + α + β).
+
+    >>> import numpy as np
+    >>> template = np.array([[2.0, 2, 0, 0], [2, 2, 0, 0], [2, 2, 0, 0]])
+    >>> argument = np.array([[2.0, 2, 0, 0], [3, 1, 0, 0], [0, 0, 2, 2]])
+    >>> SantiniJain().compare(template, argument).tolist()
+    [1.0, 0.75, 0.0]
+    >>> SantiniJain(SantiniJain.Params(alpha=1.0, beta=1.0)).compare(template, argument).tolist()
+    [1.0, 0.6, 0.0]
     """
 
     name = "santini-jain"
