@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.io import read_source
-from sketchmatch.pipeline import plugins
+from sketchmatch.pipeline.segment import segment
 from sketchmatch.pipeline.selection import Choice, resolve_segmenter
 from sketchmatch.registry import default_registry
 from tests.fuzz.mutations import TOKENS
@@ -51,7 +51,7 @@ def check(kind: str, data: bytes, folder: Path, *, segmenting: bool = True) -> b
         stage = "segmenting"
         if segmenting:
             segmenter = resolve_segmenter(default_registry(), Choice(), source)
-            plugins.segmented(source, segmenter, default_registry(), f"source.{source.field}")
+            segment(source, segmenter, default_registry(), f"source.{source.field}")
         return True
     except InvalidInputError as error:
         _check_sentence(stage, str(error))
