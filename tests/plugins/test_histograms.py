@@ -19,7 +19,7 @@ from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Kind, default_registry
 from sketchmatch.testing import random_scene
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
-from tests.interpreted import examples
+from tests.interpreted import compiled_only, examples
 from tests.oracle.laws import facing_force, force, hybrid, law_histogram
 from tests.oracle.pixels import mask_histogram
 from tests.strategies import FRAME, pairs_apart, pairs_in_overlap, pairs_in_touch, scenes, slivers
@@ -95,7 +95,7 @@ def test_rows_are_finite_and_not_negative(name, scene, half):
 
 
 @each
-@pytest.mark.parametrize("directions", [4, 6, 360, 3600])
+@pytest.mark.parametrize("directions", [4, 6, 360, pytest.param(3600, marks=compiled_only)])
 def test_the_number_of_directions_is_a_parameter(name, directions):
     rows = described(name, SCENE, directions=directions)
     assert rows.shape == (6, directions)

@@ -12,6 +12,7 @@ from sketchmatch import InvalidInputError, Scene, match
 from sketchmatch.api import MatchProblem, Outcome, Searcher, SearchProgress
 from sketchmatch.config import builtin
 from sketchmatch.model import Fmap, object_pairs
+from sketchmatch.pipeline import unmatched
 from sketchmatch.pipeline.correspond import fmap_confidence
 from sketchmatch.pipeline.events import Finished, Progress
 from sketchmatch.pipeline.match import run_match
@@ -135,6 +136,28 @@ def test_an_omission_has_the_confidence_of_the_map_that_it_leaves(seed, few, evi
         kept = [k for k in range(few) if k != g]
         part = finish(part_of(Part.whole(table), kept))
         assert computed[g] == pytest.approx(zeta(partners[kept], part.table), abs=1e-12)
+
+
+def test_omissions_are_not_weighed_where_they_would_take_too_long(monkeypatch):
+    table = random_table(np.random.default_rng(0), 5, 6)
+    fmap = Fmap.from_object_map(np.arange(5), 6)
+    monkeypatch.setattr(unmatched, "_MOST_ENTRIES", 50)
+    assert omission_confidences(fmap, table, WEIGHTS) is not None
+    monkeypatch.setattr(unmatched, "_MOST_ENTRIES", 49)
+    assert omission_confidences(fmap, table, WEIGHTS) is None
+
+
+def test_zeta_of_two_objects_means_nothing():
+    table = random_table(np.random.default_rng(0), 3, 4)
+    assert omission_confidences(Fmap.from_object_map(np.arange(3), 4), table, WEIGHTS) is None
+
+
+@pytest.mark.parametrize(
+    ("objects", "price", "share"), [(4, 0.5, 0.5), (3, 0.5, 1.0), (4, math.inf, 1.0)]
+)
+def test_all_the_time_is_for_the_whole_where_nothing_can_be_left_out(objects, price, share):
+    first = next(trials(objects, WEIGHTS, price))
+    assert (first.kept, first.share) == (tuple(range(objects)), share)
 
 
 def test_a_part_has_the_relations_of_its_objects():

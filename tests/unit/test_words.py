@@ -9,6 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from sketchmatch import InvalidInputError, Scene, directional_relation, force_histogram
+from sketchmatch.errors import Reason
 from sketchmatch.model import SceneDescriptor, object_pairs
 from sketchmatch.pipeline.words import (
     NO_DIRECTION,
@@ -213,8 +214,13 @@ def test_many_rows_are_as_each_alone():
     ],
 )
 def test_what_is_no_histogram_is_refused(row, words):
-    with pytest.raises(InvalidInputError, match=words):
+    with pytest.raises(InvalidInputError, match=words) as caught:
         directional_relation(row)
+    assert (caught.value.reason, caught.value.field) == (Reason.INVALID_PARAMETER, "histogram")
+
+
+def test_no_rounding_lifts_a_degree_above_1():
+    assert degrees([1.0, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.4], 0.0) == [1.0]
 
 
 # The nearest other object --------------------------------------------------------------------
