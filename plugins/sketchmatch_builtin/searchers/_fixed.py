@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sketchmatch.api.kernels import kernel
+from sketchmatch.api.kernels import kernel, pair_index
 from sketchmatch.model import FloatArray, IntArray
 from sketchmatch_builtin.searchers._cells import (
     COSINE,
@@ -112,7 +112,7 @@ def _entry(relations: Relations, a: int, b: int, c: int, d: int) -> tuple[int, i
     if a > b:
         a, b, c, d = b, a, d, c
     objects = 1 + int(np.sqrt(2.0 * relations.pairs.shape[0]))
-    i = a * objects - a * (a + 1) // 2 + b - a - 1
+    i = pair_index(a, b, objects)
     j = relations.columns[c, d]
     half = relations.cosine.shape[1]
     if j >= half:
