@@ -467,6 +467,10 @@ class Odd(Searcher):
             yield SearchProgress(Fmap(np.array([99] * problem.table.template_pairs)), 0.5, 1, 1)
         if self.behaviour == "short":
             yield SearchProgress(Fmap(np.array([0])), 0.5, 1, 1)
+        if self.behaviour == "another":
+            # A ζ that was checked for one FMAP says nothing of the next.
+            for partners in (np.arange(7), np.arange(7)[::-1]):
+                yield SearchProgress(Fmap.from_object_map(partners, 7), 1.0, 1, 1)
         if self.behaviour == "bound":
             fmap = Fmap.from_object_map(np.arange(7), 7)
             yield SearchProgress(fmap, 1.0, 1, 1, upper_bound=1.0)
@@ -480,7 +484,7 @@ def with_odd(monkeypatch, behaviour):
     return Registry([*default_registry().algorithms, offered])
 
 
-@pytest.mark.parametrize("behaviour", ["nothing", "raise", "outside", "short"])
+@pytest.mark.parametrize("behaviour", ["nothing", "raise", "outside", "short", "another"])
 def test_a_searcher_that_breaks_its_contract_is_named(monkeypatch, behaviour):
     registry = with_odd(monkeypatch, behaviour)
     with pytest.raises(PluginError, match="odd"):
