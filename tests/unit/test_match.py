@@ -467,6 +467,10 @@ class Odd(Searcher):
             yield SearchProgress(Fmap(np.array([99] * problem.table.template_pairs)), 0.5, 1, 1)
         if self.behaviour == "short":
             yield SearchProgress(Fmap(np.array([0])), 0.5, 1, 1)
+        if self.behaviour in ("twice", "dual"):
+            entries = np.arange(21)
+            entries[1] = 21 if self.behaviour == "dual" else 0
+            yield SearchProgress(Fmap(entries), 0.5, 1, 1)
         if self.behaviour == "another":
             # A ζ that was checked for one FMAP says nothing of the next.
             for partners in (np.arange(7), np.arange(7)[::-1]):
@@ -484,10 +488,21 @@ def with_odd(monkeypatch, behaviour):
     return Registry([*default_registry().algorithms, offered])
 
 
-@pytest.mark.parametrize("behaviour", ["nothing", "raise", "outside", "short", "another"])
-def test_a_searcher_that_breaks_its_contract_is_named(monkeypatch, behaviour):
+@pytest.mark.parametrize(
+    ("behaviour", "words"),
+    [
+        ("nothing", "ended without any answer"),
+        ("raise", "ZeroDivisionError: lost"),
+        ("outside", "an entry outside 0 … 41"),
+        ("short", r"shape \(1,\), not \(21,\)"),
+        ("twice", "takes a pair of objects twice, or a pair and its dual"),
+        ("dual", "takes a pair of objects twice, or a pair and its dual"),
+        ("another", "says that its FMAP has ζ 1, and it has 0."),
+    ],
+)
+def test_a_searcher_that_breaks_its_contract_is_named(monkeypatch, behaviour, words):
     registry = with_odd(monkeypatch, behaviour)
-    with pytest.raises(PluginError, match="odd"):
+    with pytest.raises(PluginError, match=f"searcher odd of acme-odd 1.0 failed .*{words}"):
         matched(seven(), seven(), registry, selection={"searcher": Choice("odd")})
 
 
