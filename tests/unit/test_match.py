@@ -19,6 +19,7 @@ from sketchmatch.pipeline.selection import Choice
 from sketchmatch.pipeline.warmup import warm_up, warm_up_others
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from sketchmatch.testing import random_scene, simulate_sketch
+from sketchmatch_builtin.searchers.easm import Easm
 from tests.oracle import maps as oracle
 from tests.pace import within
 
@@ -287,6 +288,20 @@ def test_a_time_budget_ends_the_search_with_its_best():
     assert result.outcome is Outcome.TIME_BUDGET
     assert 0.4 <= result.statistics.seconds["total"] <= watch.seconds
     assert result.object_map == {k: k for k in range(7)}
+
+
+@pytest.mark.parametrize("budget", [None, 500.0])
+def test_a_searcher_is_told_how_much_time_is_left(budget, monkeypatch):
+    told, search = [], Easm.search
+
+    def recorded(self, problem, rng):
+        told.append(problem.time_budget)
+        return search(self, problem, rng)
+
+    monkeypatch.setattr(Easm, "search", recorded)
+    matched(seven(), seven(), selection={"searcher": Choice("easm")}, time_budget=budget)
+    (left,) = told
+    assert left is None if budget is None else 0.0 < left < budget
 
 
 def test_a_time_budget_too_short_for_any_answer_says_where_it_went():
