@@ -18,17 +18,23 @@ from google.protobuf.message import Message
 
 from sketchmatch.app.jobs import Job, answers
 from sketchmatch.app.setup import RequestLimits, Setup
-from sketchmatch.errors import SketchmatchError
+from sketchmatch.errors import (
+    AnswerUnavailableError,
+    InvalidInputError,
+    PluginError,
+    Reason,
+    SketchmatchError,
+)
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.selection import Defaults
 from sketchmatch.pipeline.warmup import warm_up, warm_up_others
 from sketchmatch.registry import OWN_DISTRIBUTION, PluginRules, discover
 
-__all__ = ["STOP", "Answer", "Ended", "Failed", "Ready", "Task", "live"]
+__all__ = ["STOP", "Answer", "Ended", "Errand", "Failed", "Ready", "live"]
 
 STOP = "stop"
-"""Ends the task under way."""
+"""Ends the errand under way."""
 
 _LOADING = 120.0
 _POLITE = 10
@@ -36,7 +42,7 @@ _FIRST_TO_GO = 500
 
 
 @dataclass(frozen=True)
-class Task:
+class Errand:
     """What a child is to do.
 
     Attributes
@@ -71,12 +77,12 @@ class Answer:
 
 @dataclass(frozen=True)
 class Ended:
-    """The task is done, or was stopped."""
+    """The errand is done, or was stopped."""
 
 
 @dataclass(frozen=True)
 class Failed:
-    """The task ended with an error.
+    """The errand ended with an error.
 
     Attributes
     ----------
@@ -104,18 +110,18 @@ def live(connection: Connection, distributions: tuple[str, ...]) -> None:
     _end_unless_alive(_LOADING)
     registry = discover(rules=PluginRules.of(allow=distributions))
     warm_up(registry)
-    tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
+    errands: queue.SimpleQueue[Errand] = queue.SimpleQueue()
     stop = threading.Event()
-    listening = threading.Thread(target=_listen, args=(connection, tasks, stop), daemon=True)
+    listening = threading.Thread(target=_listen, args=(connection, errands, stop), daemon=True)
     listening.start()
     connection.send(Ready())
     while True:
         faulthandler.cancel_dump_traceback_later()
-        task = tasks.get()
-        setup = Setup(Engine(registry, task.defaults, task.sources), task.limits)
-        _end_unless_alive(task.patience)
-        for message in _messages(task, setup, stop):
-            _end_unless_alive(task.patience)
+        errand = errands.get()
+        setup = Setup(Engine(registry, errand.defaults, errand.sources), errand.limits)
+        _end_unless_alive(errand.patience)
+        for message in _messages(errand, setup, stop):
+            _end_unless_alive(errand.patience)
             connection.send(message)
 
 
@@ -135,7 +141,9 @@ def _step_back() -> None:
         Path("/proc/self/oom_score_adj").write_text(str(_FIRST_TO_GO), encoding="ascii")
 
 
-def _listen(connection: Connection, tasks: queue.SimpleQueue[Task], stop: threading.Event) -> None:
+def _listen(
+    connection: Connection, errands: queue.SimpleQueue[Errand], stop: threading.Event
+) -> None:
     while True:
         try:
             message = connection.recv()
@@ -145,22 +153,35 @@ def _listen(connection: Connection, tasks: queue.SimpleQueue[Task], stop: thread
             stop.set()
         else:
             stop.clear()
-            tasks.put(message)
+            errands.put(message)
 
 
-def _messages(task: Task, setup: Setup, stop: threading.Event) -> Iterator[Answer | Ended | Failed]:
-    """Do a task; the last message is Ended or Failed."""
+def _messages(
+    errand: Errand, setup: Setup, stop: threading.Event
+) -> Iterator[Answer | Ended | Failed]:
+    """Do an errand; the last message is Ended or Failed."""
     try:
-        if task.job is None:
+        if errand.job is None:
             engine = setup.engine
             warm_up_others(engine.registry.without(OWN_DISTRIBUTION), engine.defaults)
         else:
-            with closing(answers(task.job, setup)) as responses:
+            with closing(answers(errand.job, setup)) as responses:
                 for response in responses:
                     if stop.is_set():
                         break
                     yield Answer(response)
         yield Ended()
     except Exception as error:
-        known = error if isinstance(error, SketchmatchError) else None
-        yield Failed(known, "".join(traceback.format_exception(error)))
+        yield Failed(_plain(error), "".join(traceback.format_exception(error)))
+
+
+def _plain(error: Exception) -> SketchmatchError | None:
+    """Return what the server can read without a plugin's own classes, which it never loads."""
+    match error:
+        case InvalidInputError():
+            return InvalidInputError(Reason(error.reason), f"{error.field}", f"{error.problem}")
+        case AnswerUnavailableError():
+            return AnswerUnavailableError(f"{error}")
+        case SketchmatchError():
+            return PluginError(f"{error}")
+    return None

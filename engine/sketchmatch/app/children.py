@@ -3,9 +3,9 @@
 A thread cannot be stopped from outside, a loop in plain Python holds up all threads of its
 process, and a crash ends them. So a request that uses an algorithm of a distribution which is not
 the engine's own is answered in a child process: it reads the request, runs the very same pipeline,
-and sends the responses through a pipe. A child that gives no sign of life for too
-long, or does not end when its time is over, is killed, and the request fails with the names of
-plugin and distribution. A child that behaved is kept for the next request.
+and sends the responses through a pipe. A child that gives no sign of life for too long, or does
+not end when its time is over, is killed, and the request fails with the names of plugin and
+distribution. A child that behaved is kept for the next request.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 from google.protobuf.message import Message
 
-from sketchmatch.app.child import STOP, Answer, Ended, Failed, Ready, Task, live
+from sketchmatch.app.child import STOP, Answer, Ended, Errand, Failed, Ready, live
 from sketchmatch.app.jobs import Job, algorithms, time_budget
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import PluginError
@@ -110,7 +110,7 @@ class Children:
         """
         strangers = setup.isolation.strangers(algorithms(job, setup))
         watch = _Watch(strangers, setup.isolation.patience, time_budget(job, setup))
-        yield from self._done(_task(job, setup, watch.patience), watch, stop)
+        yield from self._done(_errand(job, setup, watch.patience), watch, stop)
 
     def warm_up(
         self, strangers: tuple[Registered, ...], setup: Setup, stop: threading.Event
@@ -123,12 +123,12 @@ class Children:
             As :meth:`answers` does.
         """
         watch = _Watch(strangers, _WARMING)
-        for _ in self._done(_task(None, setup, _WARMING), watch, stop):
+        for _ in self._done(_errand(None, setup, _WARMING), watch, stop):
             pass
 
-    def _done(self, task: Task, watch: _Watch, stop: threading.Event) -> Iterator[Message]:
+    def _done(self, errand: Errand, watch: _Watch, stop: threading.Event) -> Iterator[Message]:
         with self._child(watch, stop) as child:
-            yield from child.answers(task, watch, stop)
+            yield from child.answers(errand, watch, stop)
 
     def close(self) -> None:
         """End the children that wait; those at work end with their requests."""
@@ -202,12 +202,12 @@ class _Child:
             if time.monotonic() > deadline:
                 raise _silent(watch, "did not load in its own process")
 
-    def answers(self, task: Task, watch: _Watch, stop: threading.Event) -> Iterator[Message]:
-        """Do a task; one that is given up or stopped is over, if the child obeys."""
+    def answers(self, errand: Errand, watch: _Watch, stop: threading.Event) -> Iterator[Message]:
+        """Do an errand; one that is given up or stopped is over, if the child obeys."""
         if stop.is_set():
             return
         self.done = False
-        self._send(task, watch)
+        self._send(errand, watch)
         try:
             yield from self._responses(watch, stop)
         except GeneratorExit:
@@ -217,7 +217,7 @@ class _Child:
             self._stop(watch)
 
     def _responses(self, watch: _Watch, stop: threading.Event) -> Iterator[Message]:
-        """Yield responses until the task is done or to be stopped."""
+        """Yield responses until the errand is done or to be stopped."""
         started = heard = time.monotonic()
         while not stop.is_set():
             message = self._received(watch)
@@ -280,6 +280,6 @@ def _ending(code: int | None) -> str:
     return f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
 
 
-def _task(job: Job | None, setup: Setup, patience: float) -> Task:
+def _errand(job: Job | None, setup: Setup, patience: float) -> Errand:
     engine = setup.engine
-    return Task(job, engine.defaults, engine.limits, setup.limits, patience)
+    return Errand(job, engine.defaults, engine.limits, setup.limits, patience)
