@@ -120,7 +120,7 @@ def modules() -> list[Module]:
             path = file.relative_to(ROOT).as_posix()
             if ">>>" in file.read_text(encoding="utf-8"):
                 tests.insert(0, path)
-            interpreted = group != "pipeline" and file.stem not in _COMPILED
+            interpreted = group == "kernels" and file.stem not in _COMPILED
             if file.stem != "__init__":
                 found.append(Module(group, path, tuple(tests), interpreted))
     return found
