@@ -96,7 +96,8 @@ class Module:
     tests
         Files whose tests run until one fails; first its own examples, if it has any.
     interpreted
-        Whether its kernels run as plain Python, so that none is compiled anew for each mutant.
+        Whether its kernels run as plain Python, so that none is compiled anew for each mutant. That
+        is far too slow for whole searches: those are compiled, a minute or two a mutant.
     """
 
     group: str
