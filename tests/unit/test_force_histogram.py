@@ -196,6 +196,13 @@ def test_it_is_continuous_in_the_exponent(pivot, shapes):
         assert_same(computed(*shapes, pivot + step), at, *shapes, pivot, tolerance=1e-6)
 
 
+@pytest.mark.parametrize("r", [-10.0, 10.0])
+def test_objects_just_far_enough_apart_for_an_expansion_keep_twelve_digits(r):
+    oblong = SQUARE * np.array([1.2, 1.0])
+    shapes = [oblong + np.array([79.0, 0.0])], [oblong]
+    assert_same(computed(*shapes, r), by_definition(*shapes, r), *shapes, r, tolerance=3e-13)
+
+
 @given(beside(), exponents)
 @few
 def test_objects_far_apart_pull_like_points(shapes, r):

@@ -8,6 +8,7 @@ import sys
 import numba
 import numpy as np
 import pytest
+from platformdirs import user_cache_path
 
 from sketchmatch.kernels import _jit
 from sketchmatch.kernels.confidence import fmap_confidence, mean_absolute_difference
@@ -221,6 +222,12 @@ def test_the_cache_lies_where_the_environment_says(tmp_path, monkeypatch):
     before = numba.config.CACHE_DIR
     _jit.kernel(without_text)
     assert before == numba.config.CACHE_DIR, "kernels of other programs go where they went"
+
+
+def test_the_cache_lies_with_those_of_the_user_else(monkeypatch):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    place = user_cache_path("sketchmatch", appauthor=False) / "kernels"
+    assert _jit._cache_folder(without_text).parent == place
 
 
 @compiled_only
