@@ -24,6 +24,7 @@ from sketchmatch.api.kernels import (
     map_confidence,
     map_entry,
     map_evidence,
+    pair_index,
     total_distance,
 )
 from sketchmatch.model import FloatArray, IntArray
@@ -289,7 +290,7 @@ def add_values(
     """
     objects = moves.slack.shape[0]
     low, high = min(a, k), max(a, k)
-    relations = moves.relations[low * objects - low * (low + 3) // 2 + high - 1, partner]
+    relations = moves.relations[pair_index(low, high, objects), partner]
     sign = 1.0 if a < k else -1.0
     for c in range(values.size):
         if c != partner:
@@ -308,7 +309,7 @@ def add_turned_values(
     loop a choice between the two would cost half as much again.
     """
     objects = moves.slack.shape[0]
-    row = moves.relations[k * objects - k * (k + 3) // 2 + a - 1]
+    row = moves.relations[pair_index(k, a, objects)]
     for c in range(values.size):
         if c != partner:
             values[c] += similar * (row[c, partner, _S] - row[partner, c, _S])
@@ -408,7 +409,7 @@ def _add_entries(
     sums, lines, slack = moves.sums, moves.lines, moves.slack
     objects, others = slack.shape
     low, high = min(a, k), max(a, k)
-    relations = moves.relations[low * objects - low * (low + 3) // 2 + high - 1, partner]
+    relations = moves.relations[pair_index(low, high, objects), partner]
     now = state.entries[a, k, _L]
     sign = factor if a < k else -factor
     for c in range(others):
