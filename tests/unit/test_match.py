@@ -429,7 +429,8 @@ def test_a_time_budget_that_ends_with_the_sketch_leaves_the_map_alone():
     assert Slow.asked == 1
 
 
-def test_what_is_in_progress_is_let_go_when_the_time_ends(monkeypatch):
+def describing_without_end(monkeypatch):
+    """Let descriptions go on until they are let go; return of which sides they were."""
     ended = []
 
     def describing(scene, histogram, registry, side):  # noqa: ARG001
@@ -441,6 +442,11 @@ def test_what_is_in_progress_is_let_go_when_the_time_ends(monkeypatch):
             ended.append(side)
 
     monkeypatch.setattr(match_module, "described", describing)
+    return ended
+
+
+def test_what_is_in_progress_is_let_go_when_the_time_ends(monkeypatch):
+    ended = describing_without_end(monkeypatch)
     running = events(seven(), seven(), time_budget=1.0)
     with pytest.raises(AnswerUnavailableError, match="phase describe") as caught:
         list(running)
@@ -450,17 +456,7 @@ def test_what_is_in_progress_is_let_go_when_the_time_ends(monkeypatch):
 
 
 def test_nothing_is_left_running_where_the_events_are_closed(monkeypatch):
-    ended = []
-
-    def describing(scene, histogram, registry, side):  # noqa: ARG001
-        try:
-            while True:
-                time.sleep(0.01)
-                yield 0.5
-        finally:
-            ended.append(side)
-
-    monkeypatch.setattr(match_module, "described", describing)
+    ended = describing_without_end(monkeypatch)
     running = events(seven(), seven())
     while not (isinstance(event := next(running), Progress) and event.phase is Phase.DESCRIBE):
         pass

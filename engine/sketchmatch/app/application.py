@@ -35,26 +35,24 @@ _log = logging.getLogger(__name__)
 class Place(Protocol):
     """Somewhere that jobs can be done."""
 
-    def answers(self, job: Job, setup: Setup, stop: threading.Event) -> Iterator[Message]:
-        """Do a job, yielding its responses; ``stop`` ends it from another thread."""
+    def answers(
+        self, job: Job, setup: Setup, stop: threading.Event
+    ) -> Generator[Message, None, None]:
+        """Do a job, yielding its responses.
 
-    def close(self) -> None:
-        """End what waits for jobs."""
+        Closing the generator ends it; so may ``stop``, set in another thread, while it waits.
+        """
 
 
 class Here:
     """Does jobs in this process, in the thread that asks for them."""
 
-    def answers(self, job: Job, setup: Setup, stop: threading.Event) -> Iterator[Message]:
-        """Do a job, yielding its responses."""
-        with closing(answers(job, setup)) as work:
-            for response in work:
-                if stop.is_set():
-                    return
-                yield response
-
-    def close(self) -> None:
-        """Do nothing: nothing waits."""
+    def answers(
+        self, job: Job, setup: Setup, stop: threading.Event
+    ) -> Generator[Message, None, None]:
+        """Do a job, yielding its responses; it waits for nothing."""
+        del stop
+        return answers(job, setup)
 
 
 class Application:
@@ -160,18 +158,18 @@ class Application:
         for task in tuple(self._tasks):
             task.stop()
         self._threads.shutdown()
-        self._here.close()
         self._children.close()
 
     def _run(self, task: Task[Message], job: Job, setup: Setup) -> None:
         """Do a job, and tell of it in its task's log; its place is free when this ends."""
         error: BaseException | None = None
         try:
-            place = self._place(job, setup)
-            for response in place.answers(job, setup, task.stopping):
-                if task.stopping.is_set():
-                    break
-                task.log.add(response, news=_is_progress(response))
+            work = self._place(job, setup).answers(job, setup, task.stopping)
+            with closing(work) as told:
+                for response in told:
+                    if task.stopping.is_set():
+                        break
+                    task.log.add(response, news=_is_progress(response))
         except BaseException as raised:
             error = raised
         finally:

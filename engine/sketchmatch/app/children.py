@@ -13,7 +13,7 @@ from __future__ import annotations
 import multiprocessing
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import wait
@@ -89,7 +89,9 @@ class Children:
         self._lock = threading.Lock()
         self._closed = False
 
-    def answers(self, job: Job, setup: Setup, stop: threading.Event) -> Iterator[Message]:
+    def answers(
+        self, job: Job, setup: Setup, stop: threading.Event
+    ) -> Generator[Message, None, None]:
         """Let a child do a job, and yield its responses.
 
         Parameters
