@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from sketchmatch.api import Similarity
+from sketchmatch.api import Histogram, Similarity
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.kernels.evidence import SelfRelations
 from sketchmatch.model import (
@@ -21,15 +21,17 @@ from sketchmatch.model import (
     pair_count,
     pair_index,
 )
+from sketchmatch.pipeline.describe import check_histograms
 from sketchmatch.pipeline.evidence import compare_objects, rotation_weights, weigh_objects
 from sketchmatch.pipeline.guard import blamed
 from sketchmatch.pipeline.reading import half_turned
-from sketchmatch.pipeline.relate import check_exponent, relate
+from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.result import Correspondence
+from sketchmatch.pipeline.selection import SIDES
 from sketchmatch.pipeline.slices import retold
 from sketchmatch.registry import Registry
 
-__all__ = ["Comparison", "check_comparisons", "compare"]
+__all__ = ["Comparison", "check_scenes", "compare"]
 
 # What 2 GB hold: 100 × 100 objects.
 _MAX_COMPARISONS = 30_000_000
@@ -106,7 +108,7 @@ class Comparison:
         return tuple(found)
 
 
-def check_comparisons(sketch: Scene, map_: Scene) -> None:
+def _check_comparisons(sketch: Scene, map_: Scene) -> None:
     """Refuse two scenes whose relation table would not fit into memory.
 
     Raises
@@ -125,6 +127,19 @@ def check_comparisons(sketch: Scene, map_: Scene) -> None:
         )
 
 
+def check_scenes(scenes: tuple[Scene, Scene], histogram: Histogram) -> None:
+    """Refuse a sketch and a map whose histograms or comparison would not fit into memory.
+
+    Raises
+    ------
+    InvalidInputError
+        With the path ``sketch`` or ``map``.
+    """
+    for side, scene in zip(SIDES, scenes, strict=True):
+        check_histograms(side, scene, histogram)
+    _check_comparisons(*scenes)
+
+
 def compare(
     scenes: tuple[Scene, Scene],
     descriptors: tuple[SceneDescriptor, SceneDescriptor],
@@ -137,7 +152,8 @@ def compare(
     Parameters
     ----------
     scenes, descriptors
-        Of the sketch and of the map, described by the same histogram.
+        Of the sketch and of the map, which :func:`check_scenes` lets pass, described by the same
+        histogram.
     similarity
         How alike two histograms are.
     registry
@@ -153,12 +169,10 @@ def compare(
     Raises
     ------
     InvalidInputError
-        If the scenes are too large for each other, or are described by different histograms.
+        If no dilation follows from the histograms, or they are different ones.
     PluginError
         If the measure breaks its contract.
     """
-    check_comparisons(*scenes)
-    check_exponent(descriptors[0].exponent)
     (template, argument), related = scenes, descriptors
     if _swapped(*scenes):
         (argument, template), related = scenes, (descriptors[1], descriptors[0])

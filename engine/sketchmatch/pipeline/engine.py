@@ -10,7 +10,7 @@ from sketchmatch.api import Histogram, Searcher, Segmentation, Segmenter, Simila
 from sketchmatch.model import ConfidenceWeights, Scene, SceneDescriptor, Source
 from sketchmatch.model.limits import SourceLimits, limited_to
 from sketchmatch.pipeline.clock import Clock
-from sketchmatch.pipeline.compare import Comparison, check_comparisons, compare
+from sketchmatch.pipeline.compare import Comparison, check_scenes, compare
 from sketchmatch.pipeline.describe import check_histograms, described
 from sketchmatch.pipeline.events import MatchEvent
 from sketchmatch.pipeline.match import run_match
@@ -105,9 +105,7 @@ class Engine:
 
         The weights say whether objects and distances count.
         """
-        for side, scene in zip(SIDES, scenes, strict=True):
-            check_histograms(side, scene, histogram)
-        check_comparisons(*scenes)
+        check_scenes(scenes, histogram)
         return self._compared(scenes, histogram, similarity, weights)
 
     def search(

@@ -15,8 +15,8 @@ from sketchmatch.pipeline import reading
 from sketchmatch.pipeline.answer import answer
 from sketchmatch.pipeline.calibration import Calibration, calibrated
 from sketchmatch.pipeline.clock import Clock
-from sketchmatch.pipeline.compare import Comparison, check_comparisons, compare
-from sketchmatch.pipeline.describe import check_histograms, described
+from sketchmatch.pipeline.compare import Comparison, check_scenes, compare
+from sketchmatch.pipeline.describe import described
 from sketchmatch.pipeline.events import (
     Accepted,
     Finished,
@@ -34,7 +34,7 @@ from sketchmatch.pipeline.request import (
 )
 from sketchmatch.pipeline.search import Goal, Search, search
 from sketchmatch.pipeline.segment import segment_side
-from sketchmatch.pipeline.selection import SIDES, UNCONFIGURED, Defaults, Pipeline, resolve
+from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, Pipeline, resolve
 from sketchmatch.pipeline.slices import retold
 from sketchmatch.registry import Kind, Registry
 
@@ -149,9 +149,7 @@ def _events(
         clock.check(Phase.SEGMENT)
         map_ = segment_side("map", request.map, pipeline, registry)
     scenes = (sketch.scene, map_.scene)
-    for side, scene in zip(SIDES, scenes, strict=True):
-        check_histograms(side, scene, pipeline.histogram)
-    check_comparisons(*scenes)
+    check_scenes(scenes, pipeline.histogram)
     check_exponent(pipeline.histogram.exponent)
     yield Segmented(sketch, map_)
     goal = replace(goal, alternatives=alternatives_wanted(request.alternatives, *scenes))
