@@ -1,5 +1,8 @@
 """Cutting work into slices: nothing lost, nothing twice, no slice too slow."""
 
+import gc
+import os
+import signal
 import threading
 import time
 from types import SimpleNamespace
@@ -44,7 +47,7 @@ def test_every_item_is_done_once_and_the_share_rises_to_one(cpus, total):
     assert shares[-1:] == ([1.0] if total else [])
     if total == 100:
         assert len(names - {threading.main_thread().name}) == (0 if cpus == 1 else min(cpus, 4))
-    assert not pool_threads()
+    assert len(pool_threads()) <= 4, "the same threads do everybody's work"
 
 
 @pytest.mark.usefixtures("cpus")
@@ -56,18 +59,25 @@ def test_short_work_starts_no_thread():
 
 @pytest.mark.usefixtures("quick_to_pool", "cpus")
 def test_what_the_work_raises_comes_out_and_nothing_goes_on():
+    begun = []
+
     def work(first, last):
         time.sleep(0.001)
         if first >= 20:
             raise ZeroDivisionError(f"at {last}")
 
+        begun.append(first)
+
     with pytest.raises(ZeroDivisionError):
         list(in_slices(10_000, work))
-    assert not pool_threads()
+    time.sleep(0.02)
+    before = len(begun)
+    time.sleep(0.02)
+    assert len(begun) == before
 
 
 @pytest.mark.usefixtures("quick_to_pool")
-def test_closing_waits_for_what_is_under_way_and_starts_nothing(cpus):
+def test_closing_starts_nothing_and_lets_what_is_under_way_end(cpus):
     begun, ended = [], []
 
     def work(first, last):
@@ -80,12 +90,72 @@ def test_closing_waits_for_what_is_under_way_and_starts_nothing(cpus):
         pass
     before = len(begun)
     shares.close()
+    time.sleep(0.02)
     assert sorted(begun) == sorted(ended)
     assert len(begun) <= before + cpus
     after = len(begun)
     time.sleep(0.02)
     assert len(begun) == after
-    assert not pool_threads()
+
+
+@pytest.mark.usefixtures("quick_to_pool")
+def test_what_is_forgotten_may_be_collected_in_a_thread_of_its_own_work(monkeypatch):
+    monkeypatch.setattr(module, "_usable_cpus", lambda: 2)
+    forgotten, collected, ended = [], threading.Event(), threading.Event()
+
+    def work(first, last):
+        time.sleep(0.001 * (last - first))
+        if forgotten and module._is_helping():
+            collected.wait(10)
+            forgotten.clear()
+            gc.collect()
+            ended.set()
+
+    shares = in_slices(10_000, work)
+    while next(shares) < 0.01:
+        pass
+    forgotten.append(shares)
+    next(shares)
+    del shares
+    collected.set()
+    assert ended.wait(10), "the collection waits for work that waits for the collection"
+    assert list(in_slices(3, lambda *_: time.sleep(0.002)))[-1] == 1.0
+
+
+@pytest.mark.usefixtures("quick_to_pool")
+def test_work_that_is_itself_cut_into_slices_ends(monkeypatch):
+    monkeypatch.setattr(module, "_usable_cpus", lambda: 4)
+    done = []
+
+    def inner(first, last):
+        time.sleep(0.001 * (last - first))
+        done.extend(range(first, last))
+
+    def outer(first, last):
+        for _ in range(first, last):
+            list(in_slices(20, inner))
+
+    list(in_slices(20, outer))
+    assert len(done) == 400
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.usefixtures("quick_to_pool")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own(monkeypatch):
+    monkeypatch.setattr(module, "_usable_cpus", lambda: 2)
+    list(in_slices(50, lambda *_: time.sleep(0.001)))
+    child = os.fork()
+    if child == 0:
+        list(in_slices(50, lambda *_: time.sleep(0.001)))
+        os._exit(7)
+    deadline = time.monotonic() + 20
+    while not (ended := os.waitpid(child, os.WNOHANG))[0] and time.monotonic() < deadline:
+        time.sleep(0.01)
+    if not ended[0]:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(ended[1]) == 7
 
 
 @pytest.mark.usefixtures("quick_to_pool", "cpus")

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
 
 from sketchmatch.model.arrays import FloatArray, IntArray, frozen, frozen_floats, sealed
+from sketchmatch.model.caching import cached_property
 
 __all__ = [
     "DILATION_SCALE",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from hashlib import sha256
 from typing import Any, NamedTuple, Self
 
@@ -14,6 +13,7 @@ from shapely.validation import explain_validity
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model.arrays import FloatArray, IntArray, frozen_floats, sealed
+from sketchmatch.model.caching import cached_property
 
 __all__ = ["Edges", "Scene", "SceneObject"]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Protocol
 
@@ -25,6 +24,7 @@ from sketchmatch.kernels.alignment import (
 )
 from sketchmatch.model import FloatArray, IntArray, RelationTable, SceneDescriptor
 from sketchmatch.model.arrays import sealed
+from sketchmatch.model.caching import cached_property
 from sketchmatch.pipeline.guard import checked_array
 from sketchmatch.pipeline.slices import in_slices
 

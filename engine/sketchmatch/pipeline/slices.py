@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -16,14 +17,16 @@ _Told = TypeVar("_Told")
 _Value = TypeVar("_Value")
 _SLICE_SECONDS = 0.02
 _MOST_THREADS = 4
+_THREAD_NAME = "sketchmatch-slice"
+_pool: ThreadPoolExecutor
 
 
 def in_slices(total: int, work: Callable[[int, int], None]) -> Generator[float, None, None]:
     """Do ``total`` items of work in threads, a range of items that takes about 20 ms at a time.
 
-    Short work is done in the caller's thread; a pool starts once a range is worth one. Between two
-    values no range is started beyond those under way, one a thread: closing the generator waits
-    for these alone.
+    Short work is done in the caller's thread; threads that all such work shares help once a range
+    is worth it. Between two values no range is started beyond those under way, one a thread, which
+    alone end after the generator is closed.
 
     Parameters
     ----------
@@ -39,7 +42,7 @@ def in_slices(total: int, work: Callable[[int, int], None]) -> Generator[float, 
     float
         The share that is done.
     """
-    threads = min(_usable_cpus(), _MOST_THREADS)
+    threads = 1 if _is_helping() else min(_usable_cpus(), _MOST_THREADS)
     done, size, seconds = 0, 1, 0.0
     while done < total and (threads == 1 or seconds < _SLICE_SECONDS / 4):
         first, done = done, min(total, done + size)
@@ -83,14 +86,20 @@ def retold(
 def _in_threads(
     first: int, total: int, size: int, work: Callable[[int, int], None], threads: int
 ) -> Generator[float, None, None]:
-    """Do items ``first`` … ``total`` − 1 of work in a pool of threads."""
+    """Do items ``first`` … ``total`` − 1 of work in the pool of threads."""
     running: dict[Future[float], int] = {}
-    done, started = first, first
-    with ThreadPoolExecutor(threads, "sketchmatch-slice") as pool:
+    done, started, closed = first, first, False
+
+    def begin(first: int, last: int) -> float:
+        return 0.0 if closed else _seconds(work, first, last)
+
+    # A generator that nobody closed is closed by the garbage collection, in any thread, which may
+    # hold any lock or do a range of this very work: nothing may be waited for on that way.
+    try:
         while started < total or running:
             while started < total and len(running) < threads:
                 last = min(total, started + size)
-                running[pool.submit(_seconds, work, started, last)] = last - started
+                running[_pool.submit(begin, started, last)] = last - started
                 started = last
             if done > first:
                 yield done / total
@@ -98,6 +107,8 @@ def _in_threads(
                 items = running.pop(future)
                 size = _next_size(items, future.result())
                 done += items
+    finally:
+        closed = True
     yield 1.0
 
 
@@ -112,6 +123,22 @@ def _next_size(items: int, seconds: float) -> int:
     """Return how many items take 20 ms, if ``items`` took ``seconds``; at most eightfold."""
     wanted = int(items * _SLICE_SECONDS / max(seconds, 1e-6))
     return max(1, min(wanted, 8 * items))
+
+
+def _start_pool() -> None:
+    """Make the pool that lasts as long as the process; its threads start when they are needed."""
+    global _pool  # noqa: PLW0603
+    _pool = ThreadPoolExecutor(_MOST_THREADS, _THREAD_NAME)
+
+
+_start_pool()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_start_pool)
+
+
+def _is_helping() -> bool:
+    """Return whether this thread is one of the pool's, which must not wait for the others."""
+    return threading.current_thread().name.startswith(_THREAD_NAME)
 
 
 def _usable_cpus() -> int:

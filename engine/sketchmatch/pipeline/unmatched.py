@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from sketchmatch.model import (
     object_pairs,
 )
 from sketchmatch.model.arrays import sealed
+from sketchmatch.model.caching import cached_property
 from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
 from sketchmatch.pipeline.slices import in_slices
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from sketchmatch.model import FloatArray, SceneObject
+from sketchmatch.model.caching import cached_property
 
 __all__ = ["Lidar", "World", "cast_rays", "scan"]
 

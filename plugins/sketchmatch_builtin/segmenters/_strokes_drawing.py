@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import shapely
+
+from sketchmatch.model.caching import cached_property
 
 from ._strokes_trace import Trace, span_of
 
