@@ -9,7 +9,15 @@ from functools import cache
 import numpy as np
 
 from sketchmatch import MatchResult, match
-from sketchmatch.model import Fmap, IntArray, RelationTable, Scene, SceneDescriptor, object_pairs
+from sketchmatch.model import (
+    Confidence,
+    Fmap,
+    IntArray,
+    RelationTable,
+    Scene,
+    SceneDescriptor,
+    object_pairs,
+)
 from sketchmatch.pipeline.correspond import fmap_confidence
 from sketchmatch.pipeline.describe import describe
 from sketchmatch.pipeline.relate import relate
@@ -102,19 +110,24 @@ class Case:
         """Sketch index → map index, as it should be."""
         return {k: partner for k, partner in enumerate(self.truth.tolist()) if partner >= 0}
 
-    def zeta(self, object_map: Mapping[int, int]) -> float:
+    def confidence(self, object_map: Mapping[int, int]) -> Confidence | None:
         """Return the thesis's ζ of the FMAP that an object map from sketch to map induces.
 
-        NaN unless every object of the smaller side has a partner.
+        None unless every object of the smaller side has a partner.
         """
         pairs = dict(object_map)
         if len(self.sketch) > len(self.map):
             pairs = {b: a for a, b in pairs.items()}
         if len(pairs) < self.table.template_objects:
-            return float("nan")
+            return None
         partners = np.array([pairs[k] for k in range(len(pairs))])
         fmap = Fmap.from_object_map(partners, self.table.argument_objects)
-        return fmap_confidence(fmap, self.table).total
+        return fmap_confidence(fmap, self.table)
+
+    def zeta(self, object_map: Mapping[int, int]) -> float:
+        """Return :meth:`confidence` as a number, NaN where there is none."""
+        found = self.confidence(object_map)
+        return float("nan") if found is None else found.total
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         method.name: method
         for method in (
             Method("fsnn-pso", "fsnn-pso"),
+            Method("fsnn-folded", "fsnn-pso", {"params": {"searcher": {"rotation": "folded"}}}),
             Method("easm", "easm"),
             Method("easm-pairwise", "easm", {"params": {"searcher": {"consistency": "pairwise"}}}),
             Method("auto", "auto"),
@@ -51,7 +52,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 )
 """The methods of the tables."""
 
-THESIS = frozenset({"fsnn-pso", "easm", "easm-pairwise"})
+THESIS = frozenset({"fsnn-pso", "fsnn-folded", "easm", "easm-pairwise"})
 """Those that the thesis has."""
 
 

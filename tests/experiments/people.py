@@ -3,8 +3,7 @@
 What is known of sketch maps is that they keep order and direction better than distance and size,
 straighten and simplify, and differ from person to person. At strength 1, before the pen:
 
-- the whole is turned anyhow; its size is the room's, because the thesis's seed points for FSNN
-  take L̂ within ±0.5 for granted, and nothing else sees it;
+- the whole is turned anyhow, or is ``upright``; its size is the room's, which nothing sees;
 - the page stretches it, along one direction more than across (``page``);
 - one side comes out larger than the other: the scale grows evenly across the room (``gradient``);
 - each object is displaced (``displacement``, of the typical spacing), turned (``turn``), drawn too
@@ -14,6 +13,9 @@ straighten and simplify, and differ from person to person. At strength 1, before
 - the pen rounds corners, swings past them, trembles, stops up to 3 % of an outline before where it
   began or up to 3 % too late, and has drifted by 3 ‰ of the page, whatever the strength. (With
   twice this drift the segmenter leaves an object open in 6 % of all sketches.)
+
+Things may be drawn ``small``: so many times as large as they are, between places that are as far
+apart as ever, as people do who leave room between what they draw.
 
 ``Shapes`` says whether an outline is drawn at all: people who draw a box, or an ellipse, for
 everything keep its place, its size and its direction.
@@ -74,6 +76,10 @@ class Person:
         How far a simplified outline leaves the true one, as a share of the root of its area.
     wobble
         Of an outline, as a share of the object's size.
+    small
+        How many times as large as it is an object is drawn, whatever the strength.
+    upright
+        Whether the whole is as the room lies, and not turned anyhow.
     shapes
         Whether outlines are drawn.
     """
@@ -87,6 +93,8 @@ class Person:
     stretch: float = 0.15
     simplify: float = 0.06
     wobble: float = 0.08
+    small: float = 1.0
+    upright: bool = False
     shapes: Shapes = Shapes.OUTLINES
 
 
@@ -146,13 +154,14 @@ def _remembered(room: Scene, person: Person, strength: float, rng: np.random.Gen
         simple = _simplified(item, person.shapes, strength * person.simplify)
         centre = np.array(item.centroid)
         growth = float(gradient @ (centre - middle)) / extent
-        size = math.exp(growth + rng.normal(0.0, strength * person.size))
+        size = person.small * math.exp(growth + rng.normal(0.0, strength * person.size))
         place = (centre - middle) * math.exp(growth / 2.0)
         ring = ((simple - centre) * size + place) @ page.T
         objects.append(SceneObject.from_rings([ring], item.label))
     return simulate_sketch(
         Scene(tuple(objects)),
         rng,
+        rotation=0.0 if person.upright else None,
         scale=1.0,
         displacement=strength * person.displacement,
         turn=strength * person.turn,

@@ -14,13 +14,14 @@ from tests.experiments.cases import NOTHING, Removal
 from tests.experiments.people import Person, Shapes
 from tests.experiments.runs import Work
 from tests.experiments.scenes import DRIVES, PLACES
-from tests.experiments.study import STRENGTH, Style
+from tests.experiments.study import SMALL, STRENGTH, Style
 
 __all__ = [
     "LETTERS",
     "MAPS",
     "PARTS",
     "SKETCHES",
+    "SMALL_TITLES",
     "STRENGTHS",
     "STRONGER",
     "UNEQUAL",
@@ -50,13 +51,17 @@ STRENGTHS = (0.5, 0.7, 0.95, 1.25, 1.5, 2.0)
 STRONGER = 1.05
 """Gives sketches (b) to (j) alone the thesis's mean ζ, without case (a); see ``calibrate``."""
 
+SMALL_TITLES = ("small objects, upright", "small objects, turned")
+"""Sketches of people calibrated on the parts of ζ, and the same ones with the paper turned."""
+
 _NINE = len(LETTERS)
+_GOLDEN_ANGLE = 137.5
 _PAPERS = range(0, 360, 30)
 _LARGE = {10: 4, 12: 3, 16: 2, 20: 2, 30: 1}
 _SMALL = ("fsnn-pso", "easm", "auto", "learned", "exact")
 _LARGE_BY = ("easm", "auto", "learned", "direct")
 _FEWEST = 3
-_FSNN, _EASM = "fsnn-pso", "easm"
+_FSNN, _FOLDED, _EASM = "fsnn-pso", "fsnn-folded", "easm"
 
 
 def experiments(
@@ -156,6 +161,26 @@ def _several(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     return {"several missing": works}
 
 
+def _small(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
+    """Return people who draw things small, upright and with the paper turned anyhow: 4.1, 4.2."""
+    those = _affordable(methods, 0)
+    if _FSNN in methods:
+        those = tuple(dict.fromkeys((_FSNN, _FOLDED, *those)))
+    return {
+        title: [
+            Work(
+                place,
+                number,
+                Style(SMALL, paper=turned * _GOLDEN_ANGLE * (number + 1) % 360.0),
+                methods=those,
+            )
+            for place in PLACES
+            for number in range(max(1, count // 4))
+        ]
+        for turned, title in enumerate(SMALL_TITLES)
+    }
+
+
 def _strength(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
     """Return the sweep over strength, and many sketches at one that is a little stronger."""
     swift, sweep = _swift(methods), []
@@ -227,6 +252,7 @@ PARTS: Mapping[str, Callable[[tuple[str, ...], int], dict[str, list[Work]]]] = {
     "3": lambda methods, count: _equal("grid", methods, count),
     "4": lambda methods, count: _missing("map", methods, count) | _several(methods, count),
     "5": lambda methods, count: _missing("grid", methods, count),
+    "small": _small,
     "strength": _strength,
     "rotation": _rotation,
     "shapes": _shapes,

@@ -16,10 +16,13 @@ from sketchmatch_builtin.segmenters.strokes import StrokeSegmenter
 from tests.experiments.people import EXTRA, Person, draw, with_extras
 from tests.experiments.scenes import Place, charted
 
-__all__ = ["STRENGTH", "Sketch", "Style", "sketch", "traced"]
+__all__ = ["SMALL", "STRENGTH", "Sketch", "Style", "sketch", "traced"]
 
 STRENGTH = 0.95
 """Gives the thesis's mean ζ of the right map with all objects, 0.911; see ``calibrate``."""
+
+SMALL = Person(0.3, small=0.39, upright=True)
+"""Gives the parts of ζ that the thesis's tables of EASM tell of; see ``calibrate``."""
 
 
 @dataclass(frozen=True)

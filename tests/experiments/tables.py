@@ -10,7 +10,7 @@ from typing import TypeVar
 from tests.experiments import thesis
 from tests.experiments.cases import Record
 from tests.experiments.document import Table
-from tests.experiments.protocol import LETTERS, MAPS, UNEQUAL
+from tests.experiments.protocol import LETTERS, MAPS, SMALL_TITLES, UNEQUAL
 from tests.experiments.records import (
     Results,
     as_row,
@@ -38,6 +38,7 @@ __all__ = [
     "one_missing",
     "protocol_of_418",
     "several_missing",
+    "small_objects",
     "studies_of_nine",
     "summary_418",
     "times",
@@ -121,6 +122,30 @@ def equal_summary(results: Results, maps: Sequence[str]) -> Table:
         note=f"{_FIGURES_NOTE} The thesis's nine sketches are (b) to (j), without case (a). In "
         f"{faulty} of our {len(sketches)} sketches segmentation lost or invented an object, which "
         "counts as wrong here and everywhere below.",
+    )
+
+
+def small_objects(results: Results) -> Table:
+    """Return tables 4.1 to 4.4 beside people who draw things small, upright and turned anyhow."""
+    rows = []
+    for place in PLACES:
+        objects = len(PLACES[place].furniture)
+        fsnn, easm = _EQUAL_TABLES[place, "map"]
+        for name, number in (("thesis FSNN", fsnn), ("thesis EASM", easm)):
+            printed = [thesis.EQUAL[str(number)][letter] for letter in LETTERS]
+            rows.append((place, "–", name, *_printed(printed, objects)))
+        for title in SMALL_TITLES:
+            heading = title.partition(", ")[2]
+            drawn = grouped(chosen(results[title], place=place), lambda record: record.method)
+            rows += [(place, heading, method, *_figures(own)) for method, own in drawn.items()]
+    return Table(
+        "Tables 4.1 to 4.4: people who draw things small, map, all objects",
+        ("scene", "paper", "method", *_FIGURES),
+        tuple(rows),
+        left=3,
+        note="These people give the parts of ζ that the thesis's tables of EASM tell of. "
+        "fsnn-folded takes R̂ as the thesis prints it, fsnn-pso takes it as circular. turned: the "
+        f"same sketches, each turned by another angle. {_FIGURES_NOTE}",
     )
 
 

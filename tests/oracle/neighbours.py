@@ -1,5 +1,8 @@
 """NN, FSNN and the particle swarm (thesis 3.5, 3.6 and 3.7.1), step by step as they are printed.
 
+L̂ counts from the mean of the table's. R̂ is folded, as printed, or circular: R/180°, with
+differences modulo 2.
+
 Degrees of closeness are decimals of many digits: near a cluster they differ from 1 by less than a
 float can tell.
 """
@@ -10,20 +13,31 @@ from decimal import Decimal, localcontext
 from tests.oracle.relations import correspondence
 
 
-def vectors(table):
+def vectors(table, folded):
     """Return (σ̂, R̂, L̂) by (i, j'), duals included."""
     half, result = table.argument_pairs, {}
+    logarithms = [math.log(float(dilation)) for dilation in table.dilation.flat]
+    mean = math.fsum(logarithms) / len(logarithms)
     for i in range(table.template_pairs):
         for column in range(half):
             for j in (column, column + half):
                 rotation = float(table.rotation[i, column]) + (math.pi if j >= half else 0.0)
                 degrees = math.degrees(rotation) % 360
-                turn = (360 - degrees) / 180 if degrees > 180 else degrees / 180
-                level = 1.5 / math.log(2) * math.log(float(table.dilation[i, column]))
+                turn = (360 - degrees) / 180 if folded and degrees > 180 else degrees / 180
+                level = math.log(float(table.dilation[i, column])) - mean
+                level *= 1.5 / math.log(2)
                 result[i, j] = (float(table.similarity[i, column]), turn, level)
     count = table.argument_objects
     assert correspondence(count, count - 1, count) == 2 * half - 1
     return result
+
+
+def distance(first, second, folded):
+    """Return how far two points are apart."""
+    turned = abs(first[1] - second[1])
+    if not folded:
+        turned = min(turned % 2, 2 - turned % 2)
+    return math.hypot(first[0] - second[0], turned, first[2] - second[2])
 
 
 def fits(fmap, i, j, argument_pairs):
@@ -32,11 +46,11 @@ def fits(fmap, i, j, argument_pairs):
     return fmap[i] is None and all(entry not in (j, dual) for entry in fmap)
 
 
-def grow_nearest(table, seed):
+def grow_nearest(table, seed, folded):
     """Grow an FMAP by distance (3.5)."""
-    x, argument_pairs = vectors(table), 2 * table.argument_pairs
+    x, argument_pairs = vectors(table, folded), 2 * table.argument_pairs
     fmap = [None] * table.template_pairs
-    ordered = sorted(x, key=lambda key: (math.dist(seed, x[key]), key))
+    ordered = sorted(x, key=lambda key: (distance(seed, x[key], folded), key))
     h = 0
     while None in fmap:
         i, j = ordered[h]
@@ -46,11 +60,11 @@ def grow_nearest(table, seed):
     return fmap
 
 
-def mean_and_variance(table):
+def mean_and_variance(table, folded):
     """Return m and v (3.6.2 and 3.6.3)."""
-    x, rows, columns = vectors(table), table.template_pairs, 2 * table.argument_pairs
+    x, rows, columns = vectors(table, folded), table.template_pairs, 2 * table.argument_pairs
     distances = [
-        math.dist(x[i, j], x[v, z])
+        distance(x[i, j], x[v, z], folded)
         for i in range(rows)
         for j in range(columns)
         for v in range(rows)
@@ -63,30 +77,30 @@ def mean_and_variance(table):
     return mean, math.fsum((d - mean) ** 2 for d in distances) / len(distances)
 
 
-def closeness(distance, mean, variance, alpha, k):
+def closeness(apart, mean, variance, alpha, k):
     """Return μ_close (3.6.1)."""
-    d, m, v = Decimal(distance), Decimal(mean), Decimal(variance)
+    d, m, v = Decimal(apart), Decimal(mean), Decimal(variance)
     return 1 / (1 + (Decimal(alpha) * (d - m + Decimal(k) * v) / v).exp())
 
 
-def grow_fuzzy(table, seed, alpha=10.0, k=1.0):
+def grow_fuzzy(table, seed, folded, alpha=10.0, k=1.0):
     """Grow an FMAP by aggregate confidence (3.6)."""
     with localcontext() as context:
         context.prec = 100
-        return _grow_fuzzy(table, seed, alpha, k)
+        return _grow_fuzzy(table, seed, folded, alpha, k)
 
 
-def _grow_fuzzy(table, seed, alpha, k):
-    x, rows, columns = vectors(table), table.template_pairs, 2 * table.argument_pairs
+def _grow_fuzzy(table, seed, folded, alpha, k):
+    x, rows, columns = vectors(table, folded), table.template_pairs, 2 * table.argument_pairs
     fmap = [None] * rows
     if rows == 1:
-        return [min(x, key=lambda key: (math.dist(seed, x[key]), key))[1]]
-    mean, variance = mean_and_variance(table)
+        return [min(x, key=lambda key: (distance(seed, x[key], folded), key))[1]]
+    mean, variance = mean_and_variance(table, folded)
 
     def mu(first, second):
-        return closeness(math.dist(first, second), mean, variance, alpha, k)
+        return closeness(distance(first, second, folded), mean, variance, alpha, k)
 
-    i, j = min(x, key=lambda key: (math.dist(seed, x[key]), key))
+    i, j = min(x, key=lambda key: (distance(seed, x[key], folded), key))
     fmap[i] = j
     added, confidences = [(i, j)], [mu(x[i, j], seed)]
     while len(added) < rows:
@@ -105,11 +119,14 @@ def _grow_fuzzy(table, seed, alpha, k):
     return fmap
 
 
-def move(x, v, own_best, best, r1, r2, c1=2.0, c2=2.0, limit=0.2):
+def move(x, v, own_best, best, r1, r2, c1=2.0, c2=2.0, limit=0.2, folded=True):
     """Return position and velocity of one particle after an update (3.7.1 and 3.7.2)."""
     position, velocity = [], []
     for d in range(3):
-        speed = v[d] + r1 * c1 * (own_best[d] - x[d]) + r2 * c2 * (best[d] - x[d])
+        to_own, to_best = own_best[d] - x[d], best[d] - x[d]
+        if d == 1 and not folded:
+            to_own, to_best = (math.remainder(way, 2) for way in (to_own, to_best))
+        speed = v[d] + r1 * c1 * to_own + r2 * c2 * to_best
         velocity.append(min(max(speed, -limit), limit))
         position.append(x[d] + velocity[d])
     return position, velocity

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from sketchmatch.api import MatchProblem
 from sketchmatch.model import RelationTable
+from sketchmatch.pipeline.correspond import object_map, occm
 from sketchmatch.pipeline.describe import describe
 from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.slices import finish
@@ -39,8 +40,8 @@ def table_of_a_sketch(seed, drawn, there):
     return finish(relate(first, second, CrossCorrelation()))
 
 
-def membership(table, alpha=10.0, k=1.0, seed=0, **options):
-    features = finish(read_features(table))
+def membership(table, alpha=10.0, k=1.0, seed=0, folded=True, **options):
+    features = finish(read_features(table, folded))
     return finish(fit_membership(features, alpha, k, np.random.default_rng(seed), **options))
 
 
@@ -50,10 +51,11 @@ def mean_and_variance(table, **options):
     return fitted.centre + variance, variance
 
 
-def grower(table, alpha=10.0, k=1.0, **options):
+def grower(table, alpha=10.0, k=1.0, folded=True, **options):
     found = Found(MatchProblem(table))
-    features = finish(read_features(table))
-    return FsnnGrower(features, membership(table, alpha, k), found, **options), found
+    features = finish(read_features(table, folded))
+    fitted = membership(table, alpha, k, folded=folded)
+    return FsnnGrower(features, fitted, found, **options), found
 
 
 def grown(table, seed, **options):
@@ -62,22 +64,30 @@ def grown(table, seed, **options):
     return found.progress().fmap.entries.tolist()
 
 
-@given(tables(most=4, more=1), st.integers(0, 2**32), st.sampled_from([(10, 1), (3, 0.5), (20, 2)]))
+@given(
+    tables(most=4, more=1),
+    st.integers(0, 2**32),
+    st.sampled_from([(10, 1), (3, 0.5), (20, 2)]),
+    st.booleans(),
+)
 @settings(max_examples=30)
-def test_it_grows_as_the_thesis_says(table, seed, shape):
-    point = random_seed_point(np.random.default_rng(seed))
+def test_it_grows_as_the_thesis_says(table, seed, shape, folded):
+    point = random_seed_point(np.random.default_rng(seed), folded)
     alpha, k = shape
-    expected = neighbours.grow_fuzzy(table, point, alpha, k)
-    assert grown(table, point, alpha=alpha, k=k) == expected
-    assert grown(table, point, alpha=alpha, k=k, store_bytes=0) == expected
+    options = {"alpha": alpha, "k": k, "folded": folded}
+    expected = neighbours.grow_fuzzy(table, point, **options)
+    assert grown(table, point, **options) == expected
+    assert grown(table, point, store_bytes=0, **options) == expected
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("folded", [True, False], ids=["folded", "circular"])
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("sizes", [(3, 3), (4, 4), (3, 5), (2, 4)])
-def test_it_grows_as_the_thesis_says_on_scenes(seed, sizes):
+def test_it_grows_as_the_thesis_says_on_scenes(seed, sizes, folded):
     table = table_of_a_sketch(seed, *sizes)
-    point = random_seed_point(np.random.default_rng(seed))
-    assert grown(table, point) == neighbours.grow_fuzzy(table, point)
+    point = random_seed_point(np.random.default_rng(seed), folded)
+    expected = neighbours.grow_fuzzy(table, point, folded)
+    assert grown(table, point, folded=folded) == expected
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -93,14 +103,15 @@ def test_closeness_that_a_float_takes_for_1_is_told_apart(seed):
     )
     fitted = membership(table)
     assert fitted.steepness * fitted.centre > 60, "1 − μ(0) is far below the last digit of 1"
-    point = random_seed_point(np.random.default_rng(seed))
-    assert grown(table, point) == neighbours.grow_fuzzy(table, point)
+    point = random_seed_point(np.random.default_rng(seed), True)
+    assert grown(table, point) == neighbours.grow_fuzzy(table, point, True)
 
 
-@given(tables(least=3, most=4, more=1))
+@given(tables(least=3, most=4, more=1), st.booleans())
 @settings(max_examples=20)
-def test_mean_and_variance_are_those_of_all_compatible_vectors(table):
-    assert mean_and_variance(table) == pytest.approx(neighbours.mean_and_variance(table), rel=1e-9)
+def test_mean_and_variance_are_those_of_all_compatible_vectors(table, folded):
+    expected = neighbours.mean_and_variance(table, folded)
+    assert mean_and_variance(table, folded=folded) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("sizes", [(3, 40), (12, 12)])
@@ -119,7 +130,7 @@ def test_slices_and_stored_closeness_do_not_change_what_grows():
     options = [{"budget": 1}, {"budget": 3000}, {"store_bytes": 0}, {"store_bytes": 200_000}]
     variants = [grower(table, **each) for each in options]
     for seed in range(20):
-        point = random_seed_point(np.random.default_rng(seed))
+        point = random_seed_point(np.random.default_rng(seed), True)
         confidence = finish(usual.grow(point))
         for other, _ in variants:
             assert finish(other.grow(point)) == confidence
@@ -132,7 +143,7 @@ def test_an_fmap_grows_from_a_first_vector_once():
     grows, found = grower(table)
     rng = np.random.default_rng(0)
     for _ in range(500):
-        finish(grows.grow(random_seed_point(rng)))
+        finish(grows.grow(random_seed_point(rng, True)))
     assert found.evaluations <= 6 * 20
 
 
@@ -149,7 +160,7 @@ def test_on_small_scenes_it_finds_the_best_fmap_from_a_good_seed_point():
     for seed in range(20):
         table = table_of_a_sketch(seed, 3, 3)
         best, partners = maps.best_object_map(table)
-        entries = neighbours.vectors(table)
+        entries = neighbours.vectors(table, True)
         pairs = {tuple(pair): j for j, pair in enumerate(_pairs(table))}
         chosen = [pairs[pair] for pair in maps.induced(partners)]
         grows, _ = grower(table)
@@ -166,3 +177,50 @@ def test_eight_objects_come_to_a_map_worth_having():
     table = table_of_a_sketch(0, 8, 8)
     *_, last = FsnnPso().search(MatchProblem(table), np.random.default_rng(0))
     assert last.confidence > 0.7
+
+
+def best_of(table, **params):
+    searcher = FsnnPso(FsnnPso.Params(**params))
+    *_, last = searcher.search(MatchProblem(table), np.random.default_rng(0))
+    return last
+
+
+@pytest.mark.parametrize("rotation", ["circular", "folded"])
+def test_every_first_entry_is_tried_and_no_swarm_finds_more(rotation):
+    table = random_table(np.random.default_rng(5), 4, 5)
+    every = best_of(table, rotation=rotation, first="every")
+    # Besides the 6 × 20 entries a random FMAP and one that grew by distance.
+    assert (every.iteration, every.evaluations) == (120, 122)
+    swarm = best_of(table, rotation=rotation, particles=400, patience=20)
+    assert swarm.confidence <= every.confidence
+
+
+def turned(table, angle):
+    rotation = (table.rotation + angle) % (2 * np.pi)
+    return RelationTable(table.similarity, rotation, table.dilation, 5, 5)
+
+
+@pytest.mark.parametrize("angle", [0.5, np.pi / 2, np.pi, 4.0])
+def test_circular_any_turn_of_a_sketch_gives_the_same_map(angle):
+    table = table_of_a_sketch(4, 5, 5)
+    upright = best_of(table, first="every")
+    other = best_of(turned(table, angle), first="every")
+    assert other.confidence == pytest.approx(upright.confidence, rel=1e-9)
+    assert other.fmap.entries.tolist() == upright.fmap.entries.tolist()
+
+
+@pytest.mark.parametrize(("rotation", "turned_by_90"), [("folded", 0), ("circular", 5)])
+def test_folded_a_sketch_turned_by_90_degrees_is_lost(rotation, turned_by_90):
+    right = {0.0: 0, np.pi / 2: 0}
+    for angle in right:
+        for seed in range(5):
+            rng = np.random.default_rng(seed)
+            scene = random_scene(rng, 6)
+            sketch = simulate_sketch(scene, rng, rotation=angle)
+            drawn, there = (finish(describe(s, ConstantForce())) for s in (sketch.scene, scene))
+            table = finish(relate(drawn, there, CrossCorrelation()))
+            fmap = best_of(table, rotation=rotation, first="every").fmap
+            partners = object_map(occm(fmap, table)).partners
+            right[angle] += partners.tolist() == sketch.partners.tolist()
+    assert right[0.0] >= 4
+    assert right[np.pi / 2] == turned_by_90

@@ -1,6 +1,8 @@
 """The ``nn`` searcher, and what it has in common with ``nn-pso`` and ``fsnn-pso``."""
 
 import itertools
+import json
+import math
 import threading
 
 import numpy as np
@@ -8,8 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sketchmatch import match, read_scene
 from sketchmatch.api import MatchProblem, Outcome
 from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH, LIVING_ROOM_TRUTH
 from sketchmatch.model import RelationTable
 from sketchmatch.pipeline.describe import describe
 from sketchmatch.pipeline.relate import relate
@@ -78,48 +82,94 @@ def table_of_a_sketch(seed, drawn=4, there=5):
     return finish(relate(first, second, CrossCorrelation()))
 
 
-def grown(table, seed, **options):
+def grown(table, seed, folded, **options):
     found = Found(MatchProblem(table))
-    confidence = finish(NnGrower(finish(read_features(table)), found, **options).grow(seed))
+    confidence = finish(NnGrower(finish(read_features(table, folded)), found, **options).grow(seed))
     best = found.progress()
     assert best.confidence == confidence
     return best.fmap.entries.tolist()
 
 
-@given(tables(most=5, more=2), st.integers(0, 2**32))
+@given(tables(most=5, more=2), st.integers(0, 2**32), st.booleans())
 @settings(max_examples=60)
-def test_it_grows_as_the_thesis_says(table, seed):
-    point = random_seed_point(np.random.default_rng(seed))
-    assert grown(table, point) == neighbours.grow_nearest(table, point)
+def test_it_grows_as_the_thesis_says(table, seed, folded):
+    point = random_seed_point(np.random.default_rng(seed), folded)
+    assert grown(table, point, folded) == neighbours.grow_nearest(table, point, folded)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("folded", [True, False], ids=["folded", "circular"])
+@pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("sizes", [(3, 3), (4, 6), (5, 5), (2, 6)])
-def test_it_grows_as_the_thesis_says_on_scenes(seed, sizes):
+def test_it_grows_as_the_thesis_says_on_scenes(seed, sizes, folded):
     table = table_of_a_sketch(seed, *sizes)
-    point = random_seed_point(np.random.default_rng(seed))
-    assert grown(table, point) == neighbours.grow_nearest(table, point)
+    point = random_seed_point(np.random.default_rng(seed), folded)
+    assert grown(table, point, folded) == neighbours.grow_nearest(table, point, folded)
+
+
+@given(tables(most=5, more=2), st.integers(0, 2**32), st.integers(-4, 4))
+@settings(max_examples=30)
+def test_a_circular_seed_point_may_go_round(table, seed, rounds):
+    point = random_seed_point(np.random.default_rng(seed), False)
+    away = point + np.array([0.0, 2.0 * rounds, 0.0])
+    assert grown(table, away, False) == neighbours.grow_nearest(table, point, False)
 
 
 @pytest.mark.parametrize("budget", [1, 100])
 def test_slices_do_not_change_what_grows(budget):
     table = random_table(np.random.default_rng(5), 7, 8)
     for seed in range(10):
-        point = random_seed_point(np.random.default_rng(seed))
-        assert grown(table, point, budget=budget) == grown(table, point)
+        point = random_seed_point(np.random.default_rng(seed), True)
+        assert grown(table, point, True, budget=budget) == grown(table, point, True)
 
 
-def test_of_equal_distances_the_lowest_index_comes_first():
+@pytest.mark.parametrize("folded", [True, False], ids=["folded", "circular"])
+def test_of_equal_distances_the_lowest_index_comes_first(folded):
     same = np.ones((6, 10))
     table = RelationTable(same, np.pi / 2 * same, same, 4, 5)
-    assert grown(table, np.array([0.3, 0.2, 0.1])) == list(range(6))
+    assert grown(table, np.array([0.3, 0.2, 0.1]), folded) == list(range(6))
 
 
-def test_seed_points_are_where_the_thesis_draws_them():
+@pytest.mark.parametrize(("folded", "turns"), [(True, 1.0), (False, 2.0)])
+def test_seed_points_are_where_the_thesis_draws_them(folded, turns):
     rng = np.random.default_rng(0)
-    points = np.array([random_seed_point(rng) for _ in range(4000)])
+    points = np.array([random_seed_point(rng, folded) for _ in range(4000)])
     assert points.min(axis=0) == pytest.approx([0.0, 0.0, -0.5], abs=0.005)
-    assert points.max(axis=0) == pytest.approx([1.0, 1.0, 0.5], abs=0.005)
+    assert points.max(axis=0) == pytest.approx([1.0, turns, 0.5], abs=0.005)
+
+
+@ALL
+@pytest.mark.parametrize("rotation", ["folded", "circular"])
+@pytest.mark.parametrize("scale", [0.02, 1.3, 50.0])
+def test_the_scale_of_a_sketch_plays_no_part(searcher, rotation, scale):
+    table = table_of_a_sketch(3, 6, 6)
+    scaled = RelationTable(table.similarity, table.rotation, scale * table.dilation, 6, 6)
+    runs = [
+        run(searcher, each, rotation=rotation, **SHORT[searcher])[0][-1] for each in (table, scaled)
+    ]
+    assert runs[0].fmap.entries.tolist() == runs[1].fmap.entries.tolist()
+    assert runs[0].evaluations == runs[1].evaluations
+    assert runs[0].confidence == pytest.approx(runs[1].confidence, rel=1e-9)
+
+
+@ALL
+def test_it_is_right_on_the_living_room(searcher):
+    truth = json.loads(LIVING_ROOM_TRUTH.read_text(encoding="utf-8"))
+    sketch, map_ = read_scene(LIVING_ROOM_SKETCH), read_scene(LIVING_ROOM_MAP)
+    result = match(sketch, map_, searcher=searcher.name)
+    centroids = [item.centroid for item in map_.objects]
+    places = {item["label"]: item["map_centroid"] for item in truth["objects"]}
+    for drawn, partner in result.object_map.items():
+        place = places[sketch.labels[drawn]]
+        nearest = min(range(len(centroids)), key=lambda k: math.dist(centroids[k], place))
+        assert partner == nearest
+    assert len(result.object_map) == len(places) == 8
+
+
+@ALL
+def test_r_is_circular_unless_it_is_asked_for_as_printed(searcher):
+    assert searcher.Params().rotation == "circular"
+    with pytest.raises(ValueError, match="circular"):
+        searcher.Params(rotation="straight")
 
 
 def test_it_tries_each_seed_point():
@@ -247,7 +297,7 @@ def test_it_yields_often_and_stops_when_it_is_closed(searcher, objects):
 
 @ALL
 def test_it_has_an_answer_before_it_is_set_up(searcher, monkeypatch):
-    def stuck(_table):
+    def stuck(_table, _folded):
         raise AssertionError("set-up began")
 
     monkeypatch.setitem(searcher.search.__globals__, "read_features", stuck)
@@ -278,7 +328,7 @@ SWARM_FAULTS = [
     ({"velocity_limit": -0.2}, "velocity_limit", "greater than 0"),
     ({"iterations": 0}, "iterations", "greater than or equal to 1"),
     ({"patience": 0}, "patience", "greater than or equal to 1"),
-    ({"speed": 9}, "speed", "is no parameter of .*nn-pso; it has: particles, c1, c2"),
+    ({"speed": 9}, "speed", "is no parameter of .*nn-pso; it has: rotation, particles, c1"),
 ]
 
 
@@ -286,7 +336,12 @@ SWARM_FAULTS = [
     ("name", "parameters", "field", "words"),
     [
         ("nn", {"seed_points": 0}, "seed_points", "greater than or equal to 1"),
-        ("nn", {"particles": 3}, "particles", "is no parameter of nn; it has: seed_points"),
+        (
+            "nn",
+            {"particles": 3},
+            "particles",
+            "is no parameter of nn; it has: rotation, seed_points",
+        ),
         *(("nn-pso", *fault) for fault in SWARM_FAULTS),
         *(("fsnn-pso", *fault) for fault in SWARM_FAULTS),
         ("fsnn-pso", {"alpha": 0}, "alpha", "greater than 0"),

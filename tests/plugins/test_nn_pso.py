@@ -38,16 +38,19 @@ def bowl(seed):
     return -float(np.sum((seed - [0.7, 0.2, 1.5]) ** 2))
 
 
-def test_a_particle_moves_as_the_thesis_says():
+@pytest.mark.parametrize("folded", [True, False], ids=["folded", "circular"])
+def test_a_particle_moves_as_the_thesis_says(folded):
     rng = np.random.default_rng(1)
     positions, velocities, own_bests = rng.normal(size=(3, 12, 3)) * [[[1.0]], [[0.1]], [[1.0]]]
     best = own_bests[3]
     r1, r2 = rng.random((2, 12))
     pulls = np.stack([1.5 * r1, 0.7 * r2], axis=1)
-    after = moved(positions, velocities, own_bests, best, pulls, 0.2)
+    after = moved(positions, velocities, own_bests, best, pulls, 0.2, folded)
     for k in range(12):
         expected = neighbours.move(
-            positions[k], velocities[k], own_bests[k], best, r1[k], r2[k], 1.5, 0.7
+            *(positions[k], velocities[k], own_bests[k], best),
+            *(r1[k], r2[k], 1.5, 0.7),
+            folded=folded,
         )
         assert after[0][k] == pytest.approx(expected[0])
         assert after[1][k] == pytest.approx(expected[1])
@@ -55,7 +58,7 @@ def test_a_particle_moves_as_the_thesis_says():
 
 def test_the_whole_flight_is_the_one_of_the_thesis():
     size, iterations = 5, 12
-    _, _, seeds = fly(bowl, seed=3, particles=size, iterations=iterations)
+    _, _, seeds = fly(bowl, seed=3, particles=size, iterations=iterations, rotation="folded")
     rng = np.random.default_rng(3)
     x = [list(rng.random(3) - [0.0, 0.0, 0.5]) for _ in range(size)]
     v = rng.uniform(-0.2, 0.2, (size, 3)).tolist()

@@ -301,7 +301,13 @@ def test_the_built_in_profiles_are_sound_and_as_the_thesis_has_it():
     assert (easm["crossover_rate"], easm["exchange_rate"]) == (0.7, 0.5)
     assert (easm["mutation_rate"], easm["patience"]) == (0.3, 400)
     fsnn = profiles["thesis-fsnn"].stages["searcher"].parameters
-    assert fsnn == {"alpha": 10.0, "k": 1.0, "velocity_limit": 0.2, "patience": 30}
+    assert fsnn == {
+        "rotation": "folded",
+        "alpha": 10.0,
+        "k": 1.0,
+        "velocity_limit": 0.2,
+        "patience": 30,
+    }
 
 
 def test_python_takes_profiles_and_files_but_reads_none_that_lies_around(file, monkeypatch):

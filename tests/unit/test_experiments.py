@@ -26,6 +26,7 @@ from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from tests.experiments import __main__ as program
 from tests.experiments import cases as case_module
 from tests.experiments import document, protocol, study, thesis
+from tests.experiments.calibrate import calibrated
 from tests.experiments.cases import NOTHING, CaseName, Record, Removal, answer, cases, evaluate
 from tests.experiments.claims import CONFIRMED, IN_PART, REFUTED, claims
 from tests.experiments.intervals import wilson
@@ -104,7 +105,8 @@ def test_strength_is_how_far_sketches_leave_the_truth():
     assert confidences[0] > 0.95 > confidences[1] > 0.88 > confidences[2]
 
 
-DIALS = [f.name for f in dataclasses.fields(Person) if f.name not in ("strength", "shapes")]
+NO_DIALS = ("strength", "small", "upright", "shapes")
+DIALS = [f.name for f in dataclasses.fields(Person) if f.name not in NO_DIALS]
 
 
 @pytest.mark.parametrize("dial", DIALS)
@@ -136,6 +138,51 @@ def test_shapes(shapes):
         assert areas[item.label] == pytest.approx(item.area, rel=0.2)
     is_solid = areas["desk"] > 0.93 * hulls["desk"]
     assert is_solid == (shapes is not Shapes.OUTLINES)
+
+
+def test_things_drawn_small_keep_their_places():
+    room = PLACES["A"].furniture
+    for small in (1.0, 0.4):
+        person = Person(0.0, small=small, upright=True)
+        drawn = {s.label: s.points for s in draw(room, person, np.random.default_rng(2)).strokes}
+        offset = drawn["desk"].mean(axis=0) - room.objects[room.labels.index("desk")].centroid
+        for item in room.objects:
+            outline = shapely.convex_hull(shapely.LineString(drawn[item.label]))
+            hull = shapely.convex_hull(item.polygon)
+            assert outline.area == pytest.approx(small**2 * hull.area, rel=0.25)
+            centre = np.array(shapely.Polygon(drawn[item.label]).centroid.coords[0])
+            assert centre - item.centroid == pytest.approx(offset, abs=0.25)
+
+
+def test_the_turned_sketches_of_small_things_are_the_upright_ones():
+    work = protocol.experiments(("fsnn-pso", "auto"), 20, ["small"])
+    upright, turned = (work[title] for title in protocol.SMALL_TITLES)
+    assert len(upright) == len(turned) == 2 * 5
+    for one, other in zip(upright, turned, strict=True):
+        assert one.style == Style(study.SMALL)
+        assert dataclasses.replace(other, style=one.style) == one
+        assert other.style.paper == pytest.approx(137.5 * (one.number + 1) % 360)
+        assert one.methods == ("fsnn-pso", "fsnn-folded", "auto")
+
+
+def test_people_who_draw_small_have_the_parts_of_zeta_that_the_thesis_prints():
+    thesis_, *ways = (line for line in calibrated().parts if line.drawn != "thesis, with (a)")
+    person = f"{study.SMALL.small:g} times as large, strength {study.SMALL.strength:g}"
+    nearest = min(
+        ways,
+        key=lambda way: math.dist(
+            (way.similarity, way.others), (thesis_.similarity, thesis_.others)
+        ),
+    )
+    assert nearest.drawn == person
+    found = [
+        case.confidence(case.true_map)
+        for place in PLACES
+        for k in range(6)
+        for case in cases(place, k, Style(study.SMALL))
+    ]
+    assert mean(one.similarity for one in found) == pytest.approx(0.797, abs=0.03)
+    assert mean(one.rotation + one.dilation for one in found) == pytest.approx(1.91, abs=0.03)
 
 
 def test_things_that_are_not_there_stand_clear():
@@ -494,7 +541,7 @@ def claimed(word, titles, outcomes, **others):
     """Return the verdict on a claim if all methods and scenes have these outcomes."""
     made = [
         record
-        for method in ("fsnn-pso", "easm")
+        for method in ("fsnn-pso", "fsnn-folded", "easm")
         for place in PLACES
         for record in records(outcomes, method, place, **others)
     ]
@@ -608,3 +655,26 @@ def test_the_thesis_contradicts_itself_as_we_say():
     shown = thesis.ONE_MISSING[place, grid][letter]
     assert mean(row.zeta for row in shown) == pytest.approx(0.922, abs=0.0005)
     assert thesis.AVERAGES["4.11"][0] == 0.906
+
+
+@pytest.mark.parametrize(
+    ("by_zeta", "by_parts", "verdict"),
+    [(9, 9, CONFIRMED), (2, 9, IN_PART), (9, 2, IN_PART), (2, 2, REFUTED)],
+)
+def test_the_claim_for_fsnn_says_in_which_world_it_holds(by_zeta, by_parts, verdict):
+    def experiment(right):
+        return [
+            record
+            for method in ("fsnn-pso", "fsnn-folded", "easm")
+            for place in PLACES
+            for record in records([8] * right + [6] * (10 - right), method, place)
+        ]
+
+    experiments = {"all objects, map": experiment(by_zeta)}
+    experiments |= dict.fromkeys(protocol.SMALL_TITLES, experiment(by_parts))
+    found = claims(Results(experiments, ("fsnn-pso", "easm"), 10))
+    claim = next(each for each in found if each.text.startswith("FSNN gives good results"))
+    assert claim.verdict == verdict
+    words = {True: "which agrees", False: "which does not agree"}
+    assert claim.finding.count(words[True]) == (by_zeta == 9) + (by_parts == 9)
+    assert claim.finding.count(words[False]) == (by_zeta == 2) + (by_parts == 2)

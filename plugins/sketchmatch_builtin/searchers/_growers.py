@@ -9,11 +9,12 @@ import time
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Generator, Iterator
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
+from pydantic import Field
 
-from sketchmatch.api import MatchProblem, Outcome, SearchProgress
+from sketchmatch.api import MatchProblem, Outcome, Params, SearchProgress
 from sketchmatch.model import DILATION_SCALE, FloatArray, Fmap, IntArray, RelationTable
 from sketchmatch_builtin.searchers._neighbours import (
     ClosenessStore,
@@ -33,6 +34,7 @@ __all__ = [
     "Found",
     "FsnnGrower",
     "Grower",
+    "GrowthParams",
     "NnGrower",
     "Slices",
     "fit_membership",
@@ -139,20 +141,49 @@ def random_entries(table: RelationTable, rng: np.random.Generator) -> IntArray:
     return entries.astype(np.int64)
 
 
-def random_seed_point(rng: np.random.Generator) -> FloatArray:
-    """Return σ̂, R̂ ~ U[0, 1] and L̂ ~ U[−0.5, 0.5]."""
+class GrowthParams(Params):
+    """How histogram correspondences become points."""
+
+    rotation: Literal["circular", "folded"] = Field(
+        "circular",
+        description="What R̂ is. circular: R/180°, compared modulo 2, so that all turns of a sketch "
+        "are alike. folded: as the thesis prints it, R/180° up to 180° and back to 0 beyond; a "
+        "sketch turned by 90° is lost then, because a correspondence and its dual are one point.",
+    )
+
+    @property
+    def folded(self) -> bool:
+        """Whether R̂ is as the thesis prints it."""
+        return self.rotation == "folded"
+
+
+def random_seed_point(rng: np.random.Generator, folded: bool) -> FloatArray:
+    """Return σ̂ ~ U[0, 1], R̂ ~ U[0, 1] or, where it is circular, U[0, 2], and L̂ ~ U[−0.5, 0.5].
+
+    L̂ counts from the mean of the table's, as in :class:`Features`: the thesis takes for granted
+    that sketch and map have one scale.
+    """
     point: FloatArray = rng.random(3) - np.array([0.0, 0.0, 0.5])
+    if not folded:
+        point[1] *= 2.0
     return point
 
 
-def read_features(table: RelationTable) -> Slices[Features]:
-    """Return the vectors of a relation table."""
+def read_features(table: RelationTable, folded: bool) -> Slices[Features]:
+    """Return the vectors of a relation table.
+
+    L̂ of i → j' is a difference b_j' − a_i, of which only differences count: what is taken from
+    all of them changes no distance of two vectors. Less its mean, L̂ of seed points need not know
+    in which scale a sketch is drawn.
+    """
     # The table's own L̂ would take too long at once.
-    level = np.empty_like(table.dilation)
+    level, total = np.empty_like(table.dilation), 0.0
     for first, last in _row_slices(*level.shape):
         level[first:last] = DILATION_SCALE * np.log(table.dilation[first:last])
+        total += float(level[first:last].sum())
         yield
-    return Features(table.similarity, table.rotation, level)
+    level -= total / level.size
+    return Features(table.similarity, table.rotation, level, folded)
 
 
 def fit_membership(
@@ -299,7 +330,7 @@ class FsnnGrower(Grower):
         """Grow an FMAP from (σ̂, R̂, L̂), offer it, and return its ζ."""
         first = yield from self._first(seed)
         if first not in self._confidences:
-            self._confidences[first] = yield from self._grow_from(first)
+            self._confidences[first] = yield from self.grow_from(*first)
         return self._confidences[first]
 
     def _first(self, seed: FloatArray) -> Slices[tuple[int, int]]:
@@ -315,11 +346,12 @@ class FsnnGrower(Grower):
                 bound, row, entry = nearest
         return row, entry
 
-    def _grow_from(self, first: tuple[int, int]) -> Slices[float]:
+    def grow_from(self, row: int, entry: int) -> Slices[float]:
+        """Grow an FMAP whose first entry is row → entry, offer it, and return its ζ."""
         growth = self._growth
         growth.entries[:] = -1
         growth.columns[:] = np.arange(growth.columns.size)
-        growth.state[:] = (0, 0, 0, *first)
+        growth.state[:] = (0, 0, 0, row, entry)
         while not grow_closest(growth, self._features, self._membership, self._store, self._budget):
             yield
         return self._found.offer(growth.entries)

@@ -1,7 +1,8 @@
 """Compiled steps that grow FMAPs in the space of (σ̂, R̂, L̂), in slices.
 
 A vector stands for a histogram correspondence i → j'. It is numbered i·Q'/2 + c with its column
-c = j' mod Q'/2 and told from its dual by a sign: the dual has the same σ̂ and L̂, and 1 − R̂.
+c = j' mod Q'/2 and told from its dual by a sign: the dual has the same σ̂ and L̂. Its R̂ is 1 − R̂
+where half turns are folded onto each other, and R̂ + 1 where R̂ is circular, of period 2.
 """
 
 from __future__ import annotations
@@ -34,11 +35,22 @@ _LARGEST_EXPONENT = 700.0
 
 
 class Features(NamedTuple):
-    """The vectors: σ, R in radians within [0, 2π) and L̂, each of shape (Q, Q'/2)."""
+    """The vectors.
+
+    Attributes
+    ----------
+    similarity, rotation, level
+        Shape (Q, Q'/2): σ̂, R in radians within [0, 2π), and L̂ less its mean over the table.
+    folded
+        Whether R̂ is R/180° up to 180° and falls back to 0 beyond (thesis 3.3), so that a vector
+        and its dual are one point at R = ±90°. Otherwise R̂ is R/180°, and differences are
+        taken modulo 2.
+    """
 
     similarity: FloatArray
     rotation: FloatArray
     level: FloatArray
+    folded: bool
 
 
 class Membership(NamedTuple):
@@ -275,13 +287,17 @@ def _nearest_in_row(
     entry, dual = -1, -1
     for c in range(pairs):
         if not taken[c]:
-            turn = _folded(features.rotation[i, c])
             rest = (features.similarity[i, c] - seed[0]) ** 2
             rest += (features.level[i, c] - seed[2]) ** 2
-            distance = rest + (turn - seed[1]) ** 2
+            if features.folded:
+                turn = _folded(features.rotation[i, c])
+                direct, crossed = turn - seed[1], 1.0 - turn - seed[1]
+            else:
+                direct, crossed = _around(features.rotation[i, c] * (1.0 / np.pi) - seed[1])
+            distance = rest + direct**2
             if distance < nearest:
                 nearest, entry = distance, c
-            distance = rest + (1.0 - turn - seed[1]) ** 2
+            distance = rest + crossed**2
             if distance < nearest_dual:
                 nearest_dual, dual = distance, c + pairs
     if nearest_dual < nearest:
@@ -380,10 +396,21 @@ def _distances(features: Features, row: int, column: int, i: int, c: int) -> tup
     """Return the distance of two vectors, and of one from the other's dual."""
     rest = (features.similarity[row, column] - features.similarity[i, c]) ** 2
     rest += (features.level[row, column] - features.level[i, c]) ** 2
-    turn = _folded(features.rotation[row, column])
-    other = _folded(features.rotation[i, c])
-    direct, crossed = turn - other, turn - (1.0 - other)
+    if features.folded:
+        turn = _folded(features.rotation[row, column])
+        other = _folded(features.rotation[i, c])
+        direct, crossed = turn - other, turn - (1.0 - other)
+    else:
+        turned = features.rotation[row, column] - features.rotation[i, c]
+        direct, crossed = _around(turned * (1.0 / np.pi))
     return np.sqrt(rest + direct * direct), np.sqrt(rest + crossed * crossed)
+
+
+@kernel
+def _around(difference: float) -> tuple[float, float]:
+    """Return how far two circular R̂ are apart that differ so, and one and the other's dual."""
+    direct = abs(difference - 2.0 * np.floor(0.5 * difference + 0.5))
+    return direct, 1.0 - direct
 
 
 @kernel

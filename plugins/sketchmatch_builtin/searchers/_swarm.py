@@ -5,16 +5,22 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
-from sketchmatch.api import Outcome, Params
+from sketchmatch.api import Outcome
 from sketchmatch.model import FloatArray
-from sketchmatch_builtin.searchers._growers import Found, Grower, Slices, random_seed_point
+from sketchmatch_builtin.searchers._growers import (
+    Found,
+    Grower,
+    GrowthParams,
+    Slices,
+    random_seed_point,
+)
 
 __all__ = ["SwarmParams", "moved", "swarm"]
 
 _LARGEST_SUM = 4.0
 
 
-class SwarmParams(Params):
+class SwarmParams(GrowthParams):
     """Parameters of the swarm; the thesis leaves particles, c1, c2 and iterations open."""
 
     particles: int = Field(
@@ -60,7 +66,7 @@ def swarm(
     Particles start at random with random velocities. Yields at least once per particle.
     """
     size = params.particles
-    positions = np.array([random_seed_point(rng) for _ in range(size)])
+    positions = np.array([random_seed_point(rng, params.folded) for _ in range(size)])
     velocities = rng.uniform(-params.velocity_limit, params.velocity_limit, (size, 3))
     own_bests, own_values = positions.copy(), np.full(size, -np.inf)
     best, best_value, stale = positions[0], -np.inf, 0
@@ -78,7 +84,7 @@ def swarm(
             return Outcome.CONVERGED
         pulls = rng.random((size, 2)) * (params.c1, params.c2)
         positions, velocities = moved(
-            positions, velocities, own_bests, best, pulls, params.velocity_limit
+            positions, velocities, own_bests, best, pulls, params.velocity_limit, params.folded
         )
     return Outcome.ITERATION_LIMIT
 
@@ -90,6 +96,7 @@ def moved(
     best: FloatArray,
     pulls: FloatArray,
     velocity_limit: float,
+    folded: bool,
 ) -> tuple[FloatArray, FloatArray]:
     """Return positions and velocities after one update (thesis 3.7.1 and 3.7.2).
 
@@ -103,7 +110,13 @@ def moved(
         Shape (particles, 2): ρ1 = r1·c1 and ρ2 = r2·c2 of each particle.
     velocity_limit
         No component of a velocity exceeds it.
+    folded
+        Whether R̂ is as the thesis prints it; a circular one is pulled the shorter way round.
     """
-    wished = velocities + pulls[:, :1] * (own_bests - positions) + pulls[:, 1:] * (best - positions)
+    to_own, to_best = own_bests - positions, best - positions
+    if not folded:
+        for way in (to_own, to_best):
+            way[:, 1] -= 2.0 * np.floor(0.5 * way[:, 1] + 0.5)
+    wished = velocities + pulls[:, :1] * to_own + pulls[:, 1:] * to_best
     velocities = np.clip(wished, -velocity_limit, velocity_limit)
     return positions + velocities, velocities

@@ -25,7 +25,7 @@ class NnPso(Searcher):
     """Lets a particle swarm choose the seed points from which ``nn`` grows FMAPs.
 
     The swarm has a star neighbourhood and ζ as its fitness. A random FMAP is what the search
-    begins with.
+    begins with. The scale of a sketch plays no part, as in ``nn``.
 
     References
     ----------
@@ -43,7 +43,7 @@ class NnPso(Searcher):
     >>> is_legal(last.fmap, problem.table), is_object_consistent(last.fmap, problem.table)
     (True, False)
     >>> round(last.confidence, 2), last.evaluations
-    (0.88, 161)
+    (0.97, 71)
     """
 
     name = "nn-pso"
@@ -74,5 +74,6 @@ class NnPso(Searcher):
     def _fly(
         self, problem: MatchProblem, found: Found, rng: np.random.Generator
     ) -> Slices[Outcome]:
-        grower = NnGrower((yield from read_features(problem.table)), found)
+        features = yield from read_features(problem.table, self.params.folded)
+        grower = NnGrower(features, found)
         return (yield from swarm(grower, self.params, found, rng))
