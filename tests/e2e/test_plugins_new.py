@@ -1,5 +1,6 @@
 """``sketchmatch plugins new``: what it writes works as it stands, and what it refuses."""
 
+import os
 import shlex
 import subprocess
 import sys
@@ -54,6 +55,39 @@ def test_what_it_writes_is_clean(kind, command_line, tmp_path):
             [*ruff, *check, *options, "."], cwd=folder, capture_output=True, text=True, check=False
         )
         assert done.returncode == 0, done.stdout
+
+
+GIVEN = {
+    "segmenter": "smallest=0.5",
+    "histogram": "width=0.5, directions=90",
+    "similarity": "power=2",
+    "searcher": "restarts=3",
+}
+
+
+def test_what_it_writes_passes_mypy_strict_where_parameters_are_given(command_line, tmp_path):
+    uses = []
+    for kind, given in GIVEN.items():
+        command_line("plugins", "new", f"x-{kind}", "--kind", kind, "--into", tmp_path)
+        name = f"X{kind.capitalize()}{kind.capitalize()}"
+        uses += [
+            f"from sketchmatch_x_{kind}.{kind} import {name}",
+            f"{name}({name}.Params({given})).params.model_dump()",
+            f"{name}({name}.Params())",
+        ]
+    (tmp_path / "use.py").write_text("\n".join(uses), encoding="utf-8")
+    # All four at once: how one file is checked depends on what was checked before it.
+    written = [*tmp_path.glob("*/src"), *tmp_path.glob("*/tests/*.py")]
+    ours = (ROOT / "engine", ROOT / "plugins", ROOT / "clients" / "python")
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", "--explicit-package-bases", "use.py", *written],
+        cwd=tmp_path,
+        env=os.environ | {"MYPYPATH": os.pathsep.join(map(str, (*tmp_path.glob("*/src"), *ours)))},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout == "Success: no issues found in 13 source files\n", done.stdout
 
 
 def test_it_writes_into_a_folder_that_is_still_to_be_made(command_line, tmp_path):

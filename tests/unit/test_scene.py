@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import shapely
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import Scene, SceneObject
@@ -87,6 +88,56 @@ def test_a_scene_takes_rings_and_lists_of_rings():
     assert scene.labels == ("a", "", "c")
     assert [item.area for item in scene.objects] == pytest.approx([4.0, 3.0, 2.0])
     assert scene.bounds == (0.0, 0.0, 5.0, 2.0)
+
+
+def test_an_object_takes_the_polygons_of_shapely_with_their_holes():
+    frame = shapely.Polygon([(0, 0, 7), (0, 4, 7), (6, 4, 7), (6, 0, 7)])
+    frame = frame.difference(shapely.box(1, 1, 3, 3)).difference(shapely.box(4, 1, 5, 2))
+    assert frame.has_z
+    item = SceneObject.from_polygon(frame, "frame")
+    assert [len(ring) for ring in item.rings] == [4, 4, 4]
+    assert item.area == 24 - 4 - 1
+    assert item.polygon.equals(frame)
+    assert item.label == "frame"
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [shapely.LinearRing([(0, 0), (2, 0), (0, 2)]), shapely.MultiPolygon([shapely.box(0, 0, 2, 1)])],
+)
+def test_a_shape_of_shapely_that_is_one_outline_is_an_object(shape):
+    assert SceneObject.from_polygon(shape).area == 2.0
+
+
+@pytest.mark.parametrize(
+    ("shape", "words"),
+    [
+        (
+            shapely.union_all([shapely.box(0, 0, 1, 1), shapely.box(3, 0, 4, 1)]),
+            "polygons[1] has 2 parts, and an object has one outline; make an object of each of its "
+            ".geoms, or take its convex_hull",
+        ),
+        (shapely.Polygon(), "polygons[1] is an empty Polygon; leave it out"),
+        (shapely.MultiPolygon(), "polygons[1] is an empty MultiPolygon; leave it out"),
+        (
+            shapely.LineString([(0, 0), (1, 0), (1, 1)]),
+            "polygons[1] is a LineString, which has no area; give a Polygon",
+        ),
+        (
+            shapely.Polygon([(0, 0), (2, 2), (2, 0), (0, 2)]),
+            "polygons[1] crosses itself at (1, 1); draw its outline without crossing",
+        ),
+        (
+            shapely.Polygon([(0, 0), (float("inf"), 2), (2, 0)]),
+            "polygons[1].rings[0].points[1] is not finite; give plain numbers",
+        ),
+    ],
+)
+def test_a_shape_of_shapely_that_is_not_one_polygon_is_refused(shape, words):
+    with pytest.raises(InvalidInputError) as refused:
+        Scene.from_polygons([shapely.box(0, 0, 1, 1), shape])
+    assert refused.value.reason is Reason.INVALID_POLYGON
+    assert str(refused.value) == words
 
 
 @pytest.mark.parametrize(("polygons", "words"), [([], "no object"), ([SQUARE], "one object")])

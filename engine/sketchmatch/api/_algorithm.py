@@ -22,7 +22,7 @@ class Params(BaseModel):
     >>> from pydantic import Field
     >>> class Tracing(Params):
     ...     tolerance: float = Field(
-    ...         0.1, gt=0, description="Simplification.", json_schema_extra={"unit": "m"}
+    ...         default=0.1, gt=0, description="Simplification.", json_schema_extra={"unit": "m"}
     ...     )
     >>> Tracing(tolerance=0.5)
     Tracing(tolerance=0.5)

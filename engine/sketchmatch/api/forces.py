@@ -46,7 +46,7 @@ _HAIR = 1e-12
 def exponent_field(default: float) -> Any:
     """Return the parameter r of forces d^−r, with its bounds and text."""
     return Field(
-        default,
+        default=default,
         ge=-10.0,
         le=10.0,
         description="The force at distance d is d^-r; objects may overlap for r < 1 and "

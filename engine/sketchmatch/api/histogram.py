@@ -16,7 +16,7 @@ class HistogramParams(_algorithm.Params):
     """What every histogram is asked for."""
 
     directions: int = Field(
-        180,
+        default=180,
         ge=4,
         le=3600,
         multiple_of=2,

@@ -25,7 +25,7 @@ _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 _LONGEST_NAME = 40
 _TESTS = {"segmenter": "test_segmenter.py"}
 _USUAL_LIBRARIES = ("numpy>=1.26", "pydantic>=2.7")
-_LIBRARIES = {"segmenter": ("pydantic>=2.7", "shapely>=2.0.4")}
+_LIBRARIES = {"segmenter": ("pydantic>=2.7",)}
 
 
 def new(

@@ -85,13 +85,30 @@ class SceneObject:
 
     @classmethod
     def from_polygon(cls, polygon: Any, label: str = "") -> Self:
-        """Turn one (k, 2) array-like, or a list of such rings, into an object.
+        """Turn a polygon, in any of the forms that people have them in, into an object.
+
+        Parameters
+        ----------
+        polygon
+            One (k, 2) array-like; a list of such rings, outer ring first, then holes; or a
+            ``Polygon`` or ``LinearRing`` of shapely, or a ``MultiPolygon`` of one part. Heights
+            are left out.
+        label
+            A name for people.
 
         Raises
         ------
         InvalidInputError
-            As :meth:`from_rings`.
+            As :meth:`from_rings`, or if it is a shape of shapely that is not one polygon.
+
+        Examples
+        --------
+        >>> desk = shapely.box(0, 0, 2, 1).difference(shapely.box(0.5, 0.25, 1.5, 0.75))
+        >>> SceneObject.from_polygon(desk, "desk").area
+        1.5
         """
+        if isinstance(polygon, shapely.Geometry):
+            return cls.from_rings(_rings_of(polygon), label)
         return cls.from_rings([polygon] if _is_ring(polygon) else list(polygon), label)
 
     @cached_property
@@ -155,7 +172,8 @@ class Scene:
         Parameters
         ----------
         polygons
-            Each a (k, 2) array-like, or a list of such rings: outer ring first, then holes.
+            Each as :meth:`SceneObject.from_polygon` takes it: a (k, 2) array-like, a list of such
+            rings, outer ring first, then holes, or a polygon of shapely.
         labels
             One name for each polygon, or None.
 
@@ -231,6 +249,26 @@ class Scene:
         points = np.concatenate([item.rings[0] for item in self.objects])
         (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
         return (float(x0), float(y0), float(x1), float(y1))
+
+
+def _rings_of(shape: shapely.Geometry) -> list[FloatArray]:
+    """Return the rings of a shape that is one polygon, without heights."""
+    if isinstance(shape, shapely.MultiPolygon) and len(shape.geoms) == 1:
+        shape = shape.geoms[0]
+    if shape.is_empty:
+        problem = f"is an empty {shape.geom_type}; leave it out"
+    elif isinstance(shape, shapely.Polygon):
+        return [shapely.get_coordinates(ring) for ring in (shape.exterior, *shape.interiors)]
+    elif isinstance(shape, shapely.LinearRing):
+        return [shapely.get_coordinates(shape)]
+    elif isinstance(shape, shapely.MultiPolygon):
+        problem = (
+            f"has {len(shape.geoms)} parts, and an object has one outline; make an object of each "
+            "of its .geoms, or take its convex_hull"
+        )
+    else:
+        problem = f"is a {shape.geom_type}, which has no area; give a Polygon"
+    raise InvalidInputError(Reason.INVALID_POLYGON, "", problem)
 
 
 def _is_ring(polygon: Any) -> bool:

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from sketchmatch.api import MatchProblem, Outcome, Params, Searcher, SearchProgress
+from sketchmatch import api
+from sketchmatch.api import MatchProblem, Outcome, Searcher, SearchProgress
 from sketchmatch.api.kernels import (
     MapState,
     confidence_after,
@@ -60,24 +61,34 @@ class Annealing(Searcher):
     name = "annealing"
     summary = "Simulated annealing over object maps."
 
-    class Params(Params):
+    class Params(api.Params):
         """How slowly it cools, and how often."""
 
-        sweeps: int = Field(50, ge=1, le=1_000_000, description="Sweeps of a run, while it cools.")
+        sweeps: int = Field(
+            default=50, ge=1, le=1_000_000, description="Sweeps of a run, while it cools."
+        )
         hottest: float = Field(
-            0.8,
+            default=0.8,
             gt=0,
             le=100,
             description="Temperature of the first sweep, in standard deviations of what random "
             "moves do to ζ.",
         )
         coldest: float = Field(
-            0.25, gt=0, le=100, description="Temperature of the last sweep, in the same unit."
+            default=0.25,
+            gt=0,
+            le=100,
+            description="Temperature of the last sweep, in the same unit.",
         )
         patience: int = Field(
-            10, ge=1, le=1_000_000, description="Runs without a better best after which it ends."
+            default=10,
+            ge=1,
+            le=1_000_000,
+            description="Runs without a better best after which it ends.",
         )
-        runs: int = Field(1000, ge=1, le=1_000_000, description="Limit on the number of runs.")
+        runs: int = Field(
+            default=1000, ge=1, le=1_000_000, description="Limit on the number of runs."
+        )
 
     params: Params
 
