@@ -1,5 +1,6 @@
 """Each contract of a plugin is broken once, and its check, and no other, says so."""
 
+import re
 import subprocess
 import sys
 import threading
@@ -407,8 +408,7 @@ def sharing(self, problem, rng):
 
 def writing(self, problem, rng):
     values = problem.table.similarity
-    if values.base is not None:
-        values.flags.writeable = True
+    if values.flags.writeable:
         values[0, 0] += 1e-13
     return (yield from RandomMaps.search(self, problem, rng))
 
@@ -464,7 +464,10 @@ SEARCHERS = {
     ),
     "answers-repeat": ("different answers", like(RandomMaps, __init__=noisy, search=with_own_dice)),
     "threads-agree": ("4 threads", like(RandomMaps, search=sharing)),
-    "inputs-stay-untouched": ("changed array 0", like(RandomMaps, search=writing)),
+    "inputs-stay-untouched": (
+        "it wrote to table.similarity of a problem of 4 on 6 objects",
+        like(RandomMaps, search=writing),
+    ),
 }
 
 
@@ -551,7 +554,7 @@ HISTOGRAMS = {
     ),
     "threads-agree": ("4 threads", like(Centres, describe=sharing_the_scene)),
     "inputs-stay-untouched": (
-        "changed array 0",
+        "it wrote to pairs of a scene of 5 objects",
         like(Centres, describe=describe(changing_the_pairs)),
     ),
 }
@@ -564,7 +567,9 @@ def sharing_rows(self, aligned, argument):
 
 
 def writing_rows(self, aligned, argument):
-    aligned *= 1.0 + 1e-13
+    for rows in (aligned, argument):
+        if rows.flags.writeable:
+            np.multiply(rows, 1.0 + 1e-13, out=rows)
     return Cosine.compare(self, aligned, argument)
 
 
@@ -596,7 +601,10 @@ SIMILARITIES = {
         like(Cosine, __init__=noisy, compare=compare(lambda values, self: values / self.noise)),
     ),
     "threads-agree": ("4 threads", like(Cosine, compare=sharing_rows)),
-    "inputs-stay-untouched": ("changed array 0", like(Cosine, compare=writing_rows)),
+    "inputs-stay-untouched": (
+        "it wrote to aligned and argument of 12 pairs of rows",
+        like(Cosine, compare=writing_rows),
+    ),
 }
 
 
@@ -619,7 +627,8 @@ def sharing_the_source(self, source):
 
 def writing_the_source(self, source):
     found = Boxes.segment(self, source)
-    source.polygons[0].rings[0][0] += 1e-9
+    if source.polygons[0].rings[0].flags.writeable:
+        source.polygons[0].rings[0][0] += 1e-9
     return found
 
 
@@ -677,7 +686,10 @@ SEGMENTERS = {
         like(Boxes, __init__=noisy, segment=segment(lambda ring, self: ring * self.noise)),
     ),
     "threads-agree": ("4 threads", like(Boxes, segment=sharing_the_source)),
-    "inputs-stay-untouched": ("changed array 0", like(Boxes, segment=writing_the_source)),
+    "inputs-stay-untouched": (
+        "it wrote to polygons[0].rings[0] of a source of type polygon_set",
+        like(Boxes, segment=writing_the_source),
+    ),
 }
 
 BROKEN = [
@@ -724,6 +736,82 @@ def test_every_check_has_a_class_that_breaks_it():
     tested = {case.values[0] for case in BROKEN}
     known = {check.name for algorithm in GOOD for check in plugin_checks(algorithm)}
     assert known == tested
+
+
+def writing_sigma(self, problem, rng):
+    problem.table.similarity[0] = 0.5
+    return (yield from RandomMaps.search(self, problem, rng))
+
+
+def writing_weights(self, problem, rng):
+    problem.weights = (1.0, 0.0, 0.0)
+    return (yield from RandomMaps.search(self, problem, rng))
+
+
+def sorting_pairs(self, scene, pairs):
+    pairs.sort(axis=1)
+    return Centres.describe(self, scene, pairs)
+
+
+def normalising(self, aligned, argument):
+    aligned /= np.linalg.norm(aligned, axis=1)[:, None]
+    return Cosine.compare(self, aligned, argument)
+
+
+def cleaning(self, source):
+    for polygon in source.polygons:
+        np.nan_to_num(polygon.rings[0], copy=False)
+    return Boxes.segment(self, source)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "untouched", "elsewhere", "function", "words"),
+    [
+        (
+            like(RandomMaps, search=writing_sigma),
+            "table.similarity of a problem",
+            "odd-problems-are-solved",
+            "writing_sigma",
+            "ValueError: assignment destination is read-only",
+        ),
+        (
+            like(RandomMaps, search=writing_weights),
+            "what it is given, which is read-only",
+            "fmaps-are-legal",
+            "writing_weights",
+            "FrozenInstanceError: cannot assign to field 'weights'",
+        ),
+        (
+            like(Centres, describe=sorting_pairs),
+            "what it is given, which is read-only",
+            "dual-is-turned-by-half",
+            "sorting_pairs",
+            "ValueError: sort array is read-only",
+        ),
+        (
+            like(Cosine, compare=normalising),
+            "aligned of 12 pairs of rows",
+            "rows-are-compared-alone",
+            "normalising",
+            "ValueError: output array is read-only",
+        ),
+        (
+            like(Boxes, segment=cleaning),
+            "what it is given, which is read-only",
+            "blank-sources-are-refused",
+            "cleaning",
+            "ValueError: assignment destination is read-only",
+        ),
+    ],
+)
+def test_what_writes_to_its_input_is_told_so_by_every_check(
+    algorithm, untouched, elsewhere, function, words
+):
+    said = violations(algorithm)
+    assert f"it wrote to {untouched}" in said["inputs-stay-untouched"]
+    sentence = said[elsewhere]
+    assert f": it wrote to what it is given, which is read-only, and raised {words} at " in sentence
+    assert re.search(rf" at test_plugin_checks\.py, line \d+, in {function}; expected: ", sentence)
 
 
 def unpaired(rows, _, pairs, __):

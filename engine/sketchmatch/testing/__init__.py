@@ -26,6 +26,8 @@ How often is the best map of all the true one?
 """
 
 from sketchmatch.testing.conformance import (
+    CheckResult,
+    CheckState,
     ContractViolationError,
     PluginCheck,
     SearchReport,
@@ -56,6 +58,8 @@ from sketchmatch.testing.sketches import (
 from sketchmatch.testing.sloppy import SloppySketch, draw_sloppily
 
 __all__ = [
+    "CheckResult",
+    "CheckState",
     "ContractViolationError",
     "Lidar",
     "LogOddsGrid",

@@ -5,10 +5,19 @@ from sketchmatch.testing.conformance.checking import (
     parametrize_plugins,
     plugin_checks,
 )
-from sketchmatch.testing.conformance.contract import ContractViolationError, PluginCheck
+from sketchmatch.testing.conformance.contract import (
+    TIME_LIMIT,
+    CheckResult,
+    CheckState,
+    ContractViolationError,
+    PluginCheck,
+)
 from sketchmatch.testing.conformance.report import SearchReport, search_report
 
 __all__ = [
+    "TIME_LIMIT",
+    "CheckResult",
+    "CheckState",
     "ContractViolationError",
     "PluginCheck",
     "SearchReport",

@@ -15,6 +15,7 @@ from sketchmatch.testing.conformance import (
     similarities,
 )
 from sketchmatch.testing.conformance.contract import (
+    TIME_LIMIT,
     Contract,
     ContractViolationError,
     PluginCheck,
@@ -29,6 +30,9 @@ Reasons = Mapping[str, str]
 """By the name of a check why a class is expected to fail it."""
 
 _NONE: Reasons = MappingProxyType({})
+_COMPILING = 5
+"""How many times longer a warm-up may take, in which kernels are compiled."""
+
 _CONTRACTS: dict[Kind, Callable[[type[Any]], Sequence[Contract]]] = {
     Kind.SEGMENTER: segmenters.contracts,
     Kind.HISTOGRAM: lambda _: histograms.CONTRACTS,
@@ -37,7 +41,11 @@ _CONTRACTS: dict[Kind, Callable[[type[Any]], Sequence[Contract]]] = {
 }
 
 
-def check_plugin(algorithm: type[Any], expected_failures: Reasons = _NONE) -> None:
+def check_plugin(
+    algorithm: type[Any],
+    expected_failures: Reasons = _NONE,
+    time_limit: float | None = TIME_LIMIT,
+) -> None:
     """Put a class to every contract of its kind.
 
     It is used with its default parameters, on small inputs made for the purpose: some seconds a
@@ -49,11 +57,14 @@ def check_plugin(algorithm: type[Any], expected_failures: Reasons = _NONE) -> No
         A class that derives from one of the four interfaces in :mod:`sketchmatch.api`.
     expected_failures
         Names of checks that it fails, and why that is accepted.
+    time_limit
+        Seconds that each check may take, and its warm-up five times as many; None for no limit.
 
     Raises
     ------
     ContractViolationError
-        At the first contract that it breaks, or that it keeps though it was expected to fail.
+        At the first contract that it breaks, whose check does not end in time, or that it keeps
+        though it was expected to fail.
     ValueError
         If an expected failure names no check.
     TypeError
@@ -74,15 +85,22 @@ def check_plugin(algorithm: type[Any], expected_failures: Reasons = _NONE) -> No
     >>> check_plugin(CityBlock)
     """
     _refuse_unknown(algorithm, expected_failures)
-    for check in plugin_checks(algorithm):
+    for check in plugin_checks(algorithm, time_limit):
         if check.name not in expected_failures:
             check()
         else:
             _must_fail(check)
 
 
-def plugin_checks(algorithm: type[Any]) -> Iterator[PluginCheck]:
+def plugin_checks(
+    algorithm: type[Any], time_limit: float | None = TIME_LIMIT
+) -> Iterator[PluginCheck]:
     """Yield every contract of a class's kind as a check; each can be called by itself.
+
+    Parameters
+    ----------
+    algorithm, time_limit
+        As for :func:`check_plugin`.
 
     Examples
     --------
@@ -92,12 +110,15 @@ def plugin_checks(algorithm: type[Any]) -> Iterator[PluginCheck]:
     """
     kind = every_kind.kind_of_class(algorithm)
     for contract in (*every_kind.CONTRACTS, *_CONTRACTS[kind](algorithm)):
-        yield PluginCheck.of(contract, algorithm)
+        compiles = time_limit is not None and contract is every_kind.warm_up_can_be_repeated
+        limit = time_limit * _COMPILING if compiles else time_limit
+        yield PluginCheck.of(contract, algorithm, limit)
 
 
 def parametrize_plugins(
     classes: Sequence[type[Any]],
     expected_failures: Mapping[type[Any], Reasons] = MappingProxyType({}),
+    time_limit: float | None = TIME_LIMIT,
 ) -> pytest.MarkDecorator:
     """Return a pytest decorator that makes one test of each class and check.
 
@@ -114,6 +135,8 @@ def parametrize_plugins(
     expected_failures
         By class the names of checks that it fails and why that is accepted; such a test is
         marked ``xfail(strict=True)``, so that it fails once the check passes.
+    time_limit
+        As for :func:`check_plugin`.
 
     Raises
     ------
@@ -129,7 +152,7 @@ def parametrize_plugins(
     cases = []
     for algorithm in classes:
         reasons = expected_failures.get(algorithm, _NONE)
-        for check in plugin_checks(algorithm):
+        for check in plugin_checks(algorithm, time_limit):
             expected = pytest.mark.xfail(
                 check.name in reasons,
                 reason=reasons.get(check.name, ""),

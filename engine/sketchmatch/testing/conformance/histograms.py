@@ -11,8 +11,9 @@ import numpy as np
 
 from sketchmatch.api import Histogram
 from sketchmatch.model import FloatArray, IntArray, Scene, SceneObject, object_pairs
+from sketchmatch.model.arrays import sealed
 from sketchmatch.testing.conformance.contract import Contract, require
-from sketchmatch.testing.conformance.use import Use, contracts_of_use, writable_view
+from sketchmatch.testing.conformance.use import Use, contracts_of_use, view_within
 from sketchmatch.testing.sketches import random_scene
 
 __all__ = ["CONTRACTS"]
@@ -47,7 +48,7 @@ def directions_go_counter_clockwise(algorithm: type[Any]) -> None:
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     for quarter, step in enumerate(([4.0, 0.0], [0.0, 4.0], [-4.0, 0.0], [0.0, -4.0])):
         scene = Scene.from_polygons([square + step, square])
-        row = _of(algorithm).describe(scene, np.array([[0, 1]]))[0]
+        row = _of(algorithm).describe(scene, sealed(np.array([[0, 1]])))[0]
         angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
         main = math.atan2(row @ np.sin(angles), row @ np.cos(angles))
         off = abs((main - quarter * np.pi / 2.0 + np.pi) % (2.0 * np.pi) - np.pi)
@@ -101,11 +102,13 @@ def pairs_are_described_alone(algorithm: type[Any]) -> None:
 
 
 def _uses() -> Iterator[Use]:
-    for scene in (_scene(), _moved(angle=1.0)):
-        pairs = writable_view(_pairs())
-        rings = tuple(ring for item in scene.objects for ring in item.rings)
-        answer = partial(_answer, scene, pairs)
-        yield Use("a scene of 5 objects", (pairs, *rings, *scene.edges), answer)
+    for angle in (0.0, 1.0):
+        scene, pairs = _moved(angle), view_within(_pairs())
+        inputs = {"pairs": pairs}
+        for k, item in enumerate(scene.objects):
+            inputs |= {f"objects[{k}].rings[{n}]": ring for n, ring in enumerate(item.rings)}
+        inputs |= {f"edges.{name}": array for name, array in scene.edges._asdict().items()}
+        yield Use("a scene of 5 objects", inputs, partial(_answer, scene, pairs))
 
 
 def _answer(scene: Scene, pairs: IntArray, histogram: Histogram) -> Hashable:
@@ -169,9 +172,8 @@ def _described(
     pairs: IntArray | None = None,
     directions: int = _DIRECTIONS,
 ) -> FloatArray:
-    return _of(algorithm, directions).describe(
-        _scene() if scene is None else scene, _pairs() if pairs is None else pairs
-    )
+    given = _pairs() if pairs is None else pairs
+    return _of(algorithm, directions).describe(_scene() if scene is None else scene, sealed(given))
 
 
 def _alike(rows: FloatArray, others: FloatArray, problem: str) -> None:

@@ -163,9 +163,11 @@ def _found(source: Source, segmenter: Segmenter) -> Hashable:
 def _upper_half(source: Source) -> tuple[float, float]:
     """Return the lowest and highest y at which the sample of a source has something."""
     if isinstance(source, StrokeSet | PolygonSet):
-        y = np.concatenate(memory_of(source))[:, 1]
+        y = np.concatenate([*memory_of(source).values()])[:, 1]
         return float(y.min()), float(y.max())
-    rows = len(memory_of(source)[0]) * (RESOLUTION if isinstance(source, OccupancyGrid) else 1.0)
+    rows = len(next(iter(memory_of(source).values()))) * (
+        RESOLUTION if isinstance(source, OccupancyGrid) else 1.0
+    )
     return rows / 2.0, rows
 
 

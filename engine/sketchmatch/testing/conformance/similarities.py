@@ -10,8 +10,9 @@ import numpy as np
 
 from sketchmatch.api import Alignment, ProductSimilarity, Similarity
 from sketchmatch.model import FloatArray
-from sketchmatch.testing.conformance.contract import Contract, require
-from sketchmatch.testing.conformance.use import Use, contracts_of_use, writable_view
+from sketchmatch.model.arrays import sealed
+from sketchmatch.testing.conformance.contract import Contract, require, require_applicable
+from sketchmatch.testing.conformance.use import Use, contracts_of_use, view_within
 
 __all__ = ["CONTRACTS"]
 
@@ -27,7 +28,7 @@ def alignment_is_known(algorithm: type[Any]) -> None:
 def similarity_is_within_0_and_1(algorithm: type[Any]) -> None:
     """Return one float64 within [0, 1] for each pair of rows."""
     for first, second in (_histograms(), _alone(), _histograms(4)):
-        values = algorithm().compare(first, second)
+        values = _compared(algorithm, first, second)
         fits = isinstance(values, np.ndarray) and values.dtype == np.float64
         require(fits, f"compare() returned {type(values).__name__}s of {np.asarray(values).dtype}")
         require(values.shape == (len(first),), f"it has shape {values.shape} for {len(first)} rows")
@@ -38,7 +39,7 @@ def similarity_is_within_0_and_1(algorithm: type[Any]) -> None:
 def equal_rows_have_similarity_1(algorithm: type[Any]) -> None:
     """Return 1 for equal histograms, to 1e-9."""
     for rows in (*_histograms(), _alone()[0]):
-        values = algorithm().compare(rows, rows.copy())
+        values = _compared(algorithm, rows, rows)
         off = np.abs(values - 1.0).max()
         require(off <= _CLOSE, f"equal rows have {values[np.abs(values - 1.0).argmax()]:.9f}")
 
@@ -46,10 +47,10 @@ def equal_rows_have_similarity_1(algorithm: type[Any]) -> None:
 def rows_are_compared_alone(algorithm: type[Any]) -> None:
     """Give a pair of rows the same value whatever rows come with it."""
     first, second = _histograms()
-    whole = algorithm().compare(first, second)
+    whole = _compared(algorithm, first, second)
     for size in (1, 5):
         parts = [
-            algorithm().compare(first[k : k + size], second[k : k + size])
+            _compared(algorithm, first[k : k + size], second[k : k + size])
             for k in range(0, _ROWS, size)
         ]
         off = np.abs(np.concatenate(parts) - whole).max()
@@ -58,14 +59,14 @@ def rows_are_compared_alone(algorithm: type[Any]) -> None:
 
 def combine_agrees_with_compare(algorithm: type[Any]) -> None:
     """Combine sums of products, of any shape, to what compare() gives for the rows."""
-    if not issubclass(algorithm, ProductSimilarity):
-        return
+    product = issubclass(algorithm, ProductSimilarity)
+    require_applicable(product, "it derives from Similarity, and not from ProductSimilarity")
     first, second = _histograms()
     squares = (first * first).sum(axis=1), (second * second).sum(axis=1)
     table = algorithm().combine(first @ second.T, squares[0][:, None], squares[1])
     require(table.shape == (_ROWS, _ROWS), f"combine() returned shape {table.shape} for a table")
     for k in range(_ROWS):
-        rows = algorithm().compare(first, np.tile(second[k], (_ROWS, 1)))
+        rows = _compared(algorithm, first, np.tile(second[k], (_ROWS, 1)))
         off = np.abs(table[:, k] - rows).max()
         require(off <= _CLOSE, f"combine() and compare() differ by {off:.2g}")
 
@@ -73,8 +74,8 @@ def combine_agrees_with_compare(algorithm: type[Any]) -> None:
 def _uses() -> Iterator[Use]:
     first, second = _histograms()
     for one, other in ((first, second), (second, second[::-1])):
-        rows = (writable_view(one), writable_view(other))
-        yield Use(f"{_ROWS} pairs of rows", rows, partial(_answer, *rows))
+        rows = {"aligned": view_within(one), "argument": view_within(other)}
+        yield Use(f"{_ROWS} pairs of rows", rows, partial(_answer, *rows.values()))
 
 
 def _answer(first: FloatArray, second: FloatArray, similarity: Similarity) -> Hashable:
@@ -99,6 +100,11 @@ def _histograms(directions: int = _DIRECTIONS) -> tuple[FloatArray, FloatArray]:
     rows[..., 0] += 0.01  # no row is all zero
     rows /= rows.mean(axis=2, keepdims=True)
     return rows[0], rows[1]
+
+
+def _compared(algorithm: type[Any], aligned: FloatArray, argument: FloatArray) -> Any:
+    """Compare copies that cannot be written to."""
+    return algorithm().compare(sealed(aligned.copy()), sealed(argument.copy()))
 
 
 def _alone() -> tuple[FloatArray, FloatArray]:

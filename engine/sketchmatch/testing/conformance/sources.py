@@ -20,6 +20,7 @@ from sketchmatch.model import (
     Stroke,
     StrokeSet,
 )
+from sketchmatch.model.arrays import frozen_floats
 from sketchmatch.testing.drawing import draw_strokes
 from sketchmatch.testing.sketches import random_scene
 
@@ -49,7 +50,7 @@ def sample_source(kind: type[Any], *, mirrored: bool = False) -> Source:
     if kind is StrokeSet:
         return draw_strokes(Scene.from_polygons(rings), np.random.default_rng(4))
     if kind is PolygonSet:
-        return PolygonSet(tuple(LabelledPolygon((ring,)) for ring in rings))
+        return _polygons(*rings)
     return Image(_painted(rings))
 
 
@@ -58,17 +59,21 @@ def blank_sources(kind: type[Any]) -> Mapping[str, Source]:
     return _BLANK[kind]
 
 
-def memory_of(source: Source) -> tuple[NDArray[Any], ...]:
-    """Return the arrays of a source."""
+def memory_of(source: Source) -> Mapping[str, NDArray[Any]]:
+    """Return the arrays of a source, by the names that they have there."""
     match source:
         case StrokeSet(strokes):
-            return tuple(stroke.points for stroke in strokes)
+            return {f"strokes[{k}].points": stroke.points for k, stroke in enumerate(strokes)}
         case PolygonSet(polygons):
-            return tuple(ring for item in polygons for ring in item.rings)
+            return {
+                f"polygons[{k}].rings[{n}]": ring
+                for k, item in enumerate(polygons)
+                for n, ring in enumerate(item.rings)
+            }
         case OccupancyGrid(cells):
-            return (cells,)
+            return {"cells": cells}
         case Image(pixels):
-            return (pixels,)
+            return {"pixels": pixels}
 
 
 def _two_rooms() -> NDArray[np.int8]:
@@ -112,7 +117,7 @@ def _strokes(*points: Any) -> StrokeSet:
 
 
 def _polygons(*rings: Any) -> PolygonSet:
-    return PolygonSet(tuple(LabelledPolygon((np.array(ring, dtype=float),)) for ring in rings))
+    return PolygonSet(tuple(LabelledPolygon((frozen_floats(ring),)) for ring in rings))
 
 
 _BLANK: Mapping[type[Any], Mapping[str, Source]] = MappingProxyType(

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sketchmatch.testing.conformance.contract import Contract, require
+from sketchmatch.model.arrays import sealed
+from sketchmatch.testing.conformance.contract import BrokenError, Contract, require
+from sketchmatch.testing.conformance.time_limit import together
 
-__all__ = ["Use", "contracts_of_use", "writable_view"]
+__all__ = ["Use", "contracts_of_use", "view_within"]
 
 _THREADS = 4
 
@@ -26,20 +28,20 @@ class Use:
     given
         In words.
     inputs
-        The memory of what the algorithm is given.
+        The memory of what the algorithm is given, by name; read-only, as all that the host gives.
     answer
         Uses an algorithm and returns its answer.
     """
 
     given: str
-    inputs: tuple[NDArray[Any], ...]
+    inputs: Mapping[str, NDArray[Any]]
     answer: Callable[[Any], Hashable]
 
 
-def writable_view(array: NDArray[Any]) -> NDArray[Any]:
-    """Return a view of a copy of an array, the middle third of its base."""
+def view_within(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a read-only view of a copy of an array, the middle third of its base."""
     middle: NDArray[Any] = np.stack([array, array, array])[1]
-    return middle
+    return sealed(middle)
 
 
 def contracts_of_use(uses: Callable[[], Iterable[Use]]) -> tuple[Contract, ...]:
@@ -65,22 +67,32 @@ def contracts_of_use(uses: Callable[[], Iterable[Use]]) -> tuple[Contract, ...]:
             return [use.answer(one) for use in (*uses(), *uses(), *uses())]
 
         alone = answers()
-        with ThreadPoolExecutor(_THREADS) as pool:
-            together = [each.result() for each in [pool.submit(answers) for _ in range(_THREADS)]]
         require(
-            all(each == alone for each in together),
+            all(each == alone for each in together(answers, _THREADS)),
             f"{_THREADS} threads with one object did not all get the answers of one alone",
         )
 
     def inputs_stay_untouched(algorithm: type[Any]) -> None:
         """Leave what it is given as it is, byte by byte."""
-        for use in uses():
-            before = [_memory(array) for array in use.inputs]
-            use.answer(algorithm())
-            for k, (array, memory) in enumerate(zip(use.inputs, before, strict=True)):
-                require(_memory(array) == memory, f"it changed array {k} of {use.given}")
+        for use, sealed_use in zip(uses(), uses(), strict=True):
+            _use_writable(algorithm, use)
+            sealed_use.answer(algorithm())  # raises where something is written that was there
 
     return (answers_repeat, threads_agree, inputs_stay_untouched)
+
+
+def _use_writable(algorithm: type[Any], use: Use) -> None:
+    """Let an algorithm write where it should not, and say where it did."""
+    before = {name: _memory(array) for name, array in use.inputs.items()}
+    for array in use.inputs.values():
+        with suppress(ValueError):  # a part of what is read-only stays so
+            array.flags.writeable = True
+    try:
+        use.answer(algorithm())
+    finally:
+        wrote = [name for name, array in use.inputs.items() if _memory(array) != before[name]]
+        if wrote:
+            raise BrokenError(f"it wrote to {' and '.join(wrote)} of {use.given}")
 
 
 def _memory(array: NDArray[Any]) -> bytes:
