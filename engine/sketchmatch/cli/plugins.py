@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
-app = typer.Typer(help="List and describe what there is to choose from, or begin a plugin.")
+app = typer.Typer(
+    help="List and describe what there is to choose from, or begin and check a plugin."
+)
 app.command("new")(new.new)
 
 _Kind = Annotated[
@@ -29,7 +31,7 @@ _Kind = Annotated[
 
 @app.callback()
 def plugins() -> None:
-    """List and describe what there is to choose from, or begin a plugin."""
+    """List and describe what there is to choose from, or begin and check a plugin."""
 
 
 @app.command("list")
@@ -65,6 +67,38 @@ def show(
         _print_json(item)
     else:
         listing.show_algorithm(item)
+
+
+@app.command("check")
+def check(
+    distribution: Annotated[
+        str,
+        typer.Argument(metavar="DISTRIBUTION", help="What pip calls it, as in sketchmatch-tabu."),
+    ],
+    time_limit: Annotated[
+        float,
+        typer.Option(
+            "--time-limit",
+            metavar="SECONDS",
+            min=0.001,
+            max=86400.0,
+            help="How long one check may take; a warm-up, which compiles, five times as long.",
+        ),
+    ] = 120.0,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
+) -> None:
+    """Check whether all that an installed distribution offers keeps the contracts of its kind.
+
+    Each check is listed with its result, what it took and a sentence. One that does not end is
+    ended. The exit code is 0 if none failed, and 5 otherwise.
+    """
+    from sketchmatch.cli import checks
+    from sketchmatch.cli.app import ExitCode
+    from sketchmatch.testing.conformance.apart import check_distribution
+
+    results = check_distribution(distribution, time_limit)
+    if not checks.show(distribution, results, as_json=json):
+        raise typer.Exit(ExitCode.ALGORITHM_FAILED)
 
 
 @app.command("reference")

@@ -1,0 +1,103 @@
+"""``sketchmatch plugins check``: what came of each check, as soon as it is known."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from importlib.metadata import version
+from typing import Any
+
+from rich.console import Console
+from rich.padding import Padding
+from rich.text import Text
+
+from sketchmatch.cli.options import say
+from sketchmatch.testing import CheckState
+from sketchmatch.testing.conformance.apart import Checked
+
+__all__ = ["show"]
+
+_STYLES = {CheckState.PASSED: "green", CheckState.FAILED: "bold red", CheckState.SKIPPED: "yellow"}
+_COLUMNS = ("kind", "algorithm", "check", "result", "seconds", "sentence")
+_INDENT = 20
+
+
+def show(distribution: str, results: Iterable[Checked], *, as_json: bool) -> bool:
+    """Print what came of each check of a distribution, and return whether none failed."""
+    if as_json:
+        done = list(results)
+        print(json.dumps(_document(distribution, done), ensure_ascii=False, indent=2))
+    else:
+        done = list(_printed(results))
+    counts, seconds = _counts(done), sum(each.result.seconds for each in done)
+    how_many = ", ".join(f"{count} {state}" for state, count in counts.items())
+    say(f"{distribution} {version(distribution)}: {how_many} in {seconds:.1f} s")
+    return not counts["failed"]
+
+
+def _printed(results: Iterable[Checked]) -> Iterator[Checked]:
+    show_one = _on_a_terminal() if sys.stdout.isatty() else _in_a_pipe()
+    for each in results:
+        show_one(each)
+        yield each
+
+
+def _on_a_terminal() -> Callable[[Checked], None]:
+    console, shown = Console(), set[tuple[str, str]]()
+
+    def show_one(each: Checked) -> None:
+        result = each.result
+        if (each.kind, each.algorithm) not in shown:
+            shown.add((each.kind, each.algorithm))
+            console.print(Text(f"{each.kind} {each.algorithm}".strip(), "bold"))
+        state = (f"{result.state:8} {result.seconds:7.2f} s  ", _STYLES[result.state])
+        console.print(Text.assemble(state, result.name))
+        console.print(
+            Padding(Text(_sentence(each), "" if result.seen else "dim"), (0, 0, 0, _INDENT))
+        )
+
+    return show_one
+
+
+def _in_a_pipe() -> Callable[[Checked], None]:
+    print(*_COLUMNS, sep="\t", flush=True)
+
+    def show_one(each: Checked) -> None:
+        result = each.result
+        cells = (each.kind, each.algorithm, result.name, result.state, f"{result.seconds:.2f}")
+        print(*cells, _sentence(each), sep="\t", flush=True)
+
+    return show_one
+
+
+def _sentence(each: Checked) -> str:
+    """Return what was seen, or else what is demanded, in one line."""
+    return " ".join((each.result.seen or each.result.demand).split())
+
+
+def _document(distribution: str, done: Sequence[Checked]) -> dict[str, Any]:
+    return {
+        "distribution": distribution,
+        "version": version(distribution),
+        **_counts(done),
+        "checks": [
+            {
+                "kind": each.kind,
+                "algorithm": each.algorithm,
+                "check": each.result.name,
+                "result": str(each.result.state),
+                "sentence": _sentence(each),
+                "demand": each.result.demand,
+                "overdue": each.result.overdue,
+                "seconds": round(each.result.seconds, 3),
+            }
+            for each in done
+        ],
+    }
+
+
+def _counts(results: Iterable[Checked]) -> dict[str, int]:
+    found = Counter(each.result.state for each in results)
+    return {str(state): found[state] for state in CheckState}
