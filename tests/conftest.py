@@ -1,5 +1,3 @@
-import os
-
 from hypothesis import HealthCheck, settings
 from hypothesis.database import DirectoryBasedExampleDatabase
 
@@ -17,8 +15,6 @@ settings.register_profile(
     print_blob=True,
     **_ANY_MACHINE,
 )
-# The same ones but fewer, where kernels run as plain Python.
-settings.register_profile("interpreted", settings.get_profile("same"), max_examples=10)
-settings.load_profile("interpreted" if os.environ.get("NUMBA_DISABLE_JIT") == "1" else "same")
+settings.load_profile("same")
 
 let_children_be_interrupted()

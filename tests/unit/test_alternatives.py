@@ -7,14 +7,21 @@ import pytest
 
 from sketchmatch import InvalidInputError, Scene, match
 from sketchmatch.api import Outcome, Searcher, SearchProgress
-from sketchmatch.model import Fmap
+from sketchmatch.kernels.exchange import omission_confidences
+from sketchmatch.model import Fmap, RelationTable, object_pairs
 from sketchmatch.pipeline.alternatives import best_others, exchange_confidences, partner_margins
-from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
+from sketchmatch.pipeline.correspond import (
+    confidence_relations,
+    fmap_confidence,
+    object_map,
+    occm,
+)
 from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import Choice
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
-from tests.strategies import random_table
+from tests.oracle import maps
+from tests.strategies import random_table, with_evidence, with_rotation_weights
 
 WEIGHTS = (1.0, 1.0, 1.0)
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
@@ -42,6 +49,36 @@ def test_an_exchange_has_the_confidence_of_the_map_that_it_makes(few, many):
         changed = [best[g] if partner == h else partner for partner in best]
         changed[g] = h
         assert computed[g, h] == pytest.approx(zeta(changed, table), abs=1e-12)
+
+
+@pytest.mark.parametrize("evidence", [False, True])
+@pytest.mark.parametrize(("few", "many"), [(3, 3), (4, 4), (5, 7)])
+def test_an_omission_has_the_confidence_of_what_is_left(few, many, evidence):
+    rng = np.random.default_rng(few + many)
+    table = random_table(rng, few, many)
+    if evidence:
+        table = with_rotation_weights(rng, with_evidence(rng, table))
+    partners, weights = rng.permutation(many)[:few].tolist(), (1.0, 2.0, 0.5)
+    computed = omission_confidences(
+        Fmap.from_object_map(np.array(partners), many).entries,
+        object_pairs(few),
+        table.rotation_weights,
+        confidence_relations(table, weights),
+    )
+    for g in range(few):
+        rows = [i for i, pair in enumerate(maps.pairs(few)) if g not in pair]
+        part = RelationTable(
+            table.similarity[rows],
+            table.rotation[rows],
+            table.dilation[rows],
+            few - 1,
+            many,
+            None if table.evidence is None else table.evidence[rows],
+            table.rotation_weights[rows],
+        )
+        left = [partner for k, partner in enumerate(partners) if k != g]
+        expected = maps.confidence(part, maps.induced(left), weights)[0]
+        assert computed[g] == pytest.approx(expected, abs=1e-9)
 
 
 def test_the_alternatives_are_the_best_of_those_known_and_all_different():

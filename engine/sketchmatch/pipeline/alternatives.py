@@ -20,7 +20,12 @@ from sketchmatch.model import (
     correspondences,
     object_pairs,
 )
-from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
+from sketchmatch.pipeline.correspond import (
+    confidence_relations,
+    fmap_confidence,
+    object_map,
+    occm,
+)
 
 __all__ = ["Alternative", "best_others", "exchange_confidences", "partner_margins"]
 
@@ -58,18 +63,11 @@ def exchange_confidences(
     count = table.template_objects * table.argument_objects
     if count * table.template_pairs > _MAX_EXCHANGED_ENTRIES:
         return None
-    relations = (
-        table.entry_evidence,
-        table.cosine,
-        table.sine,
-        table.normalized_dilation,
-        np.array(weights, dtype=np.float64),
-    )
     return exchange.exchange_confidences(
         mapped.partners,
         object_pairs(table.template_objects),
         correspondences(table.argument_objects),
-        relations,
+        confidence_relations(table, weights),
     )
 
 

@@ -20,6 +20,7 @@ from sketchmatch.model import (
 )
 
 __all__ = [
+    "confidence_relations",
     "fmap_confidence",
     "global_dilation",
     "global_rotation",
@@ -59,21 +60,28 @@ def fmap_confidence(
     >>> fmap_confidence(Fmap([0]), table)
     Confidence(total=1.0, similarity=1.0, rotation=1.0, dilation=1.0, shape=None, size=None)
     """
-    scratch = np.empty(table.template_pairs)
+    scratch, relations = np.empty(table.template_pairs), confidence_relations(table, weights)
     total, similarity, rotation, dilation = kernels.fmap_confidence(
-        fmap.entries,
-        scratch,
-        table.entry_evidence,
-        table.cosine,
-        table.sine,
-        table.normalized_dilation,
-        np.array(weights, dtype=np.float64),
+        fmap.entries, scratch, *relations
     )
     if table.evidence is not None:
         similarity = _entry_similarity(fmap, table).mean()
     shape, size = (None, None) if own is None else own_confidence(fmap, table, own)
     return Confidence(
         float(total), float(similarity), float(rotation), float(dilation), shape, size
+    )
+
+
+def confidence_relations(
+    table: RelationTable, weights: Weights
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the evidence, cos R, sin R, L̂ and the weights, as kernels of ζ take them."""
+    return (
+        table.entry_evidence,
+        table.cosine,
+        table.sine,
+        table.normalized_dilation,
+        np.array(weights, dtype=np.float64),
     )
 
 

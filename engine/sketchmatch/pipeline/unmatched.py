@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sketchmatch.api import Outcome, SearchProgress
+from sketchmatch.kernels import exchange
 from sketchmatch.kernels.evidence import SelfRelations
 from sketchmatch.model import (
     Confidence,
@@ -25,7 +26,12 @@ from sketchmatch.model import (
 )
 from sketchmatch.model.arrays import sealed
 from sketchmatch.model.caching import cached_property
-from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
+from sketchmatch.pipeline.correspond import (
+    confidence_relations,
+    fmap_confidence,
+    object_map,
+    occm,
+)
 from sketchmatch.pipeline.slices import in_slices
 
 __all__ = [
@@ -259,24 +265,9 @@ def omission_confidences(fmap: Fmap, table: RelationTable, weights: Weights) -> 
     objects, pairs = table.template_objects, object_pairs(table.template_objects)
     if objects <= FEWEST or objects * len(pairs) > _MOST_ENTRIES:
         return None
-    rows, columns = np.arange(len(pairs)), fmap.entries % table.argument_pairs
-    turned = np.where(fmap.entries < table.argument_pairs, 1.0, -1.0)
-    evidence = table.entry_evidence
-    counts = evidence[rows, columns if table.evidence is None else fmap.entries]
-    others = (pairs != np.arange(objects)[:, None, None]).all(axis=2)
-    kept = np.nonzero(others)[1].reshape(objects, -1)
-    x = (turned * table.cosine[rows, columns])[kept].sum(axis=1)
-    y = (turned * table.sine[rows, columns])[kept].sum(axis=1)
-    rotations = np.hypot(x, y) / table.rotation_weights[kept].sum(axis=1)
-    levels = np.sort(table.normalized_dilation[rows, columns][kept], axis=1)
-    count = kept.shape[1]
-    ranks = 2.0 * np.arange(count) - count + 1.0
-    apart = 2.0 * (levels @ ranks) / max(1, count * (count - 1))
-    shares = np.array(weights) / sum(weights)
-    confidences: FloatArray = (
-        shares[0] * counts[kept].mean(axis=1) + shares[1] * rotations + shares[2] * np.exp2(-apart)
+    return exchange.omission_confidences(
+        fmap.entries, pairs, table.rotation_weights, confidence_relations(table, weights)
     )
-    return confidences
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from sketchmatch.pipeline.evidence import compare_objects, weigh_objects
 from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, default_names
 from sketchmatch.pipeline.slices import finish
+from sketchmatch.pipeline.unmatched import omission_confidences
 from sketchmatch.registry import Kind, Registered, Registry
 
 __all__ = ["COMPILING", "announcing_compilation", "warm_up", "warm_up_others"]
@@ -62,6 +63,8 @@ def warm_up(
     fmap = Fmap(np.array([0]))
     fmap_confidence(fmap, table)
     exchange_confidences(object_map(occm(fmap, table)), table, (1.0, 1.0, 1.0))
+    four = RelationTable(np.ones((6, 6)), np.zeros((6, 6)), np.ones((6, 6)), 4, 4)
+    omission_confidences(Fmap.from_object_map(np.arange(4), 4), four, (1.0, 1.0, 1.0))
     corner = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     scene = Scene.from_polygons([corner, corner + 2.0])
     own = finish(compare_objects(scene, scene, 4))
