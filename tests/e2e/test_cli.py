@@ -512,6 +512,17 @@ def test_what_nobody_foresaw_is_exit_code_1_and_still_one_line(command_line, mon
     assert "Traceback" in command_line("match", *ROOM).stderr
 
 
+def test_the_end_of_a_file_does_not_look_like_ctrl_c(command_line, monkeypatch):
+    def failing(*_):
+        raise EOFError("Ran out of input")
+
+    monkeypatch.setattr(Application, "answers", failing)
+    done = command_line("match", *ROOM)
+    assert done.returncode == ExitCode.UNFORESEEN
+    assert "(EOFError: Ran out of input)" in done.stderr
+    assert "interrupted" not in done.stderr
+
+
 def test_ctrl_c_ends_a_long_match_soon_and_quietly(where):
     terminal = Terminal("match", *ROOM, *where, *LONG)
     terminal.wait_for("searching")

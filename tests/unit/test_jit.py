@@ -1,11 +1,14 @@
 """How kernels are compiled is said in one place, and old machine code never outlives its source."""
 
+import errno
+import hashlib
 import os
+import pickle
 import re
 import subprocess
 import sys
+from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 from platformdirs import user_cache_path
@@ -14,7 +17,7 @@ from sketchmatch.kernels import _jit
 from sketchmatch.kernels.confidence import fmap_confidence, mean_absolute_difference
 from sketchmatch.kernels.projection import project
 from tests.interpreted import compiled_only
-from tests.tools import ROOT, require
+from tests.tools import ROOT
 
 NUMBA = re.compile(r"\b(numba|n?jit)\b")
 
@@ -102,7 +105,6 @@ def write(folder, package):
 @pytest.mark.slow
 @compiled_only
 def test_the_same_source_elsewhere_is_not_compiled_again(tmp_path):
-    require(hasattr(numba.config, "CACHE_LOCATOR_CLASSES"), "a numba that asks where code is kept")
     for folder, printed in (("here", "20 walk step"), ("there", "20")):
         write(tmp_path / folder, PACKAGE)
         assert run_outer(tmp_path / folder, tmp_path / "cache") == printed
@@ -119,11 +121,53 @@ def test_a_module_of_the_same_source_and_another_name_has_its_own(tmp_path):
     assert run_outer(tmp_path) == "20 walk step"
 
 
+@pytest.mark.slow
 @compiled_only
-def test_a_cache_that_cannot_be_written_keeps_nothing_from_running(tmp_path):
+def test_two_processes_that_compile_at_once_leave_a_cache_that_is_whole(tmp_path):
     write(tmp_path, PACKAGE)
-    (tmp_path / "file").write_bytes(b"")
-    assert run_outer(tmp_path, tmp_path / "file" / "cache") == "20 walk step"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    command = [sys.executable, "-B", "outer.py"]
+    both = [subprocess.Popen(command, cwd=tmp_path, env=environment) for _ in range(2)]
+    assert [process.wait() for process in both] == [0, 0]
+    assert run_outer(tmp_path) == "20"
+
+
+FULL_DISK = {
+    "outer.py": """
+import resource
+from sketchmatch.kernels._jit import kernel
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))  # the probe of a temporary folder fits
+@kernel
+def step(x):
+    return x + 1
+@kernel
+def walk(x):
+    return 10 * step(x)
+print(walk(1))
+"""
+}
+
+
+@compiled_only
+def test_a_full_disk_keeps_nothing_from_running_and_is_told_of_once(tmp_path):
+    write(tmp_path, FULL_DISK)
+    usual, temporary = tmp_path / "usual", tmp_path / "temporary"
+    temporary.mkdir()
+    done = subprocess.run(
+        [sys.executable, "-B", "outer.py"],
+        cwd=tmp_path,
+        env={**os.environ, "NUMBA_CACHE_DIR": str(usual), "TMPDIR": str(temporary)},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout == "20\n"
+    assert done.stderr == (
+        f"sketchmatch cannot keep compiled kernels in {usual} (File too large) and compiles them "
+        "at each start; NUMBA_CACHE_DIR can name a folder that can be written\n"
+    )
+    left = [path for folder in (usual, temporary) for path in folder.rglob("*") if path.is_file()]
+    assert left == []
 
 
 MAKER = {
@@ -216,34 +260,174 @@ print(*(compiled() - warm), sep="\\n")
     assert done.stdout.split() == []
 
 
-def test_the_cache_lies_where_the_environment_says(tmp_path, monkeypatch):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert _jit._cache_folder(without_text).parent == tmp_path
-    before = numba.config.CACHE_DIR
-    _jit.kernel(without_text)
-    assert before == numba.config.CACHE_DIR, "kernels of other programs go where they went"
-
-
-def test_the_cache_lies_with_those_of_the_user_else(monkeypatch):
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    place = user_cache_path("sketchmatch", appauthor=False) / "kernels"
-    assert _jit._cache_folder(without_text).parent == place
-
-
 @compiled_only
-def test_compilation_is_announced_by_name_and_loading_is_not(tmp_path, monkeypatch):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+@pytest.mark.usefixtures("caches")
+def test_compilation_is_announced_by_name_and_loading_is_not():
+    assert compiled_by_a_call() == ["doubled"]
+    assert compiled_by_a_call() == []
+
+
+def compiled_by_a_call():
+    """Return the names of what a process compiles that knows nothing of earlier ones."""
 
     def doubled(x):
         return 2 * x
 
     names = []
-    first = _jit.kernel(doubled)
+    compiled = _jit.kernel(doubled)
     with _jit.on_compile(names.append):
-        assert first(21) == 42
-        assert first(1) == 2
-    assert names == ["doubled"]
-    again = _jit.kernel(doubled)
+        assert compiled(21) == 42
+        assert compiled(1) == 2
+    return names
+
+
+@pytest.fixture
+def caches(tmp_path, monkeypatch):
+    """Return where compiled kernels are kept, and where else, and begin with nothing told."""
+    usual, temporary = tmp_path / "usual", tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(usual))
+    monkeypatch.setattr(_jit, "gettempdir", lambda: str(temporary))
+    _jit._tell.cache_clear()
+    return usual, temporary
+
+
+def emptied(file):
+    file.write_bytes(b"")
+
+
+def cut_short(file):
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+
+
+def flipped(file):
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+
+
+def random(file):
+    file.write_bytes(np.random.default_rng(0).bytes(5000))
+
+
+def other_text(file):
+    file.write_text("{}\n", encoding="utf-8")
+
+
+def of_what_is_no_longer_there(file):
+    write_sealed(file, b"cno_such_module\nanything\n.")
+
+
+def of_another_numba(file):
+    held = pickle.loads(file.read_bytes()[32:])
+    write_sealed(file, pickle.dumps({key: pickle.dumps(("old",)) for key in held}))
+
+
+def write_sealed(file, content):
+    file.write_bytes(hashlib.sha256(content).digest() + content)
+
+
+@compiled_only
+@pytest.mark.parametrize(
+    "damage",
+    [
+        emptied,
+        cut_short,
+        flipped,
+        random,
+        other_text,
+        of_what_is_no_longer_there,
+        of_another_numba,
+    ],
+)
+def test_a_file_that_is_damaged_is_compiled_anew_and_written_over(caches, damage, caplog):
+    usual, temporary = caches
+    assert compiled_by_a_call() == ["doubled"]
+    (file,) = usual.iterdir()
+    damage(file)
+    assert compiled_by_a_call() == ["doubled"]
+    assert compiled_by_a_call() == []
+    assert (list(usual.iterdir()), list(temporary.rglob("*.code"))) == ([file], [])
+    assert caplog.messages == []
+
+
+@compiled_only
+def test_where_there_can_be_no_folder_kernels_are_kept_in_a_temporary_one(caches, caplog):
+    usual, temporary = caches
+    usual.write_bytes(b"a file")
+    assert compiled_by_a_call() == ["doubled"]
+    assert compiled_by_a_call() == []
+    (folder,) = temporary.iterdir()
+    assert caplog.messages == [
+        f"sketchmatch cannot keep compiled kernels in {usual} (File exists) and keeps them in "
+        f"{folder}; NUMBA_CACHE_DIR can name a folder that can be written"
+    ]
+
+
+@compiled_only
+def test_without_a_home_kernels_are_kept_in_a_temporary_folder(caches, caplog, monkeypatch):
+    _, temporary = caches
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    monkeypatch.setattr(_jit, "user_cache_path", lambda *_, **__: Path("~/.cache/sketchmatch"))
+    assert compiled_by_a_call() == ["doubled"]
+    assert compiled_by_a_call() == []
+    (folder,) = temporary.iterdir()
+    assert caplog.messages == [
+        "sketchmatch cannot keep compiled kernels in a home folder, because there is none, and "
+        f"keeps them in {folder}; NUMBA_CACHE_DIR can name a folder that can be written"
+    ]
+
+
+@compiled_only
+@pytest.mark.usefixtures("caches")
+def test_a_cache_that_can_only_be_read_is_read(caplog, monkeypatch):
+    assert compiled_by_a_call() == ["doubled"]
+
+    def refused(*_):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(_jit, "_write", refused)
+    assert compiled_by_a_call() == []
+    assert caplog.messages == []
+
+
+@compiled_only
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="temporary folders are each user's own here")
+def test_machine_code_in_a_folder_that_others_can_write_is_never_used(caches, caplog):
+    usual, temporary = caches
+    usual.write_bytes(b"a file")
+    folder = temporary / f"sketchmatch-{os.getuid()}"
+    compiled_by_a_call()
+    folder.chmod(0o777)
+    assert compiled_by_a_call() == ["doubled"]
+    assert "and compiles them at each start" in caplog.messages[-1]
+    link = temporary / "elsewhere"
+    folder.chmod(0o700)
+    folder.rename(link)
+    folder.symlink_to(link)
+    assert compiled_by_a_call() == ["doubled"]
+
+
+@compiled_only
+@pytest.mark.usefixtures("caches")
+def test_kernels_are_kept_side_by_side_for_each_types_of_arguments():
+    def doubled(x):
+        return 2 * x
+
+    first, again = _jit.kernel(doubled), _jit.kernel(doubled)
+    names = []
     with _jit.on_compile(names.append):
-        assert again(21) == 42
-    assert names == ["doubled"]
+        assert (first(1), first(1.5)) == (2, 3.0)
+        assert (again(1), again(1.5)) == (2, 3.0)
+    assert names == ["doubled", "doubled"]
+
+
+def test_the_cache_lies_where_the_environment_says(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert next(_jit._folders()) == tmp_path
+
+
+def test_the_cache_lies_with_those_of_the_user_else(monkeypatch):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    place = user_cache_path("sketchmatch", appauthor=False) / "kernels"
+    assert next(_jit._folders()) == place

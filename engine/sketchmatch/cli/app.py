@@ -76,7 +76,10 @@ def _run() -> tuple[int, str]:
         code = app(standalone_mode=False) or ExitCode.OK
         sys.stdout.flush()
         return code, "interrupted" if code == ExitCode.INTERRUPTED else ""
-    except (typer.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt) as end:
+        # Typer makes an abort of the end of a file, too.
+        if isinstance(error := end.__cause__, EOFError):
+            return _exit_code(error), _sentence(error)
         return ExitCode.INTERRUPTED, "interrupted"
     except (BrokenPipeError, SystemExit) as end:
         # Typer makes an exit of a broken pipe.

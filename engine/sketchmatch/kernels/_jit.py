@@ -3,23 +3,37 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
+import pickle
+import stat
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import gettempdir
 from types import FunctionType
 from typing import Any, TypeVar
+from uuid import uuid4
 
 import numba
-from numba.core import event
+from numba.core import entrypoints, event
+from numba.core.caching import FunctionCache
+from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
+from numba.core.serialize import dumps
 from platformdirs import user_cache_path
 
 __all__ = ["kernel", "on_compile"]
 
-_CONFIG: Any = numba.config
+_log = logging.getLogger(__name__)
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+
+# Before numba compiles it reads what each installed distribution says of itself, and raises what
+# a broken one makes of that; but only once.
+with suppress(Exception):
+    entrypoints.init_all()
 
 
 def kernel(function: _Function) -> _Function:
@@ -44,9 +58,10 @@ def kernel(function: _Function) -> _Function:
     >>> kernel(pair_count)(8)
     28
     """
-    with _caching_in(_cache_folder(function)):
-        compiled: _Function = numba.njit(function, cache=True, nogil=True, error_model="numpy")
-    return compiled
+    compiled: Any = numba.njit(function, nogil=True, error_model="numpy")
+    if isinstance(compiled, Dispatcher):
+        compiled._cache = _Cache(function)
+    return compiled  # type: ignore[no-any-return]
 
 
 @contextmanager
@@ -80,19 +95,134 @@ def on_compile(listener: Callable[[str], None]) -> Iterator[None]:
         yield
 
 
-def _cache_folder(function: Callable[..., Any]) -> Path:
-    """Return a folder named after all the source that may end up in a function's machine code.
+class _Cache(FunctionCache):
+    """Where numba finds the machine code of a kernel, and puts it.
 
-    Numba notices a change in the file of a kernel, but not in what is inlined from other files;
-    without this an upgrade could go on running old machine code.
+    It is named after all its source, wherever that is installed: so another environment, another
+    checkout and an upgrade that changes no kernel find it. A file that is damaged or cannot be read
+    is as good as none. Where none can be written, machine code lasts as long as the process.
     """
-    base = os.environ.get("NUMBA_CACHE_DIR")
-    root = Path(base) if base else user_cache_path("sketchmatch", appauthor=False) / "kernels"
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._py_func = function
+        self._name = f"{function.__name__}-{_source_digest(function)}.code"
+        self.enable()
+
+    @property
+    def cache_path(self) -> str:
+        """A folder for numba's statistics."""
+        return str(next(_folders(), ""))
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the kernel compiled for some types, or None."""
+        target_context.refresh()
+        key = self._index_key(sig, target_context.codegen())
+        for folder in _folders():
+            if packed := _read(folder / self._name).get(key):
+                with suppress(Exception):  # of what this numba cannot use, whatever that raises
+                    return CompileResult._rebuild(target_context, *pickle.loads(packed))
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the kernel compiled for some types where that can be done."""
+        if data.library.has_dynamic_globals:
+            return  # it refers to memory of this process
+        key, packed = self._index_key(sig, data.codegen), dumps(data._reduce())
+        problem = ""
+        for folder in _folders():
+            file = folder / self._name
+            try:
+                _write(file, {**_read(file), key: packed})
+            except OSError as error:
+                problem = problem or f"in {folder} ({error.strerror})"
+            else:
+                if folder != _usual_folder():
+                    _tell(problem, f"keeps them in {folder}")
+                return
+        _tell(problem, "compiles them at each start")
+
+
+@cache
+def _tell(problem: str, consequence: str) -> None:
+    """Say once that kernels are not kept where they should be."""
+    _log.warning(
+        "sketchmatch cannot keep compiled kernels %s and %s; "
+        "NUMBA_CACHE_DIR can name a folder that can be written",
+        problem or "in a home folder, because there is none,",
+        consequence,
+    )
+
+
+def _folders() -> Iterator[Path]:
+    """Yield the folders where machine code may be, the best first."""
+    if (usual := _usual_folder()) is not None:
+        yield usual
+    if (temporary := _temporary_folder()) is not None:
+        yield temporary
+
+
+def _usual_folder() -> Path | None:
+    """Return the folder that the environment names, or else the user's; None without a home."""
+    if given := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(given)
+    own = user_cache_path("sketchmatch", appauthor=False) / "kernels"
+    return own if own.is_absolute() else None
+
+
+def _temporary_folder() -> Path | None:
+    """Return a temporary folder that is this user's alone, because what is in it is executed."""
+    user = os.getuid() if hasattr(os, "getuid") else None
+    try:
+        folder = Path(gettempdir()) / ("sketchmatch" if user is None else f"sketchmatch-{user}")
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+    except OSError:
+        return None
+    if user is None:  # where each user has a temporary folder anyway
+        return folder
+    private = stat.S_ISDIR(found.st_mode) and not found.st_mode & 0o077
+    return folder if private and found.st_uid == user else None
+
+
+def _read(file: Path) -> dict[Any, bytes]:
+    """Return what a file holds, packed, by numba's key; nothing if it is not as it was written."""
+    try:
+        content = file.read_bytes()
+        digest, held = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+        return pickle.loads(held) if hashlib.sha256(held).digest() == digest else {}
+    except Exception:  # it may name what is no longer there
+        return {}
+
+
+def _write(file: Path, held: dict[Any, bytes]) -> None:
+    """Write a file so that others find it whole or not at all."""
+    content = dumps(held)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    beside = file.with_name(f"{uuid4().hex}.part")
+    try:
+        beside.write_bytes(hashlib.sha256(content).digest() + content)
+        beside.replace(file)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+_DIGEST_BYTES = hashlib.sha256().digest_size
+
+
+def _source_digest(function: Callable[..., Any]) -> str:
+    """Return a digest of all the source that may end up in a function's machine code.
+
+    Numba would notice a change in the file of a kernel, but not in what is inlined from other
+    files, and an upgrade could go on running old machine code.
+    """
     digest = hashlib.sha256(_digest(function).encode())
     for cell in function.__closure__ or ():
         if isinstance(cell.cell_contents, Dispatcher):
             digest.update(_digest(cell.cell_contents.py_func).encode())
-    return root / digest.hexdigest()[:16]
+    # Machine code refers to its module, and numba packs it by the rules of one Python.
+    place = (sys.implementation.cache_tag, function.__module__, function.__code__.co_firstlineno)
+    digest.update(repr(place).encode())
+    return digest.hexdigest()[:24]
 
 
 def _digest(function: Callable[..., Any]) -> str:
@@ -115,56 +245,3 @@ def _digest(function: Callable[..., Any]) -> str:
 
 _DIGESTS: dict[str, str] = {}
 """By file; at the first kernel of a file all its imports have been made."""
-
-
-class ByContent:
-    """Tells numba where a kernel's machine code is: by all its source, wherever that is installed.
-
-    So another environment, another checkout and an upgrade that changes no kernel find it. It has
-    what numba asks of a cache locator; a numba too old to ask keeps code by path as well.
-    """
-
-    def __init__(self, function: Callable[..., Any], file: str) -> None:
-        self._py_file = file  # numba names it in warnings
-        self._place = f"{function.__module__}-{function.__code__.co_firstlineno}"
-        self._folder = Path(_CONFIG.CACHE_DIR)
-
-    @classmethod
-    def from_function(cls, function: Callable[..., Any], file: str) -> ByContent:
-        """Return the locator of a function."""
-        return cls(function, file)
-
-    def ensure_cache_path(self) -> None:
-        """Make the folder, and see that it can be written."""
-        _make(self._folder)
-
-    def get_cache_path(self) -> str:
-        """Return the folder."""
-        return str(self._folder)
-
-    def get_source_stamp(self) -> str:
-        """Return what changes with the source: the folder's name is made of it."""
-        return self._folder.name
-
-    def get_disambiguator(self) -> str:
-        """Return what tells functions of one name apart: machine code refers to its module."""
-        return self._place
-
-
-@contextmanager
-def _caching_in(folder: Path) -> Iterator[None]:
-    """Let numba keep machine code in a folder, or where it likes if that cannot be written."""
-    before = _CONFIG.CACHE_DIR, getattr(_CONFIG, "CACHE_LOCATOR_CLASSES", "")
-    try:
-        with suppress(OSError):
-            _make(folder)
-            _CONFIG.CACHE_DIR = str(folder)
-            _CONFIG.CACHE_LOCATOR_CLASSES = f"{ByContent.__module__}.{ByContent.__qualname__}"
-        yield
-    finally:
-        _CONFIG.CACHE_DIR, _CONFIG.CACHE_LOCATOR_CLASSES = before
-
-
-def _make(folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    TemporaryFile(dir=folder).close()
