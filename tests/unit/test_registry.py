@@ -1,6 +1,8 @@
 """Plugins are loaded each alone, and what is wrong with one is said where it matters."""
 
 import itertools
+import os
+import subprocess
 import sys
 from importlib.metadata import DistributionFinder, MetadataPathFinder, entry_points
 
@@ -18,6 +20,7 @@ from sketchmatch.registry import (
     discover,
 )
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+from tests.tools import ROOT, require
 
 HEADER = """
 from sketchmatch.api import Histogram, Params, Searcher, Similarity, hookimpl
@@ -274,6 +277,135 @@ def test_a_plugin_that_takes_for_ever_to_load_is_left_behind(install):
     assert registry.statuses[0].reason == (
         "TimeoutError: it was not loaded after 1 s; do less at import"
     )
+
+
+BROKEN_CASES = ROOT.parent / "shared" / "data" / "cases" / "81-plugins"
+GROUP = "[sketchmatch]\nlucky = acme_lucky\n"
+METADATA = "Metadata-Version: 2.1\nName: acme-lucky\nVersion: 1.0\n"
+
+
+def discovered_beside(folder, monkeypatch):
+    """Return what becomes of the plugins in a folder; the engine's own are there beside them."""
+    monkeypatch.syspath_prepend(folder)
+    registry = discover()
+    assert registry.find(Kind.SEARCHER, "auto").distribution == "sketchmatch"
+    ours = ("sketchmatch", "sketchmatch-example-searcher")
+    return [status for status in registry.statuses if status.distribution not in ours]
+
+
+@pytest.mark.parametrize(
+    ("name", "distribution", "reason"),
+    [
+        ("badenc", "acme-badenc", "its entry_points.txt cannot be read (UnicodeDecodeError: "),
+        ("badep", "acme-badep", "its entry_points.txt cannot be read ("),
+        ("badep2", "acme-badep2", "AttributeError: "),
+        ("base", "acme-base", "B: x"),
+        ("exit", "acme-exit", "SystemExit: 3"),
+        ("kbd", "acme-kbd", "KeyboardInterrupt: "),
+        ("missingmod", "acme-missing", "ModuleNotFoundError: "),
+        ("noname", "acme-noname", "its METADATA cannot be read (ValueError: it has no Name); inst"),
+        ("recur", "acme-recur", "RecursionError: "),
+        ("syntax", "acme-syntax", "SyntaxError: "),
+        ("ver", "acme-ver", "ValueError: it offers no algorithm"),
+    ],
+)
+def test_a_broken_distribution_is_listed_alone(name, distribution, reason, monkeypatch):
+    require(BROKEN_CASES.exists(), "shared/data/cases/81-plugins")
+    (status,) = discovered_beside(BROKEN_CASES / name, monkeypatch)
+    assert (status.distribution, status.state) == (distribution, PluginState.FAILED)
+    assert status.reason.startswith(reason)
+
+
+@pytest.mark.parametrize("name", ["leftover", "leftover2", "othergroup"])
+def test_a_broken_distribution_of_something_else_is_no_news(name, monkeypatch):
+    require(BROKEN_CASES.exists(), "shared/data/cases/81-plugins")
+    assert discovered_beside(BROKEN_CASES / name, monkeypatch) == []
+
+
+def test_of_two_versions_the_first_counts(tmp_path, monkeypatch):
+    for version in ("1.0", "2.0"):
+        folder = tmp_path / version
+        (folder / f"acme_lucky-{version}.dist-info").mkdir(parents=True)
+        info = next(folder.iterdir())
+        (info / "METADATA").write_text(METADATA.replace("1.0", version), encoding="utf-8")
+        (info / "entry_points.txt").write_text(GROUP, encoding="utf-8")
+        monkeypatch.syspath_prepend(folder)
+    (status,) = discovered_beside(tmp_path, monkeypatch)
+    assert status.version == "2.0"
+
+
+@pytest.mark.parametrize(
+    ("files", "reason"),
+    [
+        ({"entry_points.txt": GROUP}, "its METADATA cannot be read ("),
+        ({"entry_points.txt": GROUP, "METADATA": ""}, "its METADATA cannot be read ("),
+        (
+            {"entry_points.txt": GROUP, "METADATA": METADATA.encode() + b"Summary: \xe9\n"},
+            "its METADATA cannot be read (UnicodeDecodeError: ",
+        ),
+        (
+            {"entry_points.txt": GROUP.encode("utf-16"), "METADATA": METADATA},
+            "its entry_points.txt cannot be read (UnicodeDecodeError: ",
+        ),
+        ({"entry_points.txt": f"{GROUP}[", "METADATA": METADATA}, "its entry_points.txt cannot"),
+        ({"entry_points.txt": GROUP, "METADATA": METADATA}, "ModuleNotFoundError: "),
+        ({"entry_points.txt": "\0\xff" * 50, "METADATA": METADATA}, None),
+        ({"METADATA": METADATA, "RECORD": "\0"}, None),
+        ({"METADATA": "\0"}, None),
+        ({}, None),
+    ],
+)
+def test_whatever_is_wrong_with_a_distribution_the_rest_works(files, reason, tmp_path, monkeypatch):
+    info = tmp_path / "acme_lucky-1.0.dist-info"
+    info.mkdir()
+    for name, content in files.items():
+        (info / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    (tmp_path / "acme_gone.egg-link").symlink_to(tmp_path / "nowhere")
+    (tmp_path / "acme_round-1.0.dist-info").symlink_to(tmp_path / "acme_round-1.0.dist-info")
+    (tmp_path / "acme_file-1.0.dist-info").write_bytes(b"")
+    found = [
+        status
+        for status in discovered_beside(tmp_path, monkeypatch)
+        if status.distribution != "acme-round"
+    ]
+    assert [(one.distribution, one.version, one.state) for one in found] == [
+        ("acme-lucky", "1.0", PluginState.FAILED)
+    ] * (reason is not None)
+    assert all(status.reason.startswith(reason) for status in found)
+
+
+def test_a_broken_distribution_can_be_denied(tmp_path, monkeypatch):
+    info = tmp_path / "Acme_Lucky-1.0.dist-info"
+    info.mkdir()
+    (info / "entry_points.txt").write_text("[sketchmatch]\nlucky", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    registry = discover()
+    told = "distribution acme-lucky 1.0 failed to load: its entry_points.txt cannot be read ("
+    assert any(problem.startswith(told) for problem in registry.problems)
+    with pytest.raises(InvalidInputError, match="distribution acme-lucky failed to load: its ent"):
+        registry.find(Kind.SEARCHER, "lucky")
+    registry = discover(rules=PluginRules.of(deny=["acme-lucky"]))
+    assert not any("acme-lucky" in problem for problem in registry.problems)
+
+
+def test_a_broken_distribution_harms_no_library_that_reads_them_all(tmp_path):
+    info = tmp_path / "acme_lucky-1.0.dist-info"
+    info.mkdir()
+    (info / "entry_points.txt").write_text("[console_scripts]\nlucky", encoding="utf-8")
+    code = """
+import sketchmatch.config
+from sketchmatch.kernels.pairs import pair_index
+print(pair_index(1, 2, 5))
+"""
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": path},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout == "4\n"
 
 
 def test_the_source_of_an_algorithm_is_what_its_text_refers_to(install):

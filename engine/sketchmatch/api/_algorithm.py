@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
+
+from sketchmatch.strict import STRICT
 
 __all__ = ["API_VERSION", "Algorithm", "Params"]
 
@@ -28,7 +30,7 @@ class Params(BaseModel):
     Tracing(tolerance=0.5)
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = STRICT
 
 
 class Algorithm:

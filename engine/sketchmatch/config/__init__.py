@@ -5,6 +5,9 @@ names whole pipelines; ``[plugins]``, ``[server]`` and ``[limits]`` are for whoe
 Variables spell the same paths: ``SKETCHMATCH_SERVER__ADDRESS``.
 """
 
+import sketchmatch.strict  # noqa: F401  (before pydantic_settings)
+
+# isort: split
 from sketchmatch.config.configuration import (
     Configuration,
     builtin,

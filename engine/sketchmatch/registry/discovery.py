@@ -6,8 +6,10 @@ import inspect
 import re
 import threading
 from collections import Counter
-from collections.abc import Iterable
-from importlib.metadata import EntryPoint, entry_points
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from importlib.metadata import Distribution, EntryPoint, distributions
+from pathlib import PurePath
 from typing import Any
 
 import pluggy
@@ -15,7 +17,13 @@ import pluggy
 from sketchmatch.api import API_VERSION, Algorithm, Params, Segmenter
 from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
 from sketchmatch.registry import hookspecs
-from sketchmatch.registry.distributions import EVERY_PLUGIN, PluginRules, PluginState, PluginStatus
+from sketchmatch.registry.distributions import (
+    EVERY_PLUGIN,
+    PluginRules,
+    PluginState,
+    PluginStatus,
+    canonical,
+)
 from sketchmatch.registry.registry import Kind, Registered, Registry
 
 __all__ = ["ENTRY_POINT_GROUP", "discover"]
@@ -46,31 +54,103 @@ def discover(
     Returns
     -------
     Registry
-        A plugin that cannot be loaded offers nothing and is named in its statuses.
+        A plugin that cannot be loaded offers nothing and is named in its statuses, and so is a
+        distribution that seems to have plugins and cannot be read.
     """
     algorithms: list[Registered] = []
     statuses: list[PluginStatus] = []
-    for point in entry_points(group=ENTRY_POINT_GROUP) if points is None else points:
-        origin = (
-            point.dist.name if point.dist else "unknown distribution",
-            point.dist.version if point.dist else "",
-        )
-        if objection := rules.objection(origin[0]):
-            statuses.append(PluginStatus(point.name, *origin, PluginState.DISABLED, objection))
+    for point, status in _installed() if points is None else map(_presumed, points):
+        if objection := rules.objection(status.distribution):
+            statuses.append(replace(status, state=PluginState.DISABLED, reason=objection))
             continue
-        try:
-            offered = _loaded_in_time(point, loading_seconds)
-        except (Exception, SystemExit) as error:  # a plugin may raise anything
-            reason = f"{type(error).__name__}: {error}"
-            statuses.append(PluginStatus(point.name, *origin, PluginState.FAILED, reason))
+        if point is None:
+            statuses.append(status)
+            continue
+        offered = _loaded_in_time(point, loading_seconds)
+        if isinstance(offered, BaseException):
+            reason = f"{type(offered).__name__}: {offered}"
+            statuses.append(replace(status, state=PluginState.FAILED, reason=reason))
         else:
-            statuses.append(PluginStatus(point.name, *origin))
+            statuses.append(status)
+            origin = (status.distribution, status.version)
             algorithms += [Registered(kind, algorithm, *origin) for kind, algorithm in offered]
     return Registry(algorithms, statuses)
 
 
-def _loaded_in_time(point: EntryPoint, seconds: float) -> _Offered:
-    """Load a plugin in a thread of its own, which is left behind if it takes too long."""
+def _installed() -> Iterator[tuple[EntryPoint | None, PluginStatus]]:
+    """Yield what is installed: each plugin, or none for a distribution that cannot be read.
+
+    Python's own function reads all distributions, and fails for one that is broken, whosever it is.
+    """
+    seen = set()
+    for distribution in distributions():
+        name, version = _named_by_folder(distribution)
+        if name in seen:  # Python imports the first on its path
+            continue
+        seen.add(name)
+        broken = PluginStatus("", name, version, PluginState.FAILED)
+        try:
+            points = distribution.entry_points.select(group=ENTRY_POINT_GROUP)
+        except Exception as error:  # a parser that expects no damage may raise anything
+            if _may_have_plugins(distribution):
+                yield None, replace(broken, reason=_unreadable("entry_points.txt", error))
+            continue
+        for point in points:
+            try:
+                yield _presumed(point)
+            except Exception as error:
+                reason = _unreadable("METADATA", error)
+                yield None, replace(broken, entry_point=point.name, reason=reason)
+
+
+def _presumed(point: EntryPoint) -> tuple[EntryPoint, PluginStatus]:
+    """Return a plugin and what becomes of it if it loads.
+
+    Raises
+    ------
+    Exception
+        Anything, if its distribution is broken.
+    """
+    if point.dist is None:
+        return point, PluginStatus(point.name, "unknown distribution", "")
+    metadata = point.dist.metadata
+    name, version = metadata.get("Name"), metadata.get("Version")
+    if not name:
+        raise ValueError("it has no Name")
+    return point, PluginStatus(point.name, name, version or "")
+
+
+def _unreadable(file: str, error: Exception) -> str:
+    return f"its {file} cannot be read ({type(error).__name__}: {error}); install it anew"
+
+
+def _named_by_folder(distribution: Distribution) -> tuple[str, str]:
+    """Return the name and the version of a distribution without reading what is in its folder."""
+    folder = getattr(distribution, "_path", None)
+    if folder is None:  # of someone's own finder
+        return distribution.name, distribution.version
+    name, _, version = PurePath(str(folder)).stem.partition("-")
+    return canonical(name), version
+
+
+def _may_have_plugins(distribution: Distribution) -> bool:
+    """Whether entry points that cannot be read name our group; if unsure, yes."""
+    try:
+        raw: bytes = distribution._path.joinpath("entry_points.txt").read_bytes()  # type: ignore[attr-defined]
+    except (AttributeError, OSError):
+        return True
+    # Without the zeros of UTF-16.
+    return f"[{ENTRY_POINT_GROUP}]".encode() in raw.replace(b"\0", b"")
+
+
+def _loaded_in_time(point: EntryPoint, seconds: float) -> _Offered | BaseException:
+    """Load a plugin in a thread of its own, which is left behind if it takes too long.
+
+    Returns
+    -------
+    list or BaseException
+        What it offers, or what it raised: in that thread nothing of this is Ctrl-C.
+    """
     outcome: list[_Offered | BaseException] = []
 
     def load() -> None:
@@ -83,9 +163,7 @@ def _loaded_in_time(point: EntryPoint, seconds: float) -> _Offered:
     loading.start()
     loading.join(seconds)
     if not outcome:
-        raise TimeoutError(f"it was not loaded after {seconds:g} s; do less at import")
-    if isinstance(outcome[0], BaseException):
-        raise outcome[0]
+        return TimeoutError(f"it was not loaded after {seconds:g} s; do less at import")
     return outcome[0]
 
 

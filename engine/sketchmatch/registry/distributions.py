@@ -47,7 +47,7 @@ class PluginStatus:
     Attributes
     ----------
     entry_point
-        Its name in the distribution's entry points.
+        Its name in the distribution's entry points; empty where these cannot be read.
     distribution, version
         Where it comes from.
     state
@@ -61,6 +61,12 @@ class PluginStatus:
     version: str
     state: PluginState = PluginState.ACTIVE
     reason: str = ""
+
+    @property
+    def origin(self) -> str:
+        """What it is and where it comes from, to begin a sentence with."""
+        plugin = f"plugin {self.entry_point} of " if self.entry_point else "distribution "
+        return f"{plugin}{self.distribution}"
 
 
 @dataclass(frozen=True)

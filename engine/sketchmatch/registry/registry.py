@@ -176,8 +176,7 @@ class Registry:
     def problems(self) -> tuple[str, ...]:
         """A sentence for each plugin that failed and each name in conflict."""
         failed = (
-            f"plugin {status.entry_point} of {status.distribution} {status.version} "
-            f"failed to load: {status.reason}"
+            f"{status.origin} {status.version} failed to load: {status.reason}"
             for status in self.statuses
             if status.state is PluginState.FAILED
         )
@@ -250,8 +249,7 @@ class Registry:
     def _known(self, kind: Kind) -> str:
         """Say which plugins might have offered more, and what can be chosen."""
         missing = "".join(
-            f"plugin {status.entry_point} of {status.distribution} "
-            f"{_MISSING[status.state]}: {status.reason}; "
+            f"{status.origin} {_MISSING[status.state]}: {status.reason}; "
             for status in self.statuses
             if status.state is not PluginState.ACTIVE
         )
