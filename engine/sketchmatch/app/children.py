@@ -10,6 +10,7 @@ distribution. A child that behaved is kept for the next request.
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import threading
 import time
@@ -25,6 +26,8 @@ from sketchmatch.app.child import STOP, Answer, Ended, Errand, Failed, Ready, li
 from sketchmatch.app.jobs import Job, algorithms, time_budget
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import PluginError
+from sketchmatch_proto.v1 import match_pb2
+from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
 if TYPE_CHECKING:
     from multiprocessing.context import SpawnProcess
@@ -61,7 +64,7 @@ class _Watch:
     patience
         Seconds without a sign of life.
     time_budget
-        Seconds for the whole request, or None for no limit.
+        Seconds for the whole request once its kernels are compiled, or None for no limit.
     """
 
     strangers: tuple[Registered, ...]
@@ -220,13 +223,15 @@ class _Child:
 
     def _responses(self, watch: _Watch, stop: threading.Event) -> Iterator[Message]:
         """Yield responses until the errand is done or to be stopped."""
-        started = heard = time.monotonic()
+        heard, started = time.monotonic(), math.inf
         while not stop.is_set():
             message = self._received(watch)
             now = time.monotonic()
             match message:
                 case Answer(response):
                     heard = now
+                    if not _comes_before_the_budget(response):
+                        started = min(started, now)
                     yield response
                 case Ended():
                     self.done = True
@@ -272,6 +277,14 @@ class _Child:
         self._process.join()
         ending = _ending(self._process.exitcode)
         return PluginError(f"{watch.culprits} ended its process ({ending}); {_REMEDY}")
+
+
+def _comes_before_the_budget(response: Message) -> bool:
+    """Whether a match has not begun yet, because its kernels may have to be compiled."""
+    if not isinstance(response, MatchResponse):
+        return False
+    compiles = response.progress.phase == match_pb2.PHASE_COMPILE
+    return response.HasField("accepted") or compiles
 
 
 def _silent(watch: _Watch, what: str) -> PluginError:

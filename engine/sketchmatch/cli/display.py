@@ -42,6 +42,7 @@ JSON_STYLE: dict[str, Any] = {"always_print_fields_with_no_presence": True, "ens
 """How messages become JSON: index 0 and empty lists are written out."""
 
 _PHASES = {
+    match_pb2.PHASE_COMPILE: "loading the kernels",
     match_pb2.PHASE_SEGMENT: "finding the objects",
     match_pb2.PHASE_DESCRIBE: "describing relations",
     match_pb2.PHASE_RELATE: "comparing relations",

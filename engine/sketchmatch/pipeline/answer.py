@@ -133,7 +133,7 @@ def answer(
         statistics=Statistics(
             found.iterations,
             found.evaluations,
-            MappingProxyType({**clock.seconds, "total": clock.elapsed()}),
+            MappingProxyType({**clock.seconds, "total": clock.spent()}),
         ),
         sketch=sketch.scene,
         map=map_.scene,

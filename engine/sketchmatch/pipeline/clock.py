@@ -32,15 +32,20 @@ class Clock:
         self.seconds: dict[str, float] = {}
         self._budget = math.inf if budget is None else budget
         self._started = time.monotonic()
+        self._stopped = 0.0
         self._told = -math.inf
 
     def elapsed(self) -> float:
         """Return the seconds since the beginning."""
         return time.monotonic() - self._started
 
+    def spent(self) -> float:
+        """Return those of them that count."""
+        return self.elapsed() - self._stopped
+
     def left(self) -> float:
         """Return the seconds that are left; infinite without a budget, and never below 0."""
-        return max(0.0, self._budget - self.elapsed())
+        return max(0.0, self._budget - self.spent())
 
     def check(self, phase: str) -> None:
         """Go on in a phase that has no answer to give.
@@ -63,6 +68,13 @@ class Clock:
             return False
         self._told = now
         return True
+
+    @contextmanager
+    def stopped(self) -> Iterator[None]:
+        """Let the time of a block not count."""
+        began = time.monotonic()
+        yield
+        self._stopped += time.monotonic() - began
 
     @contextmanager
     def timing(self, stage: str) -> Iterator[None]:

@@ -16,6 +16,7 @@ __all__ = ["Accepted", "Finished", "MatchEvent", "Phase", "Progress", "Segmented
 class Phase(StrEnum):
     """What a match is doing; the same names as ``sketchmatch.v1.Phase``."""
 
+    COMPILE = "COMPILE"
     SEGMENT = "SEGMENT"
     DESCRIBE = "DESCRIBE"
     RELATE = "RELATE"

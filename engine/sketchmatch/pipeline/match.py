@@ -36,6 +36,7 @@ from sketchmatch.pipeline.search import Goal, Search, search
 from sketchmatch.pipeline.segment import segment_side
 from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, Pipeline, resolve
 from sketchmatch.pipeline.slices import retold
+from sketchmatch.pipeline.warmup import loading_kernels
 from sketchmatch.registry import Kind, Registry
 
 __all__ = ["run_match"]
@@ -53,7 +54,8 @@ def run_match(
     """Match, yielding Accepted, Segmented, some Progress (at most 20 a second) and Finished.
 
     Closing the generator stops the work; between two events it works 50 ms or less, but for a
-    plugin that is slower in one step.
+    plugin that is slower in one step, and for kernels that have to be compiled. These are compiled
+    before the time budget begins.
 
     Parameters
     ----------
@@ -142,6 +144,10 @@ def _events(
     pipeline, goal = plan.pipeline, plan.goal
     price = goal.price if goal.price < math.inf else None
     yield Accepted(match_id, goal.seed, pipeline, goal.weights, price)
+    with clock.stopped():
+        for _ in loading_kernels(pipeline):
+            if clock.is_time_to_tell():
+                yield Progress(Phase.COMPILE, clock.elapsed())
     if clock.is_time_to_tell():
         yield Progress(Phase.SEGMENT, clock.elapsed())
     with clock.timing("segment"), limited_to(limits):

@@ -111,7 +111,8 @@ class Statistics:
     iterations, evaluations
         Of the searcher: its iterations, and the FMAPs that it evaluated.
     seconds
-        Time of each stage, ``segment``, ``describe``, ``relate``, ``search``, and ``total``.
+        Time of each stage, ``segment``, ``describe``, ``relate``, ``search``, and ``total``, all
+        without the compilation of kernels.
     """
 
     iterations: int

@@ -39,6 +39,10 @@ class _PhaseEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._EnumType
     """Comparing every relation in the sketch with every relation in the map."""
     PHASE_SEARCH: _Phase.ValueType  # 4
     """Searching for the best map."""
+    PHASE_COMPILE: _Phase.ValueType  # 5
+    """Before all others, and rarely: loading what the algorithms have compiled, or compiling it, which
+    takes up to a minute once after an installation. It does not count for the time budget.
+    """
 
 class Phase(_Phase, metaclass=_PhaseEnumTypeWrapper):
     """The stages of a match, in order."""
@@ -53,6 +57,10 @@ PHASE_RELATE: Phase.ValueType  # 3
 """Comparing every relation in the sketch with every relation in the map."""
 PHASE_SEARCH: Phase.ValueType  # 4
 """Searching for the best map."""
+PHASE_COMPILE: Phase.ValueType  # 5
+"""Before all others, and rarely: loading what the algorithms have compiled, or compiling it, which
+takes up to a minute once after an installation. It does not count for the time budget.
+"""
 global___Phase = Phase
 
 class _Outcome:
@@ -682,7 +690,7 @@ class MatchStatistics(google.protobuf.message.Message):
 
     @property
     def total_elapsed(self) -> google.protobuf.duration_pb2.Duration:
-        """Time from the acceptance of the request to the result."""
+        """Time from the acceptance of the request to the result, without `PHASE_COMPILE`."""
 
     def __init__(
         self,

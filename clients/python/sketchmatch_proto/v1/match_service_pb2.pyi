@@ -60,8 +60,8 @@ class MatchRequest(google.protobuf.message.Message):
 
     @property
     def time_budget(self) -> google.protobuf.duration_pb2.Duration:
-        """How long the match may take, more than 0. The best map until then is the result, with
-        `OUTCOME_TIME_BUDGET`. Absent: as long as the server allows.
+        """How long the match may take, more than 0, beside `PHASE_COMPILE`. The best map until then is the
+        result, with `OUTCOME_TIME_BUDGET`. Absent: as long as the server allows.
         """
 
     @property
