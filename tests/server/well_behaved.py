@@ -47,6 +47,15 @@ class Guessing(Searcher):
         return Outcome.ITERATION_LIMIT
 
 
+class Compiling(Guessing):
+    name = "compiling"
+    summary = "The same, which takes a while before the first search of a process."
+
+    @classmethod
+    def warm_up(cls):
+        time.sleep(0.8)
+
+
 class SamePolygons(PolygonSegmenter):
     name = "same-polygons"
     summary = "Every polygon is one object."
@@ -66,7 +75,7 @@ class Refusing(Segmenter):
 
 @hookimpl
 def sketchmatch_register_searchers():
-    return [Guessing]
+    return [Guessing, Compiling]
 
 
 @hookimpl

@@ -249,10 +249,15 @@ registry = default_registry()
 warm_up(registry)
 warm_up_others(registry)
 warm = compiled()
-scene = sketchmatch.Scene.from_polygons(shapes(4))
-for item in registry.algorithms:
-    if item.kind in (Kind.HISTOGRAM, Kind.SIMILARITY):
-        sketchmatch.match(scene, scene, **{item.kind.value: item.name})
+small, large = (sketchmatch.Scene.from_polygons(shapes(n)) for n in (4, 5))
+chosen = [{item.kind.value: item.name} for item in registry.algorithms]
+for options in [
+    *(one for one in chosen if Kind.SEGMENTER.value not in one),
+    {"searcher": "easm", "params": {"searcher": {"consistency": "pairwise"}}},
+    {"weights": (1, 1, 1, 1, 1, 1), "allow_unmatched": True},
+]:
+    sketchmatch.match(small, large, **options)
+    sketchmatch.match(large, small, **options)
 print(*(compiled() - warm), sep="\\n")
 """
     command = [sys.executable, "-c", code]

@@ -11,7 +11,9 @@ from sketchmatch import Scene, directional_relation, force_histogram
 from sketchmatch.api import Outcome, Searcher, SearchProgress, Segmentation, Segmenter
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError, Reason
 from sketchmatch.model import Fmap, LabelledPolygon, OccupancyGrid, PolygonSet, SceneObject
+from sketchmatch.pipeline import clock as clock_module
 from sketchmatch.pipeline import match as match_module
+from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.events import Accepted, Finished, Phase, Progress, Segmented
 from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.request import MatchRequest
@@ -307,6 +309,50 @@ def test_a_searcher_is_told_how_much_time_is_left(budget, monkeypatch):
 def test_a_time_budget_too_short_for_any_answer_says_where_it_went():
     with pytest.raises(AnswerUnavailableError, match=r"1e-09 s ended in phase .*allow more"):
         list(events(source(seven()), source(seven()), time_budget=1e-9))
+
+
+def compiling(warm_up):
+    """Return the algorithms with an endless search of its own warm-up, and the choice of it."""
+
+    class Compiling(Easm):
+        name = "compiling"
+
+    Compiling.warm_up = classmethod(lambda _: warm_up())
+    added = Registered(Kind.SEARCHER, Compiling, "acme-search", "1.0")
+    choice = Choice("compiling", ENDLESS["searcher"].parameters)
+    return Registry([*default_registry().algorithms, added]), {"searcher": choice}
+
+
+def test_what_is_compiled_comes_first_and_does_not_count_for_the_time_budget():
+    registry, chosen = compiling(lambda: time.sleep(1.0))
+    settings = {"selection": chosen, "time_budget": 0.3}
+    first, again = (list(events(seven(), seven(), registry, **settings)) for _ in range(2))
+    assert [type(event) for event in first[:2]] == [Accepted, Progress]
+    assert [event.phase for event in (first[1], again[1])] == [Phase.COMPILE, Phase.SEGMENT]
+    for seen in (first, again):
+        assert seen[-1].result.outcome is Outcome.TIME_BUDGET
+    assert first[-1].result.statistics.seconds["total"] < first[-2].elapsed
+
+
+def test_the_time_that_a_clock_is_stopped_does_not_count(monkeypatch):
+    now = itertools.count()
+    monkeypatch.setattr(clock_module.time, "monotonic", lambda: float(next(now)))
+    clock = Clock(10.0)  # made at 0
+    with clock.stopped():  # from 1
+        assert clock.elapsed() == 2.0
+        assert clock.elapsed() == 3.0  # to 4
+    assert clock.spent() == 5.0 - 3.0
+    assert clock.left() == 10.0 - (6.0 - 3.0)
+    assert clock.elapsed() == 7.0
+
+
+def test_an_algorithm_that_cannot_warm_up_is_tried_all_the_same():
+    def explode():
+        raise MemoryError("no room")
+
+    registry, chosen = compiling(explode)
+    result = matched(seven(), seven(), registry, selection=chosen, time_budget=0.3)
+    assert result.outcome is Outcome.TIME_BUDGET
 
 
 def test_generations_end_a_search_with_their_own_outcome():
