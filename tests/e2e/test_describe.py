@@ -141,10 +141,19 @@ def test_out_saves_an_archive_or_a_table_of_the_same_numbers(command_line, boxes
 
 def test_plot_draws_the_scene_and_its_histograms(command_line, tmp_path):
     for source in ROOM:
-        lines(command_line("describe", source, "--plot", tmp_path / "x.png"))
+        done = command_line("describe", source, "--plot", tmp_path / "x.png")
+        assert (done.returncode, len(done.stdout.splitlines())) == (0, 29)
+        assert done.stderr == (
+            "sketchmatch: --plot: draws the 16 of 28 relations with the strongest forces, those of "
+            "large objects close together; choose others by --pair A,B\n"
+        )
         with PIL.Image.open(tmp_path / "x.png") as picture:
             assert (picture.format, picture.width) == ("PNG", 1600)
             assert len(picture.getcolors(10**6)) > 50
+
+
+def test_a_plot_of_all_relations_says_nothing(boxes, tmp_path):
+    assert len(lines(run("describe", boxes, "--plot", tmp_path / "x.png"))) == 4
 
 
 # relate -----------------------------------------------------------------------------------------

@@ -110,6 +110,67 @@ def test_objects_without_partner_are_grey():
             assert min(colour.mean() for colour in seen) < 248
 
 
+@pytest.fixture
+def drawn(monkeypatch):
+    """The polygons that are filled and the texts that are written, as they are drawn."""
+
+    class Drawn:
+        def __init__(self):
+            self.polygons, self.texts = [], []
+
+        def numbers(self, left, right):
+            """By area rank, from 0: the numbers on the objects of the panel between two x."""
+            shapes = [shape for shape in self.polygons if left < shape.centroid.x < right]
+            return [
+                [int(text) for text, point in self.texts if text.isdigit() and shape.covers(point)]
+                for shape in sorted(shapes, key=lambda shape: shape.area)
+            ]
+
+        def legend(self):
+            """The numbers below the panels, row by row."""
+            rows = [(p.y, p.x, int(text)) for text, p in self.texts if text.isdigit()]
+            bottom = max(shape.bounds[3] for shape in self.polygons)
+            return [number for y, _, number in sorted(rows) if y > bottom + 20.0]
+
+    recorded = Drawn()
+    fill, text = Canvas.fill, Canvas.text
+
+    def filled(canvas, rings, colour, alpha):  # an object, not one in the legend
+        if alpha in (0.42, 0.12) and np.ptp(rings[0], axis=0).max() > 30.0:
+            recorded.polygons.append(shapely.Polygon(rings[0]))
+        fill(canvas, rings, colour, alpha)
+
+    def written(canvas, at, words, *args, **options):
+        recorded.texts.append((words, shapely.Point(at)))
+        text(canvas, at, words, *args, **options)
+
+    monkeypatch.setattr(Canvas, "fill", filled)
+    monkeypatch.setattr(Canvas, "text", written)
+    return recorded
+
+
+def row(order):
+    """Squares in a row, object k as large as rank ``order[k]`` says, all with room for a badge."""
+    sides = [2.0 + 0.2 * rank for rank in order]
+    return Scene.from_polygons([rectangle(4 * k, 0, side, side) for k, side in enumerate(sides)])
+
+
+def test_every_number_is_that_of_the_object_in_its_own_scene(drawn):
+    sketch, map_ = row([2, 0, 1]), row([1, 3, 0, 2])
+    matches = [OverlayMatch(0, 3, 0.9), OverlayMatch(2, 1, 0.8)]
+    draw_overlay(sketch, map_, matches)
+    assert drawn.numbers(0, 800) == [[2], [3], [1]]
+    assert drawn.numbers(800, 1600) == [[3], [1], [4], [2]]
+    assert drawn.legend() == [1, 4, 3, 2]
+
+
+def test_numbers_of_a_scene_by_itself_are_those_beside_its_partners(drawn):
+    scene = row([1, 3, 0, 2])
+    draw_scene(Scene.from_polygons([item.rings for item in scene.objects], ["a", "", "c", ""]))
+    assert drawn.numbers(0, 1000) == [[3], [1], [4], [2]]
+    assert drawn.legend() == [1, 3]
+
+
 def test_nothing_matched_shows_no_colour():
     image = draw_overlay(room(), room(), [])
     array = pixels(image)
@@ -204,6 +265,11 @@ def test_a_route_is_a_light_arrow_and_all_of_it_is_seen():
     (tail, head), (other_head, other_tail) = ends
     assert head > 2 * tail
     assert other_head > 2 * other_tail
+    sketched = [draw_overlay(room(), room(), pairs(range(5)), route=route) for route in (None, way)]
+    near = [np.abs(pixels(image) - light).max(axis=2) <= 12 for image in sketched]
+    before, after = ((like[:, :800].sum(), like[:, 800:].sum()) for like in near)
+    assert after[0] > before[0] + 200
+    assert after[1] < before[1] + 50
     for short in ([[1.0, 1.0], [1.0, 1.0]], [[1.0, 1.0], [1.001, 1.0]]):
         assert draw_scene(room(), route=np.array(short), width=400).width == 400
 
@@ -314,7 +380,7 @@ def test_numbers_are_readable_on_their_colours(number):
 def test_badges_lie_inside_large_objects_and_beside_small_ones_apart():
     shapes = [shapely.box(100 * k, 100, 100 * k + (60 if k % 2 else 6), 160) for k in range(8)]
     shapes.append(shapely.box(0, 300, 200, 400).difference(shapely.box(20, 320, 180, 380)))
-    places = badge_places(shapes, range(9), (14.0, 14.0), (-50, 0, 850, 500))
+    places = badge_places(shapes, (14.0, 14.0), (-50, 0, 850, 500))
     badges = [shapely.Point(places[k].x, places[k].y).buffer(13.5) for k in range(9)]
     for k in (1, 3, 5, 7):
         assert shapes[k].contains(badges[k])
@@ -326,12 +392,12 @@ def test_badges_lie_inside_large_objects_and_beside_small_ones_apart():
 
 def test_badge_of_a_covered_object_is_clear_of_what_covers_it():
     shapes = [shapely.box(0, 0, 300, 300), shapely.box(100, 100, 200, 200)]
-    place = badge_places(shapes, [0, 1], (14.0, 14.0), (0, 0, 400, 400))[0]
+    place = badge_places(shapes, (14.0, 14.0), (0, 0, 400, 400))[0]
     assert shapes[1].distance(shapely.Point(place.x, place.y)) > 14
 
 
 def test_badge_of_a_tiny_object_in_a_corner_stays_in_bounds():
-    place = badge_places([shapely.box(0, 0, 1, 1)], [0], (14.0, 14.0), (0, 0, 400, 400))[0]
+    place = badge_places([shapely.box(0, 0, 1, 1)], (14.0, 14.0), (0, 0, 400, 400))[0]
     assert place.x >= 14
     assert place.y >= 14
 

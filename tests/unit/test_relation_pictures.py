@@ -1,5 +1,6 @@
 """Pictures of relations: every plot points where its object lies."""
 
+import itertools
 import math
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from sketchmatch import Scene
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.model import OccupancyGrid
+from sketchmatch.pictures._canvas import Canvas
 from sketchmatch.pictures._palette import mixed, pair_colour
 from sketchmatch.pictures.overlay import MOST_PLOTS, OverlayRelation, draw_relations
 
@@ -53,9 +55,30 @@ def test_without_a_main_direction_no_arrow_is_drawn():
 @pytest.mark.parametrize("directions", [4, 360])
 def test_any_number_of_plots_fits(count, directions):
     relations = [relation(float(k), k % 2, 1 - k % 2, directions) for k in range(count)]
-    image = draw_relations(SCENE, relations, left_out=7, width=400)
+    image = draw_relations(SCENE, relations, left_out=[(0, 1)] * 7, width=400)
     assert image.width == 400
     assert 200 < image.height < 400
+
+
+@pytest.mark.parametrize("count", [1, 12, 300])
+def test_relations_that_are_not_drawn_are_counted_and_listed_as_far_as_they_fit(count, monkeypatch):
+    written, text = [], Canvas.text
+
+    def kept(canvas, at, words, size, *args, **options):
+        written.append((at[0] + canvas.text_width(words, size), words))
+        text(canvas, at, words, size, *args, **options)
+
+    monkeypatch.setattr(Canvas, "text", kept)
+    scene = Scene.from_polygons([SQUARE + 3 * k for k in range(25)])
+    others = list(itertools.combinations(range(25), 2))[-count:]
+    draw_relations(scene, [relation()], left_out=others, width=400)
+    assert written[0][1].endswith(f"relations of 25 objects, {count} of them not drawn")
+    right, line = written[-1]
+    listed = line.removeprefix("not drawn: ").partition(" and ")[0].split("  ")
+    assert listed == [f"{a + 1},{b + 1}" for a, b in others][: len(listed)]
+    assert line.endswith(listed[-1] if count < 300 else f" and {count - len(listed)} more")
+    assert len(listed) == count if count < 300 else len(listed) > 30
+    assert right <= 1600 - 36
 
 
 def test_a_histogram_of_zeros_and_a_map_below_are_drawn():

@@ -77,10 +77,10 @@ def match(
 ) -> None:
     """Find which sketched object is which mapped object.
 
-    On a terminal it shows the search while it runs and then a table that counts objects from 1, as
-    the overlay does, and says how each sketched object lies to the nearest other. In a pipe it
-    prints tab-separated lines; these and --json, which says that too, count from 0, as the API
-    does.
+    On a terminal it shows the search while it runs and then a table that counts the objects of
+    each side from 1, as `segment` and all pictures do, and says how each sketched object lies to
+    the nearest other. In a pipe it prints tab-separated lines; these and --json, which says that
+    too, count the same objects from 0, as the API does.
     """
     from sketchmatch.cli import display, pictures, places
     from sketchmatch.cli.answering import answerer

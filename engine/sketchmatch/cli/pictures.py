@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sketchmatch.cli.display import facts
+from sketchmatch.cli.options import say
 from sketchmatch.io import read_source
 from sketchmatch.io.ros_bag import bag_and_topic, is_bag
-from sketchmatch.model import OccupancyGrid, Scene, SceneObject, StrokeSet
+from sketchmatch.model import FloatArray, OccupancyGrid, Scene, SceneObject, StrokeSet
 from sketchmatch.model.arrays import frozen_floats
 from sketchmatch.pictures.overlay import (
     MOST_PLOTS,
@@ -25,6 +27,7 @@ from sketchmatch.pictures.overlay import (
 from sketchmatch_client import Match
 from sketchmatch_proto.v1 import scene_pb2
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+from sketchmatch_proto.v1.source_pb2 import Point
 
 if TYPE_CHECKING:
     from sketchmatch.cli.inspection import Description
@@ -46,6 +49,7 @@ def draw_match(match: Match, map_path: Path, target: Path) -> None:
         pairs,
         facts=facts(match.result),
         underlay=_grid(map_path),
+        route=_way(match.scenes.sketch_route),
     )
     save_overlay(target, picture)
 
@@ -53,25 +57,32 @@ def draw_match(match: Match, map_path: Path, target: Path) -> None:
 def draw_segmentation(response: SegmentResponse, source: Path, target: Path, pen: bool) -> None:
     """Draw the objects of one scene, by a pen or not, numbered, and the route; save the picture."""
     grid = _grid(source)
-    route = np.array([(point.x, point.y) for point in response.route]) if response.route else None
+    route = _way(response.route)
     picture = draw_scene(scene_of(response.scene), underlay=grid, pen=pen, route=route)
     save_overlay(target, picture)
 
 
 def draw_description(found: Description, source: Path, target: Path) -> None:
     """Draw a scene and the histograms of its pairs: where not all fit, those of most force."""
-    most = np.argsort(-found.histograms.sum(axis=1), kind="stable")[:MOST_PLOTS]
+    most = np.argsort(-found.histograms.sum(axis=1), kind="stable")
+    shown, left_out = (sorted(part.tolist()) for part in (most[:MOST_PLOTS], most[MOST_PLOTS:]))
     relations = []
-    for k in sorted(most.tolist()):
+    for k in shown:
         (a, b), relation, row = found.pairs[k], found.relations[k], found.histograms[k]
         main = None if relation.direction is None else float(found.directions[k])
         relations.append(OverlayRelation(a, b, relation.phrase, relation.degree, row, main))
     directions = found.histograms.shape[1]
     kind = f"{found.histogram.name} histograms, {directions} directions"
+    if left_out:
+        kind += f", of the {MOST_PLOTS} pairs with the strongest forces"
+        say(
+            f"--plot: draws the {MOST_PLOTS} of {len(found.pairs)} relations with the strongest "
+            "forces, those of large objects close together; choose others by --pair A,B"
+        )
     picture = draw_relations(
         found.scene,
         relations,
-        left_out=len(found.pairs) - len(relations),
+        left_out=[found.pairs[k] for k in left_out],
         caption=f"{kind}, each drawn to its own peak; an arrow marks the main direction",
         underlay=_grid(source),
         pen=isinstance(found.source, StrokeSet),
@@ -93,6 +104,11 @@ def scene_of(message: scene_pb2.Scene) -> Scene:
             for item in message.objects
         )
     )
+
+
+def _way(points: Sequence[Point]) -> FloatArray | None:
+    """Return a route, if there is one."""
+    return np.array([(point.x, point.y) for point in points]) if points else None
 
 
 def _grid(path: Path) -> OccupancyGrid | None:

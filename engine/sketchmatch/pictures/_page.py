@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 from sketchmatch.pictures._canvas import Box, Canvas, printable
-from sketchmatch.pictures._palette import Colour, mixed, pair_colour
+from sketchmatch.pictures._palette import Colour, mixed
 from sketchmatch.pictures._panel import (
     BORDER,
     INK,
@@ -38,15 +38,30 @@ __all__ = [
 ]
 
 MARGIN, GUTTER, HEADER, ROW = 36.0, 24.0, 108.0, 38.0
+# From the number in the sketch to that on the map.
+_PAIR = 40.0
 PAGE: Colour = (246, 247, 249)
 SOFT: Colour = (98, 112, 134)
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One pair in the legend: its number, what it is called, how sure it is."""
+    """One line of the legend.
 
-    number: int
+    Attributes
+    ----------
+    numbers
+        Of an object, or of a pair: in the sketch, then on the map.
+    colour
+        What these are drawn in.
+    name
+        What it is called.
+    confidence
+        How sure the pair is, 0 … 1, or None.
+    """
+
+    numbers: tuple[int, ...]
+    colour: Colour
     name: str
     confidence: float | None = None
 
@@ -94,7 +109,9 @@ class Page:
         if not self.entries:
             return 1
         named = any(entry.name for entry in self.entries)
-        most = int((self.across - 2.0 * MARGIN) / (340.0 if named else 186.0))
+        paired = any(len(entry.numbers) > 1 for entry in self.entries)
+        least = (340.0 if named else 186.0) + (_PAIR if paired else 0.0)
+        most = int((self.across - 2.0 * MARGIN) / least)
         rows = math.ceil(len(self.entries) / most)
         return max(math.ceil(len(self.entries) / rows), min(4, most))
 
@@ -141,25 +158,34 @@ def draw_header(
 
 def draw_entry(canvas: Canvas, entry: Entry, x: float, y: float, width: float) -> None:
     """Draw one entry of a legend, from ``x`` on around the height ``y``."""
-    draw_badge(canvas, Place(x + 16.0, y), entry.number, 25.0)
-    left, right = x + 40.0, x + width
+    for k, number in enumerate(entry.numbers):
+        draw_badge(canvas, Place(x + 16.0 + k * _PAIR, y), number, 25.0, entry.colour)
+    if len(entry.numbers) > 1:
+        _draw_arrow(canvas, x + 16.0 + _PAIR / 2.0, y)
+    left, right = x + 40.0 + (len(entry.numbers) - 1) * _PAIR, x + width
     if entry.confidence is not None:
         share = min(max(entry.confidence, 0.0), 1.0)
         start = right - 130.0 if entry.name else left
         end = min(start + 80.0, right - 50.0)
-        _draw_bar(canvas, (start, y - 3.5, end, y + 3.5), share, entry.number)
+        _draw_bar(canvas, (start, y - 3.5, end, y + 3.5), share, entry.colour)
         canvas.text((end + 10.0, y), f"{share:.0%}", 16.0, INK)
         right = start - 12.0
     if entry.name:
         canvas.text((left, y), canvas.truncated(entry.name, 16.0, right - left), 16.0, INK)
 
 
-def _draw_bar(canvas: Canvas, box: Box, share: float, number: int) -> None:
+def _draw_arrow(canvas: Canvas, x: float, y: float) -> None:
+    """Draw a small arrow to the right around a point."""
+    canvas.line(np.array([[x - 6.0, y], [x + 3.0, y]]), SOFT, 1.4)
+    canvas.fill([np.array([[x + 7.0, y], [x + 2.0, y - 3.5], [x + 2.0, y + 3.5]])], SOFT, 1.0)
+
+
+def _draw_bar(canvas: Canvas, box: Box, share: float, colour: Colour) -> None:
     radius = (box[3] - box[1]) / 2.0
     canvas.rounded(box, radius, mixed(BORDER, WHITE, 0.35))
     if share > 0.0:
         filled = max(share * (box[2] - box[0]), 2.0 * radius)
-        canvas.rounded((box[0], box[1], box[0] + filled, box[3]), radius, pair_colour(number))
+        canvas.rounded((box[0], box[1], box[0] + filled, box[3]), radius, colour)
 
 
 def _draw_note(canvas: Canvas, note: str, x: float, y: float) -> None:

@@ -11,11 +11,12 @@ import shapely
 
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene
 from sketchmatch.pictures._canvas import Box, Canvas, printable
-from sketchmatch.pictures._palette import Colour, mixed, pair_colour, readable_on
+from sketchmatch.pictures._palette import Colour, mixed, readable_on
 from sketchmatch.pictures._places import Place, badge_places, label_places
 from sketchmatch.pictures._underlay import known_area, painted_cells
 
 __all__ = [
+    "ALONE",
     "BORDER",
     "INK",
     "PADDING",
@@ -31,7 +32,8 @@ PADDING = (44.0, 60.0, 44.0, 52.0)
 WHITE: Colour = (255, 255, 255)
 INK: Colour = (23, 32, 51)
 BORDER: Colour = (221, 226, 233)
-_GREY: Colour = (140, 148, 160)
+ALONE: Colour = (140, 148, 160)
+"""The grey of objects without a partner."""
 _PAPER: Colour = (255, 254, 250)
 _DOTS: Colour = (229, 226, 215)
 # Length of the head of a route's arrow, and half its width.
@@ -40,7 +42,7 @@ _HEAD = (13.0, 5.0)
 
 @dataclass(frozen=True)
 class Panel:
-    """One scene with all that its drawing needs.
+    """One scene with all that its drawing needs; its objects carry their numbers, from 1.
 
     Attributes
     ----------
@@ -48,8 +50,8 @@ class Panel:
         Written in its upper left corner.
     scene
         The objects.
-    numbers
-        By object; one without a number is drawn grey.
+    colours
+        By object; one without a colour is drawn grey and hatched.
     underlay
         The grid under the objects.
     pen
@@ -64,7 +66,7 @@ class Panel:
 
     name: str
     scene: Scene
-    numbers: Mapping[int, int]
+    colours: Mapping[int, Colour]
     underlay: OccupancyGrid | None = None
     pen: bool = False
     metres: bool = False
@@ -73,7 +75,7 @@ class Panel:
 
     def colour(self, index: int) -> Colour:
         """Return an object's colour."""
-        return pair_colour(self.numbers[index]) if index in self.numbers else _GREY
+        return self.colours.get(index, ALONE)
 
     def area(self) -> Box:
         """Return what is worth showing, in scene units: what is drawn and the room around it."""
@@ -122,7 +124,8 @@ def draw_panel(canvas: Canvas, panel: Panel, box: Box) -> None:
     over_cells = panel.underlay is not None
     rings = [frame.rings(item.rings) for item in panel.scene.objects]
     for k in sorted(range(len(rings)), key=lambda k: -panel.scene.objects[k].area):
-        draw_object(canvas, rings[k], panel.numbers.get(k), pen=panel.pen, over_cells=over_cells)
+        colour, pen = panel.colours.get(k), float(k + 1) if panel.pen else None
+        draw_object(canvas, rings[k], colour, pen=pen, over_cells=over_cells)
     if panel.route is not None:
         _draw_route(canvas, frame.rings([panel.route])[0])
     if panel.metres:
@@ -151,27 +154,29 @@ def _draw_ground(canvas: Canvas, panel: Panel, frame: _Frame, box: Box) -> None:
 def draw_object(
     canvas: Canvas,
     rings: Sequence[FloatArray],
-    number: int | None,
+    colour: Colour | None,
     *,
-    pen: bool = False,
+    pen: float | None = None,
     over_cells: bool = False,
 ) -> None:
-    """Draw one object, given in design units: in its number's colour, or grey without one."""
+    """Draw one object, given in design units: in its colour, or grey and hatched without one.
+
+    ``pen`` is where in its wobble a pen begins; without it, outlines are drawn as by a machine.
+    """
     if over_cells:
         canvas.fill(rings, WHITE, 0.8)
-    if number is None:
-        canvas.fill(rings, _GREY, 0.12)
-        canvas.hatch(rings, mixed(_GREY, WHITE, 0.35), 9.0, 1.2)
+    if colour is None:
+        canvas.fill(rings, ALONE, 0.12)
+        canvas.hatch(rings, mixed(ALONE, WHITE, 0.35), 9.0, 1.2)
         for ring in rings:
-            canvas.dashed(ring, _GREY, 2.0, 7.0, 4.5)
+            canvas.dashed(ring, ALONE, 2.0, 7.0, 4.5)
         return
-    colour = pair_colour(number)
     canvas.fill(rings, colour, 0.42)
     edge = _edge(colour)
     for k, ring in enumerate(rings):
-        if pen:
-            canvas.pen(ring, mixed(edge, WHITE, 0.45), 1.2, number + 2.0 + k)
-            canvas.pen(ring, edge, 2.8, float(number + k))
+        if pen is not None:
+            canvas.pen(ring, mixed(edge, WHITE, 0.45), 1.2, pen + 2.0 + k)
+            canvas.pen(ring, edge, 2.8, pen + k)
         else:
             canvas.outline(ring, edge, 2.8)
 
@@ -193,9 +198,9 @@ def _draw_route(canvas: Canvas, points: FloatArray) -> None:
 
 def _draw_names(canvas: Canvas, panel: Panel, shapes: Sequence[shapely.Polygon], box: Box) -> None:
     """Write the numbers, then the labels that have room."""
-    half = _badge_half(panel.badge, max(panel.numbers.values(), default=1))
+    half = _badge_half(panel.badge, len(shapes))
     bounds = (box[0] + 8.0, box[1] + 46.0, box[2] - 8.0, box[3] - 8.0)
-    places = badge_places(shapes, list(panel.numbers), half, bounds)
+    places = badge_places(shapes, half, bounds)
     texts = {
         k: canvas.truncated(printable(label), 15.0, 150.0)
         for k, label in enumerate(panel.scene.labels)
@@ -211,7 +216,7 @@ def _draw_names(canvas: Canvas, panel: Panel, shapes: Sequence[shapely.Polygon],
             ends = np.array([[place.x, place.y], place.leads_to])
             canvas.line(ends, _edge(panel.colour(k)), 1.6)
     for k, place in places.items():
-        draw_badge(canvas, place, panel.numbers[k], panel.badge)
+        draw_badge(canvas, place, k + 1, panel.badge, panel.colour(k))
 
 
 def badge_size(count: int) -> float:
@@ -224,9 +229,8 @@ def _badge_half(size: float, number: int) -> tuple[float, float]:
     return (size / 2.0 * (1.0 + 0.22 * max(0, len(str(number)) - 1)), size / 2.0)
 
 
-def draw_badge(canvas: Canvas, place: Place, number: int, size: float) -> None:
-    """Draw a number in white or dark on its colour."""
-    colour = pair_colour(number)
+def draw_badge(canvas: Canvas, place: Place, number: int, size: float, colour: Colour) -> None:
+    """Draw a number in white or dark on a colour."""
     a, b = _badge_half(size, number)
     box = (place.x - a, place.y - b, place.x + a, place.y + b)
     canvas.rounded(box, b, colour, WHITE, 0.075 * size)

@@ -27,19 +27,14 @@ class Place:
 
 
 def badge_places(
-    shapes: Sequence[shapely.Polygon],
-    numbered: Sequence[int],
-    half: tuple[float, float],
-    bounds: Box,
+    shapes: Sequence[shapely.Polygon], half: tuple[float, float], bounds: Box
 ) -> dict[int, Place]:
-    """Find a place for each numbered object's badge.
+    """Find a place for each object's badge.
 
     Parameters
     ----------
     shapes
         All objects of the panel, in design units.
-    numbered
-        Indices of those with a badge.
     half
         Half the width and height of a badge.
     bounds
@@ -52,11 +47,11 @@ def badge_places(
     """
     tree = shapely.STRtree(shapes)
     places = {}
-    for index in numbered:
+    for index in range(len(shapes)):
         point, radius = _deepest(shapes[index], _in_front(shapes, tree, index))
         if radius >= max(1.3 * half[1], 1.05 * half[0]):
             places[index] = Place(*point)
-    for index in sorted(set(numbered) - set(places), key=lambda k: shapes[k].area):
+    for index in sorted(set(range(len(shapes))) - set(places), key=lambda k: shapes[k].area):
         taken = np.array([(place.x, place.y) for place in places.values()]).reshape(-1, 2)
         places[index] = _beside(shapes[index], tree, taken, half, bounds)
     return places

@@ -65,11 +65,20 @@ class Plot:
 
 @dataclass(frozen=True)
 class RelationsPage:
-    """Header; below it the scene with its labels on the left and a grid of plots on the right."""
+    """Header; below it the scene with its labels on the left and a grid of plots on the right.
+
+    Attributes
+    ----------
+    panel, entries, plots
+        The scene, its legend, and the histograms.
+    others
+        The pairs that are not drawn, each as it is written, for a line at the bottom.
+    """
 
     panel: Panel
     entries: Sequence[Entry]
     plots: Sequence[Plot]
+    others: Sequence[str] = ()
 
     def drawn(self, title: str, caption: str, width: int) -> Image.Image:
         """Return the finished picture."""
@@ -80,8 +89,9 @@ class RelationsPage:
         left = _ACROSS - 2.0 * MARGIN - GUTTER - grid[0]
         legend = math.ceil(len(self.entries) / 2) * ROW + 20.0 + GUTTER if self.entries else 0.0
         panel = max(panel_height([self.panel], left), min(grid[1] - legend, 1.9 * left))
-        bottom = HEADER + max(grid[1], panel + legend) + MARGIN
-        canvas = Canvas((_ACROSS, bottom), width, PAGE)
+        bottom = HEADER + max(grid[1], panel + legend)
+        note = ROW if self.others else 0.0
+        canvas = Canvas((_ACROSS, bottom + note + MARGIN), width, PAGE)
         draw_header(canvas, _ACROSS, title, caption, ())
         draw_panel(canvas, self.panel, (MARGIN, HEADER, MARGIN + left, HEADER + panel))
         if self.entries:
@@ -92,6 +102,9 @@ class RelationsPage:
             x = MARGIN + left + GUTTER + column * (cell + _GAP)
             y = HEADER + row * (high + _GAP)
             _draw_plot(canvas, plot, (x, y, x + cell, y + high))
+        if self.others:
+            at = (MARGIN, bottom + 0.8 * ROW)
+            canvas.text(at, _listed(canvas, self.others, 16.0), 16.0, SOFT)
         return canvas.finished()
 
     def _draw_legend(self, canvas: Canvas, box: Box) -> None:
@@ -101,6 +114,18 @@ class RelationsPage:
             row, column = divmod(k, 2)
             x, y = box[0] + 20.0 + column * pitch, box[1] + 10.0 + (row + 0.5) * ROW
             draw_entry(canvas, entry, x, y, pitch - 44.0)
+
+
+def _listed(canvas: Canvas, pairs: Sequence[str], size: float) -> str:
+    """Return one line that lists as many pairs as fit and counts the others."""
+    best = f"not drawn: {len(pairs)}"
+    for shown in range(1, len(pairs) + 1):
+        rest = f" and {len(pairs) - shown} more" if shown < len(pairs) else ""
+        line = f"not drawn: {'  '.join(pairs[:shown])}{rest}"
+        if canvas.text_width(line, size) > _ACROSS - 2.0 * MARGIN:
+            break
+        best = line
+    return best
 
 
 def _draw_plot(canvas: Canvas, plot: Plot, box: Box) -> None:
@@ -122,7 +147,7 @@ def _draw_sentence(canvas: Canvas, plot: Plot, box: Box, grown: float) -> None:
     """Write the phrase between the two numbers, in two lines if it must be."""
     size, badge, y = 14.0 * grown, 24.0 * grown, box[1] + 31.0
     for number, x in zip(plot.numbers, (box[0] + 28.0, box[2] - 28.0), strict=True):
-        draw_badge(canvas, Place(x, y), number, badge)
+        draw_badge(canvas, Place(x, y), number, badge, pair_colour(number))
     words = printable(plot.phrase).split()
     lines = [" ".join(words)]
     if canvas.text_width(lines[0], size) > box[2] - box[0] - 100.0:

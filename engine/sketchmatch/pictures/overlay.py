@@ -1,7 +1,8 @@
-"""Pictures of results: a sketch and a map side by side, partners in one colour and number.
+"""Pictures of results: a sketch and a map side by side, partners in one colour.
 
-Everything is laid out in design units, 1600 across an overlay and 1000 across a single scene,
-and drawn at any width; a picture twice as wide shows the same, finer.
+A number in a picture is that of the object in its own scene, counted from 1, whatever is matched:
+the same as in all tables. Everything is laid out in design units, 1600 across an overlay and 1000
+across a single scene, and drawn at any width; a picture twice as wide shows the same, finer.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from sketchmatch.io._targets import check_target, writing
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene
 from sketchmatch.pictures._canvas import printable
 from sketchmatch.pictures._page import Entry, Page
+from sketchmatch.pictures._palette import pair_colour
 from sketchmatch.pictures._panel import Panel, badge_size
 from sketchmatch.pictures._plots import MOST_PLOTS, Plot, RelationsPage
 
@@ -90,17 +92,18 @@ def draw_overlay(
     facts: Sequence[tuple[str, str]] = (),
     underlay: OccupancyGrid | None = None,
     metres: bool | None = None,
+    route: FloatArray | None = None,
     width: int = 1600,
 ) -> Image.Image:
-    """Draw both scenes side by side, matched objects in the same colour and number.
+    """Draw both scenes side by side, matched objects in the same colour.
 
     Parameters
     ----------
     sketch, map
         The scenes.
     matches
-        The pairs of the object map, in any order. A pair has the number of its sketched object,
-        counted from 1; objects without a partner are grey, hatched and without a number.
+        The pairs of the object map, in any order. Objects are numbered from 1, as their scenes
+        count them, and those without a partner are grey and hatched.
     title, caption
         The headline, which counts the matches when left out, and a line below it.
     facts
@@ -109,6 +112,8 @@ def draw_overlay(
         The grid that the map was made from, drawn softly under its objects.
     metres
         Whether the map is in metres and gets a scale bar; with an underlay when left out.
+    route
+        Shape (k, 2), two points or more: a way through the sketch, drawn as a light dashed arrow.
     width
         Of the picture, in pixels, 400 … 6400. The height follows from the content.
 
@@ -125,15 +130,23 @@ def draw_overlay(
     _check_width(width)
     _check_matches(sketch, map, matches)
     matches = sorted(matches, key=lambda match: match.sketch_object)
-    numbers = {match.sketch_object: match.sketch_object + 1 for match in matches}
-    partners = {match.map_object: match.sketch_object + 1 for match in matches}
-    metres = underlay is not None if metres is None else metres
+    colours = [pair_colour(match.sketch_object + 1) for match in matches]
+    drawn = {match.sketch_object: colour for match, colour in zip(matches, colours, strict=True)}
+    mapped = {match.map_object: colour for match, colour in zip(matches, colours, strict=True)}
     badge = badge_size(max(len(sketch), len(map)))
     panels = [
-        Panel("Sketch", sketch, numbers, pen=True, badge=badge),
-        Panel("Map", map, partners, underlay, metres=metres, badge=badge),
+        Panel("Sketch", sketch, drawn, pen=True, route=route, badge=badge),
+        Panel("Map", map, mapped, underlay, metres=_in_metres(metres, underlay), badge=badge),
     ]
-    entries = [_entry(match, sketch, map) for match in matches]
+    entries = [
+        Entry(
+            (match.sketch_object + 1, match.map_object + 1),
+            drawn[match.sketch_object],
+            _name(match, sketch, map),
+            match.confidence,
+        )
+        for match in matches
+    ]
     if title is None:
         title = f"{len(matches)} of {len(sketch)} objects matched"
     page = Page(_OVERLAY, panels, entries, _note(panels))
@@ -181,9 +194,7 @@ def draw_scene(
         If the width is out of range.
     """
     _check_width(width)
-    metres = underlay is not None if metres is None else metres
-    numbers = {k: k + 1 for k in range(len(scene))}
-    panel = Panel("", scene, numbers, underlay, pen, metres, badge_size(len(scene)), route)
+    panel = _single(scene, underlay, metres, pen, route)
     title = f"{len(scene)} objects" if title is None else title
     return Page(_SINGLE, [panel], _labelled(scene), "").drawn(title, caption, (), width)
 
@@ -192,7 +203,7 @@ def draw_relations(
     scene: Scene,
     relations: Sequence[OverlayRelation],
     *,
-    left_out: int = 0,
+    left_out: Sequence[tuple[int, int]] = (),
     title: str | None = None,
     caption: str = "",
     underlay: OccupancyGrid | None = None,
@@ -211,7 +222,8 @@ def draw_relations(
     relations
         1 to 16 of them, in the order of the plots.
     left_out
-        How many others are not drawn, which the headline tells.
+        The pairs (a, b) of others that are not drawn: the headline counts them, and the last line
+        lists them as far as there is room.
     title, caption
         The headline, which counts the relations when left out, and a line below it.
     underlay, metres, pen
@@ -232,19 +244,18 @@ def draw_relations(
     """
     _check_width(width)
     _check_relations(scene, relations)
-    numbers = {k: k + 1 for k in range(len(scene))}
-    metres = underlay is not None if metres is None else metres
-    panel = Panel("", scene, numbers, underlay, pen, metres, badge_size(len(scene)))
+    panel = _single(scene, underlay, metres, pen)
     plots = [
         Plot((item.a + 1, item.b + 1), item.phrase, item.degree, item.histogram, item.direction)
         for item in relations
     ]
     if title is None:
-        total = len(relations) + left_out
+        total = len(relations) + len(left_out)
         counted = f"{total} relation" if total == 1 else f"{total} relations"
-        rest = f", {left_out} of them not drawn" if left_out else ""
+        rest = f", {len(left_out)} of them not drawn" if left_out else ""
         title = f"{counted} of {len(scene)} objects{rest}"
-    return RelationsPage(panel, _labelled(scene), plots).drawn(title, caption, width)
+    others = [f"{a + 1},{b + 1}" for a, b in left_out]
+    return RelationsPage(panel, _labelled(scene), plots, others).drawn(title, caption, width)
 
 
 def check_picture_path(path: str | Path, field: str = "overlay") -> None:
@@ -326,19 +337,43 @@ def _check_relations(scene: Scene, relations: Sequence[OverlayRelation]) -> None
                 raise InvalidInputError(Reason.INVALID_FIELD, f"relations[{k}].{name}", problem)
 
 
+def _single(
+    scene: Scene,
+    underlay: OccupancyGrid | None,
+    metres: bool | None,
+    pen: bool,
+    route: FloatArray | None = None,
+) -> Panel:
+    """Return the panel of a scene by itself, each object in a colour of its own."""
+    return Panel(
+        "",
+        scene,
+        {k: pair_colour(k + 1) for k in range(len(scene))},
+        underlay,
+        pen,
+        _in_metres(metres, underlay),
+        badge_size(len(scene)),
+        route,
+    )
+
+
+def _in_metres(metres: bool | None, underlay: OccupancyGrid | None) -> bool:
+    return underlay is not None if metres is None else metres
+
+
 def _labelled(scene: Scene) -> list[Entry]:
     """Return a legend of the objects that have labels."""
-    return [Entry(k + 1, printable(name)) for k, name in enumerate(scene.labels) if name]
+    names = enumerate(map(printable, scene.labels))
+    return [Entry((k + 1,), pair_colour(k + 1), name) for k, name in names if name]
 
 
-def _entry(match: OverlayMatch, sketch: Scene, map: Scene) -> Entry:  # noqa: A002
+def _name(match: OverlayMatch, sketch: Scene, map: Scene) -> str:  # noqa: A002
     names = (sketch.labels[match.sketch_object], map.labels[match.map_object])
-    name = " · ".join(dict.fromkeys(printable(name) for name in names if name.strip()))
-    return Entry(match.sketch_object + 1, name, match.confidence)
+    return " · ".join(dict.fromkeys(printable(name) for name in names if name.strip()))
 
 
 def _note(panels: Sequence[Panel]) -> str:
     """Return what the legend says about objects without a partner; nothing if there is none."""
-    sketched, mapped = (len(panel.scene) - len(panel.numbers) for panel in panels)
+    sketched, mapped = (len(panel.scene) - len(panel.colours) for panel in panels)
     parts = [f"{sketched} sketched"] * (sketched > 0) + [f"{mapped} mapped"] * (mapped > 0)
     return f"no partner: {' and '.join(parts)}" if parts else ""
