@@ -8,7 +8,10 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import Image
 from sketchmatch_builtin.segmenters.image import ImageSegmenter
 
-INVERTED = "The picture is light on dark: it was read as its negative."
+INVERTED = (
+    "The picture is light on dark and was read as its negative: set ink to 'dark' if the dark is "
+    "what is drawn."
+)
 
 
 def segmented(pixels, **params):

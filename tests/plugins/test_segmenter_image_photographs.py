@@ -48,6 +48,12 @@ DISTURBANCES = {
 }
 
 
+INVERTED = (
+    "The picture is light on dark and was read as its negative: set ink to 'dark' if the dark is "
+    "what is drawn."
+)
+
+
 def found_in(pixels, **params):
     return ImageSegmenter(ImageSegmenter.Params(**params)).segment(Image(pixels))
 
@@ -142,11 +148,10 @@ def test_turning_by_90_degrees_changes_nothing_but_the_direction(turns, how):
 def test_the_negative_has_the_same_objects(how):
     pixels = taken(0, **DISTURBANCES[how]).image.pixels
     found, negative = found_in(pixels), found_in(255 - pixels)
-    inverted = "The picture is light on dark: it was read as its negative."
     assert [o.rings[0].tolist() for o in negative.scene.objects] == [
         o.rings[0].tolist() for o in found.scene.objects
     ]
-    assert negative.warnings == (inverted, *found.warnings)
+    assert negative.warnings == (INVERTED, *found.warnings)
 
 
 def paper(shape=(600, 800)):

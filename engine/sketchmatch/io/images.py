@@ -30,6 +30,8 @@ _GREY = ("1", "L", "LA", "La")
 # Pixels whose channels differ by this much are in colour; fewer than this share are blemishes.
 _COLOURED = 24
 _LEAST_COLOUR = 2e-4
+# Ink shows on white paper if it is darker by so much in a channel.
+_VISIBLE = 64
 # Pixels that are looked at together.
 _STRIP = 1 << 20
 
@@ -37,8 +39,9 @@ _STRIP = 1 << 20
 def decode_image(data: bytes) -> Image:
     """Decode a picture of a map or of a sketch, in grey unless it has colours.
 
-    Faint tints become their luminance, transparent parts white paper, and a photograph is turned
-    the way its camera was held (EXIF orientation).
+    Faint tints become their luminance, and a photograph is turned the way its camera was held (EXIF
+    orientation). What is transparent is white paper, whatever colour lies under it, and ink that
+    could not be seen on that, as white chalk on nothing, becomes its negative.
 
     Parameters
     ----------
@@ -53,14 +56,34 @@ def decode_image(data: bytes) -> Image:
     """
     picture = _upright(scaled_to_8_bits(load_picture(data, "data"), "data"))
     if picture.has_transparency_data:
-        paper = PIL.Image.new("RGBA", picture.size, "white")
-        paper.alpha_composite(picture.convert("RGBA"))
-        picture = paper
+        picture = _on_paper(np.array(picture.convert("RGBA")))
     if picture.mode in _GREY:
         return Image(np.asarray(picture.convert("L")))
     if picture.mode != "RGB":
         picture = picture.convert("RGB")
     return Image(np.asarray(picture if _has_colour(picture) else picture.convert("L")))
+
+
+def _on_paper(pixels: NDArray[np.uint8]) -> PIL.Image.Image:
+    """Return a picture, shape (rows, columns, 4), on white paper, mode RGBA.
+
+    Each connected piece that is white or nearly so everywhere is drawn in its negative: it has
+    fewer pixels that show on the paper than the outline of a white shape would have.
+    """
+    opacity = pixels[:, :, 3]
+    inked = opacity >= max(1, int(opacity.max()) // 2)
+    if not inked.all():
+        import cv2  # which pictures without transparency do without
+
+        count, pieces = cv2.connectedComponents(inked.astype(np.uint8), connectivity=8)
+        shown = inked & (pixels[:, :, :3].min(axis=2) <= 255 - _VISIBLE)
+        sizes = np.bincount(pieces.ravel(), minlength=count)
+        pale = np.bincount(pieces[shown], minlength=count) < np.sqrt(sizes)
+        pale[0] = False
+        pixels[:, :, :3][pale[pieces]] ^= 255
+    paper = PIL.Image.new("RGBA", pixels.shape[1::-1], "white")
+    paper.alpha_composite(PIL.Image.fromarray(pixels))
+    return paper
 
 
 def _has_colour(picture: PIL.Image.Image) -> bool:

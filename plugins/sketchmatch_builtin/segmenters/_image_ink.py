@@ -14,9 +14,12 @@ from sketchmatch.api import InvalidInputError, Reason
 from sketchmatch_builtin.segmenters._image_light import (
     PAPER_CONTRAST,
     Mask,
+    Shade,
     continued,
+    edgeless,
     find_sheet,
     is_light_on_dark,
+    negative,
     odd,
     paper_light,
 )
@@ -36,10 +39,13 @@ _FAINT = 0.2
 _EVEN = 10
 _EDGE = 9
 
-_INVERTED = "The picture is light on dark: it was read as its negative."
+_INVERTED = (
+    "The picture is light on dark and was read as its negative: set ink to 'dark' if the dark is "
+    "what is drawn."
+)
 _TABLE = (
-    "What surrounds the sheet of paper was left out: set frame to 'keep' if it belongs to the "
-    "drawing."
+    "What surrounds the sheet of paper or the board was left out: set frame to 'keep' if it "
+    "belongs to the drawing."
 )
 _RULED = "The paper's ruled lines were left out."
 
@@ -67,7 +73,7 @@ class Ink:
     warnings: tuple[str, ...]
 
 
-def find_ink(pixels: Mask, blur: float, whole: bool) -> Ink:
+def find_ink(pixels: Mask, blur: float, whole: bool, shade: Shade) -> Ink:
     """Find the ink of a picture.
 
     In a picture in colour, ink is what absorbs light of any colour, as a yellow pen absorbs blue:
@@ -84,6 +90,8 @@ def find_ink(pixels: Mask, blur: float, whole: bool) -> Ink:
         Standard deviation of the Gaussian that evens out noise, in pixels.
     whole
         Whether all of the picture is the drawing; otherwise a table around the sheet is left out.
+    shade
+        Whether ink is darker or lighter than what it is drawn on; the picture decides with "auto".
 
     Raises
     ------
@@ -107,18 +115,21 @@ def find_ink(pixels: Mask, blur: float, whole: bool) -> Ink:
     small = [_reduced(channel, _LIGHT_SIDE) for channel in channels]
     grey = _most_telling(small)
     sheet = None if whole else find_sheet(grey)
-    inverted = sheet.inverted if sheet else is_light_on_dark(grey)
+    if sheet is not None:
+        small = [continued(some, sheet) for some in small]
+        grey = continued(grey, sheet)
+    inverted = is_light_on_dark(grey) if shade == "auto" else shade == "light"
     if inverted:
-        channels, small = [255 - channel for channel in channels], [255 - some for some in small]
-    if sheet:
-        small = [continued(some, sheet.mask) for some in small]
+        channels, small = list(map(negative, channels)), list(map(negative, small))
     absorbed = _absorbed(channels, [paper_light(some) for some in small])
-    if sheet:
+    if sheet is not None:
         size = channels[0].shape[::-1]
-        inside = np.asarray(cv2.resize(sheet.mask, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+        inside = np.asarray(cv2.resize(sheet, size, interpolation=cv2.INTER_NEAREST), np.uint8)
         absorbed *= inside[:, :, None]
-    mask, ruled = _threshold(np.ascontiguousarray(absorbed.max(axis=2)))
-    said = ((_INVERTED, inverted), (_TABLE, sheet is not None), (_RULED, ruled))
+    most = np.ascontiguousarray(absorbed.max(axis=2))
+    mask, ruled = _threshold(most)
+    mask[edgeless(most, mask)] = 0
+    said = ((_INVERTED, inverted and shade == "auto"), (_TABLE, sheet is not None), (_RULED, ruled))
     return Ink(
         mask,
         absorbed,

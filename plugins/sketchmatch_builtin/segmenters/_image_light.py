@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -12,14 +11,20 @@ from numpy.typing import NDArray
 __all__ = [
     "PAPER_CONTRAST",
     "Mask",
+    "Shade",
     "continued",
+    "edgeless",
     "find_sheet",
     "is_light_on_dark",
+    "negative",
     "odd",
     "paper_light",
 ]
 
 Mask = NDArray[np.uint8]
+
+Shade = Literal["auto", "dark", "light"]
+"""Whether ink is darker or lighter than what it is drawn on, or the picture decides."""
 
 PAPER_CONTRAST = 32
 """Grey levels between the darkest and the lightest spot, after smoothing, of paper alone."""
@@ -28,6 +33,13 @@ PAPER_CONTRAST = 32
 _THICKEST_LINE = 0.05
 # What a shape that the picture's border cuts returns at most of the light.
 _CUT = 0.55
+# Within this share of the larger side, ink falls at its rim by at least this share of its depth.
+_RIM = 0.01
+_SHARP = 0.45
+# What is drawn on a sheet covers at least this share of it, and is narrower than this share of the
+# picture's larger side.
+_DRAWN = 1e-3
+_WIDEST_SHAPE = 0.3
 
 
 def odd(length: float) -> int:
@@ -38,25 +50,22 @@ def odd(length: float) -> int:
 # The sheet of paper
 
 
-@dataclass(frozen=True)
-class _Sheet:
-    mask: Mask
-    inverted: bool
+def find_sheet(small: Mask) -> Mask | None:
+    """Return what is drawn on, if the picture shows more: a sheet of paper on a table, a board.
 
-
-def find_sheet(small: Mask) -> _Sheet | None:
-    """Return the sheet of paper on a table, if the picture shows one: a light quadrilateral.
-
-    Whichever of the negative and the picture shows a sheet is taken, and the picture first.
+    It is a quadrilateral with something drawn on it, lighter or darker than all around. Where there
+    are two, as a board on a sheet, the larger one is taken.
     """
     if min(small.shape) < 64:
         return None
-    for inverted in (False, True):
-        picture = np.asarray(255 - small if inverted else small, np.uint8)
-        found = _light_quadrilateral(picture)
-        if found is not None:
-            return _Sheet(found, inverted)
-    return None
+    found = (_light_quadrilateral(picture) for picture in (small, negative(small)))
+    sheets = [sheet for sheet in found if sheet is not None]
+    return max(sheets, key=lambda sheet: int(sheet.sum()), default=None)
+
+
+def negative(picture: Mask) -> Mask:
+    """Return a picture with light and dark exchanged."""
+    return np.asarray(255 - picture, np.uint8)
 
 
 def _light_quadrilateral(picture: Mask) -> Mask | None:
@@ -80,7 +89,17 @@ def _light_quadrilateral(picture: Mask) -> Mask | None:
         return None
     mask = np.zeros(picture.shape, np.uint8)
     cv2.fillConvexPoly(mask, best, 1)
-    return np.asarray(cv2.erode(mask, np.ones((odd(0.025 * side),) * 2, np.uint8)), np.uint8)
+    sheet = np.asarray(cv2.erode(mask, np.ones((odd(0.025 * side),) * 2, np.uint8)), np.uint8)
+    return sheet if _is_drawn_on(picture, sheet) else None
+
+
+def _is_drawn_on(picture: Mask, sheet: Mask) -> bool:
+    """Return whether anything is on a sheet: a filled shape of one colour is no sheet."""
+    wide = np.ones((odd(_WIDEST_SHAPE * max(picture.shape)),) * 2, np.uint8)
+    drawn = np.zeros_like(picture)
+    for finding in (cv2.MORPH_BLACKHAT, cv2.MORPH_TOPHAT):
+        drawn = np.maximum(drawn, cv2.morphologyEx(picture, finding, wide))
+    return float(np.mean(drawn[sheet > 0] >= 0.5 * PAPER_CONTRAST)) >= _DRAWN
 
 
 def _four_corners(contour: Any, area: float) -> Any:
@@ -193,7 +212,39 @@ def paper_light(small: Mask) -> Mask:
         for _ in range(16):
             raised = np.maximum(cv2.erode(raised, three), floor)
         if (raised == before).all():
-            return np.asarray(raised, np.uint8)
+            deep = np.asarray(cv2.subtract(raised, plain), np.uint8)
+            pits = np.asarray(deep >= 0.25 * PAPER_CONTRAST, np.uint8)
+            return np.where(edgeless(deep, pits), plain, raised).astype(np.uint8)
+
+
+def edgeless(depth: Mask, marked: Mask) -> NDArray[np.bool_]:
+    """Return which marked pieces fade out instead of ending, as glare and smears on a board do.
+
+    Over a few pixels at its rim, ink falls by most of what it falls over four times as many.
+
+    Parameters
+    ----------
+    depth
+        How much darker the picture is than its paper.
+    marked
+        1 in the pieces.
+    """
+    width = odd(max(5.0, _RIM * max(depth.shape)))
+    near, wide = np.ones((width, width), np.uint8), np.ones((4 * width + 1,) * 2, np.uint8)
+    even = np.asarray(cv2.GaussianBlur(depth, (0, 0), 0.2 * width), np.uint8)
+    count, labels = cv2.connectedComponents(marked, connectivity=8)
+    rim = np.asarray(marked > np.asarray(cv2.erode(marked, np.ones((3, 3), np.uint8))))
+    step, fall = (
+        np.bincount(
+            labels[rim],
+            np.asarray(cv2.morphologyEx(even, cv2.MORPH_GRADIENT, window))[rim],
+            minlength=count,
+        )
+        for window in (near, wide)
+    )
+    fading = step < _SHARP * fall
+    fading[0] = False
+    return np.asarray(fading[labels])
 
 
 def _border(picture: Mask) -> Mask:

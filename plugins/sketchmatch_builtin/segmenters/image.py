@@ -93,6 +93,13 @@ class ImageSegmenter(Segmenter):
             le=0.2,
             description="How far a simplified outline may leave the shape, as a share of its size.",
         )
+        ink: Literal["auto", "dark", "light"] = Field(
+            "auto",
+            description=(
+                "Whether what is drawn is darker or lighter than what it is drawn on, as chalk on "
+                "a blackboard is; 'auto' tells it from the picture."
+            ),
+        )
         frame: Literal["auto", "keep"] = Field(
             "auto",
             description=(
@@ -122,7 +129,7 @@ class ImageSegmenter(Segmenter):
     def segment(self, source: Image) -> Segmentation:
         """Return the shapes as objects, in pixels from the picture's lower left corner."""
         keep = self.params.frame == "keep"
-        ink = find_ink(source.pixels, self.params.blur, keep)
+        ink = find_ink(source.pixels, self.params.blur, keep, self.params.ink)
         least = (self.params.min_size * max(ink.mask.shape)) ** 2
         found = trace(ink.mask, least, self.params.max_gap, not keep)
         if self.params.colours == "separate":
