@@ -1,5 +1,8 @@
 """The one place that says how kernels are compiled and where the machine code is kept."""
 
+# mypy: disallow-untyped-calls=False
+# (much of numba has no types)
+
 from __future__ import annotations
 
 import hashlib
@@ -60,7 +63,7 @@ def kernel(function: _Function) -> _Function:
     """
     compiled: Any = numba.njit(function, nogil=True, error_model="numpy")
     if isinstance(compiled, Dispatcher):
-        compiled._cache = _Cache(function)
+        compiled._cache = _Cache(function)  # type: ignore[attr-defined]
     return compiled  # type: ignore[no-any-return]
 
 

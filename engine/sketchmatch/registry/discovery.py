@@ -113,7 +113,7 @@ def _presumed(point: EntryPoint) -> tuple[EntryPoint, PluginStatus]:
     """
     if point.dist is None:
         return point, PluginStatus(point.name, "unknown distribution", "")
-    metadata = point.dist.metadata
+    metadata: Any = point.dist.metadata
     name, version = metadata.get("Name"), metadata.get("Version")
     if not name:
         raise ValueError("it has no Name")
