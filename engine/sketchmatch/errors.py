@@ -7,6 +7,7 @@ server sends the same as a gRPC status with ``ErrorInfo`` and ``BadRequest``.
 
 from __future__ import annotations
 
+import re
 import reprlib
 from enum import StrEnum
 from typing import Any, Self
@@ -41,6 +42,7 @@ def quoted(value: object) -> str:
         text = _QUOTING.repr(value)
     except ValueError:
         text = "a number of thousands of digits"
+    text = re.sub(r"\n\s*", " ", text)  # of an array
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
 
 

@@ -18,7 +18,7 @@ from sketchmatch.api.forces import (
 )
 from sketchmatch.api.pixels import PixelObject, outlines, pixel_object, pixel_relations
 from sketchmatch.config import load, open_engine
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io import read_source
 from sketchmatch.model import (
     BoolArray,
@@ -46,9 +46,11 @@ def match(
     map: Scene | Source | str | Path,  # noqa: A002
     *,
     profile: str | None = None,
-    searcher: str | None = None,
+    sketch_segmenter: str | None = None,
+    map_segmenter: str | None = None,
     histogram: str | None = None,
     similarity: str | None = None,
+    searcher: str | None = None,
     params: Mapping[str, Mapping[str, Any]] | None = None,
     seed: int = 0,
     time_budget: float | None = None,
@@ -68,12 +70,16 @@ def match(
         polygons, ROS map YAML, images.
     profile
         A pipeline to start from, e.g. ``"fast"`` or ``"proof"``; what is said beside it wins.
-    searcher, histogram, similarity
+    sketch_segmenter, map_segmenter
+        Names of the algorithms that find the objects, e.g. ``map_segmenter="rooms"``; a scene needs
+        none. Left out, the profile decides, or else the configuration, or else the form of the
+        source.
+    histogram, similarity, searcher
         Names of the algorithms. Left out, the profile decides, or else the configuration, or else
-        they are ``"auto"``, ``"constant"`` and ``"cross-correlation"``.
+        they are ``"constant"``, ``"cross-correlation"`` and ``"auto"``.
     params
-        Parameters by stage, e.g. ``{"searcher": {"population": 400}}``; beside the three above
-        ``"sketch_segmenter"`` and ``"map_segmenter"``.
+        Parameters by stage, the five above, e.g. ``{"searcher": {"population": 400}}``; without a
+        name they are those of the algorithm that is used anyway.
     seed
         The same arguments with the same seed give the same result.
     time_budget
@@ -120,7 +126,13 @@ def match(
     {0: 1, 1: 2, 2: 0}
     """
     engine = _engine(config)
-    names = {"searcher": searcher, "histogram": histogram, "similarity": similarity}
+    names = {
+        "sketch_segmenter": sketch_segmenter,
+        "map_segmenter": map_segmenter,
+        "histogram": histogram,
+        "similarity": similarity,
+        "searcher": searcher,
+    }
     with engine.limited():
         request = MatchRequest(
             sketch=_loaded("sketch", sketch),
@@ -142,22 +154,40 @@ def match(
     raise AssertionError("a match ends with a result or an error")
 
 
-def read_scene(path: str | Path) -> Scene:
-    """Read the scene in a file, segmented as its kind is by default.
+def read_scene(
+    path: str | Path,
+    *,
+    segmenter: str | None = None,
+    params: Mapping[str, Any] | None = None,
+    profile: str | None = None,
+    config: str | Path | None = None,
+) -> Scene:
+    """Read the scene in a file.
 
-    Environment variables can say which segmenter that is, and how large the file may be; a
-    configuration file is not read.
+    Parameters
+    ----------
+    path
+        A sketch or a map, as :func:`match` takes them.
+    segmenter
+        Name of the algorithm that finds the objects, e.g. ``"rooms"``. Left out, the profile
+        decides, or else the configuration, or else the form of the source.
+    params
+        Its parameters, e.g. ``{"min_size": 0.3}``.
+    profile, config
+        As for :func:`match`.
 
     Raises
     ------
     InvalidInputError
-        If the file cannot be read or holds fewer than two objects.
+        If the file cannot be read or holds fewer than two objects, or the segmenter or a parameter
+        is of no use for it.
     """
-    engine = _engine()
+    engine = _engine(config)
     with engine.limited():
         source = read_source(Path(path))
-    segmenter = engine.resolve_segmenter(Choice(), source)
-    return engine.segment(source, segmenter, f"{path}: {source.field}").scene
+    choice = Choice(segmenter or "", _mapping("params", params))
+    chosen = engine.resolve_segmenter(choice, source, profile or "")
+    return engine.segment(source, chosen, f"{path}: {source.field}").scene
 
 
 def compare(
@@ -165,6 +195,8 @@ def compare(
     map: Scene | Source | str | Path,  # noqa: A002
     *,
     profile: str | None = None,
+    sketch_segmenter: str | None = None,
+    map_segmenter: str | None = None,
     histogram: str | None = None,
     similarity: str | None = None,
     params: Mapping[str, Mapping[str, Any]] | None = None,
@@ -174,7 +206,7 @@ def compare(
 
     Parameters
     ----------
-    sketch, map, profile, histogram, similarity, params, config
+    sketch, map, profile, sketch_segmenter, map_segmenter, histogram, similarity, params, config
         As for :func:`match`.
 
     Returns
@@ -199,7 +231,12 @@ def compare(
     engine = _engine(config)
     with engine.limited():
         given = _loaded("sketch", sketch), _loaded("map", map)
-    names = {"histogram": histogram, "similarity": similarity}
+    names = {
+        "sketch_segmenter": sketch_segmenter,
+        "map_segmenter": map_segmenter,
+        "histogram": histogram,
+        "similarity": similarity,
+    }
     selection = _selection(names, params or {})
     unread = [None if isinstance(each, Scene) else each for each in given]
     pipeline = engine.resolve(selection, unread[0], unread[1], profile or "")
@@ -367,8 +404,15 @@ def _object(name: str, polygon: Any) -> SceneObject:
 
 
 def _loaded(side: str, given: Scene | Source | str | Path) -> Scene | Source:
-    if not isinstance(given, str | Path):
+    if isinstance(given, Scene | Source):
         return given
+    if not isinstance(given, str | Path):
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            side,
+            f"is {quoted(given)}; give a Scene, as Scene.from_polygons makes it, a source or the "
+            "path of a file",
+        )
     try:
         return read_source(Path(given))
     except InvalidInputError as error:
@@ -378,7 +422,12 @@ def _loaded(side: str, given: Scene | Source | str | Path) -> Scene | Source:
 def _selection(
     names: Mapping[str, str | None], params: Mapping[str, Mapping[str, Any]]
 ) -> Selection:
-    for stage in params:
+    for stage, name in names.items():
+        if name is not None and not isinstance(name, str):
+            raise InvalidInputError(
+                Reason.INVALID_FIELD, stage, f"is {quoted(name)}; give the name of an algorithm"
+            )
+    for stage in _mapping("params", params):
         if stage not in STAGES:
             raise InvalidInputError(
                 Reason.INVALID_PARAMETER,
@@ -386,5 +435,16 @@ def _selection(
                 f"is no stage; choose one of: {', '.join(STAGES)}",
             )
     return {
-        stage: Choice(names.get(stage) or "", params.get(stage, {})) for stage in {*names, *params}
+        stage: Choice(names.get(stage) or "", _mapping(f"params.{stage}", params.get(stage)))
+        for stage in {*names, *params}
     }
+
+
+def _mapping(field: str, given: Mapping[str, Any] | None) -> Mapping[str, Any]:
+    if given is not None and not isinstance(given, Mapping):
+        raise InvalidInputError(
+            Reason.INVALID_PARAMETER,
+            field,
+            f"is {quoted(given)}; give a dict of parameters, as in {{'min_size': 0.3}}",
+        )
+    return given or {}

@@ -566,7 +566,7 @@ def asked(case: Case, folder: Path) -> MatchRequest:
 
 
 def arguments(case: Case, folder: Path) -> list[str]:
-    options = {"sketch_segmenter": "segmenter-sketch", "map_segmenter": "segmenter-map"}
+    options = {"sketch_segmenter": "sketch-segmenter", "map_segmenter": "map-segmenter"}
     made = [str(case.sketch(folder, "sketch")), str(case.map(folder, "map"))]
     made += [f"--{options.get(stage, stage)}={name}" for stage, name in case.chosen.items()]
     for stage, params in case.params.items():

@@ -18,15 +18,13 @@ from sketchmatch.cli.options import say
 from sketchmatch.config import load, open_engine
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
-from sketchmatch.model import FloatArray, Scene, Source, object_pairs
+from sketchmatch.model import FloatArray, Pairs, Scene, Source, object_pairs
 from sketchmatch.pipeline.result import Correspondence
 from sketchmatch.pipeline.selection import SIDES, Choice
 from sketchmatch.pipeline.warmup import announcing_compilation
 from sketchmatch.pipeline.words import DirectionalRelation, directional_relations
 
 __all__ = ["Description", "Listing", "compared", "described"]
-
-Pairs = Sequence[tuple[int, int]]
 
 
 @dataclass(frozen=True)

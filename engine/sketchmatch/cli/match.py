@@ -10,13 +10,18 @@ from google.protobuf.json_format import MessageToJson
 
 from sketchmatch.cli.options import (
     Config,
+    FormerMapSegmenter,
+    FormerSketchSegmenter,
     Json,
+    MapSegmenter,
     Overlay,
     Profile,
     Server,
     Settings,
+    SketchSegmenter,
     parse_settings,
     refuse_config,
+    say_renamed,
 )
 from sketchmatch.errors import InvalidInputError, Reason
 
@@ -41,8 +46,10 @@ def match(
     searcher: Annotated[str | None, typer.Option(help="Searcher.")] = None,
     histogram: Annotated[str | None, typer.Option(help="Histogram.")] = None,
     similarity: Annotated[str | None, typer.Option(help="Similarity measure.")] = None,
-    segmenter_sketch: Annotated[str | None, typer.Option(help="Segmenter of the sketch.")] = None,
-    segmenter_map: Annotated[str | None, typer.Option(help="Segmenter of the map.")] = None,
+    sketch_segmenter: SketchSegmenter = "",
+    map_segmenter: MapSegmenter = "",
+    segmenter_sketch: FormerSketchSegmenter = "",
+    segmenter_map: FormerMapSegmenter = "",
     settings: Settings = None,
     seed: Annotated[int, typer.Option(help="Same seed, same answer.")] = 0,
     time_budget: Annotated[
@@ -90,8 +97,8 @@ def match(
     if overlay is not None:
         pictures.check_path(overlay)
     options: MatchOptions = {
-        "sketch_segmenter": segmenter_sketch,
-        "map_segmenter": segmenter_map,
+        "sketch_segmenter": sketch_segmenter or segmenter_sketch,
+        "map_segmenter": map_segmenter or segmenter_map,
         "histogram": histogram,
         "similarity": similarity,
         "searcher": searcher,
@@ -113,6 +120,7 @@ def match(
         display.show_match(answer)
     if overlay is not None:
         pictures.draw_match(answer, map_, overlay)
+    say_renamed(segmenter_sketch, segmenter_map)
 
 
 def _weights(text: str) -> RequestWeights:

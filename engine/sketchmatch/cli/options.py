@@ -13,17 +13,22 @@ from sketchmatch.errors import InvalidInputError, Reason
 
 __all__ = [
     "Config",
+    "FormerMapSegmenter",
+    "FormerSketchSegmenter",
     "Histogram",
     "Json",
     "JsonDocument",
+    "MapSegmenter",
     "Overlay",
     "Profile",
     "Server",
     "Settings",
+    "SketchSegmenter",
     "parse_pairs",
     "parse_settings",
     "refuse_config",
     "say",
+    "say_renamed",
 ]
 
 Server = Annotated[
@@ -64,6 +69,14 @@ Json = Annotated[
 JsonDocument = Annotated[
     bool, typer.Option("--json", help="Print one JSON document, which counts objects from 0.")
 ]
+SketchSegmenter = Annotated[
+    str, typer.Option("--sketch-segmenter", help="Segmenter of the sketch; its form decides.")
+]
+MapSegmenter = Annotated[
+    str, typer.Option("--map-segmenter", help="Segmenter of the map; its form decides.")
+]
+FormerSketchSegmenter = Annotated[str, typer.Option("--segmenter-sketch", hidden=True)]
+FormerMapSegmenter = Annotated[str, typer.Option("--segmenter-map", hidden=True)]
 Histogram = Annotated[
     str, typer.Option(help="Histogram; `constant` unless the configuration names another.")
 ]
@@ -156,6 +169,13 @@ def parse_pairs(texts: Iterable[str] | None, option: str) -> list[tuple[int, int
             )
         pairs.append((a - 1, b - 1))
     return pairs
+
+
+def say_renamed(sketch_segmenter: str, map_segmenter: str) -> None:
+    """Tell that a segmenter was chosen by an option's former name, after what was asked for."""
+    for side, given in (("sketch", sketch_segmenter), ("map", map_segmenter)):
+        if given:
+            say(f"--segmenter-{side} is deprecated; write --{side}-segmenter")
 
 
 def say(sentence: str) -> None:

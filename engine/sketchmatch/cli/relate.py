@@ -11,12 +11,17 @@ import typer
 
 from sketchmatch.cli.options import (
     Config,
+    FormerMapSegmenter,
+    FormerSketchSegmenter,
     Histogram,
     JsonDocument,
+    MapSegmenter,
     Profile,
     Settings,
+    SketchSegmenter,
     parse_pairs,
     parse_settings,
+    say_renamed,
 )
 
 if TYPE_CHECKING:
@@ -51,8 +56,10 @@ def relate(
             help="Similarity measure; `cross-correlation` unless the configuration names another."
         ),
     ] = "",
-    segmenter_sketch: Annotated[str, typer.Option(help="Segmenter of the sketch.")] = "",
-    segmenter_map: Annotated[str, typer.Option(help="Segmenter of the map.")] = "",
+    sketch_segmenter: SketchSegmenter = "",
+    map_segmenter: MapSegmenter = "",
+    segmenter_sketch: FormerSketchSegmenter = "",
+    segmenter_map: FormerMapSegmenter = "",
     settings: Settings = None,
     limit: Annotated[
         int, typer.Option(min=1, metavar="K", help="Show the K most similar ones.")
@@ -72,8 +79,8 @@ def relate(
 
     pairs = (parse_pairs(sketch_pair, "--sketch-pair"), parse_pairs(map_pair, "--map-pair"))
     names = {
-        "sketch_segmenter": segmenter_sketch,
-        "map_segmenter": segmenter_map,
+        "sketch_segmenter": sketch_segmenter or segmenter_sketch,
+        "map_segmenter": map_segmenter or segmenter_map,
         "histogram": histogram,
         "similarity": similarity,
     }
@@ -88,6 +95,7 @@ def relate(
         _show_table(found)
     else:
         _print_lines(found)
+    say_renamed(segmenter_sketch, segmenter_map)
 
 
 def _document(found: Listing) -> dict[str, Any]:

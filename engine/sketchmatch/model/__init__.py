@@ -12,6 +12,7 @@ from sketchmatch.model.maps import (
 )
 from sketchmatch.model.relations import (
     DILATION_SCALE,
+    Pairs,
     RelationTable,
     SceneDescriptor,
     correspondences,
@@ -44,6 +45,7 @@ __all__ = [
     "ObjectMap",
     "Occm",
     "OccupancyGrid",
+    "Pairs",
     "PolygonSet",
     "RelationTable",
     "RequestWeights",

@@ -7,6 +7,7 @@ thesis's numbering (section 3.3), counted from 0.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TypeVar
@@ -18,6 +19,7 @@ from sketchmatch.model.caching import cached_property
 
 __all__ = [
     "DILATION_SCALE",
+    "Pairs",
     "RelationTable",
     "SceneDescriptor",
     "correspondences",
@@ -25,6 +27,9 @@ __all__ = [
     "pair_count",
     "pair_index",
 ]
+
+Pairs = Sequence[tuple[int, int]]
+"""Ordered pairs of objects, by their indices."""
 
 _Index = TypeVar("_Index", int, IntArray)
 
@@ -129,6 +134,11 @@ class SceneDescriptor:
         """The number n of directions."""
         return int(self.histograms.shape[1])
 
+    def __repr__(self) -> str:
+        by = f", by {self.described_by.split()[0]}" if self.described_by else ""
+        size = f"{len(self.histograms)} histograms in {self.directions} directions"
+        return f"<{type(self).__name__}: {size} of {self.objects} objects{by}>"
+
     def histogram(self, a: int, b: int) -> FloatArray:
         """Return the histogram of object a on object b, in either order."""
         if a < b:
@@ -190,6 +200,14 @@ class RelationTable:
             raise ValueError("rotation_weights must be one number above 0 for each template pair")
         weights = np.broadcast_to(weights / weights.mean(), shape[:1])
         object.__setattr__(self, "rotation_weights", frozen_floats(weights))
+
+    def __repr__(self) -> str:
+        least, most = self.similarity.min(), self.similarity.max()
+        return (
+            f"<{type(self).__name__}: {self.template_pairs} × {self.argument_pairs} relations of "
+            f"{self.template_objects} × {self.argument_objects} objects, "
+            f"σ {least:.3f} … {most:.3f}>"
+        )
 
     @property
     def entry_evidence(self) -> FloatArray:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from html import escape
+from numbers import Number
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 import shapely
 from shapely.validation import explain_validity
 
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model.arrays import FloatArray, IntArray, frozen_floats, sealed
 from sketchmatch.model.caching import cached_property
+from sketchmatch.model.text import listed, name, shortened
 
 __all__ = ["Edges", "Scene", "SceneObject"]
 
@@ -42,7 +45,7 @@ class SceneObject:
     label: str = ""
 
     @classmethod
-    def from_rings(cls, rings: Iterable[Any], label: str = "") -> Self:
+    def from_rings(cls, rings: Iterable[Any], label: Any = "") -> Self:
         """Check rings and turn them into an object.
 
         Parameters
@@ -51,13 +54,13 @@ class SceneObject:
             Outer ring first, then holes; each (k, 2) and array-like, in either orientation,
             closed or not.
         label
-            A name for people.
+            A name for people: text or a number; None and nan are no name.
 
         Raises
         ------
         InvalidInputError
             If a ring has fewer than three distinct points, is not finite or crosses itself, if
-            the polygon has no area, or if its holes leave it or overlap.
+            the polygon has no area, if its holes leave it or overlap, or if the label is no name.
         """
         arrays = [_clean_ring(ring, f"rings[{k}]") for k, ring in enumerate(rings)]
         if not arrays:
@@ -81,10 +84,10 @@ class SceneObject:
             frozen_floats(ring if (_signed_area(ring) > 0) == (k == 0) else ring[::-1])
             for k, ring in enumerate(arrays)
         )
-        return cls(oriented, label)
+        return cls(oriented, _name(label))
 
     @classmethod
-    def from_polygon(cls, polygon: Any, label: str = "") -> Self:
+    def from_polygon(cls, polygon: Any, label: Any = "") -> Self:
         """Turn a polygon, in any of the forms that people have them in, into an object.
 
         Parameters
@@ -127,6 +130,12 @@ class SceneObject:
         point = self.polygon.centroid
         return (point.x, point.y)
 
+    def __repr__(self) -> str:
+        x, y = self.centroid
+        called, corners = shortened(self.label), sum(map(len, self.rings))
+        shape = f"{corners} vertices, area {self.area:.3g}, around ({x:.3g}, {y:.3g})"
+        return f"<{type(self).__name__}: {called}{', ' if called else ''}{shape}>"
+
 
 class Edges(NamedTuple):
     """The outlines of several objects as directed edges, the object on their left.
@@ -166,7 +175,7 @@ class Scene:
             )
 
     @classmethod
-    def from_polygons(cls, polygons: Sequence[Any], labels: Sequence[str] | None = None) -> Self:
+    def from_polygons(cls, polygons: Sequence[Any], labels: Sequence[Any] | None = None) -> Self:
         """Build a scene from polygons.
 
         Parameters
@@ -175,12 +184,12 @@ class Scene:
             Each as :meth:`SceneObject.from_polygon` takes it: a (k, 2) array-like, a list of such
             rings, outer ring first, then holes, or a polygon of shapely.
         labels
-            One name for each polygon, or None.
+            One name for each polygon, text or a number; None and nan are no name, here or of one.
 
         Raises
         ------
         InvalidInputError
-            If a polygon cannot be used or there are fewer than two.
+            If a polygon or a label cannot be used or there are fewer than two polygons.
 
         Examples
         --------
@@ -189,22 +198,49 @@ class Scene:
         >>> Scene.from_polygons([square, triangle], labels=["desk", "plant"]).objects[1].area
         2.0
         """
-        if labels is not None and len(labels) != len(polygons):
+        if isinstance(labels, str | bytes | Mapping):
+            raise InvalidInputError(
+                Reason.INVALID_FIELD, "labels", f"is {quoted(labels)}; give a list of names"
+            )
+        names = [""] * len(polygons) if labels is None else list(labels)
+        if len(names) != len(polygons):
             raise InvalidInputError(
                 Reason.INVALID_FIELD,
                 "labels",
-                f"has {len(labels)} names for {len(polygons)} polygons; give one for each",
+                f"has {len(names)} names for {len(polygons)} polygons; give one for each",
             )
         objects = []
         for k, polygon in enumerate(polygons):
             try:
-                objects.append(SceneObject.from_polygon(polygon, labels[k] if labels else ""))
+                objects.append(SceneObject.from_polygon(polygon, names[k]))
             except InvalidInputError as error:
                 raise error.within(f"polygons[{k}]") from None
         return cls(tuple(objects))
 
     def __len__(self) -> int:
         return len(self.objects)
+
+    def __repr__(self) -> str:
+        x0, y0, x1, y1 = self.bounds
+        named = listed(self.labels)
+        size = f"{len(self)} objects, {x1 - x0:.3g} × {y1 - y0:.3g}"
+        return f"<{type(self).__name__}: {size}{': ' if named else ''}{named}>"
+
+    def _repr_svg_(self) -> str:
+        """Return a picture for a notebook; the names show under the pointer."""
+        x0, y0, x1, y1 = self.bounds
+        margin = 0.02 * max(x1 - x0, y1 - y0)
+        box = (x0 - margin, -y1 - margin, x1 - x0 + 2 * margin, y1 - y0 + 2 * margin)
+        outlines = "".join(
+            f"<path d='{_path(item)}'><title>{escape(name(k, item.label))}</title></path>"
+            for k, item in enumerate(self.objects)
+        )
+        return (
+            f"<svg xmlns='http://www.w3.org/2000/svg' width='400' height='300' "
+            f"viewBox='{' '.join(f'{value:.6g}' for value in box)}'>"
+            f"<g transform='scale(1,-1)' fill='#9ecae1' stroke='#08519c' fill-rule='evenodd' "
+            f"stroke-width='{margin / 4:.3g}'>{outlines}</g></svg>"
+        )
 
     @cached_property
     def edges(self) -> Edges:
@@ -269,6 +305,23 @@ def _rings_of(shape: shapely.Geometry) -> list[FloatArray]:
     else:
         problem = f"is a {shape.geom_type}, which has no area; give a Polygon"
     raise InvalidInputError(Reason.INVALID_POLYGON, "", problem)
+
+
+def _path(item: SceneObject) -> str:
+    """Return an outline as SVG draws it."""
+    rings = ("L".join(f"{x:.6g},{y:.6g}" for x, y in ring) for ring in item.rings)
+    return "".join(f"M{ring}Z" for ring in rings)
+
+
+def _name(given: Any) -> str:
+    """Return a label as text: people number their objects, from 0 or as ``True``."""
+    if isinstance(given, Number | np.bool_):
+        return str(given) if given == given else ""  # noqa: PLR0124 (nan, as in tables with gaps)
+    if given is None or isinstance(given, str):
+        return str(given or "")
+    raise InvalidInputError(
+        Reason.INVALID_FIELD, "label", f"is {quoted(given)}, which is no name; give text"
+    )
 
 
 def _is_ring(polygon: Any) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -14,6 +14,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.kernels.evidence import SelfRelations
 from sketchmatch.model import (
     ConfidenceWeights,
+    Pairs,
     RelationTable,
     Scene,
     SceneDescriptor,
@@ -21,6 +22,7 @@ from sketchmatch.model import (
     pair_count,
     pair_index,
 )
+from sketchmatch.model.text import Table, name
 from sketchmatch.pipeline.describe import check_histograms
 from sketchmatch.pipeline.evidence import compare_objects, rotation_weights, weigh_objects
 from sketchmatch.pipeline.guard import blamed
@@ -36,7 +38,6 @@ __all__ = ["Comparison", "check_scenes", "compare"]
 # What 2 GB hold: 100 × 100 objects.
 _MAX_COMPARISONS = 30_000_000
 
-Pairs = Sequence[tuple[int, int]]
 _Value = TypeVar("_Value")
 
 
@@ -70,6 +71,17 @@ class Comparison:
     def swapped(self) -> bool:
         """Whether the template is the map: it has fewer objects than the sketch."""
         return _swapped(self.sketch, self.map)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self._headline()}>"
+
+    def __str__(self) -> str:
+        """Return the most similar relations, for a terminal."""
+        return str(self._table())
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook."""
+        return self._table().html()
 
     def most_similar(
         self, sketch_pairs: Pairs = (), map_pairs: Pairs = (), limit: int | None = None
@@ -106,6 +118,26 @@ class Comparison:
                 )
             )
         return tuple(found)
+
+    def _headline(self) -> str:
+        return (
+            f"{self.table.similarity.size} pairs of relations, {len(self.sketch)} sketched objects "
+            f"with {len(self.map)} mapped ones, σ up to {self.table.similarity.max():.3f}"
+        )
+
+    def _table(self) -> Table:
+        heads = ("in the sketch", "on the map", "σ", "R", "L")
+        rows = [
+            (
+                _names(entry.sketch_pair, self.sketch),
+                _names(entry.map_pair, self.map),
+                f"{entry.similarity:.3f}",
+                f"{math.degrees(entry.rotation):.1f}°",
+                f"{entry.dilation:.3g}",
+            )
+            for entry in self.most_similar(limit=10)
+        ]
+        return Table(f"{self._headline()}; the most similar:", heads, rows, 2)
 
 
 def _check_comparisons(sketch: Scene, map_: Scene) -> None:
@@ -198,6 +230,10 @@ def _part(
 ) -> Generator[float, None, _Value]:
     """Go on with work that is a part of more, telling shares of the whole."""
     return retold(work, lambda share: (begin + (end - begin) * share,))
+
+
+def _names(pair: tuple[int, int], scene: Scene) -> str:
+    return ", ".join(name(k, scene.labels[k]) for k in pair)
 
 
 def _all_pairs(scene: Scene) -> Pairs:

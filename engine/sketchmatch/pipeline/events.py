@@ -84,6 +84,17 @@ class Progress:
         """Sketch index → map index of the best map so far; empty before the search."""
         return {match.sketch_object: match.map_object for match in self.matches}
 
+    def __repr__(self) -> str:
+        facts = [self.phase, f"{self.elapsed:.2f} s"]
+        if self.fraction is not None:
+            facts.append(f"{self.fraction:.0%}")
+        if self.confidence is not None:
+            facts.append(f"ζ {self.confidence:.3f}")
+            facts.append(f"{self.evaluations} evaluations")
+        if self.upper_bound is not None:
+            facts.append(f"at most {self.upper_bound:.3f}")
+        return f"<{type(self).__name__}: {', '.join(facts)}>"
+
 
 @dataclass(frozen=True)
 class Finished:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from numbers import Integral, Real
 from types import MappingProxyType
+from typing import Any
 
 from sketchmatch.api import Searcher
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model import ConfidenceWeights, RequestWeights, Scene, Source
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
 from sketchmatch.pipeline.calibration import default_price
@@ -68,20 +70,28 @@ class MatchRequest:
     unmatched_price: float | None = None
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.seed, int) and 0 <= self.seed <= _MAX_SEED):
-            raise _refused("seed", f"is {self.seed}; give an integer 0 … 2**64 − 1")
+        if not (isinstance(self.seed, Integral) and 0 <= self.seed <= _MAX_SEED):
+            raise _refused("seed", f"is {quoted(self.seed)}; give an integer 0 … 2**64 − 1")
+        object.__setattr__(self, "seed", int(self.seed))  # of NumPy, it would be one of 64 bits
         budget, price, wanted = self.time_budget, self.unmatched_price, self.alternatives
-        if budget is not None and not 0 < budget < math.inf:
+        if budget is not None and not 0 < _number("time_budget", budget) < math.inf:
             raise _refused("time_budget", f"is {budget:g} s; give a positive time or none at all")
         if self.weights is not None:
-            _check_weights(self.weights)
-        if wanted is not None and not 0 <= wanted <= _MAX_ALTERNATIVES:
+            object.__setattr__(self, "weights", _checked_weights(self.weights))
+        if wanted is not None and not (
+            isinstance(wanted, Integral) and 0 <= wanted <= _MAX_ALTERNATIVES
+        ):
             raise _refused(
-                "alternatives", f"is {wanted}; give a number from 0 to {_MAX_ALTERNATIVES}"
+                "alternatives",
+                f"is {quoted(wanted)}; give a whole number from 0 to {_MAX_ALTERNATIVES}",
             )
-        if price is not None and not 0 < price <= _MAX_PRICE:
+        if price is not None and not 0 < _number("unmatched_price", price) <= _MAX_PRICE:
             raise _refused(
                 "unmatched_price", f"is {price:g}; give a number above 0, at most {_MAX_PRICE:g}"
+            )
+        if self.allow_unmatched not in (None, True, False):
+            raise _refused(
+                "allow_unmatched", f"is {quoted(self.allow_unmatched)}; give True or False"
             )
 
 
@@ -133,9 +143,13 @@ def alternatives_wanted(requested: int | None, sketch: Scene, map_: Scene) -> in
     return requested
 
 
-def _check_weights(weights: RequestWeights) -> None:
-    """Refuse weights that make no ζ."""
+def _checked_weights(given: RequestWeights) -> tuple[float, ...]:
+    """Return weights, unless they make no ζ."""
     names = ConfidenceWeights._fields
+    try:
+        weights = tuple(given)
+    except TypeError:
+        raise _refused("weights", f"are {quoted(given)}; give three, five or six numbers") from None
     if len(weights) not in WEIGHT_COUNTS:
         raise _refused(
             "weights",
@@ -144,10 +158,17 @@ def _check_weights(weights: RequestWeights) -> None:
         )
     for name, weight in zip(names, weights, strict=False):
         most = MAX_DISTANCE if name == "distance" else MAX_WEIGHT
-        if not 0 <= weight <= most:
+        if not 0 <= _number(f"weights.{name}", weight) <= most:
             raise _refused(f"weights.{name}", f"is {weight:g}; give a number from 0 to {most:g}")
     if ConfidenceWeights(*weights).total == 0:
         raise _refused("weights", "are all zero; give at least one above zero")
+    return weights
+
+
+def _number(field_: str, given: Any) -> float:
+    if not isinstance(given, Real):
+        raise _refused(field_, f"is {quoted(given)}; give a number")
+    return float(given)
 
 
 def _refused(field_: str, words: str) -> InvalidInputError:

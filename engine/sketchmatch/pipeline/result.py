@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from sketchmatch.api import Outcome
 from sketchmatch.model import Confidence, FloatArray, Scene
+from sketchmatch.model.text import Table, likelihood, name
 
 __all__ = [
     "AlternativeMap",
@@ -77,6 +78,10 @@ class AlternativeMap:
     def object_map(self) -> dict[int, int]:
         """Sketch index → map index, from 0."""
         return {match.sketch_object: match.map_object for match in self.matches}
+
+    def __repr__(self) -> str:
+        confidences = f"ζ {self.confidence.total:.3f}, Ω {self.omap_confidence:.3f}"
+        return f"<{type(self).__name__}: {confidences}, {self.object_map}>"
 
 
 @dataclass(frozen=True)
@@ -208,3 +213,34 @@ class MatchResult:
         """Mapped objects without a partner."""
         matched = set(self.object_map.values())
         return tuple(k for k in range(len(self.map)) if k not in matched)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self._headline()}>"
+
+    def __str__(self) -> str:
+        """Return which object is which, for a terminal; objects count from 0."""
+        return str(self._table())
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook."""
+        return self._table().html()
+
+    def _headline(self) -> str:
+        matched = f"{len(self.matches)} of {len(self.sketch)} sketched objects matched"
+        confidences = f"ζ {self.fmap_confidence:.3f}, Ω {self.omap_confidence:.3f}"
+        likely = "" if self.probability is None else f", probability {likelihood(self.probability)}"
+        return f"{matched}, {confidences}{likely}, {self.outcome}"
+
+    def _table(self) -> Table:
+        heads = ("in the sketch", "on the map", "confidence", "probability", "margin")
+        rows = [
+            (
+                name(match.sketch_object, self.sketch.labels[match.sketch_object]),
+                name(match.map_object, self.map.labels[match.map_object]),
+                f"{match.confidence:.3f}",
+                "" if match.probability is None else likelihood(match.probability),
+                "" if match.margin is None else f"{match.margin:.3f}",
+            )
+            for match in self.matches
+        ]
+        return Table(self._headline(), heads, rows, 2)

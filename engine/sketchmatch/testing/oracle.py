@@ -10,12 +10,11 @@ import itertools
 import math
 from collections.abc import Sequence
 
-from sketchmatch.model import Confidence, Fmap, RelationTable, Weights
+from sketchmatch.model import Confidence, Fmap, Pairs, RelationTable, Weights
 
 __all__ = ["best_object_map", "is_legal", "is_object_consistent", "mapped_pairs", "score_fmap"]
 
 _EQUAL: Weights = (1.0, 1.0, 1.0)
-Pairs = Sequence[tuple[int, int]]
 
 
 def score_fmap(fmap: Fmap, table: RelationTable, weights: Weights = _EQUAL) -> Confidence:

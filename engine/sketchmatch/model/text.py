@@ -1,0 +1,119 @@
+"""How values show themselves: a line in a terminal, a small table in print and in a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+
+__all__ = ["Table", "likelihood", "listed", "name", "shortened"]
+
+_ROWS = 20
+_NAMES = 5
+_LONGEST = 30
+
+
+def shortened(label: str) -> str:
+    r"""Return a label that fits into a line, whatever is in it.
+
+    Examples
+    --------
+    >>> shortened("the\nsofa \x1b[31m"), shortened("x" * 99) == 29 * "x" + "…"
+    ('the sofa �[31m', True)
+    """
+    text = "".join(char if char.isprintable() else "�" for char in " ".join(label.split()))
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+
+
+def name(index: int, label: str) -> str:
+    """Return what to call an object: its index, and its label where it has one.
+
+    Examples
+    --------
+    >>> name(0, "sofa"), name(1, "")
+    ('0 sofa', '1')
+    """
+    return f"{index} {shortened(label)}".rstrip()
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names, without the empty ones, in a line.
+
+    Examples
+    --------
+    >>> listed(["a", "", "b"]), listed("abcdefg")
+    ('a, b', 'a, b, c, d, e, …')
+    """
+    shown = [shortened(each) for each in names if each.strip()]
+    return ", ".join(shown if len(shown) <= _NAMES else [*shown[:_NAMES], "…"])
+
+
+def likelihood(probability: float) -> str:
+    """Return a probability that rounds to 1 only if it is.
+
+    Examples
+    --------
+    >>> likelihood(0.9986), likelihood(0.99986), likelihood(1.0)
+    ('0.999', '>0.999', '1.000')
+    """
+    return ">0.999" if 0.9995 <= probability < 1.0 else f"{probability:.3f}"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A small table; of a long one the first rows.
+
+    Attributes
+    ----------
+    title
+        The line above it.
+    heads
+        What is in each column.
+    rows
+        Its cells.
+    names
+        How many columns, from the first, hold names, which stand at the left.
+
+    Examples
+    --------
+    >>> table = Table("two things", ("is", "size"), [("a sofa", "2.5"), ("a bed", "10")])
+    >>> print(table)
+    two things
+    is      size
+    a sofa   2.5
+    a bed     10
+    >>> table.html()[:54]
+    '<p>two things</p><table><tr><th>is</th><th>size</th></'
+    """
+
+    title: str
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    names: int = 1
+
+    def __str__(self) -> str:
+        """Return it for a terminal."""
+        shown = [self.heads, *self.rows[:_ROWS]]
+        widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
+        lines = [
+            "  ".join(
+                cell.ljust(width) if k < self.names else cell.rjust(width)
+                for k, (cell, width) in enumerate(zip(row, widths, strict=True))
+            ).rstrip()
+            for row in shown
+        ]
+        return "\n".join([self.title, *lines, *self._rest()])
+
+    def html(self) -> str:
+        """Return it for a notebook."""
+        head = "".join(f"<th>{escape(cell)}</th>" for cell in self.heads)
+        body = "".join(
+            "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
+            for row in self.rows[:_ROWS]
+        )
+        rest = "".join(f"<p>{line}</p>" for line in self._rest())
+        return f"<p>{escape(self.title)}</p><table><tr>{head}</tr>{body}</table>{rest}"
+
+    def _rest(self) -> list[str]:
+        left_out = len(self.rows) - _ROWS
+        return [f"… and {left_out} more"] if left_out > 0 else []
