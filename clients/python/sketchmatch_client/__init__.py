@@ -6,8 +6,10 @@ makes sketches and maps to hand to them.
 
 from sketchmatch_client import sources
 from sketchmatch_client._aio import AsyncClient
-from sketchmatch_client._match import Match, MatchCollector
+from sketchmatch_client._call import MatchCall
+from sketchmatch_client._match import Match, MatchCollector, Progress
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
+from sketchmatch_client._summary import summary
 from sketchmatch_client._sync import Client
 from sketchmatch_client.errors import (
     CallCancelledError,
@@ -28,10 +30,12 @@ __all__ = [
     "DeadlineExceededError",
     "InvalidRequestError",
     "Match",
+    "MatchCall",
     "MatchCollector",
     "MatchOptions",
     "NotAuthenticatedError",
     "NotSupportedError",
+    "Progress",
     "ServerBusyError",
     "ServerFailedError",
     "ServerUnavailableError",
@@ -39,6 +43,7 @@ __all__ = [
     "match_request",
     "segment_request",
     "sources",
+    "summary",
 ]
 
 __version__ = "0.1.0"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import AsyncGenerator, Mapping
 from contextlib import aclosing
@@ -16,12 +17,15 @@ import grpc.aio
 from sketchmatch_client._channel import (
     CHECK_HEALTH,
     HEALTH_POLL_SECONDS,
-    OPTIONS,
     SERVING,
     ChannelOptions,
+    channel_options,
+    check_address,
+    limit_of,
     never_served,
+    within,
 )
-from sketchmatch_client._match import Match, MatchCollector, ProgressCallback
+from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, tell_progress
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
 from sketchmatch_client.errors import (
     DeadlineExceededError,
@@ -56,14 +60,8 @@ class AsyncClient:
 
     Parameters
     ----------
-    address
-        Host and port of the server, e.g. ``"localhost:50051"``.
-    credentials
-        TLS credentials, e.g. ``grpc.ssl_channel_credentials()``. None: no encryption.
-    timeout
-        Seconds that a call may take where the call itself does not say. None: no limit.
-    options
-        Channel options of gRPC, beside or instead of this package's own.
+    address, credentials, timeout, options
+        As for :class:`Client`.
 
     Raises
     ------
@@ -79,10 +77,11 @@ class AsyncClient:
         timeout: float | None = None,
         options: ChannelOptions = (),
     ) -> None:
+        check_address(address, credentials is not None)
         self._address = address
         self._credentials = credentials
-        self._timeout = timeout
-        self._options = OPTIONS + options
+        self._timeout = limit_of(timeout)
+        self._options = channel_options(address, options)
 
     async def __aenter__(self) -> Self:
         return self
@@ -109,10 +108,11 @@ class AsyncClient:
         **options: Unpack[MatchOptions],
     ) -> Match:
         """Match a sketch with a map and wait for the answer; see :meth:`Client.match`."""
-        collector = MatchCollector(on_progress)
+        collector = MatchCollector(None)
         async with aclosing(self.events(sketch, map, timeout=timeout, **options)) as events:
             async for event in events:
                 collector.add(event)
+                tell_progress(event, on_progress)
         return collector.match()
 
     def events(
@@ -128,7 +128,7 @@ class AsyncClient:
         Closing the generator cancels the match. Python does not close it at the moment a loop
         over it is left; ``contextlib.aclosing`` does.
         """
-        return self._events(match_request(sketch, map, **options), timeout)
+        return self._events(match_request(sketch, map, **options), self._limit(timeout))
 
     async def segment(
         self,
@@ -159,8 +159,9 @@ class AsyncClient:
 
     async def wait_until_serving(self, timeout: float = 60.0) -> None:
         """Wait until the server is up and warm; see :meth:`Client.wait_until_serving`."""
-        deadline = time.monotonic() + timeout
-        while not await self._is_serving(deadline - time.monotonic()):
+        limit = limit_of(timeout)
+        deadline = time.monotonic() + (math.inf if limit is None else limit)
+        while not await self._is_serving(within(deadline, time.monotonic())):
             if time.monotonic() >= deadline:
                 raise never_served(self._address, timeout)
             await asyncio.sleep(HEALTH_POLL_SECONDS)
@@ -173,18 +174,18 @@ class AsyncClient:
         return grpc.aio.secure_channel(self._address, self._credentials, self._options)
 
     async def _events(
-        self, request: MatchRequest, timeout: float | None
+        self, request: MatchRequest, limit: float | None
     ) -> AsyncGenerator[MatchResponse, None]:
         stub = cast("MatchServiceAsyncStub", MatchServiceStub(self._channel))
         with translated_errors(self._address):
-            call = stub.Match(request, timeout=self._limit(timeout))
+            call = stub.Match(request, timeout=limit)
             try:
                 async for event in call:
                     yield event
             finally:
                 call.cancel()
 
-    async def _is_serving(self, timeout: float) -> bool:
+    async def _is_serving(self, timeout: float | None) -> bool:
         check: grpc.aio.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(
             CHECK_HEALTH
         )
@@ -195,4 +196,4 @@ class AsyncClient:
             return False
 
     def _limit(self, timeout: float | None) -> float | None:
-        return self._timeout if timeout is None else timeout
+        return self._timeout if timeout is None else limit_of(timeout)

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import math
+import re
+import reprlib
+from ipaddress import ip_address
+from numbers import Real
 from typing import Any
 
-from sketchmatch_client.errors import ServerUnavailableError
+from sketchmatch_client.errors import InvalidRequestError, ServerUnavailableError
 
 __all__ = [
     "CHECK_HEALTH",
     "HEALTH_POLL_SECONDS",
-    "OPTIONS",
     "SERVING",
     "ChannelOptions",
+    "channel_options",
+    "check_address",
+    "limit_of",
     "never_served",
+    "within",
 ]
 
 ChannelOptions = tuple[tuple[str, Any], ...]
 
-OPTIONS: ChannelOptions = (
+_OPTIONS: ChannelOptions = (
     # What is too large is the server's to say: only it knows its memory.
     ("grpc.max_send_message_length", -1),
     ("grpc.max_receive_message_length", -1),
@@ -31,6 +39,8 @@ OPTIONS: ChannelOptions = (
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.max_reconnect_backoff_ms", 5_000),
 )
+# No proxy, whatever http_proxy says, leads to where the client itself is.
+_DIRECT: ChannelOptions = (("grpc.enable_http_proxy", 0),)
 
 # The standard health service, by hand: its request for the whole server is the empty message,
 # and a response is one enum (field 1). This saves a dependency.
@@ -38,10 +48,93 @@ CHECK_HEALTH = "/grpc.health.v1.Health/Check"
 SERVING = b"\x08\x01"
 HEALTH_POLL_SECONDS = 0.05
 
+# gRPC fails at once where the deadline is further away than its clock can tell.
+_FOR_EVER = 1e8
+
+_SCHEMES = re.compile(r"(dns|ipv4|ipv6|unix|unix-abstract|vsock|xds|passthrough|google-c2p):")
+_WITHIN_MACHINE = ("unix:", "unix-abstract:", "vsock:")
+# A host and a port, perhaps behind the scheme and the name server that look the host up.
+_HOST_AND_PORT = re.compile(
+    r"(?:dns:(?://[^/]*/)?|ipv[46]:)?(?P<host>\[[^\]]*\]|[^:/\s]*)(?::(?P<port>\d+))?"
+)
+_THIS_MACHINE = {"localhost", "localhost.localdomain", "ip6-localhost", "ip6-loopback"}
+
+
+def channel_options(address: str, given: ChannelOptions) -> ChannelOptions:
+    """Return the options of a channel to a server; those that are given win."""
+    return _OPTIONS + (_DIRECT if _is_here(address) else ()) + given
+
+
+def check_address(address: str, encrypted: bool) -> None:
+    """Refuse what cannot be the address of a server.
+
+    Raises
+    ------
+    InvalidRequestError
+        If it is a URL, or lacks a port where there is no default one, as there is for TLS.
+    """
+    if not isinstance(address, str) or not address.strip():
+        raise _refused(address, "give host and port, as in 'localhost:50051'")
+    if _SCHEMES.match(address):
+        return
+    if "://" in address:
+        raise _refused(address, "give host and port alone, as in 'localhost:50051'")
+    parts = _HOST_AND_PORT.fullmatch(address)
+    if parts is None or not parts["host"]:
+        raise _refused(address, "give host and port, as in 'localhost:50051' or '[::1]:50051'")
+    if parts["port"] is None and not encrypted:
+        raise _refused(address, f"add the port, as in '{address}:50051'")
+    if parts["port"] is not None and not 0 < int(parts["port"]) < 1 << 16:
+        raise _refused(address, "give a port from 1 to 65535")
+
+
+def limit_of(timeout: float | None) -> float | None:
+    """Return how many seconds a call may take as gRPC takes it; None for no limit.
+
+    Raises
+    ------
+    InvalidRequestError
+        If it is no time.
+    """
+    if timeout is None:
+        return None
+    if not isinstance(timeout, Real) or not timeout >= 0:  # nan is not
+        raise InvalidRequestError(
+            f"timeout is {reprlib.repr(timeout)}; give seconds, at least 0, or None for no limit",
+            "INVALID_FIELD",
+            "timeout",
+        )
+    return float(timeout) if timeout < _FOR_EVER else None
+
+
+def within(deadline: float, now: float) -> float | None:
+    """Return what is left until a deadline, for gRPC; None if there is none."""
+    return None if deadline == math.inf else max(deadline - now, 0.0)
+
 
 def never_served(address: str, seconds: float) -> ServerUnavailableError:
     """Return the error of a server that somebody waited for in vain."""
     return ServerUnavailableError(
         f"the sketchmatch server at {address} did not serve within {seconds:g} s; "
         "start it, check the address, or wait longer"
+    )
+
+
+def _is_here(address: str) -> bool:
+    """Whether an address is one of this very machine."""
+    if address.startswith(_WITHIN_MACHINE):
+        return True
+    parts = _HOST_AND_PORT.fullmatch(address)
+    host = parts["host"].strip("[]").rstrip(".").lower() if parts else ""
+    try:
+        number = ip_address(host)
+    except ValueError:
+        return host in _THIS_MACHINE or host.endswith(".localhost")
+    number = getattr(number, "ipv4_mapped", None) or number
+    return number.is_loopback or number.is_unspecified
+
+
+def _refused(address: object, remedy: str) -> InvalidRequestError:
+    return InvalidRequestError(
+        f"address is {reprlib.repr(address)}; {remedy}", "INVALID_FIELD", "address"
     )

@@ -1,23 +1,110 @@
-"""A finished match, and how its events become one."""
+"""A finished match, how its events become one, and how far it is until then."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from google.protobuf.duration_pb2 import Duration
+
+from sketchmatch_client._summary import enum_name, match_headline, match_table, progress_line
 from sketchmatch_client.errors import ServerFailedError
-from sketchmatch_proto.v1.match_pb2 import MatchAccepted, MatchProgress, MatchResult, MatchScenes
+from sketchmatch_proto.v1.match_pb2 import (
+    MatchAccepted,
+    MatchProgress,
+    MatchResult,
+    MatchScenes,
+    ObjectMatch,
+    Outcome,
+    Phase,
+)
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
-__all__ = ["Match", "MatchCollector", "ProgressCallback"]
+__all__ = ["Match", "MatchCollector", "Progress", "ProgressCallback", "tell_progress"]
 
-ProgressCallback = Callable[[MatchProgress], object]
-"""Called with each progress event; what it returns is ignored."""
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """How far a match is: the contract's message, but None where it has no value yet.
+
+    Attributes
+    ----------
+    message
+        The message, which an equal one is equal to.
+    """
+
+    message: MatchProgress
+
+    @property
+    def phase(self) -> Phase.ValueType:
+        """What is being done, e.g. ``PHASE_SEARCH`` of ``sketchmatch_proto.v1.match_pb2``."""
+        return self.message.phase
+
+    @property
+    def fraction(self) -> float | None:
+        """How much of the phase is done, from 0 to 1; None where nobody knows."""
+        return self._known("fraction")
+
+    @property
+    def iteration(self) -> int:
+        """Iterations of the search so far."""
+        return self.message.iteration
+
+    @property
+    def evaluations(self) -> int:
+        """Maps that the search has evaluated so far."""
+        return self.message.evaluations
+
+    @property
+    def confidence(self) -> float | None:
+        """ζ of the best map so far, which never falls; None before the search."""
+        return self._known("confidence")
+
+    @property
+    def upper_bound(self) -> float | None:
+        """A ζ that no map exceeds; None where the searcher proves nothing."""
+        return self._known("upper_bound")
+
+    @property
+    def object_matches(self) -> Sequence[ObjectMatch]:
+        """The best object map so far, line by line; empty before the search."""
+        return self.message.object_matches
+
+    @property
+    def object_map(self) -> dict[int, int]:
+        """The same, from the index of a sketched object to that of the mapped one."""
+        return _object_map(self.object_matches)
+
+    @property
+    def elapsed(self) -> Duration:
+        """Time since the request was accepted."""
+        return self.message.elapsed
+
+    def HasField(self, name: str) -> bool:  # noqa: N802 (as messages call it)
+        """Return whether the message has an optional field."""
+        return self.message.HasField(name)  # type: ignore[arg-type]
+
+    def __eq__(self, other: object) -> bool:
+        return self.message == (other.message if isinstance(other, Progress) else other)
+
+    __hash__ = None  # type: ignore[assignment]  # as of messages
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {progress_line(self.message)}>"
+
+    def _known(self, name: str) -> float | None:
+        return getattr(self.message, name) if self.HasField(name) else None
+
+
+ProgressCallback = Callable[[Progress], object]
+"""Called with each progress; what it returns is ignored."""
 
 
 @dataclass(frozen=True)
 class Match:
     """A finished match.
+
+    Printed, it is a small table; its parts are messages of the contract, which print at length.
 
     Attributes
     ----------
@@ -36,7 +123,39 @@ class Match:
     @property
     def object_map(self) -> dict[int, int]:
         """For each sketched object with a partner the index of its mapped object, from 0."""
-        return {line.sketch_object: line.map_object for line in self.result.object_matches}
+        return _object_map(self.result.object_matches)
+
+    @property
+    def fmap_confidence(self) -> float:
+        """ζ, which is what the search maximised."""
+        return self.result.fmap_confidence.total
+
+    @property
+    def omap_confidence(self) -> float:
+        """Ω, the mean confidence of the matched objects."""
+        return self.result.omap_confidence
+
+    @property
+    def probability(self) -> float | None:
+        """How likely the object map is right as a whole; None where nothing was learned."""
+        return self.result.probability if self.result.HasField("probability") else None
+
+    @property
+    def upper_bound(self) -> float | None:
+        """A ζ that no map exceeds; None where the searcher proves nothing."""
+        return self.result.upper_bound if self.result.HasField("upper_bound") else None
+
+    @property
+    def outcome(self) -> str:
+        """Why the search ended, e.g. ``"OPTIMAL"``."""
+        return enum_name(Outcome, "OUTCOME_", self.result.outcome)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {match_headline(self.result)}>"
+
+    def __str__(self) -> str:
+        """Return which object is which, for a terminal; objects count from 0."""
+        return match_table(self.result)
 
 
 class MatchCollector:
@@ -45,14 +164,19 @@ class MatchCollector:
     Parameters
     ----------
     on_progress
-        Called with each progress.
+        Called with the message of each progress.
     """
 
-    def __init__(self, on_progress: ProgressCallback | None) -> None:
+    def __init__(self, on_progress: Callable[[MatchProgress], object] | None) -> None:
         self._on_progress = on_progress
         self._accepted = MatchAccepted()
         self._scenes = MatchScenes()
         self._result: MatchResult | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether there is a result."""
+        return self._result is not None
 
     def add(self, event: MatchResponse) -> None:
         """Take the next event; one of a kind that this version does not know is left out."""
@@ -71,3 +195,13 @@ class MatchCollector:
         if self._result is None:
             raise ServerFailedError("the server ended the match without a result; send it again")
         return Match(self._accepted, self._scenes, self._result)
+
+
+def tell_progress(event: MatchResponse, on_progress: ProgressCallback | None) -> None:
+    """Call back where an event is progress."""
+    if on_progress is not None and event.HasField("progress"):
+        on_progress(Progress(event.progress))
+
+
+def _object_map(lines: Sequence[ObjectMatch]) -> dict[int, int]:
+    return {line.sketch_object: line.map_object for line in lines}

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Generator, Mapping
-from contextlib import closing
+from collections.abc import Mapping
 from types import TracebackType
 from typing import Any, Self, Unpack
 
 import grpc
 
+from sketchmatch_client._call import MatchCall
 from sketchmatch_client._channel import (
     CHECK_HEALTH,
     HEALTH_POLL_SECONDS,
-    OPTIONS,
     SERVING,
     ChannelOptions,
+    channel_options,
+    check_address,
+    limit_of,
     never_served,
+    within,
 )
-from sketchmatch_client._match import Match, MatchCollector, ProgressCallback
+from sketchmatch_client._match import Match, ProgressCallback
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
 from sketchmatch_client.errors import (
     DeadlineExceededError,
@@ -32,7 +36,6 @@ from sketchmatch_proto.v1.catalog_service_pb2 import (
     ListAlgorithmsResponse,
 )
 from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceStub
-from sketchmatch_proto.v1.match_service_pb2 import MatchRequest, MatchResponse
 from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceStub
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceStub
@@ -50,11 +53,14 @@ class Client:
     Parameters
     ----------
     address
-        Host and port of the server, e.g. ``"localhost:50051"``.
+        Host and port of the server, e.g. ``"localhost:50051"``, or another address as gRPC
+        names them, e.g. ``"unix:/run/sketchmatch.sock"``. Proxies that the environment names
+        are not asked for what is on this machine.
     credentials
         TLS credentials, e.g. ``grpc.ssl_channel_credentials()``. None: no encryption.
     timeout
-        Seconds that a call may take where the call itself does not say. None: no limit.
+        Seconds that a call may take where the call itself does not say. None or infinity: no
+        limit.
     options
         Channel options of gRPC, beside or instead of this package's own.
 
@@ -72,12 +78,14 @@ class Client:
         timeout: float | None = None,
         options: ChannelOptions = (),
     ) -> None:
+        check_address(address, credentials is not None)
         self._address = address
-        self._timeout = timeout
+        self._timeout = limit_of(timeout)
+        chosen = channel_options(address, options)
         self._channel = (
-            grpc.insecure_channel(address, OPTIONS + options)
+            grpc.insecure_channel(address, chosen)
             if credentials is None
-            else grpc.secure_channel(address, credentials, OPTIONS + options)
+            else grpc.secure_channel(address, credentials, chosen)
         )
 
     def __enter__(self) -> Self:
@@ -111,11 +119,11 @@ class Client:
         sketch, map
             From :mod:`sketchmatch_client.sources`.
         on_progress
-            Called with each :class:`MatchProgress`, at most 20 a second. What it raises ends
-            the match.
+            Called with each :class:`Progress`, at most 20 a second. What it raises ends the
+            match.
         timeout
-            Seconds after which the call fails. To have the best match until then, give a
-            ``time_budget`` instead.
+            Seconds after which the call fails; infinity for none. To have the best match until
+            then, give a ``time_budget`` instead.
         **options
             Profile, algorithms, parameters, seed, time budget …: :class:`MatchOptions`.
 
@@ -124,11 +132,7 @@ class Client:
         Match
             How it ran, the objects found and the result.
         """
-        collector = MatchCollector(on_progress)
-        with closing(self.events(sketch, map, timeout=timeout, **options)) as events:
-            for event in events:
-                collector.add(event)
-        return collector.match()
+        return self.events(sketch, map, timeout=timeout, **options).result(on_progress)
 
     def events(
         self,
@@ -137,24 +141,25 @@ class Client:
         *,
         timeout: float | None = None,
         **options: Unpack[MatchOptions],
-    ) -> Generator[MatchResponse, None, None]:
-        """Match a sketch with a map, event by event.
-
-        The match starts when the first event is asked for. Closing the generator, or leaving
-        the loop over it and dropping it, cancels the match.
+    ) -> MatchCall:
+        """Match a sketch with a map, event by event, or with a hand on it.
 
         Parameters
         ----------
         sketch, map, timeout, **options
             As for :meth:`match`.
 
-        Yields
-        ------
-        MatchResponse
-            ``accepted``, ``scenes``, any number of ``progress``, ``result``; a newer server
-            may send others, to be skipped.
+        Returns
+        -------
+        MatchCall
+            An iterator of :class:`MatchResponse`: ``accepted``, ``scenes``, any number of
+            ``progress``, ``result``; a newer server may send others, to be skipped. Its
+            ``cancel()`` stops the match from another thread, and its ``result()`` waits for the
+            end.
         """
-        return self._events(match_request(sketch, map, **options), timeout)
+        request, limit = match_request(sketch, map, **options), self._limit(timeout)
+        stub = MatchServiceStub(self._channel)
+        return MatchCall(lambda: stub.Match(request, timeout=limit), self._address)
 
     def segment(
         self,
@@ -209,30 +214,22 @@ class Client:
         Parameters
         ----------
         timeout
-            Seconds to wait at most. A server's first ever start compiles its kernels.
+            Seconds to wait at most; infinity for no limit. A server's first ever start compiles
+            its kernels.
 
         Raises
         ------
         ServerUnavailableError
             If it does not serve by then.
         """
-        deadline = time.monotonic() + timeout
-        while not self._is_serving(deadline - time.monotonic()):
+        limit = limit_of(timeout)
+        deadline = time.monotonic() + (math.inf if limit is None else limit)
+        while not self._is_serving(within(deadline, time.monotonic())):
             if time.monotonic() >= deadline:
                 raise never_served(self._address, timeout)
             time.sleep(HEALTH_POLL_SECONDS)
 
-    def _events(
-        self, request: MatchRequest, timeout: float | None
-    ) -> Generator[MatchResponse, None, None]:
-        with translated_errors(self._address):
-            call = MatchServiceStub(self._channel).Match(request, timeout=self._limit(timeout))
-            try:
-                yield from call
-            finally:
-                call.cancel()
-
-    def _is_serving(self, timeout: float) -> bool:
+    def _is_serving(self, timeout: float | None) -> bool:
         check: grpc.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(CHECK_HEALTH)
         try:
             with translated_errors(self._address):
@@ -241,4 +238,4 @@ class Client:
             return False
 
     def _limit(self, timeout: float | None) -> float | None:
-        return self._timeout if timeout is None else timeout
+        return self._timeout if timeout is None else limit_of(timeout)

@@ -1,0 +1,131 @@
+"""A match that a server is doing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from threading import RLock
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, tell_progress
+from sketchmatch_client.errors import CallCancelledError, SketchmatchError, translated_errors
+from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+
+if TYPE_CHECKING:
+    import grpc
+
+__all__ = ["MatchCall"]
+
+
+class MatchCall(Generator[MatchResponse, None, None]):
+    """A match that a server is doing, as :meth:`Client.events` returns it.
+
+    Iterate over its events, or wait for its :meth:`result`. It starts when the first event is asked
+    for. Leaving a ``with`` statement over it, closing it or dropping it stops the match. One thread
+    goes through the events; :meth:`cancel` and :meth:`close` may be called from any other.
+    """
+
+    def __init__(self, begin: Callable[[], grpc.CallIterator[MatchResponse]], address: str) -> None:
+        self._begin = begin
+        self._address = address
+        self._lock = RLock()  # a handler of signals may cancel, too
+        self._call: grpc.CallIterator[MatchResponse] | None = None
+        self._collector = MatchCollector(None)
+        self._error: SketchmatchError | None = None
+        self._ended = self._closed = False
+
+    def cancel(self) -> None:
+        """Stop the match: whoever waits for it gets a :class:`CallCancelledError`.
+
+        One that has ended stays as it is.
+        """
+        self._end(CallCancelledError("the match was cancelled before its end"))
+
+    def close(self) -> None:
+        """Stop the match: whoever iterates over it comes to the end."""
+        with self._lock:
+            self._closed = self._closed or not self._ended
+            self._end()
+
+    def result(self, on_progress: ProgressCallback | None = None) -> Match:
+        """Wait for the end of the match.
+
+        Parameters
+        ----------
+        on_progress
+            Called with each :class:`Progress`, at most 20 a second. What it raises ends the match.
+
+        Returns
+        -------
+        Match
+            How it ran, the objects found and the result.
+
+        Raises
+        ------
+        SketchmatchError
+            What ended the match before; a :class:`CallCancelledError` if it was stopped.
+        """
+        with self:
+            for event in self:
+                tell_progress(event, on_progress)
+        if self._closed and not self._collector.complete:
+            raise CallCancelledError("the match was closed before its end")
+        return self._collector.match()
+
+    def send(self, _value: None = None, /) -> MatchResponse:
+        """Return the next event, as ``next`` does."""
+        try:
+            event = self._next()
+        except BaseException:
+            self.close()
+            raise
+        if event is None:
+            raise StopIteration
+        self._collector.add(event)
+        return event
+
+    def throw(self, *error: Any) -> MatchResponse:
+        """Stop the match and raise an error, as generators do."""
+        self.close()
+        return super().throw(*error)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _next(self) -> MatchResponse | None:
+        """Return the next event, or None at the end."""
+        call, event = self._started(), None
+        if call is not None:
+            try:
+                with translated_errors(self._address):
+                    event = next(call, None)
+            except SketchmatchError as error:
+                self._end(error)
+        if event is None:
+            self._end()
+            if self._error is not None:
+                raise self._error
+        return event
+
+    def _started(self) -> grpc.CallIterator[MatchResponse] | None:
+        """Return the call, made where there was none; None if the match has ended."""
+        with self._lock:
+            if self._call is None and not self._ended:
+                self._call = self._begin()
+            return None if self._ended else self._call
+
+    def _end(self, error: SketchmatchError | None = None) -> None:
+        """Come to the end, unless it was reached; the error is for whoever asks for more."""
+        with self._lock:
+            if not self._ended:
+                self._ended, self._error = True, error
+                if self._call is not None:
+                    self._call.cancel()
