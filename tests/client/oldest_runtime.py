@@ -2,11 +2,18 @@
 
 import asyncio
 import sys
+from threading import Timer
 
 import google.protobuf
 import grpc
 
-from sketchmatch_client import AsyncClient, Client, InvalidRequestError, sources
+from sketchmatch_client import (
+    AsyncClient,
+    CallCancelledError,
+    Client,
+    InvalidRequestError,
+    sources,
+)
 
 IMAGE = sources.image(b"picture")
 
@@ -20,6 +27,17 @@ def match(address: str) -> object:
             return error.field
 
 
+def cancel(address: str) -> object:
+    """Cancel a match from another thread."""
+    with Client(address, timeout=60) as client, client.events(IMAGE, IMAGE) as call:
+        first = next(call).WhichOneof("event")
+        Timer(0.2, call.cancel).start()
+        try:
+            return call.result()
+        except CallCancelledError:
+            return f"cancelled after {first}"
+
+
 async def match_async(address: str) -> object:
     async with AsyncClient(address) as client:
         await client.wait_until_serving(timeout=60)
@@ -31,5 +49,9 @@ async def match_async(address: str) -> object:
 
 if __name__ == "__main__":
     print(grpc.__version__, google.protobuf.__version__)
-    print(match(sys.argv[1]))
-    print(asyncio.run(match_async(sys.argv[1])))
+    address, *what = sys.argv[1:]
+    if what == ["cancel"]:
+        print(cancel(address))
+    else:
+        print(match(address))
+        print(asyncio.run(match_async(address)))

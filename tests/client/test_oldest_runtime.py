@@ -5,7 +5,7 @@ from pathlib import Path
 
 import grpc
 
-from tests.client.fake_server import reason, violation
+from tests.client.fake_server import EVENTS, reason, violation
 from tests.tools import ROOT, tool
 
 CLIENT = ROOT / "clients" / "python"
@@ -28,10 +28,27 @@ def test_both_clients_translate_errors(server):
     assert run_script(server.address)[1:] == ["map", "map"]
 
 
-def run_script(address: str) -> list[str]:
+def test_another_thread_cancels(server):
+    server.events, server.endless = EVENTS[:3], True
+    assert run_script(server.address, "cancel")[1:] == ["cancelled after accepted"]
+    assert server.cancelled.wait(5)
+
+
+def test_no_proxy_stands_between_programs_of_one_machine(server):
+    assert run_script(server.address, http_proxy="http://127.0.0.1:9")[1:] == 2 * ["{0: 2, 1: 0}"]
+
+
+def run_script(address: str, *what: str, **environment: str) -> list[str]:
     done = subprocess.run(
-        [tool("python"), "-W", "error", Path(__file__).with_name("oldest_runtime.py"), address],
-        env={"PYTHONPATH": str(CLIENT)},
+        [
+            tool("python"),
+            "-W",
+            "error",
+            Path(__file__).with_name("oldest_runtime.py"),
+            address,
+            *what,
+        ],
+        env={"PYTHONPATH": str(CLIENT), **environment},
         capture_output=True,
         text=True,
         timeout=200,

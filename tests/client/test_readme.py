@@ -1,7 +1,10 @@
 import re
+from threading import Timer
 
 import pytest
 
+from sketchmatch_client import CallCancelledError, Client, MatchOptions, sources
+from tests.client.fake_server import EVENTS
 from tests.tools import ROOT
 
 README = (ROOT / "clients" / "python" / "README.md").read_text(encoding="utf-8")
@@ -15,3 +18,26 @@ def test_the_examples_run(example, server, tmp_path, monkeypatch):
     for name in ("room.pgm", "sketch.png", "ca.pem"):
         (tmp_path / name).write_bytes(b"")
     exec(example.replace("localhost:50051", server.address), {})
+
+
+def test_a_button_stops_a_match(server):
+    class Button:
+        def on_click(self, action):
+            Timer(0.2, action).start()
+
+    (example,) = re.findall(r"```py\n(.*?)```", README, re.DOTALL)
+    server.events, server.endless = EVENTS[:3], True
+    source = sources.image(b"picture")
+    with Client(server.address) as client:
+        names = {
+            **{"client": client, "sketch": source, "room": source, "stop_button": Button()},
+            "CallCancelledError": CallCancelledError,
+        }
+        exec(example, names)
+    assert names["match"] is None
+    assert server.cancelled.wait(5)
+
+
+def test_every_option_is_listed():
+    table = README.partition("| option |")[2].partition("\n\n")[0]
+    assert {name for name in MatchOptions.__annotations__ if f"`{name}`" not in table} == set()

@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from threading import RLock
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Protocol, Self
 
 from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, tell_progress
 from sketchmatch_client.errors import CallCancelledError, SketchmatchError, translated_errors
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
-if TYPE_CHECKING:
-    import grpc
-
 __all__ = ["MatchCall"]
+
+
+class _Stream(Protocol):
+    """What gRPC returns from a call that streams."""
+
+    def __next__(self) -> MatchResponse: ...
+
+    def cancel(self) -> object: ...
 
 
 class MatchCall(Generator[MatchResponse, None, None]):
@@ -25,11 +30,11 @@ class MatchCall(Generator[MatchResponse, None, None]):
     goes through the events; :meth:`cancel` and :meth:`close` may be called from any other.
     """
 
-    def __init__(self, begin: Callable[[], grpc.CallIterator[MatchResponse]], address: str) -> None:
+    def __init__(self, begin: Callable[[], _Stream], address: str) -> None:
         self._begin = begin
         self._address = address
         self._lock = RLock()  # a handler of signals may cancel, too
-        self._call: grpc.CallIterator[MatchResponse] | None = None
+        self._call: _Stream | None = None
         self._collector = MatchCollector(None)
         self._error: SketchmatchError | None = None
         self._ended = self._closed = False
@@ -115,7 +120,7 @@ class MatchCall(Generator[MatchResponse, None, None]):
                 raise self._error
         return event
 
-    def _started(self) -> grpc.CallIterator[MatchResponse] | None:
+    def _started(self) -> _Stream | None:
         """Return the call, made where there was none; None if the match has ended."""
         with self._lock:
             if self._call is None and not self._ended:
