@@ -202,6 +202,44 @@ def test_set_sets_parameters_of_any_stage(command_line, where):
     assert list(answer.unmatched_sketch_objects), "the plant is smaller than that"
 
 
+def test_segmenters_are_chosen_by_the_names_of_their_stages(command_line, where):
+    done = command_line("match", *ROOM, *where, "--map-segmenter", "strokes")
+    assert done.returncode == ExitCode.INVALID_INPUT
+    assert "map_segmenter.name is 'strokes', which cannot read" in done.stderr
+    done = command_line("match", *ROOM, *where, "--sketch-segmenter", "rooms")
+    assert "sketch_segmenter.name is 'rooms', which cannot read" in done.stderr
+
+
+@pytest.mark.parametrize("command", ["match", "relate"])
+@pytest.mark.parametrize("side", ["sketch", "map"])
+def test_former_names_of_options_hold_and_are_deprecated(command_line, command, side):
+    segmenter = {"sketch": "strokes", "map": "occupancy-grid"}[side]
+    now = command_line(command, *ROOM, f"--{side}-segmenter", segmenter)
+    former = command_line(command, *ROOM, f"--segmenter-{side}", segmenter)
+    assert former.stdout == now.stdout
+    assert (now.stderr, now.returncode, former.returncode) == ("", 0, 0)
+    assert former.stderr == (
+        f"sketchmatch: --segmenter-{side} is deprecated; write --{side}-segmenter\n"
+    )
+    wrong = command_line(command, *ROOM, f"--segmenter-{side}", "best")
+    (line,) = wrong.stderr.splitlines()
+    assert f"{side}_segmenter.name is 'best'" in line
+
+
+def test_a_server_on_this_machine_is_asked_without_a_proxy(command_line, address, monkeypatch):
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")
+    done = command_line("match", *ROOM, "--server", address)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_server_without_a_port_is_refused_with_the_remedy(command_line):
+    done = command_line("match", *ROOM, "--server", "localhost")
+    assert done.returncode == ExitCode.INVALID_INPUT
+    assert done.stderr == (
+        "sketchmatch: address is 'localhost'; add the port, as in 'localhost:50051'\n"
+    )
+
+
 def test_a_time_budget_gives_the_best_answer_until_then(command_line, where):
     with within(2.5):
         answer = result(command_line("match", *ROOM, *where, *LONG, "--json", "--time-budget", 0.5))

@@ -1,9 +1,11 @@
 """What people in a notebook use."""
 
+import inspect
 import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,7 +22,10 @@ from sketchmatch import (
 from sketchmatch.api import Outcome
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH, LIVING_ROOM_TRUTH
 from sketchmatch.model import Stroke, StrokeSet
-from sketchmatch.pipeline.events import Progress
+from sketchmatch.model.text import likelihood
+from sketchmatch.pipeline.events import Phase, Progress
+from sketchmatch.pipeline.result import ObjectMatch
+from sketchmatch.pipeline.selection import STAGES
 from sketchmatch.pipeline.warmup import warm_up_others
 from sketchmatch.registry import default_registry
 from sketchmatch.testing import random_scene
@@ -103,6 +108,96 @@ def test_arguments_reach_the_match():
     assert all(isinstance(progress, Progress) for progress in seen)
 
 
+def test_segmenters_and_their_parameters_are_chosen_by_side():
+    usual = match(LIVING_ROOM_SKETCH, LIVING_ROOM_MAP)
+    large = {"map_segmenter": {"min_size": 0.5}}
+    chosen = match(
+        LIVING_ROOM_SKETCH,
+        LIVING_ROOM_MAP,
+        sketch_segmenter="strokes",
+        map_segmenter="occupancy-grid",
+        params=large,
+    )
+    assert len(chosen.sketch) == len(usual.sketch)
+    assert len(chosen.map) < len(usual.map)
+    unnamed = match(LIVING_ROOM_SKETCH, LIVING_ROOM_MAP, params=large)
+    assert unnamed.map.identity == chosen.map.identity
+    scene = read_scene(LIVING_ROOM_MAP, segmenter="occupancy-grid", params={"min_size": 0.5})
+    assert scene.identity == chosen.map.identity
+    compared = sketchmatch.compare(LIVING_ROOM_SKETCH, LIVING_ROOM_MAP, params=large)
+    assert compared.map.identity == chosen.map.identity
+
+
+@pytest.mark.parametrize("function", [match, sketchmatch.compare])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (
+            {"map_segmenter": "room"},
+            r"map_segmenter\.name is 'room', which is no segmenter; choose",
+        ),
+        ({"map_segmenter": "strokes"}, r"is 'strokes', which cannot read source occupancy_grid"),
+        ({"sketch_segmenter": "rooms"}, r"is 'rooms', which cannot read source stroke_set"),
+        (
+            {"params": {"map_segmenter": {"size": 1}}},
+            r"map_segmenter\.parameters\.size is no param",
+        ),
+        (
+            {"params": {"segmenter_map": {}}},
+            r"params\.segmenter_map is no stage; choose .*map_segm",
+        ),
+        ({"params": {"map_segmenter": 3}}, r"params\.map_segmenter is 3; give a dict"),
+        ({"params": [1]}, r"params is \[1\]; give a dict"),
+        ({"map_segmenter": ["rooms"]}, r"map_segmenter is \['rooms'\]; give the name"),
+    ],
+)
+def test_a_segmenter_of_no_use_is_refused_in_one_sentence(function, arguments, words):
+    with pytest.raises(InvalidInputError, match=words):
+        function(LIVING_ROOM_SKETCH, LIVING_ROOM_MAP, **arguments)
+
+
+def test_a_scene_is_read_as_its_profile_and_configuration_say(tmp_path):
+    file = tmp_path / "sketchmatch.toml"
+    file.write_text(
+        '[profiles.large.map_segmenter]\nname = "occupancy-grid"\nparameters = { min_size = 0.5 }\n'
+    )
+    large = read_scene(LIVING_ROOM_MAP, profile="large", config=file)
+    assert large.identity == read_scene(LIVING_ROOM_MAP, params={"min_size": 0.5}).identity
+    assert len(read_scene(LIVING_ROOM_MAP, config=file)) == 8
+    with pytest.raises(InvalidInputError, match="profile is 'large', which is no profile"):
+        read_scene(LIVING_ROOM_MAP, profile="large")
+
+
+def test_a_scene_is_refused_a_segmenter_of_no_use():
+    with pytest.raises(InvalidInputError, match=r"segmenter\.name is 'strokes', which cannot"):
+        read_scene(LIVING_ROOM_MAP, segmenter="strokes")
+
+
+def test_a_stage_has_one_name_everywhere():
+    from typer.main import get_command
+
+    from sketchmatch.cli.app import app
+    from sketchmatch_client import MatchOptions
+    from sketchmatch_proto.v1.pipeline_pb2 import AlgorithmSelection, Pipeline
+
+    chosen = AlgorithmSelection.DESCRIPTOR
+    contract = [each.name for each in Pipeline.DESCRIPTOR.fields if each.message_type is chosen]
+    assert list(STAGES) == contract
+    assert set(STAGES) <= set(MatchOptions.__annotations__)
+    assert set(STAGES) <= set(inspect.signature(match).parameters)
+    assert set(STAGES) - {"searcher"} <= set(inspect.signature(sketchmatch.compare).parameters)
+    for command, stages in (("match", STAGES), ("relate", STAGES[:-1])):
+        options = {
+            option: parameter.name
+            for parameter in get_command(app).commands[command].params
+            for option in parameter.opts
+            if not getattr(parameter, "hidden", False)
+        }
+        for stage in stages:
+            assert options[f"--{stage.replace('_', '-')}"] == stage
+        assert not [option for option in options if option.startswith("--segmenter")]
+
+
 def test_a_time_budget_reaches_the_match():
     warm_up_others(default_registry())
     scene = random_scene(np.random.default_rng(0), 5)
@@ -123,6 +218,14 @@ def test_a_time_budget_reaches_the_match():
         ({"seed": -1}, "seed is -1"),
         ({"time_budget": -1}, "time_budget is -1 s"),
         ({"weights": (0, 0, 0)}, "weights are all zero"),
+        ({"seed": "one"}, "seed is 'one'; give an integer"),
+        ({"time_budget": "1"}, "time_budget is '1'; give a number"),
+        ({"weights": 1}, "weights are 1; give three, five or six numbers"),
+        ({"weights": ("much", 1, 1)}, r"weights\.similarity is 'much'; give a number"),
+        ({"alternatives": 0.5}, r"alternatives is 0\.5; give a whole number"),
+        ({"allow_unmatched": "yes"}, "allow_unmatched is 'yes'; give True or False"),
+        ({"allow_unmatched": True, "unmatched_price": "x"}, "unmatched_price is 'x'; give a numb"),
+        ({"profile": 5}, "profile is 5, which is no profile"),
     ],
 )
 def test_a_wrong_argument_is_refused_in_one_sentence(arguments, words):
@@ -130,6 +233,115 @@ def test_a_wrong_argument_is_refused_in_one_sentence(arguments, words):
     with pytest.raises(InvalidInputError, match=words) as caught:
         match(scene, scene, **arguments)
     assert "\n" not in str(caught.value)
+
+
+def test_numbers_of_numpy_are_numbers():
+    scene = random_scene(np.random.default_rng(0), 3)
+    result = match(
+        *(scene, scene),
+        seed=np.uint64(2**64 - 1),
+        time_budget=np.float32(60.0),
+        weights=np.array([1.0, 1.0, 0.5]),
+        alternatives=np.int64(1),
+        allow_unmatched=np.True_,
+        unmatched_price=np.float64(0.5),
+    )
+    assert type(result.seed) is int
+    assert result.seed == 2**64 - 1
+    assert len(result.alternatives) == 1
+
+
+@pytest.mark.parametrize("given", [None, 5, [SQUARE, SQUARE + 3.0], b"sketch.svg"])
+def test_what_is_no_scene_is_refused_with_its_side(given):
+    scene = random_scene(np.random.default_rng(0), 3)
+    with pytest.raises(
+        InvalidInputError, match=r"^sketch is .*; give a Scene, .* or the path"
+    ) as caught:
+        match(given, scene)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(InvalidInputError, match=r"^map is "):
+        sketchmatch.compare(scene, given)
+
+
+def test_a_result_shows_itself_in_a_line_and_prints_a_table(living_room):
+    line = repr(living_room)
+    assert line == (
+        f"<MatchResult: 8 of 8 sketched objects matched, ζ {living_room.fmap_confidence:.3f}, "
+        f"Ω {living_room.omap_confidence:.3f}, probability {likelihood(living_room.probability)}, "
+        "OPTIMAL>"
+    )
+    headline, _, *rows = str(living_room).splitlines()
+    assert headline == line.removeprefix("<MatchResult: ").removesuffix(">")
+    assert len(rows) == 8
+    for row, found in zip(rows, living_room.matches, strict=True):
+        label = living_room.sketch.labels[found.sketch_object]
+        assert row.split() == [
+            *(str(found.sketch_object), *label.split(), str(found.map_object)),
+            *(f"{found.confidence:.3f}", likelihood(found.probability), f"{found.margin:.3f}"),
+        ]
+
+
+def test_a_result_is_a_table_in_a_notebook(living_room):
+    scene = living_room.sketch
+    named = Scene.from_polygons(
+        [item.rings for item in scene.objects], [f"<{k}>" for k in range(len(scene))]
+    )
+    table = replace(living_room, sketch=named)._repr_html_()
+    assert table.count("<tr>") == 9
+    assert "<td>3 &lt;3&gt;</td>" in table
+
+
+def test_a_result_shows_no_probability_where_none_is_known(living_room):
+    unknown = replace(
+        living_room,
+        probability=None,
+        matches=tuple(replace(m, probability=None, margin=None) for m in living_room.matches),
+    )
+    assert "probability" not in repr(unknown)
+    first = str(unknown).splitlines()[2]
+    assert first.endswith(f"{unknown.matches[0].confidence:.3f}")
+
+
+def test_other_maps_show_themselves_in_a_line(living_room):
+    other = living_room.alternatives[0]
+    assert repr(other) == (
+        f"<AlternativeMap: ζ {other.confidence.total:.3f}, Ω {other.omap_confidence:.3f}, "
+        f"{other.object_map}>"
+    )
+
+
+def test_a_comparison_shows_itself_in_a_line_and_prints_the_most_similar():
+    found = sketchmatch.compare(LIVING_ROOM_SKETCH, LIVING_ROOM_MAP)
+    best = found.most_similar(limit=10)
+    most = f"{best[0].similarity:.3f}"
+    line = f"784 pairs of relations, 8 sketched objects with 8 mapped ones, σ up to {most}"
+    assert repr(found) == f"<Comparison: {line}>"
+    headline, _, *rows = str(found).splitlines()
+    assert headline == f"{line}; the most similar:"
+    assert len(rows) == 10
+    (a, b), (c, d) = best[0].sketch_pair, best[0].map_pair
+    names = f"{a} {found.sketch.labels[a]}, {b} {found.sketch.labels[b]}"
+    assert rows[0].split() == [
+        *names.split(),
+        *(f"{c},", f"{d}", f"{best[0].similarity:.3f}"),
+        *(f"{math.degrees(best[0].rotation):.1f}°", f"{best[0].dilation:.3g}"),
+    ]
+    assert found._repr_html_().count("<tr>") == 11
+    assert repr(found.table) == (
+        f"<RelationTable: 28 × 28 relations of 8 × 8 objects, "
+        f"σ {found.table.similarity.min():.3f} … {most}>"
+    )
+    assert repr(found.sketch_descriptor) == (
+        "<SceneDescriptor: 28 histograms in 180 directions of 8 objects, by constant>"
+    )
+
+
+def test_progress_shows_itself_in_a_line_with_what_is_known():
+    begun = Progress(Phase.DESCRIBE, 1.0, 0.25)
+    assert (begun.confidence, begun.upper_bound) == (None, None)
+    assert repr(begun) == "<Progress: DESCRIBE, 1.00 s, 25%>"
+    searching = Progress(Phase.SEARCH, 2.0, None, 3, 40, 0.5, 0.75, (ObjectMatch(0, 1, 0.5),) * 50)
+    assert repr(searching) == "<Progress: SEARCH, 2.00 s, ζ 0.500, 40 evaluations, at most 0.750>"
 
 
 @pytest.mark.parametrize("side", ["sketch", "map"])

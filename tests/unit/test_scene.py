@@ -1,10 +1,13 @@
 """Scenes: what an object may be, how it is kept, and how each fault is told."""
 
+import math
+
 import numpy as np
 import pytest
 import shapely
 
 from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io import read_source
 from sketchmatch.model import Scene, SceneObject
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
@@ -151,6 +154,66 @@ def test_a_bad_polygon_is_named_by_its_place_in_the_scene():
     with pytest.raises(InvalidInputError) as caught:
         Scene.from_polygons([SQUARE, [SQUARE, [[0, 0], [1, np.nan], [1, 0]]]])
     assert caught.value.field == "polygons[1].rings[1].points[1]"
+
+
+def test_labels_may_be_numbers_and_none():
+    given = [0, True, None, math.nan, 1.5, np.int64(3), np.bool_(False), np.str_("desk")]
+    shapes = [SQUARE] * len(given)
+    labels = ("0", "True", "", "", "1.5", "3", "False", "desk")
+    for several in (given, tuple(given), np.array(given, dtype=object)):
+        assert Scene.from_polygons(shapes, labels=several).labels == labels
+    assert Scene.from_polygons(shapes[:2], labels=np.array([0, 1])).labels == ("0", "1")
+    assert all(type(label) is str for label in Scene.from_polygons(shapes, given).labels)
+    assert SceneObject.from_rings([SQUARE], 0).label == "0"
+
+
+@pytest.mark.parametrize("label", [b"desk", ["desk"], {"name": "desk"}, np.array([1, 2])])
+def test_what_is_no_label_is_refused(label):
+    with pytest.raises(InvalidInputError, match="which is no name; give text") as caught:
+        Scene.from_polygons([SQUARE, TRIANGLE], labels=["", label])
+    assert caught.value.field == "polygons[1].label"
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("labels", ["ab", b"ab", {0: "a", 1: "b"}])
+def test_labels_are_a_list(labels):
+    with pytest.raises(InvalidInputError, match="give a list of names") as caught:
+        Scene.from_polygons([SQUARE, TRIANGLE], labels=labels)
+    assert caught.value.field == "labels"
+
+
+def test_a_scene_shows_itself_in_a_line():
+    scene = Scene.from_polygons([SQUARE, TRIANGLE], labels=["desk", "a\nplant"])
+    x0, y0, x1, y1 = scene.bounds
+    size = f"{x1 - x0:.3g} × {y1 - y0:.3g}"
+    assert repr(scene) == str(scene) == f"<Scene: 2 objects, {size}: desk, a plant>"
+    unnamed = Scene.from_polygons([SQUARE] * 9)
+    assert repr(unnamed) == "<Scene: 9 objects, 2 × 2>"
+    many = Scene.from_polygons([SQUARE] * 9, labels=range(9))
+    assert repr(many) == "<Scene: 9 objects, 2 × 2: 0, 1, 2, 3, 4, …>"
+    assert len(repr(Scene.from_polygons([SQUARE] * 9, labels=["long " * 999] * 9))) < 250
+
+
+def test_an_object_shows_itself_in_a_line():
+    item = SceneObject.from_polygon([SQUARE, HOLE], "desk")
+    assert repr(item).startswith(f"<SceneObject: desk, 8 vertices, area {item.area:.3g}, around (")
+    assert "\n" not in repr(SceneObject.from_polygon(SQUARE, "a\nb"))
+
+
+def test_a_scene_is_a_picture_in_a_notebook(tmp_path):
+    scene = Scene.from_polygons(
+        [[SQUARE, HOLE], TRIANGLE, np.add(TRIANGLE, 5.0)], ["<desk>", "", "plant"]
+    )
+    file = tmp_path / "scene.svg"
+    file.write_text(scene._repr_svg_(), encoding="utf-8")
+    strokes = read_source(file).strokes
+    drawn = [stroke.points[:-1] for stroke in strokes]
+    rings = [ring for item in scene.objects for ring in item.rings]
+    assert len(drawn) == len(rings)
+    for points, ring in zip(drawn, rings, strict=True):
+        lowest = points.min(axis=0) - ring.min(axis=0)
+        np.testing.assert_allclose(points - lowest, ring, rtol=0, atol=1e-5)
+    assert [stroke.label for stroke in strokes] == ["0 <desk>", "0 <desk>", "1", "2 plant"]
 
 
 def test_labels_come_one_for_each_polygon():
