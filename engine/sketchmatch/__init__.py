@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from sketchmatch.model import Scene
     from sketchmatch.pipeline.compare import Comparison
     from sketchmatch.pipeline.engine import Engine
+    from sketchmatch.pipeline.events import Progress
     from sketchmatch.pipeline.result import MatchResult
     from sketchmatch.pipeline.words import DirectionalRelation, directional_relation
     from sketchmatch.public import (
@@ -30,6 +31,7 @@ __all__ = [
     "Engine",
     "InvalidInputError",
     "MatchResult",
+    "Progress",
     "Scene",
     "SketchmatchError",
     "compare",
@@ -48,6 +50,7 @@ _HOMES = {
     "DirectionalRelation": "sketchmatch.pipeline.words",
     "InvalidInputError": "sketchmatch.errors",
     "MatchResult": "sketchmatch.pipeline.result",
+    "Progress": "sketchmatch.pipeline.events",
     "Scene": "sketchmatch.model",
     "SketchmatchError": "sketchmatch.errors",
     "directional_relation": "sketchmatch.pipeline.words",
