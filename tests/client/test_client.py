@@ -133,6 +133,14 @@ class TestRequest:
             ),
             ({"weights": (1,) * 7}, "weights is (1, 1, 1, 1, 1, 1, ...); give three numbers"),
             ({"params": {"serch": {}}}, "params has no stage 'serch'; the stages are sketch_seg"),
+            ({"params": {5: {}}}, "params has no stage 5; the stages are sketch_segmenter"),
+            ({"params": 5}, "params is 5; give a dict"),
+            ({"params": [("searcher", {})]}, "params is [('searcher', {})]; give a dict"),
+            ({"params": {"searcher": 5}}, "pipeline.searcher.parameters is 5; give a dict"),
+            ({"searcher": 5}, "pipeline.searcher.name is 5; give the name of an algorithm"),
+            ({"map_segmenter": ["rooms"]}, "pipeline.map_segmenter.name is ['rooms']; give the na"),
+            ({"searcher": "\ud800"}, "pipeline.searcher.name is '\\ud800'; give the name"),
+            ({"profile": 5}, "profile is 5; give the name of a profile"),
             (
                 {"params": {"searcher": {"population": object()}}},
                 "pipeline.searcher.parameters holds a value that is not JSON",
@@ -145,6 +153,16 @@ class TestRequest:
         assert str(caught.value).startswith(sentence)
         assert caught.value.reason == "INVALID_FIELD"
         assert not server.requests
+
+    @pytest.mark.parametrize("given", [None, "sketch.svg", TRIANGLE, 5])
+    def test_refuses_what_is_no_source(self, call, server, given):
+        remedy = "make a source of it with sketchmatch_client.sources"
+        for sides in ((given, MAP), (SKETCH, given)):
+            with pytest.raises(InvalidRequestError, match=remedy) as caught:
+                call(server.address, "match", *sides)
+            assert caught.value.field == ("sketch" if sides[0] is given else "map")
+        with pytest.raises(InvalidRequestError, match=f"^source is .*; {remedy}"):
+            call(server.address, "segment", given)
 
     def test_an_unknown_option_is_a_mistake_in_the_program(self, call, server):
         with pytest.raises(TypeError, match="unknown option 'serch'"):

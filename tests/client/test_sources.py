@@ -23,6 +23,35 @@ class TestStrokes:
         assert [point.time_seconds for point in drawn.strokes[1].points] == [0.0, 0.1, 0.2]
         assert drawn.strokes[1].points[0].HasField("time_seconds")
 
+    def test_labels_may_be_numbers_and_none(self):
+        given = [0, True, None, float("nan"), np.int64(3), np.bool_(False), "desk", np.str_("a")]
+        for labels in (given, np.array(given, dtype=object)):
+            drawn = sources.strokes([TRIANGLE] * 8, labels).stroke_set.strokes
+            names = ["0", "True", "", "", "3", "False", "desk", "a"]
+            assert [stroke.label for stroke in drawn] == names
+        drawn = sources.polygons([TRIANGLE] * 2, [0, None]).polygon_set.polygons
+        assert [polygon.label for polygon in drawn] == ["0", ""]
+
+    def test_half_a_character_is_replaced(self):
+        (drawn,) = sources.strokes([TRIANGLE], ["\ud83d desk \U0001f6cb"]).stroke_set.strokes
+        assert drawn.label == "\N{REPLACEMENT CHARACTER} desk \U0001f6cb"
+
+    @pytest.mark.parametrize(
+        ("labels", "field", "remedy"),
+        [
+            (["a", b"b"], "labels[1]", "give text"),
+            ([["a"], "b"], "labels[0]", "give text"),
+            ("ab", "labels", "give a list of names"),
+            ({"a": 1, "b": 2}, "labels", "give a list of names"),
+            (["a"], "labels", "give one for each, or none"),
+        ],
+    )
+    def test_what_is_no_label_is_refused(self, labels, field, remedy):
+        for make in (sources.strokes, sources.polygons):
+            with pytest.raises(InvalidRequestError, match=remedy) as caught:
+                make([TRIANGLE] * 2, labels)
+            assert (caught.value.reason, caught.value.field) == ("INVALID_FIELD", field)
+
     def test_arrays(self):
         assert sources.strokes([np.array(TRIANGLE)]) == sources.strokes([TRIANGLE])
 

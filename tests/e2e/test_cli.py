@@ -232,14 +232,6 @@ def test_a_server_on_this_machine_is_asked_without_a_proxy(command_line, address
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_a_server_without_a_port_is_refused_with_the_remedy(command_line):
-    done = command_line("match", *ROOM, "--server", "localhost")
-    assert done.returncode == ExitCode.INVALID_INPUT
-    assert done.stderr == (
-        "sketchmatch: address is 'localhost'; add the port, as in 'localhost:50051'\n"
-    )
-
-
 def test_a_time_budget_gives_the_best_answer_until_then(command_line, where):
     with within(2.5):
         answer = result(command_line("match", *ROOM, *where, *LONG, "--json", "--time-budget", 0.5))

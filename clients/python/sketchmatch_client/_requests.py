@@ -95,8 +95,10 @@ def match_request(
     given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
     names = {stage: given.pop(stage) for stage in _STAGES if stage in given}
     pipeline = _pipeline(names, given.pop("params", {}))
-    pipeline.profile = given.pop("profile", "")
-    request = MatchRequest(sketch=sketch, map=map, pipeline=pipeline)
+    _set_profile(pipeline, given.pop("profile", ""))
+    request = MatchRequest(
+        sketch=_checked("sketch", sketch), map=_checked("map", map), pipeline=pipeline
+    )
     for name, value in given.items():
         if name not in _FIELDS:
             raise TypeError(f"unknown option {name!r}; MatchOptions lists those there are")
@@ -113,14 +115,15 @@ def segment_request(
     profile: str | None = None,
 ) -> SegmentRequest:
     """Return the request for the objects of one source; see :meth:`Client.segment`."""
-    request = SegmentRequest(source=source, profile=profile or "")
+    request = SegmentRequest(source=_checked("source", source))
+    _set_profile(request, profile or "")
     if segmenter or params:
         request.segmenter.CopyFrom(_selection("segmenter", segmenter or "", params or {}))
     return request
 
 
 def _pipeline(names: Mapping[str, str], params: Mapping[str, Mapping[str, Any]]) -> Pipeline:
-    if unknown := sorted(params.keys() - set(_STAGES)):
+    if unknown := [stage for stage in _mapping("params", params) if stage not in _STAGES]:
         raise InvalidRequestError(
             f"params has no stage {unknown[0]!r}; the stages are {', '.join(_STAGES)}",
             "INVALID_FIELD",
@@ -135,13 +138,41 @@ def _pipeline(names: Mapping[str, str], params: Mapping[str, Mapping[str, Any]])
 
 
 def _selection(field: str, name: str, params: Mapping[str, Any]) -> AlgorithmSelection:
-    selection = AlgorithmSelection(name=name)
-    if params:
+    with refused_as(
+        "INVALID_FIELD", f"{field}.name", f"is {reprlib.repr(name)}; give the name of an algorithm"
+    ):
+        selection = AlgorithmSelection(name=name)
+    if _mapping(f"{field}.parameters", params):
         struct = Struct()
         with refused_as("INVALID_FIELD", f"{field}.parameters", "holds a value that is not JSON"):
             struct.update(params)
         selection.parameters.CopyFrom(struct)
     return selection
+
+
+def _mapping(field: str, given: Any) -> Mapping[str, Any]:
+    if not isinstance(given, Mapping):
+        raise InvalidRequestError(
+            f"{field} is {reprlib.repr(given)}; give a dict", "INVALID_FIELD", field
+        )
+    return given
+
+
+def _checked(field: str, given: Source) -> Source:
+    if not isinstance(given, Source):
+        raise InvalidRequestError(
+            f"{field} is {reprlib.repr(given)}; "
+            "make a source of it with sketchmatch_client.sources",
+            "INVALID_FIELD",
+            field,
+        )
+    return given
+
+
+def _set_profile(message: Pipeline | SegmentRequest, profile: str) -> None:
+    problem = f"is {reprlib.repr(profile)}; give the name of a profile"
+    with refused_as("INVALID_FIELD", "profile", problem):
+        message.profile = profile
 
 
 def _weights(weights: Weights) -> ConfidenceWeights:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import os
 import re
+import reprlib
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
-from numbers import Real
+from numbers import Number, Real
 from pathlib import Path
 from typing import Any, Literal
 
@@ -34,7 +35,7 @@ _IMAGE_LINE = re.compile(
 
 def strokes(
     strokes: Iterable[Iterable[Sequence[float]]],
-    labels: Sequence[str] | None = None,
+    labels: Sequence[Any] | None = None,
     *,
     y_axis: YAxis = "up",
 ) -> source_pb2.Source:
@@ -45,7 +46,7 @@ def strokes(
     strokes
         For each stroke its points, (x, y) or (x, y, seconds); lists or arrays.
     labels
-        A name for each stroke.
+        A name for each stroke, text or a number; None and nan are no name.
     y_axis
         ``"down"`` for points from a screen, tablet or browser. A sketch that is read with the
         wrong axis is its own mirror image, and cannot match.
@@ -73,7 +74,7 @@ def strokes(
 
 def polygons(
     polygons: Iterable[Sequence[Any]],
-    labels: Sequence[str] | None = None,
+    labels: Sequence[Any] | None = None,
     *,
     y_axis: YAxis = "up",
 ) -> source_pb2.Source:
@@ -85,7 +86,7 @@ def polygons(
         For each object the (x, y) corners of its outline, or a list of such rings: the outline,
         then its holes.
     labels
-        A name for each polygon.
+        A name for each polygon, text or a number; None and nan are no name.
     y_axis
         Which way y grows; see :func:`strokes`.
 
@@ -256,15 +257,34 @@ def _flat_cells(cells: Any) -> tuple[bytes, int]:
     return array("b", chain.from_iterable(rows)).tobytes(), widths.pop()
 
 
-def _labels(labels: Sequence[str] | None, count: int, what: str) -> Sequence[str]:
+def _labels(labels: Sequence[Any] | None, count: int, what: str) -> Sequence[str]:
     if labels is None:
         return [""] * count
-    if len(labels) != count:
+    if isinstance(labels, str | bytes | Mapping):
+        raise _refused_label("labels", labels, "give a list of names")
+    names = [_name(label, f"labels[{k}]") for k, label in enumerate(labels)]
+    if len(names) != count:
         raise InvalidRequestError(
-            f"labels has {len(labels)} names for {count} {what}; give one for each, or none",
+            f"labels has {len(names)} names for {count} {what}; give one for each, or none",
             "INVALID_FIELD",
+            "labels",
         )
-    return labels
+    return names
+
+
+def _name(given: Any, field: str) -> str:
+    """Return a label as text: people number their objects, from 0 or as ``True``."""
+    if given is None or isinstance(given, str):
+        # Half a pair of surrogates, as broken files have them, has no place in a message.
+        return str(given or "").encode("utf-16-le", "surrogatepass").decode("utf-16-le", "replace")
+    if isinstance(given, Number) or type(given).__name__ in ("bool", "bool_"):  # NumPy's own
+        return str(given) if given == given else ""  # noqa: PLR0124 (nan, as in tables with gaps)
+    raise _refused_label(field, given, "give text")
+
+
+def _refused_label(field: str, given: Any, remedy: str) -> InvalidRequestError:
+    problem = f"{field} is {reprlib.repr(given)}; {remedy}"
+    return InvalidRequestError(problem, "INVALID_FIELD", field)
 
 
 def _y_axis(name: str) -> source_pb2.YAxis.ValueType:
