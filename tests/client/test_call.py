@@ -1,7 +1,7 @@
 """A match under way, in the hands of several threads."""
 
-from contextlib import closing
-from threading import Timer
+from contextlib import closing, contextmanager
+from threading import Event, Thread
 
 import grpc
 import pytest
@@ -33,24 +33,35 @@ def endless(client, server):
         yield call
 
 
-def soon(action):
-    timer = Timer(0.2, action)
-    timer.start()
-    return timer
+@contextmanager
+def another_thread(action):
+    """Yield an event, after which another thread does something."""
+    event = Event()
+    thread = Thread(target=lambda: (event.wait(60), action()))
+    thread.start()
+    try:
+        yield event
+    finally:
+        event.set()
+        thread.join()
 
 
 def test_another_thread_cancels_who_waits_for_the_result(endless, server):
-    soon(endless.cancel)
-    with pytest.raises(CallCancelledError, match="was cancelled before its end"):
-        endless.result()
+    with (
+        another_thread(endless.cancel) as begun,
+        pytest.raises(CallCancelledError, match="was cancelled before its end"),
+    ):
+        endless.result(on_progress=lambda _progress: begun.set())
     assert server.cancelled.wait(5)
 
 
 def test_another_thread_cancels_who_goes_through_the_events(endless, server):
-    seen = []
-    soon(endless.cancel)
-    with pytest.raises(CallCancelledError, match="was cancelled before its end"):
-        seen.extend(endless)
+    with (
+        another_thread(endless.cancel) as begun,
+        pytest.raises(CallCancelledError, match="was cancelled before its end"),
+    ):
+        for _event in endless:
+            begun.set()
     assert server.cancelled.wait(5)
     with pytest.raises(CallCancelledError):
         next(endless)
@@ -89,8 +100,10 @@ def test_the_result_holds_what_came_before_it_was_asked_for(client):
 
 
 def test_another_thread_closes_and_the_loop_comes_to_its_end(endless, server):
-    soon(endless.close)
-    assert list(endless)[:2] == list(EVENTS[:2])
+    with another_thread(endless.close) as begun:
+        for _event in endless:
+            begun.set()
+    assert begun.is_set()
     assert server.cancelled.wait(5)
     with pytest.raises(CallCancelledError, match="was closed before its end"):
         endless.result()
@@ -133,4 +146,3 @@ def test_a_timeout_ends_it(client, server):
     call = client.events(SKETCH, MAP, timeout=0.2)
     with pytest.raises(DeadlineExceededError):
         call.result()
-    assert server.cancelled.wait(5)

@@ -1,5 +1,6 @@
 import re
-from threading import Timer
+import time
+from threading import Thread
 
 import pytest
 
@@ -23,7 +24,12 @@ def test_the_examples_run(example, server, tmp_path, monkeypatch):
 def test_a_button_stops_a_match(server):
     class Button:
         def on_click(self, action):
-            Timer(0.2, action).start()
+            Thread(target=self._press, args=[action]).start()
+
+        def _press(self, action):
+            while not server.requests:
+                time.sleep(0.01)
+            action()
 
     (example,) = re.findall(r"```py\n(.*?)```", README, re.DOTALL)
     server.events, server.endless = EVENTS[:3], True
