@@ -56,12 +56,15 @@ def test_another_thread_cancels_who_waits_for_the_result(endless, server):
 
 
 def test_another_thread_cancels_who_goes_through_the_events(endless, server):
+    def go_through(begun):
+        for _event in endless:
+            begun.set()
+
     with (
         another_thread(endless.cancel) as begun,
         pytest.raises(CallCancelledError, match="was cancelled before its end"),
     ):
-        for _event in endless:
-            begun.set()
+        go_through(begun)
     assert server.cancelled.wait(5)
     with pytest.raises(CallCancelledError):
         next(endless)

@@ -86,6 +86,8 @@ def test_progress_has_none_until_there_is_a_value():
     assert (begun.fraction, begun.confidence, begun.upper_bound) == (None, None, None)
     assert (begun.iteration, begun.evaluations, begun.object_map) == (0, 0, {})
     assert repr(begun) == "<Progress: SEGMENT, 0.00 s>"
+    first = match_pb2.MatchProgress(phase=match_pb2.PHASE_SEARCH, confidence=0.5, evaluations=1)
+    assert repr(Progress(first)) == "<Progress: SEARCH, 0.00 s, ζ 0.500, 1 evaluation>"
 
 
 def test_progress_reads_as_its_message():

@@ -340,6 +340,8 @@ def test_progress_shows_itself_in_a_line_with_what_is_known():
     begun = Progress(Phase.DESCRIBE, 1.0, 0.25)
     assert (begun.confidence, begun.upper_bound) == (None, None)
     assert repr(begun) == "<Progress: DESCRIBE, 1.00 s, 25%>"
+    first = Progress(Phase.SEARCH, 2.0, confidence=0.5, evaluations=1)
+    assert repr(first) == "<Progress: SEARCH, 2.00 s, ζ 0.500, 1 evaluation>"
     searching = Progress(Phase.SEARCH, 2.0, None, 3, 40, 0.5, 0.75, (ObjectMatch(0, 1, 0.5),) * 50)
     assert repr(searching) == "<Progress: SEARCH, 2.00 s, ζ 0.500, 40 evaluations, at most 0.750>"
 

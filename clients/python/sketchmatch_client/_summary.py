@@ -91,7 +91,8 @@ def progress_line(progress: MatchProgress) -> str:
     if progress.HasField("fraction"):
         facts.append(f"{progress.fraction:.0%}")
     if progress.HasField("confidence"):
-        facts += [f"ζ {progress.confidence:.3f}", f"{progress.evaluations} evaluations"]
+        count = progress.evaluations
+        facts += [f"ζ {progress.confidence:.3f}", f"{count} evaluation{'s' * (count != 1)}"]
     if progress.HasField("upper_bound"):
         facts.append(f"at most {progress.upper_bound:.3f}")
     return ", ".join(facts)
