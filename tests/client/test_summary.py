@@ -25,13 +25,16 @@ def match() -> Match:
 def test_a_match_shows_itself_in_a_line(match):
     result = STREAM[-1].result
     assert repr(match) == (
-        f"<Match: 2 of 3 sketched objects matched, ζ {result.fmap_confidence.total:.3f}, "
-        f"Ω {result.omap_confidence:.3f}, probability {result.probability:.3f}, ITERATION_LIMIT>"
+        f"<Match: 2 of 3 sketched objects matched, "
+        f"FMAP confidence {result.fmap_confidence.total:.3f}, "
+        f"OMAP confidence {result.omap_confidence:.3f}, "
+        f"probability {result.probability:.3f}, ITERATION_LIMIT>"
     )
 
 
 def test_a_match_prints_a_small_table(match):
     headline, heads, *rows = str(match).splitlines()
+    assert str(match).isascii(), "any terminal can take it"
     assert headline == repr(match).removeprefix("<Match: ").removesuffix(">")
     assert heads.split("  ")[0] == "in the sketch"
     first, second = match.result.object_matches
@@ -69,9 +72,9 @@ def test_a_long_match_prints_its_first_lines():
         result.object_matches.add(sketch_object=k, map_object=k, sketch_label="a\nb\x1b" * 30)
     lines = str(finished(MatchResponse(result=result))).splitlines()
     assert len(lines) == 2 + 20 + 1
-    assert lines[2].startswith("0 a b�a b�")
-    assert "…" in lines[2]
-    assert lines[-1] == "… and 10 more"
+    assert lines[2].startswith("0 a b?a b?")
+    assert "..." in lines[2]
+    assert lines[-1] == "... and 10 more"
 
 
 def test_a_certainty_is_not_rounded_up_to():
@@ -87,7 +90,7 @@ def test_progress_has_none_until_there_is_a_value():
     assert (begun.iteration, begun.evaluations, begun.object_map) == (0, 0, {})
     assert repr(begun) == "<Progress: SEGMENT, 0.00 s>"
     first = match_pb2.MatchProgress(phase=match_pb2.PHASE_SEARCH, confidence=0.5, evaluations=1)
-    assert repr(Progress(first)) == "<Progress: SEARCH, 0.00 s, ζ 0.500, 1 evaluation>"
+    assert repr(Progress(first)) == "<Progress: SEARCH, 0.00 s, confidence 0.500, 1 evaluation>"
 
 
 def test_progress_reads_as_its_message():
@@ -101,7 +104,7 @@ def test_progress_reads_as_its_message():
     assert progress.HasField("confidence")
     assert progress.object_map == {1: 3, 2: 0}
     assert repr(progress) == (
-        "<Progress: SEARCH, 1.25 s, 62%, ζ 0.710, 1300 evaluations, at most 0.930>"
+        "<Progress: SEARCH, 1.25 s, 62%, confidence 0.710, 1300 evaluations, at most 0.930>"
     )
 
 
@@ -109,7 +112,7 @@ def test_a_stream_can_be_printed_event_by_event():
     assert [summary(event).splitlines()[0] for event in STREAM] == [
         f"accepted as {STREAM[0].accepted.match_id}, seed {2**53 + 1}",
         "3 sketched objects, 4 mapped ones",
-        "SEARCH, 1.25 s, 62%, ζ 0.710, 1300 evaluations, at most 0.930",
+        "SEARCH, 1.25 s, 62%, confidence 0.710, 1300 evaluations, at most 0.930",
         str(finished(*STREAM)).splitlines()[0],
     ]
     assert summary(MatchResponse()) == ""

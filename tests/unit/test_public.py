@@ -266,10 +266,12 @@ def test_what_is_no_scene_is_refused_with_its_side(given):
 def test_a_result_shows_itself_in_a_line_and_prints_a_table(living_room):
     line = repr(living_room)
     assert line == (
-        f"<MatchResult: 8 of 8 sketched objects matched, ζ {living_room.fmap_confidence:.3f}, "
-        f"Ω {living_room.omap_confidence:.3f}, probability {likelihood(living_room.probability)}, "
-        "OPTIMAL>"
+        f"<MatchResult: 8 of 8 sketched objects matched, "
+        f"FMAP confidence {living_room.fmap_confidence:.3f}, "
+        f"OMAP confidence {living_room.omap_confidence:.3f}, "
+        f"probability {likelihood(living_room.probability)}, OPTIMAL>"
     )
+    assert str(living_room).isascii(), "any terminal can take it"
     headline, _, *rows = str(living_room).splitlines()
     assert headline == line.removeprefix("<MatchResult: ").removesuffix(">")
     assert len(rows) == 8
@@ -305,7 +307,8 @@ def test_a_result_shows_no_probability_where_none_is_known(living_room):
 def test_other_maps_show_themselves_in_a_line(living_room):
     other = living_room.alternatives[0]
     assert repr(other) == (
-        f"<AlternativeMap: ζ {other.confidence.total:.3f}, Ω {other.omap_confidence:.3f}, "
+        f"<AlternativeMap: FMAP confidence {other.confidence.total:.3f}, "
+        f"OMAP confidence {other.omap_confidence:.3f}, "
         f"{other.object_map}>"
     )
 
@@ -314,8 +317,9 @@ def test_a_comparison_shows_itself_in_a_line_and_prints_the_most_similar():
     found = sketchmatch.compare(LIVING_ROOM_SKETCH, LIVING_ROOM_MAP)
     best = found.most_similar(limit=10)
     most = f"{best[0].similarity:.3f}"
-    line = f"784 pairs of relations, 8 sketched objects with 8 mapped ones, σ up to {most}"
+    line = f"784 pairs of relations, 8 sketched objects with 8 mapped ones, similarity up to {most}"
     assert repr(found) == f"<Comparison: {line}>"
+    assert (str(found) + repr(found.table) + repr(found.sketch)).isascii()
     headline, _, *rows = str(found).splitlines()
     assert headline == f"{line}; the most similar:"
     assert len(rows) == 10
@@ -324,12 +328,12 @@ def test_a_comparison_shows_itself_in_a_line_and_prints_the_most_similar():
     assert rows[0].split() == [
         *names.split(),
         *(f"{c},", f"{d}", f"{best[0].similarity:.3f}"),
-        *(f"{math.degrees(best[0].rotation):.1f}°", f"{best[0].dilation:.3g}"),
+        *(f"{math.degrees(best[0].rotation):.1f}", f"{best[0].dilation:.3g}"),
     ]
     assert found._repr_html_().count("<tr>") == 11
     assert repr(found.table) == (
-        f"<RelationTable: 28 × 28 relations of 8 × 8 objects, "
-        f"σ {found.table.similarity.min():.3f} … {most}>"
+        f"<RelationTable: 28 x 28 relations of 8 x 8 objects, "
+        f"similarity {found.table.similarity.min():.3f} to {most}>"
     )
     assert repr(found.sketch_descriptor) == (
         "<SceneDescriptor: 28 histograms in 180 directions of 8 objects, by constant>"
@@ -341,9 +345,12 @@ def test_progress_shows_itself_in_a_line_with_what_is_known():
     assert (begun.confidence, begun.upper_bound) == (None, None)
     assert repr(begun) == "<Progress: DESCRIBE, 1.00 s, 25%>"
     first = Progress(Phase.SEARCH, 2.0, confidence=0.5, evaluations=1)
-    assert repr(first) == "<Progress: SEARCH, 2.00 s, ζ 0.500, 1 evaluation>"
+    assert repr(first) == "<Progress: SEARCH, 2.00 s, confidence 0.500, 1 evaluation>"
     searching = Progress(Phase.SEARCH, 2.0, None, 3, 40, 0.5, 0.75, (ObjectMatch(0, 1, 0.5),) * 50)
-    assert repr(searching) == "<Progress: SEARCH, 2.00 s, ζ 0.500, 40 evaluations, at most 0.750>"
+    assert (
+        repr(searching)
+        == "<Progress: SEARCH, 2.00 s, confidence 0.500, 40 evaluations, at most 0.750>"
+    )
 
 
 @pytest.mark.parametrize("side", ["sketch", "map"])

@@ -185,12 +185,12 @@ def test_labels_are_a_list(labels):
 def test_a_scene_shows_itself_in_a_line():
     scene = Scene.from_polygons([SQUARE, TRIANGLE], labels=["desk", "a plant"])
     x0, y0, x1, y1 = scene.bounds
-    size = f"{x1 - x0:.3g} × {y1 - y0:.3g}"
+    size = f"{x1 - x0:.3g} x {y1 - y0:.3g}"
     assert repr(scene) == str(scene) == f"<Scene: 2 objects, {size}: desk, a plant>"
     unnamed = Scene.from_polygons([SQUARE] * 9)
-    assert repr(unnamed) == "<Scene: 9 objects, 2 × 2>"
+    assert repr(unnamed) == "<Scene: 9 objects, 2 x 2>"
     many = Scene.from_polygons([SQUARE] * 9, labels=range(9))
-    assert repr(many) == "<Scene: 9 objects, 2 × 2: 0, 1, 2, 3, 4, …>"
+    assert repr(many) == "<Scene: 9 objects, 2 x 2: 0, 1, 2, 3, 4, ...>"
     assert len(repr(Scene.from_polygons([SQUARE] * 9, labels=["long " * 999] * 9))) < 250
 
 

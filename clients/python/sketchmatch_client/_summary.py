@@ -1,4 +1,7 @@
-"""What servers answer, in a line or a small table."""
+"""What servers answer, in a line or a small table.
+
+All but what they say themselves is ASCII, which every terminal and pipe can take.
+"""
 
 from __future__ import annotations
 
@@ -57,8 +60,8 @@ def match_headline(result: MatchResult) -> str:
     matched = len(result.object_matches)
     facts = [
         f"{matched} of {matched + len(result.unmatched_sketch_objects)} sketched objects matched",
-        f"ζ {result.fmap_confidence.total:.3f}",
-        f"Ω {result.omap_confidence:.3f}",
+        f"FMAP confidence {result.fmap_confidence.total:.3f}",
+        f"OMAP confidence {result.omap_confidence:.3f}",
         enum_name(Outcome, "OUTCOME_", result.outcome),
     ]
     if result.HasField("probability"):
@@ -92,7 +95,10 @@ def progress_line(progress: MatchProgress) -> str:
         facts.append(f"{progress.fraction:.0%}")
     if progress.HasField("confidence"):
         count = progress.evaluations
-        facts += [f"ζ {progress.confidence:.3f}", f"{count} evaluation{'s' * (count != 1)}"]
+        facts += [
+            f"confidence {progress.confidence:.3f}",
+            f"{count} evaluation{'s' * (count != 1)}",
+        ]
     if progress.HasField("upper_bound"):
         facts.append(f"at most {progress.upper_bound:.3f}")
     return ", ".join(facts)
@@ -164,7 +170,7 @@ def _table(
         ).rstrip()
         for row in shown
     ]
-    rest = [f"… and {len(rows) - most} more"] if len(rows) > most else []
+    rest = [f"... and {len(rows) - most} more"] if len(rows) > most else []
     return "\n".join([title, *lines, *rest])
 
 
@@ -174,8 +180,8 @@ def _name(index: int, label: str) -> str:
 
 def _cut(text: str, longest: int = _LONGEST) -> str:
     """Return what fits into a cell, whatever is in it."""
-    line = "".join(char if char.isprintable() else "�" for char in " ".join(text.split()))
-    return line if len(line) <= longest else f"{line[: longest - 1]}…"
+    line = "".join(char if char.isprintable() else "?" for char in " ".join(text.split()))
+    return line if len(line) <= longest else f"{line[: longest - 3]}..."
 
 
 def _likelihood(probability: float) -> str:

@@ -204,9 +204,9 @@ class RelationTable:
     def __repr__(self) -> str:
         least, most = self.similarity.min(), self.similarity.max()
         return (
-            f"<{type(self).__name__}: {self.template_pairs} × {self.argument_pairs} relations of "
-            f"{self.template_objects} × {self.argument_objects} objects, "
-            f"σ {least:.3f} … {most:.3f}>"
+            f"<{type(self).__name__}: {self.template_pairs} x {self.argument_pairs} relations of "
+            f"{self.template_objects} x {self.argument_objects} objects, "
+            f"similarity {least:.3f} to {most:.3f}>"
         )
 
     @property

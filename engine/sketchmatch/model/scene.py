@@ -223,7 +223,7 @@ class Scene:
     def __repr__(self) -> str:
         x0, y0, x1, y1 = self.bounds
         named = listed(self.labels)
-        size = f"{len(self)} objects, {x1 - x0:.3g} × {y1 - y0:.3g}"
+        size = f"{len(self)} objects, {x1 - x0:.3g} x {y1 - y0:.3g}"
         return f"<{type(self).__name__}: {size}{': ' if named else ''}{named}>"
 
     def _repr_svg_(self) -> str:

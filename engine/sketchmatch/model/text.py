@@ -1,4 +1,7 @@
-"""How values show themselves: a line in a terminal, a small table in print and in a notebook."""
+"""How values show themselves: a line in a terminal, a small table in print and in a notebook.
+
+All but labels is ASCII, which every terminal and pipe can take.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +21,10 @@ def shortened(label: str) -> str:
 
     Examples
     --------
-    >>> shortened("sofa"), shortened("x" * 99) == 29 * "x" + "…"
+    >>> shortened("sofa"), shortened("x" * 99) == 27 * "x" + "..."
     ('sofa', True)
     """
-    return label if len(label) <= _LONGEST else f"{label[: _LONGEST - 1]}…"
+    return label if len(label) <= _LONGEST else f"{label[: _LONGEST - 3]}..."
 
 
 def name(index: int, label: str) -> str:
@@ -41,10 +44,10 @@ def listed(names: Iterable[str]) -> str:
     Examples
     --------
     >>> listed(["a", "", "b"]), listed("abcdefg")
-    ('a, b', 'a, b, c, d, e, …')
+    ('a, b', 'a, b, c, d, e, ...')
     """
     shown = [shortened(each) for each in names if each.strip()]
-    return ", ".join(shown if len(shown) <= _NAMES else [*shown[:_NAMES], "…"])
+    return ", ".join(shown if len(shown) <= _NAMES else [*shown[:_NAMES], "..."])
 
 
 def likelihood(probability: float) -> str:
@@ -115,4 +118,4 @@ class Table:
 
     def _rest(self) -> list[str]:
         left_out = len(self.rows) - _ROWS
-        return [f"… and {left_out} more"] if left_out > 0 else []
+        return [f"... and {left_out} more"] if left_out > 0 else []

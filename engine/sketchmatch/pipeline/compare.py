@@ -122,17 +122,17 @@ class Comparison:
     def _headline(self) -> str:
         return (
             f"{self.table.similarity.size} pairs of relations, {len(self.sketch)} sketched objects "
-            f"with {len(self.map)} mapped ones, σ up to {self.table.similarity.max():.3f}"
+            f"with {len(self.map)} mapped ones, similarity up to {self.table.similarity.max():.3f}"
         )
 
     def _table(self) -> Table:
-        heads = ("in the sketch", "on the map", "σ", "R", "L")
+        heads = ("in the sketch", "on the map", "similarity", "degrees", "dilation")
         rows = [
             (
                 _names(entry.sketch_pair, self.sketch),
                 _names(entry.map_pair, self.map),
                 f"{entry.similarity:.3f}",
-                f"{math.degrees(entry.rotation):.1f}°",
+                f"{math.degrees(entry.rotation):.1f}",
                 f"{entry.dilation:.3g}",
             )
             for entry in self.most_similar(limit=10)

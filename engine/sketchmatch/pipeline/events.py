@@ -89,7 +89,7 @@ class Progress:
         if self.fraction is not None:
             facts.append(f"{self.fraction:.0%}")
         if self.confidence is not None:
-            facts.append(f"ζ {self.confidence:.3f}")
+            facts.append(f"confidence {self.confidence:.3f}")
             facts.append(f"{self.evaluations} evaluation{'s' * (self.evaluations != 1)}")
         if self.upper_bound is not None:
             facts.append(f"at most {self.upper_bound:.3f}")

@@ -80,7 +80,7 @@ class AlternativeMap:
         return {match.sketch_object: match.map_object for match in self.matches}
 
     def __repr__(self) -> str:
-        confidences = f"ζ {self.confidence.total:.3f}, Ω {self.omap_confidence:.3f}"
+        confidences = _confidences(self.confidence.total, self.omap_confidence)
         return f"<{type(self).__name__}: {confidences}, {self.object_map}>"
 
 
@@ -227,7 +227,7 @@ class MatchResult:
 
     def _headline(self) -> str:
         matched = f"{len(self.matches)} of {len(self.sketch)} sketched objects matched"
-        confidences = f"ζ {self.fmap_confidence:.3f}, Ω {self.omap_confidence:.3f}"
+        confidences = _confidences(self.fmap_confidence, self.omap_confidence)
         likely = "" if self.probability is None else f", probability {likelihood(self.probability)}"
         return f"{matched}, {confidences}{likely}, {self.outcome}"
 
@@ -244,3 +244,7 @@ class MatchResult:
             for match in self.matches
         ]
         return Table(self._headline(), heads, rows, 2)
+
+
+def _confidences(fmap: float, omap: float) -> str:
+    return f"FMAP confidence {fmap:.3f}, OMAP confidence {omap:.3f}"
