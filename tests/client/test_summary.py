@@ -45,6 +45,11 @@ def test_a_match_prints_a_small_table(match):
     assert rows[1].split()[:4] == ["2", second.sketch_label, "0", second.map_label]
 
 
+def test_a_match_is_the_same_table_in_a_notebook(match):
+    match.result.object_matches[0].sketch_label = "<b>"
+    assert match._repr_html_() == f"<pre>{str(match).replace('<b>', '&lt;b&gt;')}</pre>"
+
+
 def test_a_match_has_none_where_there_is_no_value():
     bare = finished(MatchResponse(result=match_pb2.MatchResult()))
     assert (bare.probability, bare.upper_bound) == (None, None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from html import escape
 
 from google.protobuf.duration_pb2 import Duration
 
@@ -156,6 +157,10 @@ class Match:
     def __str__(self) -> str:
         """Return which object is which, for a terminal; objects count from 0."""
         return match_table(self.result)
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook."""
+        return f"<pre>{escape(str(self))}</pre>"
 
 
 class MatchCollector:
