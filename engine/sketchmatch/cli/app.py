@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import traceback
 import warnings
+from contextlib import suppress
 from enum import IntEnum
 from typing import Annotated, NoReturn
 
 import typer
 
 import sketchmatch
-from sketchmatch.cli import config, demo, describe, match, plugins, relate, segment, serve
+from sketchmatch.cli import (
+    config,
+    demo,
+    describe,
+    match,
+    output,
+    plugins,
+    relate,
+    segment,
+    serve,
+)
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError
 
 __all__ = ["ExitCode", "main"]
@@ -64,9 +76,11 @@ def main() -> NoReturn:
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")
     # An odd tag in a picture is no news to whoever drew it.
     warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\.")
+    output.use_any_encoding()
     code, message = _run()
     if message:
-        typer.echo(f"sketchmatch: {message}", err=True)
+        with suppress(OSError):
+            typer.echo(f"sketchmatch: {message}", err=True)
     sys.exit(code)
 
 
@@ -74,7 +88,8 @@ def _run() -> tuple[int, str]:
     """Run the command line and return its exit code and what to say about it."""
     try:
         code = app(standalone_mode=False) or ExitCode.OK
-        sys.stdout.flush()
+        if sys.stdout:
+            sys.stdout.flush()
         return code, "interrupted" if code == ExitCode.INTERRUPTED else ""
     except (typer.Abort, KeyboardInterrupt) as end:
         # Typer makes an abort of the end of a file, too.
@@ -85,10 +100,12 @@ def _run() -> tuple[int, str]:
         # Typer makes an exit of a broken pipe.
         if BrokenPipeError not in (type(end), type(end.__context__)):
             raise
-        # Whoever read standard output has had enough; Python must not flush into it at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        output.discard()  # whoever read standard output has had enough
         return ExitCode.OK, ""
     except Exception as error:
+        if isinstance(error, OSError) and error.errno == errno.ENOSPC and not error.filename:
+            output.discard()
+            error = output.unwritable(error)
         return _exit_code(error), _sentence(error)
 
 
@@ -120,12 +137,12 @@ def _is_usage_error(error: Exception) -> bool:
 def _sentence(error: Exception) -> str:
     if _is_usage_error(error):
         problem = error.format_message()  # type: ignore[attr-defined]
-        return f"{problem.rstrip('.')}; --help tells what it takes"
+        return output.clean(f"{problem.rstrip('.')}; --help tells what it takes")
     if _exit_code(error) is not ExitCode.UNFORESEEN:
-        return str(error)
+        return output.clean(str(error))
     if os.environ.get("SKETCHMATCH_DEBUG"):
         return "".join(traceback.format_exception(error)).rstrip()
-    return (
+    return output.clean(
         f"failed in a way nobody foresaw ({type(error).__name__}: {error}); "
         "please report it with what SKETCHMATCH_DEBUG=1 prints"
     )

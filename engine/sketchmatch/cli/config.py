@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
+from sketchmatch.cli import output
 from sketchmatch.cli.options import Config, say
+from sketchmatch.cli.output import answering
 from sketchmatch.errors import InvalidInputError, Reason
 
 __all__ = ["app"]
@@ -21,6 +23,7 @@ def config() -> None:
 
 
 @app.command("show")
+@answering
 def show(
     config: Config = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
@@ -29,14 +32,13 @@ def show(
 
     What it prints is a configuration file that says the same.
     """
-    from sketchmatch.cli import display
     from sketchmatch.config import entries, load, shown_file
     from sketchmatch.registry import default_registry
 
     configuration = load(config)
     registry = default_registry(configuration.rules)
     if not json:
-        typer.echo(shown_file(configuration, registry), nl=False)
+        output.write(shown_file(configuration, registry))
         return
     settings = {
         ".".join(entry.path): {
@@ -46,10 +48,11 @@ def show(
         }
         for entry in entries(configuration, registry)
     }
-    display.print_document({"file": configuration.file, "settings": settings})
+    output.write_json({"file": configuration.file, "settings": settings})
 
 
 @app.command("check")
+@answering
 def check(
     file: Annotated[
         Path | None,
@@ -64,10 +67,11 @@ def check(
         say(str(fault))
     if faults:
         raise typer.Exit(2)
-    typer.echo(f"{path or 'the configuration (without a file)'} is sound")
+    output.write_line(f"{path or 'the configuration (without a file)'} is sound")
 
 
 @app.command("init")
+@answering
 def init(
     file: Annotated[Path, typer.Argument(metavar="[FILE]", help="Where to write it.")] = Path(
         "sketchmatch.toml"

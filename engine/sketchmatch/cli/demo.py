@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from sketchmatch.cli.options import say
+from sketchmatch.cli.output import answering, clean
 
 __all__ = ["demo"]
 
@@ -21,6 +22,7 @@ _START_SECONDS = 120.0
 _STOP_SECONDS = 10.0
 
 
+@answering
 def demo(
     overlay: Annotated[
         Path, typer.Option("--overlay", metavar="FILE", help="Where to draw the answer.")
@@ -36,15 +38,16 @@ def demo(
         # The server starts while this process loads what it needs.
         from sketchmatch.cli import display, pictures
         from sketchmatch.cli.answering import answerer
-        from sketchmatch.cli.sources import source_of
+        from sketchmatch.cli.sources import in_metres, source_of
         from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 
         pictures.check_path(overlay)
         with answerer(_address(server), None) as asked:
             sources = source_of(LIVING_ROOM_SKETCH), source_of(LIVING_ROOM_MAP)
             answer = display.watch(asked.events(*sources, seed=seed))
-    display.show_match(answer)
-    pictures.draw_match(answer, LIVING_ROOM_MAP, overlay)
+    metres = in_metres(sources[1])
+    pictures.draw_match(answer, LIVING_ROOM_MAP, overlay, metres)
+    display.show_match(answer, metres, verbose=False)
     say(f"the picture is in {overlay}")
 
 
@@ -69,7 +72,7 @@ def _address(process: subprocess.Popen[str]) -> str:
 
     assert process.stderr is not None
     for line in process.stderr:
-        typer.echo(f"[server] {line.rstrip()}", err=True)
+        typer.echo(f"[server] {clean(line.rstrip())}", err=True)
         if found := re.search(r"listening on (\S+)", line):
             threading.Thread(target=_pass_on, args=(process,), daemon=True).start()
             with Client(found[1]) as client:
@@ -81,4 +84,4 @@ def _address(process: subprocess.Popen[str]) -> str:
 def _pass_on(process: subprocess.Popen[str]) -> None:
     assert process.stderr is not None
     for line in process.stderr:
-        typer.echo(f"[server] {line.rstrip()}", err=True)
+        typer.echo(f"[server] {clean(line.rstrip())}", err=True)

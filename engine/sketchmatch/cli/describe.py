@@ -2,37 +2,31 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sketchmatch.cli.options import (
-    Config,
-    Histogram,
-    JsonDocument,
-    Profile,
-    Settings,
-    parse_pairs,
-    parse_settings,
-)
+from sketchmatch.cli import options, output
+from sketchmatch.cli.output import answering
 
 if TYPE_CHECKING:
     from sketchmatch.cli.inspection import Description
+    from sketchmatch.cli.tables import Rows
 
 __all__ = ["describe"]
 
 
+@answering
 def describe(
     scene: Annotated[
         Path, typer.Argument(metavar="SCENE", help="A sketch or a map, as `match` takes them.")
     ],
-    config: Config = None,
-    profile: Profile = "",
+    config: options.Config = None,
+    profile: options.Profile = "",
     segmenter: Annotated[str, typer.Option(help="Segmenter; the file's kind decides.")] = "",
-    histogram: Histogram = "",
-    settings: Settings = None,
+    histogram: options.Histogram = "",
+    settings: options.Settings = None,
     pair: Annotated[
         list[str] | None,
         typer.Option(
@@ -42,7 +36,7 @@ def describe(
             "may be repeated. All pairs if left out.",
         ),
     ] = None,
-    json: JsonDocument = False,
+    json: options.JsonDocument = False,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="FILE", help="Save the histograms: .npz or .csv."),
@@ -51,6 +45,7 @@ def describe(
         Path | None,
         typer.Option("--plot", metavar="FILE", help="Draw the histograms beside the scene."),
     ] = None,
+    verbose: options.Verbose = False,
 ) -> None:
     """Say how the objects of a scene lie to each other.
 
@@ -59,10 +54,10 @@ def describe(
     as pictures and --pair do; in a pipe the lines count from 0, as --json and --out do. Parameters
     are set as in --set histogram.directions=360.
     """
-    from sketchmatch.cli import display, places
+    from sketchmatch.cli import places
 
-    pairs = parse_pairs(pair, "--pair")
-    params = parse_settings(settings, ("segmenter", "histogram"))
+    pairs = options.parse_pairs(pair, "--pair")
+    params = options.parse_settings(settings, ("segmenter", "histogram"))
     if out is not None:
         from sketchmatch.io import histogram_files
 
@@ -75,13 +70,7 @@ def describe(
 
     names = {"segmenter": segmenter, "histogram": histogram}
     with places.places_in(scene=scene):
-        found = inspection.described(scene, names, params, pairs, profile, config)
-    if json:
-        display.print_document(_document(found))
-    elif sys.stdout.isatty():
-        _show_table(found)
-    else:
-        _print_lines(found)
+        found = inspection.described(scene, names, params, pairs, profile, config, verbose=verbose)
     if out is not None:
         histogram_files.save_histograms(
             out,
@@ -96,6 +85,12 @@ def describe(
         )
     if plot is not None:
         pictures.draw_description(found, scene, plot)
+    if json:
+        output.write_json(_document(found))
+    elif output.for_people():
+        output.show(_table(found))
+    else:
+        _write_lines(found)
 
 
 def _document(found: Description) -> dict[str, Any]:
@@ -120,33 +115,32 @@ def _document(found: Description) -> dict[str, Any]:
     }
 
 
-def _print_lines(found: Description) -> None:
-    print("a", "b", "phrase", "degree", "a_label", "b_label", sep="\t")
+def _write_lines(found: Description) -> None:
+    output.write_line("a", "b", "phrase", "degree", "a_label", "b_label")
     for (a, b), relation in zip(found.pairs, found.relations, strict=True):
         names = (found.scene.labels[a], found.scene.labels[b])
-        print(a, b, relation.phrase, f"{relation.degree:.4f}", *names, sep="\t")
+        output.write_line(a, b, relation.phrase, f"{relation.degree:.4f}", *names)
 
 
-def _show_table(found: Description) -> None:
-    from rich.console import Console
-    from rich.progress_bar import ProgressBar
-    from rich.table import Table
-    from rich.text import Text
+def _table(found: Description) -> Rows:
+    from sketchmatch.cli.display import numbered
+    from sketchmatch.cli.tables import Column, Rows, plain
 
     shown, labels = len(found.pairs), found.scene.labels
+    columns = [
+        Column("object", least=12),
+        Column("is", least=12),
+        Column("object", least=12),
+        Column("degree", right=True),
+    ]
+    rows = [
+        [
+            numbered(a, labels),
+            plain(relation.phrase, "" if relation.direction is not None else "dim"),
+            numbered(b, labels),
+            plain(f"{relation.degree:.3f}"),
+        ]
+        for (a, b), relation in zip(found.pairs, found.relations, strict=True)
+    ]
     title = f"{shown} relations of {len(labels)} objects, by {found.histogram.name}"
-    table = Table(title=title, title_justify="left")
-    for name in ("No.", "label", "is", "No.", "label", "degree"):
-        table.add_column(name, justify="right" if name in ("No.", "degree") else "left")
-    table.add_column("", width=12)
-    for (a, b), relation in zip(found.pairs, found.relations, strict=True):
-        table.add_row(
-            str(a + 1),
-            Text(labels[a]),
-            Text(relation.phrase, style="" if relation.direction is not None else "dim"),
-            str(b + 1),
-            Text(labels[b]),
-            f"{relation.degree:.3f}",
-            ProgressBar(total=1.0, completed=relation.degree, width=12),
-        )
-    Console().print(table)
+    return Rows(title, columns, rows)

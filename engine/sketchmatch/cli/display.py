@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
-import sys
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+import re
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -16,7 +15,9 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
+from sketchmatch.cli import output
 from sketchmatch.cli.options import say
+from sketchmatch.cli.tables import Column, Rows, plain
 from sketchmatch_client import Match, MatchCollector
 from sketchmatch_proto.v1 import match_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
@@ -26,20 +27,19 @@ if TYPE_CHECKING:
     from sketchmatch.api import Algorithm
 
 __all__ = [
-    "JSON_STYLE",
     "chosen",
     "facts",
     "follow",
+    "likely",
     "named",
-    "print_document",
-    "say_warnings",
+    "numbered",
+    "say_match_notes",
+    "say_notes",
     "show_match",
     "show_scene",
+    "summary_of",
     "watch",
 ]
-
-JSON_STYLE: dict[str, Any] = {"always_print_fields_with_no_presence": True, "ensure_ascii": False}
-"""How messages become JSON: index 0 and empty lists are written out."""
 
 _PHASES = {
     match_pb2.PHASE_COMPILE: "loading the kernels",
@@ -51,6 +51,9 @@ _PHASES = {
 _Value = TypeVar("_Value")
 # A margin in ζ below this is within what a wobbling outline changes.
 _AMBIGUOUS = 0.005
+_MOST_NOTES = 5
+# What differs between notes of one kind: numbers, and what is quoted.
+_VARYING = re.compile(r"\d[\d.,]*|'[^']*'|\"[^\"]*\"")
 _OUTCOMES = {
     match_pb2.OUTCOME_CONVERGED: "converged",
     match_pb2.OUTCOME_OPTIMAL: "proved optimal",
@@ -60,29 +63,65 @@ _OUTCOMES = {
 
 
 def watch(events: Generator[MatchResponse, None, None]) -> Match:
-    """Follow a match to its end, showing progress where standard error is a terminal."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
+    """Follow a match to its end, showing progress where standard error is a terminal.
+
+    Whoever interrupts it there is shown the best object map until then.
+    """
+    screen = output.console(error=True)
+    if not screen.is_terminal:
         return _collected(events, None)
-    with Live(Spinner("dots", "starting"), console=console, transient=True) as live:
-        return _collected(events, lambda progress: live.update(_progress(progress)))
+    best = _BestSoFar()
+    try:
+        with Live(_busy(screen, "starting"), console=screen, transient=True) as live:
+
+            def shown(progress: match_pb2.MatchProgress) -> None:
+                best.take(progress)
+                live.update(_progress(screen, progress))
+
+            return _collected(best.looking_at(events), shown)
+    except KeyboardInterrupt:
+        if best.progress is not None:
+            screen.print(_interrupted(best.progress, best.scenes))
+        raise
+
+
+class _BestSoFar:
+    """The latest progress with an object map, and the objects that it is about."""
+
+    def __init__(self) -> None:
+        self.scenes = match_pb2.MatchScenes()
+        self.progress: match_pb2.MatchProgress | None = None
+
+    def looking_at(
+        self, events: Generator[MatchResponse, None, None]
+    ) -> Generator[MatchResponse, None, None]:
+        """Pass events on and keep the scenes."""
+        with closing(events):
+            for event in events:
+                if event.HasField("scenes"):
+                    self.scenes = event.scenes
+                yield event
+
+    def take(self, progress: match_pb2.MatchProgress) -> None:
+        """Keep a progress that has an object map."""
+        if progress.object_matches:
+            self.progress = progress
 
 
 def follow(work: Generator[float, None, _Value], what: str) -> _Value:
     """Run a generator of shares done to its end, showing it where standard error is a terminal."""
     from sketchmatch.pipeline.slices import finish, retold  # what asks a server does without
 
-    console = Console(stderr=True)
-    if not console.is_terminal:
+    screen = output.console(error=True)
+    if not screen.is_terminal:
         return finish(work)
-    grid, bar = Table.grid(padding=(0, 2)), ProgressBar(total=1.0, width=24)
-    grid.add_row(Spinner("dots", what), bar)
+    bar = _bar()
 
     def shown(share: float) -> Iterable[None]:
         bar.update(share)
         return ()
 
-    with Live(grid, console=console, transient=True):
+    with Live(_busy(screen, what, bar), console=screen, transient=True):
         return finish(retold(work, shown))
 
 
@@ -97,29 +136,33 @@ def _collected(
     return collector.match()
 
 
-def show_match(match: Match) -> None:
-    """Print the object map: a table on a terminal, tab-separated lines elsewhere."""
-    say_warnings("sketch", match.scenes.sketch_warnings)
-    say_warnings("map", match.scenes.map_warnings)
-    if sys.stdout.isatty():
-        Console().print(_match_table(match))
+def show_match(match: Match, metres: bool, verbose: bool) -> None:
+    """Write the object map: a table on a terminal, tab-separated lines elsewhere.
+
+    Parameters
+    ----------
+    match
+        What was found.
+    metres
+        Whether the map is in metres.
+    verbose
+        Whether to tell all that the segmenters noted.
+    """
+    say_match_notes(match, verbose)
+    if output.for_people():
+        output.show(_answer(match, metres))
         return
-    print("sketch_object", "map_object", "confidence", "sketch_label", "map_label", sep="\t")
+    output.write_line("sketch_object", "map_object", "confidence", "sketch_label", "map_label")
     for line in match.result.object_matches:
         confidence = f"{line.confidence:.4f}"
-        print(
-            line.sketch_object,
-            line.map_object,
-            confidence,
-            line.sketch_label,
-            line.map_label,
-            sep="\t",
+        output.write_line(
+            line.sketch_object, line.map_object, confidence, line.sketch_label, line.map_label
         )
 
 
-def show_scene(response: SegmentResponse) -> None:
-    """Print the objects of a scene: a table on a terminal, tab-separated lines elsewhere."""
-    say_warnings("", response.warnings)
+def show_scene(response: SegmentResponse, verbose: bool) -> None:
+    """Write the objects of a scene: a table on a terminal, tab-separated lines elsewhere."""
+    say_notes("", response.warnings, verbose)
     rows = [
         (
             item.label,
@@ -131,29 +174,53 @@ def show_scene(response: SegmentResponse) -> None:
         for item in response.scene.objects
     ]
     names = ("label", "vertices", "area", "centroid_x", "centroid_y")
-    if not sys.stdout.isatty():
-        print("object", *names, sep="\t")
+    if not output.for_people():
+        output.write_line("object", *names)
         for k, row in enumerate(rows):
-            print(k, *row, sep="\t")
+            output.write_line(k, *row)
         return
-    table = Table(title=f"{len(rows)} objects, by {response.segmenter.name}", title_justify="left")
-    table.add_column("No.", justify="right")
-    for name in names:
-        table.add_column(name.replace("_", " "), justify="left" if name == "label" else "right")
-    for k, row in enumerate(rows, start=1):
-        table.add_row(str(k), *map(Text, row))  # a label may look like markup
-    Console().print(table)
+    columns = [
+        Column("object", least=12),
+        *(Column(name.replace("_", " "), right=True) for name in names[1:]),
+    ]
+    labels = [row[0] for row in rows]
+    title = f"{len(rows)} objects, by {response.segmenter.name}"
+    cells = [[numbered(k, labels), *map(plain, row[1:])] for k, row in enumerate(rows)]
+    output.show(Rows(title, columns, cells))
 
 
-def say_warnings(side: str, warnings: Iterable[str]) -> None:
-    """Tell what segmentation left out or decided."""
-    for warning in warnings:
-        say(f"{side}: {warning}" if side else warning)
+def say_match_notes(match: Match, verbose: bool) -> None:
+    """Tell what segmentation left out or decided on both sides."""
+    say_notes("sketch", match.scenes.sketch_warnings, verbose)
+    say_notes("map", match.scenes.map_warnings, verbose)
 
 
-def print_document(document: Mapping[str, Any]) -> None:
-    """Print what no message of the contract holds as JSON, in the same style."""
-    print(json.dumps(document, ensure_ascii=False, indent=2))
+def say_notes(side: str, notes: Sequence[str], verbose: bool) -> None:
+    """Tell what segmentation left out or decided: of many notes one of each kind."""
+    for note in notes if verbose else summary_of(notes):
+        say(f"{side}: {note}" if side else note)
+
+
+def summary_of(notes: Sequence[str]) -> list[str]:
+    """Return some notes, or of many one of each kind and how many more there are.
+
+    Examples
+    --------
+    >>> summary_of([f"stroke {k} is a mark" for k in range(1, 209)])
+    ['stroke 1 is a mark (and 207 more like it)', 'with -v all 208 notes are told']
+    """
+    if len(notes) <= _MOST_NOTES:
+        return list(notes)
+    kinds: dict[str, list[str]] = {}
+    for note in notes:
+        kinds.setdefault(_VARYING.sub("", note), []).append(note)
+    told = [
+        f"{alike[0]} (and {len(alike) - 1} more like it)" if len(alike) > 1 else alike[0]
+        for alike in list(kinds.values())[:_MOST_NOTES]
+    ]
+    untold = len(notes) - sum(map(len, list(kinds.values())[:_MOST_NOTES]))
+    others = f"{untold} others were noted; " if untold else ""
+    return [*told, f"{others}with -v all {len(notes)} notes are told"]
 
 
 def chosen(algorithm: Algorithm) -> dict[str, Any]:
@@ -175,80 +242,155 @@ def named(index: int, labels: Sequence[str]) -> str:
     return f"{label} ({index + 1})" if labels.count(labels[index]) > 1 else label
 
 
-def facts(result: match_pb2.MatchResult) -> list[tuple[str, str]]:
-    """Return the figures that sum a result up, by name."""
+def numbered(index: int, labels: Sequence[str]) -> Text:
+    """Return an object for a table: its number, counted from 1, and its label."""
+    width = len(str(len(labels)))
+    return plain(f"{index + 1:>{width}} {labels[index]}".rstrip())
+
+
+def likely(probability: float) -> str:
+    """Return a probability for people; what is not certain never looks so.
+
+    Examples
+    --------
+    >>> [likely(each) for each in (0.99996, 0.9986, 0.5, 0.004, 0.0)]
+    ['> 99.9 %', '99.9 %', '50 %', '0.4 %', '< 0.1 %']
+    """
+    percent = 100.0 * probability
+    if percent >= 99.95:
+        return "> 99.9 %"
+    if percent < 0.05:
+        return "< 0.1 %"
+    return f"{percent:.0f} %" if 1.0 <= percent < 99.0 else f"{percent:.1f} %"
+
+
+def facts(result: match_pb2.MatchResult, metres: bool) -> list[tuple[str, str]]:
+    """Return the figures that sum a result up, by name; ``metres``, whether the map is in them."""
+    degrees = round(math.degrees(result.rotation_radians))
+    sense = (
+        "" if degrees in (0, 180, -180) else " clockwise" if degrees < 0 else " counter-clockwise"
+    )
     return [
+        *([("Probability", likely(result.probability))] if result.HasField("probability") else []),
+        ("Rotation", f"{abs(degrees)}°{sense}"),
+        ("Scale", f"{result.scale:.3g} {'m' if metres else 'map units'} per sketch unit"),
         ("FMAP confidence", f"{result.fmap_confidence.total:.3f}"),
         ("OMAP confidence", f"{result.omap_confidence:.3f}"),
-        ("Rotation", f"{math.degrees(result.rotation_radians):.0f}°"),
-        ("Scale", f"{result.scale:.3g}"),
-        *([("Probability", f"{result.probability:.0%}")] if result.HasField("probability") else []),
     ]
 
 
-def _match_table(match: Match) -> RenderableType:
+def _answer(match: Match, metres: bool) -> RenderableType:
     result = match.result
-    table = Table(title=_headline(match), title_justify="left")
-    table.add_column("No. in sketch", justify="right")
-    table.add_column("label")
-    table.add_column("No. on map", justify="right")
-    table.add_column("label")
-    table.add_column("confidence", justify="right")
-    table.add_column("", width=12)
-    table.add_column("margin", justify="right")
-    table.add_column("likely", justify="right")
-    table.add_column("in the sketch")
-    labels = [item.label for item in match.scenes.sketch.objects]
-    for line in result.object_matches:
-        table.add_row(
-            str(line.sketch_object + 1),
-            Text(line.sketch_label),
-            str(line.map_object + 1),
-            Text(line.map_label),
-            f"{line.confidence:.3f}",
-            ProgressBar(total=1.0, completed=line.confidence, width=12),
+    sketched = [item.label for item in match.scenes.sketch.objects]
+    mapped = [item.label for item in match.scenes.map.objects]
+    unclear = any(_is_ambiguous(line) for line in result.object_matches)
+    counted = result.HasField("probability")
+    columns = [
+        Column("in the sketch", least=13),
+        Column("on the map", least=10),
+        Column("likely", right=True),
+        Column("confidence", right=True, dispensable=2 if counted else 1),
+        Column("margin", right=True, dispensable=0 if unclear else 2),
+        Column("lies in the sketch", least=24, dispensable=1),
+    ]
+    rows = [
+        [
+            numbered(line.sketch_object, sketched),
+            numbered(line.map_object, mapped),
+            plain(likely(line.probability) if line.HasField("probability") else ""),
+            plain(f"{line.confidence:.3f}"),
             _margin(line),
-            f"{line.probability:.0%}" if line.HasField("probability") else "",
-            _relation(line, labels),
-        )
+            _relation(line, sketched),
+        ]
+        for line in result.object_matches
+    ]
     parts = result.fmap_confidence
-    summary = "  ".join(f"{name} {value}" for name, value in facts(result))
     detail = (
         f"ζ {parts.total:.3f} of relations {parts.similarity:.3f}, "
         f"rotations {parts.rotation:.3f}, dilations {parts.dilation:.3f}"
     )
     if parts.HasField("shape"):
         detail += f", shapes {parts.shape:.3f}, sizes {parts.size:.3f}"
-    lines = [summary, detail, _effort(result), *filter(None, [result.search_note])]
-    return Group(table, *map(Text, lines), *_alternatives(result))
+    said = [f"{name} {value}" for name, value in facts(result, metres)]
+    lines = ["  ".join(said[:-2]), "  ".join(said[-2:]), detail, _effort(result)]
+    lines += filter(None, [result.search_note])
+    return Group(
+        Rows(_headline(match), columns, rows),
+        "",
+        *map(plain, lines),
+        *_alternatives(result, sketched, mapped),
+    )
+
+
+def _interrupted(
+    progress: match_pb2.MatchProgress, scenes: match_pb2.MatchScenes
+) -> RenderableType:
+    """Return the best object map of a match that was not waited for."""
+    sketched = [item.label for item in scenes.sketch.objects]
+    mapped = [item.label for item in scenes.map.objects]
+    columns = [
+        Column("in the sketch", least=13),
+        Column("on the map", least=10),
+        Column("confidence", right=True),
+    ]
+    rows = [
+        [
+            numbered(line.sketch_object, sketched),
+            numbered(line.map_object, mapped),
+            plain(f"{line.confidence:.3f}"),
+        ]
+        for line in progress.object_matches
+    ]
+    title = f"The best map so far, after {_seconds(progress.elapsed):.1f} s"
+    if progress.HasField("confidence"):
+        title += f", with ζ {progress.confidence:.3f}"
+    return Rows(title, columns, rows)
+
+
+def _is_ambiguous(line: match_pb2.ObjectMatch) -> bool:
+    """Whether another partner is as good."""
+    return line.HasField("margin") and line.margin < _AMBIGUOUS
 
 
 def _margin(line: match_pb2.ObjectMatch) -> Text:
     """Return by how much ζ falls with another partner, loud where the two are as good."""
     if not line.HasField("margin"):
         return Text("")
-    return Text(f"{line.margin:.3f}", style="bold red" if line.margin < _AMBIGUOUS else "")
+    return Text(f"{line.margin:.3f}", style="bold red" if _is_ambiguous(line) else "")
 
 
 def _relation(line: match_pb2.ObjectMatch, labels: Sequence[str]) -> Text:
-    """Return how the sketched object lies to the nearest other; no markup, whatever the label."""
+    """Return how the sketched object lies to the nearest other."""
     if not line.HasField("relation"):
         return Text("")
-    return Text(f"{line.relation.phrase} {named(line.relation.reference_object, labels)}")
+    return plain(f"{line.relation.phrase} {named(line.relation.reference_object, labels)}")
 
 
-def _alternatives(result: match_pb2.MatchResult) -> list[Text]:
+def _alternatives(
+    result: match_pb2.MatchResult, sketched: Sequence[str], mapped: Sequence[str]
+) -> list[Text]:
     """Say what else it could be: only the objects that another map maps otherwise."""
-    best = {line.sketch_object: line.map_object for line in result.object_matches}
+    best = _partners(result.object_matches)
+    total = result.fmap_confidence.total
     lines = []
     for other in result.alternatives:
-        changes = "  ".join(
-            f"{line.sketch_object + 1}→{line.map_object + 1}"
-            for line in other.object_matches
-            if best.get(line.sketch_object) != line.map_object
-        )
-        lines.append(Text(f"else ζ {other.fmap_confidence.total:.3f}: {changes}", style="dim"))
+        others = _partners(other.object_matches)
+        changes = [
+            f"{named(k, sketched)} is {named(others[k], mapped)}"
+            if k in others
+            else f"{named(k, sketched)} has no partner"
+            for k in sorted({*best, *others})
+            if best.get(k) != others.get(k)
+        ]
+        found = other.fmap_confidence.total
+        how = "Just as good" if total - found < _AMBIGUOUS else "Next best"
+        said = f"{how}, ζ {found:.3f}: on the map {', '.join(changes)}"
+        lines.append(plain(said, "" if how == "Just as good" else "dim"))
     return lines
+
+
+def _partners(lines: Iterable[match_pb2.ObjectMatch]) -> dict[int, int]:
+    return {line.sketch_object: line.map_object for line in lines}
 
 
 def _headline(match: Match) -> str:
@@ -270,29 +412,38 @@ def _effort(result: match_pb2.MatchResult) -> str:
     )
 
 
-def _progress(progress: match_pb2.MatchProgress) -> RenderableType:
-    grid = Table.grid(padding=(0, 2))
-    cells: list[RenderableType] = [
-        Spinner("dots", _PHASES.get(progress.phase, "working")),
-        f"{_seconds(progress.elapsed):5.1f} s",
-    ]
-    if progress.HasField("fraction"):
-        cells.append(ProgressBar(total=1.0, completed=progress.fraction, width=24))
+def _progress(screen: Console, progress: match_pb2.MatchProgress) -> RenderableType:
+    said = [_PHASES.get(progress.phase, "working"), f"{_seconds(progress.elapsed):.1f} s"]
     if progress.HasField("confidence"):
-        cells.append(f"ζ {progress.confidence:.4f}")
-        if progress.HasField("upper_bound"):
-            cells.append(f"≤ {progress.upper_bound:.4f}")
-        cells.append(f"iteration {progress.iteration}")
-        cells.append(f"{progress.evaluations} evaluations")
-    grid.add_row(*cells)
+        said.append(f"ζ {progress.confidence:.4f}")
+        if progress.HasField("upper_bound") and progress.upper_bound < 1.0:
+            said.append(f"≤ {progress.upper_bound:.4f}")
+        said += [f"iteration {progress.iteration}", f"{progress.evaluations} evaluations"]
+    bar = None
+    if progress.HasField("fraction"):
+        bar = _bar(progress.fraction)
+    busy = _busy(screen, "  ".join(said), bar)
     if not progress.object_matches:
-        return grid
+        return busy
     pairs = "  ".join(
         f"{line.sketch_object + 1}→{line.map_object + 1}" for line in progress.object_matches
     )
     return Group(
-        grid, Text(f"best so far: {pairs}", style="dim", overflow="ellipsis", no_wrap=True)
+        busy, Text(f"best so far: {pairs}", style="dim", overflow="ellipsis", no_wrap=True)
     )
+
+
+def _busy(screen: Console, text: str, bar: ProgressBar | None = None) -> RenderableType:
+    """Return one line that moves while something is done."""
+    line = Table.grid(padding=(0, 1))
+    spinner = Spinner("line" if screen.options.ascii_only else "dots")
+    said = Text(text, overflow="ellipsis", no_wrap=True)
+    line.add_row(spinner, said, *filter(None, [bar]))
+    return line
+
+
+def _bar(share: float = 0.0) -> ProgressBar:
+    return ProgressBar(total=1.0, completed=share, width=24)
 
 
 def _seconds(duration: Any) -> float:

@@ -88,6 +88,8 @@ def described(
     pairs: Pairs,
     profile: str = "",
     config: Path | None = None,
+    *,
+    verbose: bool = False,
 ) -> Description:
     """Describe pairs of the objects in a file, all pairs a < b if none are chosen.
 
@@ -102,7 +104,7 @@ def described(
         source = read_source(file)
         segmenter = engine.resolve_segmenter(chosen.pop("segmenter"), source, profile)
         histogram = engine.resolve(chosen, profile=profile).histogram
-        scene = _told(engine.segment(source, segmenter, f"scene.{source.field}"))
+        scene = _told(engine.segment(source, segmenter, f"scene.{source.field}"), "", verbose)
         _check_pairs(pairs, scene, "--pair", "scene")
         work = engine.describe(scene, histogram)
         descriptor = display.follow(work, "describing relations")
@@ -131,6 +133,8 @@ def compared(
     limit: int,
     profile: str = "",
     config: Path | None = None,
+    *,
+    verbose: bool = False,
 ) -> Listing:
     """Compare pairs of a sketch with pairs of a map, all pairs a < b where none are chosen.
 
@@ -144,7 +148,7 @@ def compared(
         sources = (read_source(sketch), read_source(map_))
         pipeline = engine.resolve(_choices((*names,), names, params), *sources, profile)
         drawn, mapped = (
-            _told(engine.segment_side(side, source, pipeline), side)
+            _told(engine.segment_side(side, source, pipeline), side, verbose)
             for side, source in zip(SIDES, sources, strict=True)
         )
         _check_pairs(sketch_pairs, drawn, "--sketch-pair", "sketch")
@@ -171,9 +175,9 @@ def _choices(
     return {stage: Choice(names.get(stage, ""), params.get(stage, {})) for stage in stages}
 
 
-def _told(found: Segmentation, side: str = "") -> Scene:
+def _told(found: Segmentation, side: str, verbose: bool) -> Scene:
     """Return the objects that were found, and tell what was left out."""
-    display.say_warnings(side, found.warnings)
+    display.say_notes(side, found.warnings, verbose)
     return found.scene
 
 

@@ -5,13 +5,12 @@ Texts of plugins are shown as they are, whatever markup they look like.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable
 
-from rich.console import Console, Group, RenderableType
-from rich.table import Table
+from rich.console import Group, RenderableType
 from rich.text import Text
 
+from sketchmatch.cli import output
 from sketchmatch.cli.catalogue import (
     Parameter,
     kind,
@@ -22,6 +21,8 @@ from sketchmatch.cli.catalogue import (
     references,
     state,
 )
+from sketchmatch.cli.output import clean, write, write_line
+from sketchmatch.cli.tables import Column, Rows, plain
 from sketchmatch_proto.v1.catalog_service_pb2 import (
     Algorithm,
     ListAlgorithmsResponse,
@@ -35,111 +36,114 @@ _STYLES = {"failed": "bold red", "disabled": "dim"}
 
 
 def show_catalogue(found: ListAlgorithmsResponse) -> None:
-    """Print what algorithms and profiles there are, and what became of each plugin."""
-    if sys.stdout.isatty():
-        console = Console()
-        console.print(_algorithm_table(found.algorithms))
+    """Write what algorithms and profiles there are, and what became of each plugin."""
+    if output.for_people():
+        tables = [_algorithm_table(found.algorithms)]
         if found.profiles:
-            console.print(_profile_table(found.profiles))
-        console.print(_plugin_table(found.plugins))
+            tables.append(_profile_table(found.profiles))
+        tables.append(_plugin_table(found.plugins))
+        output.show(Group(*tables[:1], *(part for table in tables[1:] for part in ("", table))))
         return
-    _print("kind", "name", "default", "distribution", "version", "summary", "source")
+    write_line("kind", "name", "default", "distribution", "version", "summary", "source")
     for item in found.algorithms:
         default = str(item.is_default).lower()
         owner = (item.distribution, item.distribution_version)
-        _print(kind(item), item.name, default, *owner, item.summary, item.source)
-    print()
-    _print("profile", "default", "summary")
+        write_line(kind(item), item.name, default, *owner, item.summary, item.source)
+    write("\n")
+    write_line("profile", "default", "summary")
     for profile in found.profiles:
-        _print(profile.name, str(profile.is_default).lower(), profile.summary)
-    print()
-    _print("plugin", "version", "state", "reason")
+        write_line(profile.name, str(profile.is_default).lower(), profile.summary)
+    write("\n")
+    write_line("plugin", "version", "state", "reason")
     for plugin in found.plugins:
-        _print(plugin.distribution, plugin.version, state(plugin), plugin.reason)
+        write_line(plugin.distribution, plugin.version, state(plugin), plugin.reason)
 
 
 def show_algorithm(item: Algorithm) -> None:
-    """Print all there is to know of one algorithm."""
-    if sys.stdout.isatty():
-        Console().print(_description(item))
+    """Write all there is to know of one algorithm."""
+    if output.for_people():
+        output.show(_description(item))
         return
-    _print("kind", kind(item))
-    _print("name", item.name)
-    _print("default", str(item.is_default).lower())
-    _print("distribution", item.distribution)
-    _print("version", item.distribution_version)
-    _print("reads", *reads(item))
-    _print("summary", item.summary)
+    write_line("kind", kind(item))
+    write_line("name", item.name)
+    write_line("default", str(item.is_default).lower())
+    write_line("distribution", item.distribution)
+    write_line("version", item.distribution_version)
+    write_line("reads", *reads(item))
+    write_line("summary", item.summary)
     for paragraph in prose(item):
-        _print("description", paragraph)
-    _print("source", item.source)
+        write_line("description", paragraph)
+    write_line("source", item.source)
     for each in parameters(item):
-        _print("parameter", *_cells(each))
+        write_line("parameter", *_cells(each))
 
 
-def _print(*cells: str) -> None:
-    """Print one line, however many a plugin's text has."""
-    print(*(" ".join(cell.split()) for cell in cells), sep="\t")
-
-
-def _algorithm_table(items: Iterable[Algorithm]) -> Table:
-    table = Table()
-    for column in ("kind", "name", "from", "summary and parameters"):
-        table.add_column(column, no_wrap=column in ("kind", "name"))
+def _algorithm_table(items: Iterable[Algorithm]) -> Rows:
+    columns = [
+        Column("name"),
+        Column("kind"),
+        Column("from", least=11, dispensable=1),
+        Column("summary and parameters", least=32, wraps=True),
+    ]
+    rows = []
     for item in items:
-        text = Text(item.summary)
+        text = plain(item.summary)
         if named := parameters(item):
-            text.append("\n" + ", ".join(f"{each.name} = {each.value}" for each in named), "dim")
-        table.add_row(kind(item), _default(item), Text(origin(item)), text)
-    return table
+            text.append("\n").append_text(
+                plain(", ".join(f"{each.name} = {each.value}" for each in named), "dim")
+            )
+        rows.append([_default(item), plain(kind(item)), plain(origin(item)), text])
+    return Rows("", columns, rows)
 
 
-def _profile_table(profiles: Iterable[Profile]) -> Table:
-    table = Table()
-    for column in ("profile", "summary"):
-        table.add_column(column, no_wrap=column == "profile")
-    for profile in profiles:
-        table.add_row(_default(profile), Text(profile.summary))
-    return table
+def _profile_table(profiles: Iterable[Profile]) -> Rows:
+    columns = [Column("profile"), Column("summary", least=32, wraps=True)]
+    return Rows("", columns, [[_default(each), plain(each.summary)] for each in profiles])
 
 
 def _default(item: Algorithm | Profile) -> Text:
-    return Text(item.name).append(" (default)" if item.is_default else "", "dim")
+    return plain(item.name).append(" (default)" if item.is_default else "", "dim")
 
 
-def _plugin_table(plugins: Iterable[Plugin]) -> Table:
-    table = Table()
-    for column in ("plugin", "state", "reason"):
-        table.add_column(column, no_wrap=column == "state")
-    for plugin in plugins:
-        word = state(plugin)
-        table.add_row(Text(origin(plugin)), Text(word, _STYLES.get(word, "")), Text(plugin.reason))
-    return table
+def _plugin_table(plugins: Iterable[Plugin]) -> Rows:
+    columns = [Column("plugin"), Column("state"), Column("reason", least=32, wraps=True)]
+    rows = [
+        [
+            plain(origin(plugin)),
+            Text(state(plugin), _STYLES.get(state(plugin), "")),
+            plain(plugin.reason),
+        ]
+        for plugin in plugins
+    ]
+    return Rows("", columns, rows)
 
 
 def _description(item: Algorithm) -> Group:
-    title = Text(item.name, "bold")
+    title = plain(item.name, "bold")
     default = ", the default" if item.is_default else ""
-    title.append(f", a {kind(item)} of {origin(item)}{default}", "not bold")
-    parts: list[RenderableType] = [title, Text(item.summary)]
+    title.append(clean(f", a {kind(item)} of {origin(item)}{default}"), "not bold")
+    parts: list[RenderableType] = [title, plain(item.summary)]
     for paragraph in prose(item):
-        parts += ["", Text(paragraph.replace("``", "").replace("]_", "]"))]
+        parts += ["", plain(paragraph.replace("``", "").replace("]_", "]"))]
     if item.source_kinds:
         parts += ["", Text(f"Reads: {', '.join(reads(item))}")]
     if item.source:
-        parts += ["", Text("\n".join(references(item)), "dim")]
+        parts += ["", *(plain(each, "dim") for each in references(item))]
     if named := parameters(item):
         parts += ["", _parameter_table(named)]
     return Group(*parts)
 
 
-def _parameter_table(named: Iterable[Parameter]) -> Table:
-    table = Table()
-    for column in ("parameter", "type", "default", "bounds", "unit", "what it does"):
-        table.add_column(column, no_wrap=column == "parameter")
-    for each in named:
-        table.add_row(*map(Text, _cells(each)))
-    return table
+def _parameter_table(named: Iterable[Parameter]) -> Rows:
+    columns = [
+        Column("parameter"),
+        Column("type", least=9, wraps=True),
+        Column("default", least=7, wraps=True),
+        Column("bounds", least=9, wraps=True),
+        Column("unit"),
+        Column("what it does", least=24, wraps=True),
+    ]
+    return Rows("", columns, [list(map(plain, _cells(each))) for each in named])
 
 
 def _cells(each: Parameter) -> tuple[str, ...]:

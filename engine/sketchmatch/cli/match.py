@@ -6,23 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
-from google.protobuf.json_format import MessageToJson
 
-from sketchmatch.cli.options import (
-    Config,
-    FormerMapSegmenter,
-    FormerSketchSegmenter,
-    Json,
-    MapSegmenter,
-    Overlay,
-    Profile,
-    Server,
-    Settings,
-    SketchSegmenter,
-    parse_settings,
-    refuse_config,
-    say_renamed,
-)
+from sketchmatch.cli import options
+from sketchmatch.cli.output import answering
 from sketchmatch.errors import InvalidInputError, Reason
 
 if TYPE_CHECKING:
@@ -32,6 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["match"]
 
 
+@answering
 def match(
     sketch: Annotated[
         Path,
@@ -40,17 +27,17 @@ def match(
     map_: Annotated[
         Path, typer.Argument(metavar="MAP", help="Map: ROS map .yaml, .geojson, .svg, image.")
     ],
-    server: Server = None,
-    config: Config = None,
-    profile: Profile = "",
+    server: options.Server = None,
+    config: options.Config = None,
+    profile: options.Profile = "",
     searcher: Annotated[str | None, typer.Option(help="Searcher.")] = None,
     histogram: Annotated[str | None, typer.Option(help="Histogram.")] = None,
     similarity: Annotated[str | None, typer.Option(help="Similarity measure.")] = None,
-    sketch_segmenter: SketchSegmenter = "",
-    map_segmenter: MapSegmenter = "",
-    segmenter_sketch: FormerSketchSegmenter = "",
-    segmenter_map: FormerMapSegmenter = "",
-    settings: Settings = None,
+    sketch_segmenter: options.SketchSegmenter = "",
+    map_segmenter: options.MapSegmenter = "",
+    segmenter_sketch: options.FormerSketchSegmenter = "",
+    segmenter_map: options.FormerMapSegmenter = "",
+    settings: options.Settings = None,
     seed: Annotated[int, typer.Option(help="Same seed, same answer.")] = 0,
     time_budget: Annotated[
         float | None,
@@ -79,8 +66,9 @@ def match(
     alternatives: Annotated[
         int | None, typer.Option(metavar="K", help="How many of the next best maps; 3 by default.")
     ] = None,
-    json: Json = False,
-    overlay: Overlay = None,
+    json: options.Json = False,
+    overlay: options.Overlay = None,
+    verbose: options.Verbose = False,
 ) -> None:
     """Find which sketched object is which mapped object.
 
@@ -89,20 +77,20 @@ def match(
     the nearest other. In a pipe it prints tab-separated lines; these and --json, which says that
     too, count the same objects from 0, as the API does.
     """
-    from sketchmatch.cli import display, pictures, places
+    from sketchmatch.cli import display, output, pictures, places
     from sketchmatch.cli.answering import answerer
-    from sketchmatch.cli.sources import source_of
+    from sketchmatch.cli.sources import in_metres, source_of
 
-    refuse_config(config, server)
+    options.refuse_config(config, server)
     if overlay is not None:
         pictures.check_path(overlay)
-    options: MatchOptions = {
+    chosen: MatchOptions = {
         "sketch_segmenter": sketch_segmenter or segmenter_sketch,
         "map_segmenter": map_segmenter or segmenter_map,
         "histogram": histogram,
         "similarity": similarity,
         "searcher": searcher,
-        "params": parse_settings(settings),
+        "params": options.parse_settings(settings),
         "seed": seed,
         "time_budget": time_budget,
         "weights": None if weights is None else _weights(weights),
@@ -113,14 +101,17 @@ def match(
     }
     with places.places_in(sketch=sketch, map=map_), answerer(server, config) as asked:
         sources = source_of(sketch, "sketch"), source_of(map_, "map")
-        answer = display.watch(asked.events(*sources, **options))
-    if json:
-        typer.echo(MessageToJson(answer.result, **display.JSON_STYLE))
-    else:
-        display.show_match(answer)
+        answer = display.watch(asked.events(*sources, **chosen))
+    metres = in_metres(sources[1])
+    # Files first: whoever reads the answer may have had enough of it after a line.
     if overlay is not None:
-        pictures.draw_match(answer, map_, overlay)
-    say_renamed(segmenter_sketch, segmenter_map)
+        pictures.draw_match(answer, map_, overlay, metres)
+    if json:
+        display.say_match_notes(answer, verbose)
+        output.write_message(answer.result)
+    else:
+        display.show_match(answer, metres, verbose)
+    options.say_renamed(segmenter_sketch, segmenter_map)
 
 
 def _weights(text: str) -> RequestWeights:

@@ -14,6 +14,7 @@ import typer
 
 import sketchmatch
 from sketchmatch.cli.options import say
+from sketchmatch.cli.output import answering, write_line
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ _USUAL_LIBRARIES = ("numpy>=1.26", "pydantic>=2.7")
 _LIBRARIES = {"segmenter": ("pydantic>=2.7",)}
 
 
+@answering
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="What the algorithm is selected by.")],
     kind: Annotated[
@@ -57,7 +59,7 @@ def new(
     _write(folder, _files(name, chosen))
     say(f"wrote the {chosen} {name} into {folder}; these commands install, test and use it")
     for command in _next_steps(folder, name, chosen):
-        typer.echo(command)
+        write_line(command)
 
 
 def _kind(text: str) -> Kind:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from sketchmatch.cli.output import clean
 from sketchmatch.errors import InvalidInputError, Reason
 
 __all__ = [
@@ -24,6 +26,7 @@ __all__ = [
     "Server",
     "Settings",
     "SketchSegmenter",
+    "Verbose",
     "parse_pairs",
     "parse_settings",
     "refuse_config",
@@ -82,6 +85,13 @@ Histogram = Annotated[
 ]
 Overlay = Annotated[
     Path | None, typer.Option("--overlay", metavar="FILE", help="Draw the answer into a picture.")
+]
+
+Verbose = Annotated[
+    bool,
+    typer.Option(
+        "--verbose", "-v", help="Tell all that was noted in the files, not one note of each kind."
+    ),
 ]
 
 
@@ -180,5 +190,6 @@ def say_renamed(sketch_segmenter: str, map_segmenter: str) -> None:
 
 def say(sentence: str) -> None:
     """Tell the person at the terminal something that is not part of the answer."""
-    typer.echo(f"sketchmatch: {sentence}", err=True)
-    sys.stderr.flush()
+    with suppress(OSError):  # what is not part of the answer may be lost
+        typer.echo(f"sketchmatch: {clean(sentence)}", err=True)
+        sys.stderr.flush()

@@ -37,7 +37,7 @@ __all__ = ["check_path", "draw_description", "draw_match", "draw_segmentation", 
 check_path = check_picture_path
 
 
-def draw_match(match: Match, map_path: Path, target: Path) -> None:
+def draw_match(match: Match, map_path: Path, target: Path, metres: bool) -> None:
     """Draw both scenes of a match, a robot's map under its objects, and save the picture."""
     pairs = [
         OverlayMatch(line.sketch_object, line.map_object, line.confidence)
@@ -47,7 +47,7 @@ def draw_match(match: Match, map_path: Path, target: Path) -> None:
         scene_of(match.scenes.sketch),
         scene_of(match.scenes.map),
         pairs,
-        facts=facts(match.result),
+        facts=facts(match.result, metres),
         underlay=_grid(map_path),
         route=_way(match.scenes.sketch_route),
     )

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sketchmatch.cli import new
+from sketchmatch.cli import new, output
 from sketchmatch.cli.options import Config, Json, Server, refuse_config
+from sketchmatch.cli.output import answering
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def plugins() -> None:
 
 
 @app.command("list")
+@answering
 def list_(
     kind: _Kind = "", server: Server = None, config: Config = None, json: Json = False
 ) -> None:
@@ -46,12 +48,13 @@ def list_(
 
     found = _catalogue(kind, server, config)
     if json:
-        _print_json(found)
+        output.write_message(found)
     else:
         listing.show_catalogue(found)
 
 
 @app.command("show")
+@answering
 def show(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of an algorithm.")],
     kind: _Kind = "",
@@ -64,7 +67,7 @@ def show(
 
     item = _named(_catalogue(kind, server, config), name, kind)
     if json:
-        _print_json(item)
+        output.write_message(item)
     else:
         listing.show_algorithm(item)
 
@@ -102,6 +105,7 @@ def check(
 
 
 @app.command("reference")
+@answering
 def reference(
     distribution: Annotated[
         str, typer.Option(metavar="NAME", help="The Python distribution that offers them.")
@@ -113,7 +117,7 @@ def reference(
     from sketchmatch.registry import discover
 
     # Whatever the configuration says, the page tells what the classes say.
-    print(reference.page(responses.catalogue(discover()), distribution), end="")
+    output.write(reference.page(responses.catalogue(discover()), distribution))
 
 
 def _catalogue(kind: str, server: str | None, config: Path | None) -> ListAlgorithmsResponse:
@@ -176,11 +180,3 @@ def _nearest(found: ListAlgorithmsResponse, name: str) -> str:
     if close:
         return f"the nearest names are: {', '.join(close)}"
     return f"choose one of: {', '.join(known) or 'none'}"
-
-
-def _print_json(message: ListAlgorithmsResponse | Algorithm) -> None:
-    from google.protobuf.json_format import MessageToJson
-
-    from sketchmatch.cli.display import JSON_STYLE
-
-    typer.echo(MessageToJson(message, **JSON_STYLE))

@@ -3,34 +3,26 @@
 from __future__ import annotations
 
 import math
-import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sketchmatch.cli.options import (
-    Config,
-    FormerMapSegmenter,
-    FormerSketchSegmenter,
-    Histogram,
-    JsonDocument,
-    MapSegmenter,
-    Profile,
-    Settings,
-    SketchSegmenter,
-    parse_pairs,
-    parse_settings,
-    say_renamed,
-)
+from sketchmatch.cli import options, output
+from sketchmatch.cli.output import answering
 
 if TYPE_CHECKING:
+    from rich.text import Text
+
     from sketchmatch.cli.inspection import Listing
+    from sketchmatch.cli.tables import Rows
     from sketchmatch.pipeline.result import Correspondence
 
 __all__ = ["relate"]
 
 
+@answering
 def relate(
     sketch: Annotated[Path, typer.Argument(metavar="SKETCH", help="Sketch, as `match` takes it.")],
     map_: Annotated[Path, typer.Argument(metavar="MAP", help="Map, as `match` takes it.")],
@@ -47,24 +39,25 @@ def relate(
         list[str] | None,
         typer.Option("--map-pair", metavar="C,D", help="The same on the map."),
     ] = None,
-    config: Config = None,
-    profile: Profile = "",
-    histogram: Histogram = "",
+    config: options.Config = None,
+    profile: options.Profile = "",
+    histogram: options.Histogram = "",
     similarity: Annotated[
         str,
         typer.Option(
             help="Similarity measure; `cross-correlation` unless the configuration names another."
         ),
     ] = "",
-    sketch_segmenter: SketchSegmenter = "",
-    map_segmenter: MapSegmenter = "",
-    segmenter_sketch: FormerSketchSegmenter = "",
-    segmenter_map: FormerMapSegmenter = "",
-    settings: Settings = None,
+    sketch_segmenter: options.SketchSegmenter = "",
+    map_segmenter: options.MapSegmenter = "",
+    segmenter_sketch: options.FormerSketchSegmenter = "",
+    segmenter_map: options.FormerMapSegmenter = "",
+    settings: options.Settings = None,
     limit: Annotated[
         int, typer.Option(min=1, metavar="K", help="Show the K most similar ones.")
     ] = 20,
-    json: JsonDocument = False,
+    json: options.JsonDocument = False,
+    verbose: options.Verbose = False,
 ) -> None:
     """Compare relations of a sketch with relations of a map.
 
@@ -77,25 +70,30 @@ def relate(
     """
     from sketchmatch.cli import places
 
-    pairs = (parse_pairs(sketch_pair, "--sketch-pair"), parse_pairs(map_pair, "--map-pair"))
+    pairs = (
+        options.parse_pairs(sketch_pair, "--sketch-pair"),
+        options.parse_pairs(map_pair, "--map-pair"),
+    )
     names = {
         "sketch_segmenter": sketch_segmenter or segmenter_sketch,
         "map_segmenter": map_segmenter or segmenter_map,
         "histogram": histogram,
         "similarity": similarity,
     }
-    params = parse_settings(settings, tuple(names))
-    from sketchmatch.cli import display, inspection
+    params = options.parse_settings(settings, tuple(names))
+    from sketchmatch.cli import inspection
 
     with places.places_in(sketch=sketch, map=map_):
-        found = inspection.compared(sketch, map_, names, params, *pairs, limit, profile, config)
+        found = inspection.compared(
+            sketch, map_, names, params, *pairs, limit, profile, config, verbose=verbose
+        )
     if json:
-        display.print_document(_document(found))
-    elif sys.stdout.isatty():
-        _show_table(found)
+        output.write_json(_document(found))
+    elif output.for_people():
+        output.show(_table(found))
     else:
-        _print_lines(found)
-    say_renamed(segmenter_sketch, segmenter_map)
+        _write_lines(found)
+    options.say_renamed(segmenter_sketch, segmenter_map)
 
 
 def _document(found: Listing) -> dict[str, Any]:
@@ -118,12 +116,12 @@ def _document(found: Listing) -> dict[str, Any]:
     }
 
 
-def _print_lines(found: Listing) -> None:
+def _write_lines(found: Listing) -> None:
     names = ("a", "b", "c", "d")
     labels = [f"{name}_label" for name in names]
-    print(*names, "similarity", "rotation_degrees", "dilation", *labels, sep="\t")
+    output.write_line(*names, "similarity", "rotation_degrees", "dilation", *labels)
     for entry in found.best:
-        print(
+        output.write_line(
             *entry.sketch_pair,
             *entry.map_pair,
             f"{entry.similarity:.4f}",
@@ -131,41 +129,41 @@ def _print_lines(found: Listing) -> None:
             f"{entry.dilation:.4g}",
             *(found.sketch.labels[k] for k in entry.sketch_pair),
             *(found.map.labels[k] for k in entry.map_pair),
-            sep="\t",
         )
 
 
-def _show_table(found: Listing) -> None:
-    from rich.console import Console
-    from rich.progress_bar import ProgressBar
-    from rich.table import Table
-    from rich.text import Text
+def _table(found: Listing) -> Rows:
+    from sketchmatch.cli.tables import Column, Rows, plain
 
+    columns = [
+        Column("in the sketch", least=13),
+        Column("on the map", least=12),
+        Column("σ", right=True),
+        Column("R", right=True),
+        Column("L", right=True),
+    ]
+    rows = [
+        [
+            _pair(entry.sketch_pair, found.sketch.labels),
+            _pair(entry.map_pair, found.map.labels),
+            plain(f"{entry.similarity:.3f}"),
+            plain(f"{_degrees(entry):.1f}°"),
+            plain(f"{entry.dilation:.3g}"),
+        ]
+        for entry in found.best
+    ]
     shown = f"{len(found.best)} of {found.total}" if len(found.best) < found.total else found.total
     title = f"{shown} comparisons, by {found.similarity.name} of {found.histogram.name}"
-    table = Table(title=title, title_justify="left")
-    for side, scene in (("sketch", found.sketch), ("map", found.map)):
-        table.add_column(f"No. {'in' if side == 'sketch' else 'on'} {side}", justify="right")
-        if any(scene.labels):
-            table.add_column("labels")
-    table.add_column("σ", justify="right")
-    table.add_column("", width=12)
-    table.add_column("R", justify="right")
-    table.add_column("L", justify="right")
-    for entry in found.best:
-        cells = []
-        for scene, (a, b) in ((found.sketch, entry.sketch_pair), (found.map, entry.map_pair)):
-            cells.append(Text(f"{a + 1}, {b + 1}"))
-            if any(scene.labels):
-                cells.append(Text(", ".join(filter(None, (scene.labels[a], scene.labels[b])))))
-        table.add_row(
-            *cells,
-            f"{entry.similarity:.3f}",
-            ProgressBar(total=1.0, completed=entry.similarity, width=12),
-            f"{_degrees(entry):.1f}°",
-            f"{entry.dilation:.3g}",
-        )
-    Console().print(table)
+    return Rows(title, columns, rows)
+
+
+def _pair(pair: tuple[int, int], labels: Sequence[str]) -> Text:
+    """Return two objects for a table, the first as seen from the second."""
+    from rich.text import Text
+
+    from sketchmatch.cli.display import numbered
+
+    return Text(", ").join(numbered(k, labels) for k in pair)
 
 
 def _degrees(entry: Correspondence) -> float:

@@ -17,7 +17,12 @@ from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
 from sketchmatch_client import sources
 from sketchmatch_proto.v1.source_pb2 import MapServerMap, Source
 
-__all__ = ["source_of"]
+__all__ = ["in_metres", "source_of"]
+
+
+def in_metres(source: Source) -> bool:
+    """Whether a source says how long a metre is in it."""
+    return source.HasField("map_server_map") or source.HasField("occupancy_grid")
 
 
 def source_of(path: Path, side: str = "") -> Source:
