@@ -10,7 +10,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Unpack, cast
 
-from sketchmatch.cli.options import say
+from sketchmatch.cli.options import check_server, say
 from sketchmatch.config import load, open_engine
 from sketchmatch.model.limits import limited_to
 from sketchmatch_client import Client, MatchOptions, match_request, segment_request
@@ -53,6 +53,7 @@ class Answerer(Protocol):
 @contextmanager
 def answerer(server: str | None, config: Path | None) -> Iterator[Answerer]:
     """Yield the server at an address, or this process; files may be as large as it says."""
+    check_server(server)
     configuration = load(config)
     with limited_to(configuration.limits):
         if server:

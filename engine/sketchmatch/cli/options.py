@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from sketchmatch.cli.output import clean
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 
 __all__ = [
     "Config",
@@ -27,6 +27,7 @@ __all__ = [
     "Settings",
     "SketchSegmenter",
     "Verbose",
+    "check_server",
     "parse_pairs",
     "parse_settings",
     "refuse_config",
@@ -37,7 +38,9 @@ __all__ = [
 Server = Annotated[
     str | None,
     typer.Option(
-        "--server", metavar="HOST:PORT", help="Ask this server instead of computing here."
+        "--server",
+        metavar="ADDRESS",
+        help="Ask the server at this HOST:PORT or unix:PATH instead of computing here.",
     ),
 ]
 Config = Annotated[
@@ -137,6 +140,22 @@ def parse_settings(
             )
         stages.setdefault(stage, {})[parameter] = value_of(text)
     return stages
+
+
+def check_server(address: str | None) -> None:
+    """Refuse an address at which no server can be found.
+
+    Raises
+    ------
+    InvalidInputError
+        If it lacks its port, for example: gRPC would take another one.
+    """
+    from sketchmatch.config.addresses import address_fault
+
+    if address is not None and (fault := address_fault(address, found=True)):
+        raise InvalidInputError(
+            Reason.INVALID_FIELD, "--server", f"is {quoted(address)}; it {fault}"
+        )
 
 
 def refuse_config(config: Path | None, server: str | None) -> None:

@@ -189,8 +189,7 @@ def _answers_apart() -> Iterator[None]:
         return
     kept = os.dup(answers)
     os.dup2(others, answers)
-    errors = "sketchmatch.spelled" if own.isatty() else "backslashreplace"
-    stream = os.fdopen(kept, "w", encoding=own.encoding, errors=errors)
+    stream = os.fdopen(kept, "w", encoding=own.encoding, errors="sketchmatch.spelled")
     _answer, sys.stdout = stream, sys.stderr
     try:
         yield
@@ -246,16 +245,15 @@ def _escaped_for_json(found: re.Match[str]) -> str:
 
 
 def _spelled(error: UnicodeError) -> tuple[str | bytes, int]:
-    """Spell what an encoding lacks: our own signs in letters, others by their numbers."""
+    """Spell what an encoding lacks: our own signs in letters, others as TOML and Python do."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    lacking = error.object[error.start : error.end]
-    known = (_SPELLED.get(char) for char in lacking)
-    text = "".join(
-        spelling or char.encode("ascii", "backslashreplace").decode()
-        for spelling, char in zip(known, lacking, strict=True)
-    )
-    return text, error.end
+    return "".join(map(_spelling, error.object[error.start : error.end])), error.end
+
+
+def _spelling(char: str) -> str:
+    code = ord(char)
+    return _SPELLED.get(char) or (f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}")
 
 
 codecs.register_error("sketchmatch.spelled", _spelled)

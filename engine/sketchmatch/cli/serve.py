@@ -26,8 +26,9 @@ def serve(
     address: Annotated[
         str | None,
         typer.Option(
-            metavar="HOST:PORT",
-            help="Where to listen, 127.0.0.1:50051 by default; port 0 picks a free one.",
+            metavar="ADDRESS",
+            help="HOST:PORT or unix:PATH to listen on, 127.0.0.1:50051 by default; port 0 picks a "
+            "free one.",
         ),
     ] = None,
     max_request_mib: Annotated[

@@ -21,12 +21,14 @@ from sketchmatch.config.layers import (
     file_layer,
     flag_layer,
     found_file,
+    says,
     variable_of,
     variables_in,
+    without,
     without_overruled,
 )
 from sketchmatch.config.settings import Settings, keys_of, static_paths
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.pipeline.selection import (
     STAGES,
@@ -37,9 +39,9 @@ from sketchmatch.pipeline.selection import (
     fault_of,
     kind_of,
     profile_faults,
-    set_up,
+    set_up_faults,
 )
-from sketchmatch.registry import Kind, PluginRules, Registry, default_registry
+from sketchmatch.registry import OWN_DISTRIBUTION, Kind, PluginRules, Registry, default_registry
 from sketchmatch.registry.distributions import canonical
 
 if TYPE_CHECKING:
@@ -101,7 +103,7 @@ class Configuration:
         """Return where the value at a path comes from, and what it is called there."""
         for layer in self.layers:
             for leaf, label in layer.labels.items():
-                if leaf == path[: len(leaf)]:
+                if leaf == path[: len(leaf)] and says(layer, path):
                     return layer.origin, _called(layer, label, path, len(leaf))
         return Origin.DEFAULT, ""
 
@@ -155,7 +157,12 @@ def _merged(layers: tuple[Layer, ...]) -> Configuration:
         settings = Settings.of(without_overruled(layers))
     except ValidationError as error:
         raise next(_faults(error, layers)) from None
-    _check_segmenters(settings, layers)
+    for path, fault in _segmenter_faults(settings):
+        raise _placed(layers, (path, fault))
+    return _configuration(settings, layers)
+
+
+def _configuration(settings: Settings, layers: tuple[Layer, ...]) -> Configuration:
     plugins = settings.plugins
     return Configuration(
         defaults=_defaults(settings),
@@ -221,8 +228,8 @@ def check(path: str | Path | None = None) -> tuple[Path | None, list[InvalidInpu
     Returns
     -------
     path, list of InvalidInputError
-        The file that was read, if there is one, and its faults. What the algorithms say is asked
-        for once keys and types are right.
+        The file that was read, if there is one, and the faults of all kinds. What has no use is
+        left out of what is checked after it.
 
     Raises
     ------
@@ -230,20 +237,40 @@ def check(path: str | Path | None = None) -> tuple[Path | None, list[InvalidInpu
         If a file is named and does not exist.
     """
     file = found_file(path)
-    try:
-        layers = _layers(file, _NO_FLAGS, search=False)
-    except InvalidInputError as error:
-        return file, [error]
-    try:
-        Settings.of(without_overruled(layers))
-    except ValidationError as error:
-        return file, list(_faults(error, layers))
-    try:
-        configuration = _merged(layers)
-    except InvalidInputError as error:
-        return file, [error]
-    found = _all_faults(configuration, default_registry(configuration.rules))
-    return file, [_placed(layers, fault) for fault in found]
+    found: list[InvalidInputError] = []
+    layers = [environment_layer(os.environ, found.append), builtin_layer()]
+    if file is not None:
+        try:
+            layers.insert(1, file_layer(file))
+        except InvalidInputError as error:
+            found.append(error)
+    settings, sound, faults = _sound(tuple(layers))
+    found += faults
+    configuration = _configuration(settings, sound)
+    registry = default_registry(configuration.rules)
+    found += [_placed(sound, fault) for fault in _all_faults(configuration, registry)]
+    return file, found
+
+
+def _sound(
+    layers: tuple[Layer, ...],
+) -> tuple[Settings, tuple[Layer, ...], list[InvalidInputError]]:
+    """Return what layers set, without what has no use; the layers without it; and the faults."""
+    found: list[InvalidInputError] = []
+    sound = layers
+    while True:
+        try:
+            settings = Settings.of(without_overruled(sound))
+        except ValidationError as error:
+            found += _faults(error, sound)
+            wrong = [tuple(map(str, fault["loc"])) for fault in error.errors(include_url=False)]
+        else:
+            faults = list(_segmenter_faults(settings))
+            if not faults:
+                return settings, sound, found
+            found += [_placed(sound, fault) for fault in faults]
+            wrong = [path[:-1] for path, _ in faults]
+        sound = without(sound, wrong)
 
 
 def _layers(path: str | Path | None, flags: Mapping[str, Any], search: bool) -> tuple[Layer, ...]:
@@ -312,24 +339,24 @@ def _known(path: tuple[str, ...], place: str) -> str:
     return f"did you mean {variable_of(near[0]) if variable else '.'.join(near[0])}?"
 
 
-def _check_segmenters(settings: Settings, layers: Sequence[Layer]) -> None:
-    """Refuse parameters of a segmenter without its name: each kind of source has another one."""
+_Fault = tuple[tuple[str, ...], InvalidInputError]
+"""What is wrong, and the path where it is said."""
+
+
+def _segmenter_faults(settings: Settings) -> Iterator[_Fault]:
+    """Yield parameters of a segmenter without its name: each kind of source has another one."""
     tables: list[tuple[tuple[str, ...], Selection]]
     tables = [(("pipeline",), _selection(settings.pipeline))]
     tables += [(("profiles", name), _selection(p)) for name, p in settings.profiles.items()]
     for path, selection in tables:
         for stage, choice in selection.items():
             if kind_of(stage) is Kind.SEGMENTER and not choice.name:
-                place = _place(layers, (*path, stage, "parameters", *choice.parameters))
                 problem = (
                     "is set for no segmenter; give its name beside it, or set the parameter in "
                     "algorithms.segmenter.NAME"
                 )
-                raise InvalidInputError(Reason.INVALID_PARAMETER, place, problem)
-
-
-_Fault = tuple[tuple[str, ...], InvalidInputError]
-"""What is wrong, and the path where it is said."""
+                whole = (*path, stage, "parameters", next(iter(choice.parameters)))
+                yield whole, InvalidInputError(Reason.INVALID_PARAMETER, stage, problem)
 
 
 def _all_faults(configuration: Configuration, registry: Registry) -> list[_Fault]:
@@ -342,7 +369,11 @@ def _all_faults(configuration: Configuration, registry: Registry) -> list[_Fault
             for path, fault in _profile_faults(configuration, registry, profile.name)
             if (path[-1], fault.problem) not in inherited
         ]
-    return [*found, *_default_profile_faults(configuration)]
+    return [
+        *found,
+        *_default_profile_faults(configuration),
+        *_distribution_faults(configuration, registry),
+    ]
 
 
 def _faults_in_force(configuration: Configuration, registry: Registry) -> Iterator[_Fault]:
@@ -362,23 +393,39 @@ def _stage_faults(configuration: Configuration, registry: Registry) -> Iterator[
     for stage, choice in configuration.defaults.pipeline.items():
         name = choice.name or registry.default(kind_of(stage))
         whole = Choice(name, choice.parameters)
-        for error in _set_up_faults(registry, stage, whole):
+        for error in set_up_faults(registry, kind_of(stage), whole, stage):
             yield ("pipeline", *error.field.split(".")), error
 
 
 def _algorithm_faults(configuration: Configuration, registry: Registry) -> Iterator[_Fault]:
     for kind, algorithms in configuration.defaults.parameters.items():
         for name, parameters in algorithms.items():
-            for error in _set_up_faults(registry, kind, Choice(name, parameters)):
+            for error in set_up_faults(registry, kind, Choice(name, parameters), kind):
                 # There the parameters stand below the name itself.
                 yield ("algorithms", str(kind), name, *error.field.split(".")[2:]), error
 
 
-def _set_up_faults(registry: Registry, stage: str, choice: Choice) -> Iterator[InvalidInputError]:
-    try:
-        set_up(registry, kind_of(stage), choice, stage)
-    except InvalidInputError as error:
-        yield error
+def _distribution_faults(configuration: Configuration, registry: Registry) -> Iterator[_Fault]:
+    """Yield distributions that are named in vain: what is denied by a wrong name is let in."""
+    installed = {canonical(status.distribution) for status in registry.statuses}
+    others = sorted(installed - {OWN_DISTRIBUTION})
+    plugins = configuration.settings.plugins
+    for key in ("allow", "deny", "trusted"):
+        for name in getattr(plugins, key) or ():
+            if key == "deny" and canonical(name) == OWN_DISTRIBUTION:
+                problem = f"is {quoted(name)}, the engine itself, which is never denied; drop it"
+            elif canonical(name) in installed or (key, name) == ("trusted", "*"):
+                continue
+            else:
+                near = get_close_matches(canonical(name), others, 1)
+                remedy = (
+                    f"did you mean {near[0]}?"
+                    if near
+                    else f"those with plugins are: {', '.join(others) or 'none'}"
+                )
+                problem = f"is {quoted(name)}, which is not installed or has no plugin; {remedy}"
+            fault = InvalidInputError(Reason.INVALID_PARAMETER, f"plugins.{key}", problem)
+            yield ("plugins", key), fault
 
 
 def _default_profile_faults(configuration: Configuration) -> Iterator[_Fault]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import os
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from enum import StrEnum
 from functools import cache
@@ -27,8 +27,10 @@ __all__ = [
     "flag_layer",
     "found_file",
     "leaves_of",
+    "says",
     "value_of",
     "variable_of",
+    "without",
     "without_overruled",
 ]
 
@@ -130,8 +132,22 @@ def variables_in(environment: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
     return tuple((name, text) for name, text in items if name.startswith(_PREFIX))
 
 
-def environment_layer(environment: Mapping[str, str]) -> Layer:
+def _raise(fault: InvalidInputError) -> None:
+    raise fault
+
+
+def environment_layer(
+    environment: Mapping[str, str], refuse: Callable[[InvalidInputError], None] = _raise
+) -> Layer:
     """Return what environment variables say.
+
+    Parameters
+    ----------
+    environment
+        The variables.
+    refuse
+        Called with each fault; raises it when left out. Where it returns, the variable counts for
+        nothing.
 
     Raises
     ------
@@ -143,10 +159,13 @@ def environment_layer(environment: Mapping[str, str]) -> Layer:
     for variable, text in variables_in(environment):
         if variable in _NO_SETTINGS or not text.strip():
             continue
-        path = _path_of(variable)
-        if path is not None:
-            _put(values, path, text if annotation_of(path) is str else value_of(text), variable)
-            labels[path] = variable
+        try:
+            path = _path_of(variable)
+            if path is not None:
+                _put(values, path, text if annotation_of(path) is str else value_of(text), variable)
+                labels[path] = variable
+        except InvalidInputError as fault:
+            refuse(fault)
     return Layer(Origin.ENVIRONMENT, values, labels)
 
 
@@ -182,6 +201,27 @@ def without_overruled(layers: Sequence[Layer]) -> list[dict[str, Any]]:
                     overruled.clear()
             weaker.append(table)
     return fit
+
+
+def without(layers: Sequence[Layer], paths: Iterable[tuple[str, ...]]) -> tuple[Layer, ...]:
+    """Return layers of which the strongest that says something at a path says it no more."""
+    fit = [_copied(layer.values) for layer in layers]
+    for path in paths:
+        any(_take_out(values, path) for values in fit)
+    left = [replace(layer, values=values) for layer, values in zip(layers, fit, strict=True)]
+    return tuple(
+        replace(
+            layer, labels={path: name for path, name in layer.labels.items() if says(layer, path)}
+        )
+        for layer in left
+    )
+
+
+def says(layer: Layer, path: Sequence[str]) -> bool:
+    """Whether a layer has something at a path."""
+    *above, last = path
+    table = _at(layer.values, above)
+    return isinstance(table, Mapping) and last in table
 
 
 def leaves_of(values: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
@@ -275,6 +315,19 @@ def _at(values: Any, path: Sequence[str]) -> Any:
     for part in path:
         values = values.get(part) if isinstance(values, dict) else None
     return values
+
+
+def _take_out(values: dict[str, Any], path: tuple[str, ...]) -> bool:
+    """Take out what is at a path, or the value or bad name that it ends at, if it is there."""
+    for k, part in enumerate(path):
+        if part not in values:
+            return False
+        below = values[part]
+        if not isinstance(below, dict) or path[k + 1 :] in ((), ("[key]",)):
+            del values[part]
+            return True
+        values = below
+    return False
 
 
 def _copied(values: Any) -> Any:

@@ -13,6 +13,7 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 
+from sketchmatch.config.addresses import address_fault
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
 from sketchmatch.pipeline.selection import STAGES
@@ -37,6 +38,12 @@ def _weighing(weights: tuple[float, ...]) -> tuple[float, ...]:
     if any(exponent > MAX_DISTANCE for exponent in weights[5:]):
         raise ValueError(f"should have an exponent of distance of at most {MAX_DISTANCE:g}")
     return weights
+
+
+def _listening(address: str) -> str:
+    if fault := address_fault(address):
+        raise ValueError(fault)
+    return address
 
 
 _Weight = Annotated[float, Field(ge=0.0, le=MAX_WEIGHT)]
@@ -118,8 +125,9 @@ class _Plugins(_Section):
 class _Server(_Section):
     """What `sketchmatch serve` listens on and lets requests ask for."""
 
-    address: str = Field(
-        "127.0.0.1:50051", description="Host and port to listen on; port 0 picks a free one."
+    address: Annotated[str, AfterValidator(_listening)] = Field(
+        "127.0.0.1:50051",
+        description="Host and port to listen on, or unix:PATH; port 0 picks a free one.",
     )
     grace_seconds: float = Field(
         5.0, ge=0, description="Time for running matches when the server is stopped."

@@ -45,6 +45,7 @@ __all__ = [
     "resolve",
     "resolve_segmenter",
     "set_up",
+    "set_up_faults",
     "stage_of",
 ]
 
@@ -306,16 +307,30 @@ def set_up(registry: Registry, kind: Kind, choice: Choice, stage: str) -> Algori
     InvalidInputError
         With a path that begins with ``stage``, if it is unknown or a parameter is wrong.
     """
+    for fault in set_up_faults(registry, kind, choice, stage):
+        raise fault
+    algorithm = registry.find(kind, choice.name).algorithm
+    with blaming(algorithm, registry):
+        return algorithm(algorithm.Params(**dict(choice.parameters)))
+
+
+def set_up_faults(
+    registry: Registry, kind: Kind, choice: Choice, stage: str
+) -> Iterator[InvalidInputError]:
+    """Yield whatever is wrong with a choice, each with a path that begins with ``stage``."""
     try:
         algorithm = registry.find(kind, choice.name).algorithm
     except InvalidInputError as error:
-        raise error.within(stage) from None
+        yield error.within(stage)
+        return
     with blaming(algorithm, registry):
         try:
-            params = algorithm.Params(**dict(choice.parameters))
+            algorithm.Params(**dict(choice.parameters))
         except ValidationError as error:
-            raise _parameter_error(algorithm, error).within(f"{stage}.parameters") from None
-        return algorithm(params)
+            faults = list(_parameter_errors(algorithm, error))
+        else:
+            return
+    yield from (fault.within(f"{stage}.parameters") for fault in faults)
 
 
 def profile_faults(
@@ -401,10 +416,7 @@ class _Levels:
             name = "" if kind is Kind.SEGMENTER else self.registry.default(kind)
             chosen = _folded(name, levels, self.parameters.get(kind, {}))
             if chosen.name and (choice.name or choice.parameters):
-                try:
-                    set_up(self.registry, kind, chosen, stage)
-                except InvalidInputError as error:
-                    yield error
+                yield from set_up_faults(self.registry, kind, chosen, stage)
 
     def folded(self, stage: str, choice: Choice, source: type[Any] | None = None) -> Choice:
         """Return what all levels together choose in a stage."""
@@ -479,13 +491,15 @@ def _folded(
     return Choice(name, {**parameters.get(name, {}), **chosen})
 
 
-def _parameter_error(algorithm: type[Algorithm], error: ValidationError) -> InvalidInputError:
-    """Say the first fault of a validation in one sentence."""
-    fault = error.errors(include_url=False)[0]
-    path = ".".join(str(part)[:_LONGEST_NAME] for part in fault["loc"])
-    if fault["type"] == "extra_forbidden":
-        known = ", ".join(algorithm.Params.model_fields) or "none"
-        problem = f"is no parameter of {algorithm.name}; it has: {known}"
-    else:
-        problem = fault_of(fault["input"], fault["msg"])
-    return InvalidInputError(Reason.INVALID_PARAMETER, path, problem)
+def _parameter_errors(
+    algorithm: type[Algorithm], error: ValidationError
+) -> Iterator[InvalidInputError]:
+    """Say each fault of a validation in one sentence."""
+    for fault in error.errors(include_url=False):
+        path = ".".join(str(part)[:_LONGEST_NAME] for part in fault["loc"])
+        if fault["type"] == "extra_forbidden":
+            known = ", ".join(algorithm.Params.model_fields) or "none"
+            problem = f"is no parameter of {algorithm.name}; it has: {known}"
+        else:
+            problem = fault_of(fault["input"], fault["msg"])
+        yield InvalidInputError(Reason.INVALID_PARAMETER, path, problem)

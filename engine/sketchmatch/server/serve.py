@@ -104,8 +104,7 @@ async def serve(
     stopping, ended = stop or asyncio.Event(), Event()
     reloading = _Reloading(load, app, say)
     _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
-    host = settings.address.rpartition(":")[0]
-    say(f"listening on {host}:{port}")
+    say(f"listening on {_found_at(settings.address, port)}")
     for problem in app.setup.engine.registry.problems:
         say(problem)
     try:
@@ -185,6 +184,11 @@ def _listen(server: grpc.aio.Server, address: str) -> int:
             f"{address!r} cannot be listened on; choose a free port, as in 127.0.0.1:50051",
         )
     return port
+
+
+def _found_at(address: str, port: int) -> str:
+    """Return where clients find a server: a port may have been picked, a file has none."""
+    return address if address.startswith("unix") else f"{address.rpartition(':')[0]}:{port}"
 
 
 def _on_signals(actions: Mapping[str, Callable[[], None]]) -> None:
