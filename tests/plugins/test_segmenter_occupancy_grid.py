@@ -206,6 +206,37 @@ def test_too_few_objects_say_what_was_found_and_the_remedy(case):
     assert (caught.value.field, caught.value.reason) == ("cells", Reason.TOO_FEW_OBJECTS)
 
 
+def flat():
+    """Two empty rooms of 3 × 4 m with a doorway of 0.8 m between them."""
+    grid = room(shape=(42, 63))
+    cells = grid.cells.copy()
+    cells[:, 31] = 100
+    cells[20:28, 31] = 0
+    return OccupancyGrid(cells, 0.1)
+
+
+CUPBOARDS = ((1, 5, 6, 12), (33, 30, 6, 9), (1, 40, 6, 8))
+
+
+@pytest.mark.parametrize(
+    ("grid", "params", "cures", "others"),
+    [
+        (room(*CUPBOARDS), {}, ["set attached to 2, which finds 3 objects at the"], ["rooms"]),
+        (flat(), {}, ["choose the segmenter rooms, which finds 2 rooms"], ["attached"]),
+        (flat(), {"attached": 1.0}, ["segmenter rooms, which finds 2 rooms"], ["attached"]),
+        (room(), {}, ["give a map with objects standing free"], ["attached", "rooms"]),
+    ],
+    ids=["cupboards", "flat", "flat with attached set", "nothing"],
+)
+def test_too_few_objects_name_the_options_that_find_enough_and_no_others(
+    grid, params, cures, others
+):
+    with pytest.raises(InvalidInputError) as caught:
+        segmented(grid, **params)
+    assert all(cure in caught.value.problem for cure in cures), caught.value
+    assert not any(other in caught.value.problem for other in others), caught.value
+
+
 def test_a_map_of_noise_is_refused_before_it_takes_long():
     noise = np.where(np.random.default_rng(0).random((1000, 1000)) < 0.1, 100, 0).astype(np.int8)
     with pytest.raises(InvalidInputError, match="more than the limit of 1000; raise min_size"):

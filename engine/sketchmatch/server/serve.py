@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
+import socket
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -173,17 +174,33 @@ def _add_services(server: grpc.aio.Server, app: Application) -> health.aio.Healt
 
 
 def _listen(server: grpc.aio.Server, address: str) -> int:
+    local = address.startswith("unix")
     try:
-        port = server.add_insecure_port(address)
+        port = 0 if _is_taken(address) else server.add_insecure_port(address)
     except RuntimeError:
         port = 0
     if port == 0:
+        remedy = "name a file that no server uses" if local else "choose a free port"
+        example = "unix:/run/sketchmatch.sock" if local else "127.0.0.1:50051"
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             "address",
-            f"{address!r} cannot be listened on; choose a free port, as in 127.0.0.1:50051",
+            f"{address!r} cannot be listened on; {remedy}, as in {example}",
         )
     return port
+
+
+def _is_taken(address: str) -> bool:
+    """Whether somebody listens at a file; gRPC would take it away from them without a word."""
+    if not address.startswith("unix:") or not hasattr(socket, "AF_UNIX"):
+        return False
+    path = address.removeprefix("unix:").removeprefix("//")
+    with socket.socket(socket.AF_UNIX) as probe:
+        try:
+            probe.connect(path)
+        except OSError:
+            return False
+    return True
 
 
 def _found_at(address: str, port: int) -> str:

@@ -29,6 +29,7 @@ from sketchmatch_builtin.segmenters._cells import (
     refuse_more,
 )
 from sketchmatch_builtin.segmenters._merging import merged
+from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
 
 __all__ = ["OccupancyGridSegmenter"]
 
@@ -36,6 +37,8 @@ __all__ = ["OccupancyGridSegmenter"]
 _COARSEST_TOLERANCE = 0.12
 # Legs, before they are merged to tables.
 _MOST_PARTS = 10_000
+# What the text of ``attached`` recommends, in metres.
+_USUAL_ATTACHED = 2.0
 
 
 class OccupancyGridSegmenter(Segmenter):
@@ -182,7 +185,7 @@ class OccupancyGridSegmenter(Segmenter):
         outlines = self._outlines(parts, source)
         if len(outlines) < 2:
             largest = max(int(np.count_nonzero(room)) for room, _, _ in rooms)
-            raise _too_few(len(outlines), largest, source, self.params.min_size)
+            raise _too_few(len(outlines), largest, source, self.params)
         return Segmentation(
             Scene(
                 tuple(
@@ -266,11 +269,32 @@ def _drop_around(held: Mask, labels: NDArray[np.int32], k: int) -> None:
         cv2.floodFill(held, None, (x, y), (0,), flags=8)
 
 
-def _too_few(found: int, free: int, grid: OccupancyGrid, min_size: float) -> InvalidInputError:
+def _too_few(
+    found: int, free: int, grid: OccupancyGrid, params: OccupancyGridSegmenter.Params
+) -> InvalidInputError:
+    cures = [*_cures(grid, params), "give a map with objects standing free of the walls"]
     return InvalidInputError(
         Reason.TOO_FEW_OBJECTS,
         "cells",
-        f"has {'no object' if not found else 'only one object'} of at least {min_size:g} m within "
-        f"its largest free region ({free * grid.resolution**2:.3g} m²), and a match needs two; "
-        "give a map with objects standing free of the walls, or lower min_size",
+        f"has {'no object' if not found else 'only one object'} of at least {params.min_size:g} m "
+        f"within its largest free region ({free * grid.resolution**2:.3g} m²), and a match needs "
+        f"two; {', '.join(cures)}, or lower min_size",
     )
+
+
+def _cures(grid: OccupancyGrid, params: OccupancyGridSegmenter.Params) -> Iterator[str]:
+    """Yield which other options find objects enough, having tried them."""
+    if params.attached == 0.0:
+        wider = params.model_copy(update={"attached": _USUAL_ATTACHED})
+        if found := _count(OccupancyGridSegmenter(wider), grid):
+            yield f"set attached to {_USUAL_ATTACHED:g}, which finds {found} objects at the walls"
+    rooms = RoomSegmenter(RoomSegmenter.Params(free_threshold=params.free_threshold))
+    if found := _count(rooms, grid):
+        yield f"choose the segmenter rooms, which finds {found} rooms"
+
+
+def _count(segmenter: Segmenter, grid: OccupancyGrid) -> int:
+    try:
+        return len(segmenter.segment(grid).scene)
+    except InvalidInputError:
+        return 0
