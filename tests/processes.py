@@ -109,14 +109,21 @@ class Server:
 class Terminal:
     """A command whose standard error, and standard output if asked, are a terminal."""
 
-    def __init__(self, *arguments, stdout: bool = True) -> None:
+    def __init__(
+        self, *arguments, stdout: bool = True, columns: int = 140, **environment: str
+    ) -> None:
         self._screen, terminal = pty.openpty()
         self.process = subprocess.Popen(
             [*COMMAND, *map(str, arguments)],
             stdin=subprocess.DEVNULL,
             stdout=terminal if stdout else subprocess.PIPE,
             stderr=terminal,
-            env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "140"},
+            env={
+                **os.environ,
+                "TERM": "xterm-256color",
+                "COLUMNS": str(columns),
+                **environment,
+            },
         )
         os.close(terminal)
         self._shown = bytearray()

@@ -215,7 +215,9 @@ def summary_of(notes: Sequence[str]) -> list[str]:
     for note in notes:
         kinds.setdefault(_VARYING.sub("", note), []).append(note)
     told = [
-        f"{alike[0]} (and {len(alike) - 1} more like it)" if len(alike) > 1 else alike[0]
+        f"{alike[0].rstrip('.')} (and {len(alike) - 1} more like it)"
+        if len(alike) > 1
+        else alike[0]
         for alike in list(kinds.values())[:_MOST_NOTES]
     ]
     untold = len(notes) - sum(map(len, list(kinds.values())[:_MOST_NOTES]))
