@@ -7,7 +7,6 @@ import os
 import sys
 import traceback
 import warnings
-from contextlib import suppress
 from enum import IntEnum
 from typing import Annotated, NoReturn
 
@@ -79,8 +78,7 @@ def main() -> NoReturn:
     output.use_any_encoding()
     code, message = _run()
     if message:
-        with suppress(OSError):
-            typer.echo(f"sketchmatch: {message}", err=True)
+        output.tell(f"sketchmatch: {message}")
     sys.exit(code)
 
 

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from sketchmatch.cli.options import say
-from sketchmatch.cli.output import answering, clean
+from sketchmatch.cli.output import answering, clean, tell
 
 __all__ = ["demo"]
 
@@ -72,7 +72,7 @@ def _address(process: subprocess.Popen[str]) -> str:
 
     assert process.stderr is not None
     for line in process.stderr:
-        typer.echo(f"[server] {clean(line.rstrip())}", err=True)
+        tell(f"[server] {clean(line.rstrip())}")
         if found := re.search(r"listening on (\S+)", line):
             threading.Thread(target=_pass_on, args=(process,), daemon=True).start()
             with Client(found[1]) as client:
@@ -84,4 +84,4 @@ def _address(process: subprocess.Popen[str]) -> str:
 def _pass_on(process: subprocess.Popen[str]) -> None:
     assert process.stderr is not None
     for line in process.stderr:
-        typer.echo(f"[server] {clean(line.rstrip())}", err=True)
+        tell(f"[server] {clean(line.rstrip())}")

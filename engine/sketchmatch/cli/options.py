@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from sketchmatch.cli.output import clean
+from sketchmatch.cli.output import clean, tell
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 
 __all__ = [
@@ -209,6 +207,4 @@ def say_renamed(sketch_segmenter: str, map_segmenter: str) -> None:
 
 def say(sentence: str) -> None:
     """Tell the person at the terminal something that is not part of the answer."""
-    with suppress(OSError):  # what is not part of the answer may be lost
-        typer.echo(f"sketchmatch: {clean(sentence)}", err=True)
-        sys.stderr.flush()
+    tell(f"sketchmatch: {clean(sentence)}")

@@ -30,6 +30,7 @@ __all__ = [
     "discard",
     "for_people",
     "show",
+    "tell",
     "unwritable",
     "use_any_encoding",
     "write",
@@ -138,6 +139,13 @@ def write_message(message: Message) -> None:
 
     text = MessageToJson(message, always_print_fields_with_no_presence=True, ensure_ascii=False)
     write(_json_for(_stream(), text) + "\n")
+
+
+def tell(text: str) -> None:
+    """Write a line that is no part of the answer; it may be lost."""
+    if sys.stderr is not None:
+        with suppress(OSError):
+            print(text, file=sys.stderr, flush=True)
 
 
 def clean(text: str) -> str:
