@@ -10,12 +10,13 @@ import pytest
 
 from sketchmatch import Scene, match, read_scene
 from sketchmatch.config import Origin, builtin, check, entries, load, open_registry, template
+from sketchmatch.config.addresses import address_fault
 from sketchmatch.config.settings import static_paths
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import Choice, resolve
-from sketchmatch.registry import Kind, default_registry
+from sketchmatch.registry import Kind, PluginStatus, Registry, default_registry
 from tests.tools import ROOT
 
 SCENE = Scene.from_polygons(
@@ -288,6 +289,130 @@ def test_check_finds_every_fault(file):
     assert check(file("[server]\na = 1\nb = 2\n"))[1][1].field.endswith("server.b")
 
 
+EVERYTHING_WRONG = """
+profile = "best"
+colour = 3
+[pipeline.searcher]
+name = "easm"
+parameters = { population = 1, generations = 0, foo = 1 }
+[pipeline.map_segmenter.parameters]
+min_size = 1
+[pipeline.histogram]
+name = "nope"
+[algorithms.searcher.nn]
+seed_points = 0
+[profiles.'My Own']
+[profiles.mine]
+weights = [1, 2]
+[profiles.mine.similarity]
+name = "x"
+[plugins]
+deny = ["acme-serach"]
+[server]
+address = "127.0.0.1"
+adress = "x"
+[limits]
+max_objects = "few"
+"""
+
+
+def test_check_finds_faults_of_every_kind_at_once(file, monkeypatch):
+    path = file(EVERYTHING_WRONG)
+    monkeypatch.setenv("SKETCHMATCH_MAX_BYTES", "1")
+    monkeypatch.setenv("SKETCHMATCH_SERVER__ADRESS", "x")
+    monkeypatch.setenv("SKETCHMATCH_SERVER__ADDRESS", "y")
+    _, faults = check(path)
+    places = [fault.field.removeprefix(f"{path}: ") for fault in faults]
+    assert sorted(places) == sorted(
+        [
+            *("SKETCHMATCH_MAX_BYTES", "SKETCHMATCH_SERVER__ADRESS", "SKETCHMATCH_SERVER__ADDRESS"),
+            *("profile", "colour", "server.address", "server.adress", "limits.max_objects"),
+            *(f"pipeline.searcher.parameters.{name}" for name in ("population", "foo")),
+            *("pipeline.searcher.parameters.generations", "pipeline.histogram.name"),
+            "pipeline.map_segmenter.parameters.min_size",
+            *("algorithms.searcher.nn.seed_points", "profiles.My Own"),
+            *("profiles.mine.weights", "profiles.mine.similarity.name", "plugins.deny"),
+        ]
+    )
+
+
+def test_check_goes_on_with_the_environment_where_the_file_is_no_toml(file, monkeypatch):
+    path = file("a = [")
+    monkeypatch.setenv("SKETCHMATCH_LIMITS__MAX_BYTES", "0")
+    _, faults = check(path)
+    assert [fault.field for fault in faults] == [str(path), "SKETCHMATCH_LIMITS__MAX_BYTES"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("deny = ['acme-serach']", "which is not installed or has no plugin; did you mean acme-se"),
+        ("deny = ['zzz']", "is 'zzz', which is not installed or has no plugin; those with plugins"),
+        ("allow = ['Acme_Search', 'zzz']", "those with plugins are: acme-search"),
+        ("trusted = ['*', 'zzz']", "is 'zzz', which is not installed"),
+        ("deny = ['sketchmatch']", "the engine itself, which is never denied; drop it"),
+    ],
+)
+def test_check_finds_distributions_that_are_named_in_vain(file, monkeypatch, text, words):
+    own = default_registry()
+    strangers = [*own.statuses, PluginStatus("search", "acme.search", "1.0")]
+    both = Registry(own.algorithms, strangers)
+    monkeypatch.setattr("sketchmatch.config.configuration.default_registry", lambda _: both)
+    _, faults = check(file(f"[plugins]\n{text}\n"))
+    (fault,) = faults
+    assert words in str(fault)
+    assert fault.field.endswith(f": plugins.{text.split()[0]}")
+    assert check(file("[plugins]\ndeny = ['Acme_Search']\ntrusted = ['*', 'sketchmatch']"))[1] == []
+
+
+@pytest.mark.parametrize(
+    ("address", "fault"),
+    [
+        ("127.0.0.1:0", ""),
+        ("localhost:65535", ""),
+        ("[::1]:50051", ""),
+        ("unix:s.sock", ""),
+        ("unix:///run/s.sock", ""),
+        ("unix-abstract:sketchmatch", ""),
+        ("localhost", "have a port, as in localhost:50051"),
+        ("::1", "have brackets around an IPv6 address"),
+        ("fe80::1:50051", "have brackets around an IPv6 address"),
+        ("[]:50051", "begin with a host"),
+        ("a b:50051", "begin with a host"),
+        ("localhost:", "end with a port from 0 to 65535, as in localhost:50051"),
+        ("localhost:65536", "end with a port from 0 to 65535"),
+        ("localhost:-1", "end with a port from 0 to 65535"),
+        ("localhost:²", "end with a port from 0 to 65535"),
+        ("dns:///localhost:1", "be no URL but HOST:PORT"),
+        (f"unix:/{'x' * 107}", "name a file by at most 107 bytes"),
+        ("unix:", "name a file"),
+    ],
+)
+def test_an_address_to_listen_at_is_whole(file, address, fault):
+    path = file(f"[server]\naddress = {json.dumps(address)}\n")
+    if not fault:
+        assert load(path).settings.server.address == address
+        return
+    error = refused(load, path)
+    assert error.field == f"{path}: server.address"
+    assert f"; it should {fault}" in error.problem
+
+
+@pytest.mark.parametrize(
+    ("address", "sound"),
+    [
+        ("robot:50051", True),
+        ("dns:///robot:50051", True),
+        ("ipv4:10.0.0.1:50051,10.0.0.2:50051", True),
+        ("unix:s.sock", True),
+        ("robot:0", False),
+        ("https://robot:50051", False),
+    ],
+)
+def test_an_address_to_find_a_server_at_may_be_any_that_grpc_resolves(address, sound):
+    assert (address_fault(address, found=True) == "") is sound
+
+
 # Profiles ---------------------------------------------------------------------------------------
 
 
@@ -395,6 +520,20 @@ def test_every_entry_tells_where_it_comes_from(file, monkeypatch):
     ]:
         entry = found[tuple(dotted.split("."))]
         assert (entry.value, entry.origin) == (value, origin), dotted
+
+
+def test_no_entry_comes_from_a_place_that_does_not_say_it(file, monkeypatch):
+    path = file(
+        "[limits]\n[profiles.fast]\n[pipeline.searcher]\nparameters = {}\n"
+        "[pipeline.histogram]\nparameters = {directions = 90}\n"
+    )
+    monkeypatch.setenv("SKETCHMATCH_PIPELINE__HISTOGRAM", '{"name": "constant"}')
+    found = {entry.path: entry for entry in entries(load(path), default_registry())}
+    origins = {path: entry.origin for path, entry in found.items() if entry.origin != "default"}
+    assert origins == {
+        ("pipeline", "histogram", "name"): Origin.ENVIRONMENT,
+        ("pipeline", "histogram", "parameters", "directions"): Origin.FILE,
+    }
 
 
 def test_help_starts_without_what_reads_the_configuration():
