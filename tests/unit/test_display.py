@@ -1,0 +1,228 @@
+"""How answers look to people, whatever is in them."""
+
+import io
+
+import pytest
+from google.protobuf.duration_pb2 import Duration
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.cells import cell_len
+from rich.console import Console
+
+from sketchmatch.cli import display, output
+from sketchmatch.cli.tables import Column, Rows, plain
+from sketchmatch_client import Match
+from sketchmatch_proto.v1 import match_pb2, scene_pb2
+from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+
+RAW = "\x1b[31mdesk\x1b[0m\nby\tthe \x9bwall\u202e"
+
+
+def drawn(what, width=80, encoding="utf-8") -> list[str]:
+    stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding, errors="sketchmatch.spelled")
+    Console(file=stream, width=width, color_system=None).print(what)
+    stream.seek(0)
+    return [line.rstrip() for line in stream.read().splitlines()]
+
+
+def scene(*labels):
+    return scene_pb2.Scene(objects=[scene_pb2.SceneObject(label=label) for label in labels])
+
+
+def line(sketch, mapped, **fields):
+    return match_pb2.ObjectMatch(
+        sketch_object=sketch, map_object=mapped, confidence=0.9, **{"margin": 0.1, **fields}
+    )
+
+
+def answer(**fields):
+    return Match(
+        match_pb2.MatchAccepted(),
+        match_pb2.MatchScenes(sketch=scene("desk", "shelf", ""), map=scene("", "bed", "")),
+        match_pb2.MatchResult(
+            **{
+                "object_matches": [line(0, 0), line(1, 1), line(2, 2)],
+                "fmap_confidence": match_pb2.FmapConfidence(total=0.9),
+                "outcome": match_pb2.OUTCOME_CONVERGED,
+                "scale": 0.0105,
+                **fields,
+            }
+        ),
+    )
+
+
+def shown(match, monkeypatch, width=100, metres=False) -> list[str]:
+    said = []
+    monkeypatch.setattr(output, "for_people", lambda: True)
+    monkeypatch.setattr(output, "show", lambda what: said.extend(drawn(what, width)))
+    display.show_match(match, metres, verbose=False)
+    return said
+
+
+# Tables -----------------------------------------------------------------------------------------
+
+TEXTS = st.text(st.sampled_from("ab cé椅🛋…"), max_size=40)
+COLUMNS = [
+    Column("name", least=8),
+    Column("figure", right=True),
+    Column("rare", dispensable=2),
+    Column("words", least=12, dispensable=1),
+    Column("prose", least=20, wraps=True),
+]
+
+
+@given(
+    st.lists(st.tuples(*[TEXTS] * len(COLUMNS)), min_size=1, max_size=4),
+    st.integers(20, 200),
+)
+def test_no_line_is_wider_than_the_terminal_and_each_row_has_its_head(rows, width):
+    cells = [[plain(text) for text in row] for row in rows]
+    lines = drawn(Rows("", COLUMNS, cells), width)
+    assert all(cell_len(line) <= width for line in lines)
+    table = any(line.startswith("─") for line in lines)
+    assert table or width <= 60 or max(map(len, sum(rows, ()))) > 8
+
+
+def rows(*cells):
+    return Rows("", COLUMNS[:4], [[plain(cell) for cell in cells]])
+
+
+def test_what_has_no_room_goes_in_the_order_in_which_it_matters():
+    cells = ("n" * 20, "1.0", "r" * 30, "w" * 30)
+    whole = "  ".join(cells)
+    assert drawn(rows(*cells), 100)[-1] == f"{'n' * 20}     1.0  {'r' * 30}  {'w' * 30}"
+    assert len(whole) > 80
+    assert drawn(rows(*cells), 80)[-1] == f"{'n' * 20}     1.0  {'w' * 30}", "rare goes first"
+    cells = ("n" * 60, "1.0", "", "w" * 30)
+    assert drawn(rows(*cells), 80)[-1] == f"{'n' * 39}…     1.0  {'w' * 30}", "then cells are cut"
+    assert drawn(rows(*cells), 60)[1:] == [f"  figure: 1.0, words: {'w' * 30}"]
+
+
+def test_a_list_leaves_out_what_is_empty():
+    assert drawn(rows("desk", "", "", "left"), 60) == ["desk", "  words: left"]
+
+
+def test_other_encodings_have_tables_of_their_own():
+    lines = drawn(rows("Küche", "1°", "", ""), 80, "ascii")
+    assert lines[0].split("|")[0].strip() == "name"
+    assert lines[-1].startswith("K\\u00fcche")
+    assert lines[-1].endswith("1 deg")
+
+
+# Matches ----------------------------------------------------------------------------------------
+
+
+@given(st.floats(0.0, 1.0))
+def test_no_probability_is_rounded_to_certainty(probability):
+    text = display.likely(probability)
+    assert text not in ("100 %", "0 %", "100.0 %", "0.0 %")
+    number = float(text.strip("<> %"))
+    if text[0] not in "<>":
+        assert abs(number - 100.0 * probability) <= (0.51 if 1.0 <= number < 99.0 else 0.051)
+
+
+def test_a_result_without_probability_shows_none(monkeypatch):
+    lines = shown(answer(), monkeypatch)
+    assert not any("likely" in line or "Probability" in line for line in lines)
+    assert any("confidence" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("radians", "words"),
+    [(0.0, "0°"), (0.5, "29° counter-clockwise"), (-0.5, "29° clockwise"), (3.14159, "180°")],
+)
+def test_a_rotation_says_which_way(radians, words):
+    told = dict(display.facts(match_pb2.MatchResult(rotation_radians=radians), metres=False))
+    assert told["Rotation"] == words
+
+
+def test_a_scale_has_its_unit():
+    result = match_pb2.MatchResult(scale=0.0105)
+    assert dict(display.facts(result, metres=True))["Scale"] == "0.0105 m per sketch unit"
+    assert dict(display.facts(result, metres=False))["Scale"] == "0.0105 map units per sketch unit"
+
+
+def alternative(total, *lines):
+    return match_pb2.AlternativeMap(
+        object_matches=lines, fmap_confidence=match_pb2.FmapConfidence(total=total)
+    )
+
+
+def test_other_maps_are_told_by_the_objects_that_differ(monkeypatch):
+    others = [
+        alternative(0.8991, line(0, 2), line(1, 1), line(2, 0)),
+        alternative(0.7, line(0, 0), line(2, 1)),
+    ]
+    lines = shown(answer(alternatives=others), monkeypatch)
+    assert lines[-2:] == [
+        "Just as good, ζ 0.899: on the map desk is No. 3, No. 3 is No. 1",
+        "Next best, ζ 0.700: on the map shelf has no partner, No. 3 is bed",
+    ]
+
+
+def test_a_pair_that_could_be_another_keeps_its_margin_where_there_is_little_room(monkeypatch):
+    relation = match_pb2.ObjectRelation(reference_object=1, phrase="to the right of and below it")
+    told = {"relation": relation, "probability": 0.5}
+    sure = answer(object_matches=[line(0, 0, **told)], probability=0.5)
+    open_ = answer(object_matches=[line(0, 0, **told, margin=0.001)], probability=0.5)
+    assert "margin" not in shown(sure, monkeypatch, 66)[1]
+    assert "margin" in shown(open_, monkeypatch, 66)[1]
+
+
+def test_progress_shows_no_figure_that_there_is_none_of():
+    elapsed = Duration(seconds=3)
+    screen = Console(width=100)
+
+    def said(**fields):
+        progress = match_pb2.MatchProgress(elapsed=elapsed, **fields)
+        return drawn(display._progress(screen, progress), 100)[0]
+
+    begun = said(phase=match_pb2.PHASE_SEARCH)
+    assert begun.endswith("searching  3.0 s")
+    trivial = said(confidence=0.5, upper_bound=1.0, iteration=2, evaluations=9)
+    assert trivial.endswith("3.0 s  ζ 0.5000  iteration 2  9 evaluations")
+    assert "ζ 0.5000  ≤ 0.7500" in said(confidence=0.5, upper_bound=0.75)
+
+
+# Texts of others --------------------------------------------------------------------------------
+
+
+def test_labels_of_a_careless_server_are_not_obeyed(monkeypatch, capsys):
+    match = answer()
+    match.scenes.sketch.objects[0].label = RAW
+    match.result.object_matches[0].sketch_label = RAW
+    match.result.alternatives.append(alternative(0.5, line(0, 1), line(1, 0)))
+    match.scenes.sketch_warnings.append(f"{RAW} was left out")
+    text = "\n".join(shown(match, monkeypatch))
+    assert r"1 \x1b[31mdesk\x1b[0m by the \x9bwall\u202e" in text
+    monkeypatch.setattr(output, "for_people", lambda: False)
+    display.show_match(match, metres=False, verbose=False)
+    piped = capsys.readouterr()
+    assert len(piped.out.splitlines()) == 4
+    for written in (text, piped.out, piped.err):
+        assert not set("\x1b\x9b\u202e") & set(written)
+
+
+def test_json_keeps_the_labels_and_hides_what_a_terminal_would_obey(capsys):
+    found = SegmentResponse(scene=scene(RAW))
+    output.write_message(found)
+    written = capsys.readouterr().out
+    assert not set("\x1b\x9b\u202e") & set(written)
+    assert r"\u001b[31mdesk" in written
+    assert r"\u009bwall\u202e" in written
+
+
+def test_what_repeats_is_told_once_and_what_differs_is_told():
+    notes = [f"strokes[{k}] ('desk {k}') is a mark." for k in range(100)]
+    notes += ["the map has a yaw of nan.", *(f"{k} rooms were left out." for k in (1, 2))]
+    assert display.summary_of(notes) == [
+        "strokes[0] ('desk 0') is a mark (and 99 more like it)",
+        "the map has a yaw of nan.",
+        "1 rooms were left out (and 1 more like it)",
+        "with -v all 103 notes are told",
+    ]
+    different = [f"note {chr(97 + k)}" for k in range(20)]
+    assert display.summary_of(different)[-1] == (
+        "15 others were noted; with -v all 20 notes are told"
+    )
+    assert display.summary_of(different[:5]) == different[:5]
