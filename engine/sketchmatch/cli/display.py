@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import Console, Group, RenderableType
@@ -65,23 +65,25 @@ _OUTCOMES = {
 def watch(events: Generator[MatchResponse, None, None]) -> Match:
     """Follow a match to its end, showing progress where standard error is a terminal.
 
-    Whoever interrupts it there is shown the best object map until then.
+    Whoever interrupts it on a terminal is shown the best object map until then.
     """
     screen = output.console(error=True)
-    if not screen.is_terminal:
+    if not (screen.is_terminal or output.for_people()):
         return _collected(events, None)
     best = _BestSoFar()
+    live = Live(_busy(screen, "starting"), console=screen, transient=True)
+
+    def shown(progress: match_pb2.MatchProgress) -> None:
+        best.take(progress)
+        live.update(_progress(screen, progress))
+
     try:
-        with Live(_busy(screen, "starting"), console=screen, transient=True) as live:
-
-            def shown(progress: match_pb2.MatchProgress) -> None:
-                best.take(progress)
-                live.update(_progress(screen, progress))
-
+        with live if screen.is_terminal else nullcontext():
             return _collected(best.looking_at(events), shown)
     except KeyboardInterrupt:
         if best.progress is not None:
-            screen.print(_interrupted(best.progress, best.scenes))
+            seen = screen if screen.is_terminal else output.console()
+            seen.print(_interrupted(best.progress, best.scenes))
         raise
 
 
