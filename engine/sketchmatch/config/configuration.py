@@ -270,7 +270,9 @@ def _sound(
                 return settings, sound, found
             found += [_placed(sound, fault) for fault in faults]
             wrong = [path[:-1] for path, _ in faults]
-        sound = without(sound, wrong)
+        left = without(sound, wrong)
+        assert left != sound, "a fault is at no value, and would be found for ever"
+        sound = left
 
 
 def _layers(path: str | Path | None, flags: Mapping[str, Any], search: bool) -> tuple[Layer, ...]:
