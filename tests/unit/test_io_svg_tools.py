@@ -78,14 +78,18 @@ def test_transforms(transform, expected):
 def test_every_path_command_is_followed():
     path = "M10 10 H20 V20 h-5 v5 L1 2 l3 4 C5 6 7 8 9 9 c1 1 2 2 3 0 S1 2 3 4 s1 2 3 4 Q1 2 3 4 "
     path += "q1 2 3 4 T9 9 t1 1 A5 4 30 0 1 30 30 a5 4 30 1 0 5 5 m1 1 l2 2 Z"
-    first, second = decode_svg(f'<svg><path d="{path}"/></svg>'.encode()).strokes
+    first, second = decode_svg(
+        f'<svg fill="none" stroke="red"><path d="{path}"/></svg>'.encode()
+    ).strokes
     assert first.points[0].tolist() == [10, -10]
     assert np.allclose(first.points[-1], [35, -35])
     assert np.allclose(second.points, [[36, -36], [38, -38], [36, -36]])
 
 
 def test_arcs_with_packed_flags_are_read():
-    (stroke,) = decode_svg(b'<svg><path d="M0 0a25 25 0 0150 0"/></svg>').strokes
+    (stroke,) = decode_svg(
+        b'<svg fill="none" stroke="red"><path d="M0 0a25 25 0 0150 0"/></svg>'
+    ).strokes
     assert np.allclose(stroke.points[-1], [50, 0])
 
 

@@ -1,27 +1,36 @@
 """Strokes from an SVG drawing, as vector tools and sketch pads export it.
 
-Every ``path``, ``line``, ``polyline``, ``polygon``, ``rect``, ``circle`` and ``ellipse`` becomes a
-stroke, every further subpath one more, with all transforms applied and y turned up; a closed
-shape repeats its first point. ``use`` is followed within the document; text, pictures and what is
-not displayed are ignored. Coordinates are user units: ``viewBox`` scales a drawing as a whole,
-which a match does not see.
+What a browser shows becomes strokes, as it shows it: every ``path``, ``line``, ``polyline``,
+``polygon``, ``rect``, ``circle`` and ``ellipse`` one, every further subpath one more, with all
+transforms applied and y turned up; a closed shape repeats its first point, and so does an open one
+that is filled. ``use``, ``symbol`` and nested ``svg`` are followed within the document. Text and
+pictures are ignored. Coordinates are user units: ``viewBox`` scales a drawing as a whole, which a
+match does not see, unless it stretches it.
+
+Style sheets, ``style`` and attributes decide alike: what has neither a line nor a filling that
+could be seen is no shape, nor is what ``display``, ``visibility``, ``opacity``, a clip, ``switch``
+or the edge of a nested ``svg`` hide; but what lies beyond the page is read. What cannot be
+followed, as a turn in space, is refused.
 
 A shape's label is the first that it has of: its ``<title>``, ``aria-label``, ``inkscape:label``,
-and an ``id`` that a person gave (``desk-2``, but not a tool's ``path123``); or else that of the
-innermost group with a title or one of these two labels which is no layer.
+``serif:id``, ``data-name``, and an ``id`` that a person gave (``desk-2``, but not a tool's
+``path123``); or else that of the innermost group with one of all these but an ``id`` which is no
+layer.
 
-Paper is no shape: a rectangle without a stroke that covers the whole drawing is ignored. Of the
-paths with which Excalidraw draws one shape, its hatching or filling first, the last is taken: the
-outline, every line of which is drawn twice.
+Paper is no shape: a filled rectangle without a line that covers the whole page, or lies under all
+else. Of a shape that is drawn once filled and once as a line, the line is taken; of the paths with
+which Excalidraw draws one, its hatching or filling first, the last: the outline, every line of
+which is drawn twice. A pen stroke that was exported as the outline of its ink becomes the line
+again (:mod:`sketchmatch.io._svg_ink`).
 
 Nothing outside the document is ever opened, and a document that defines entities is refused.
 """
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -30,35 +39,31 @@ import numpy as np
 import svgelements
 
 from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io._svg_curves import (
+    SHAPES,
+    TOLERANCE,
+    Subpath,
+    flattened,
+    size_of,
+    steps_of,
+    subpaths_of,
+)
+from sketchmatch.io._svg_frame import Frame, css_transform, fitted, length, view_box
+from sketchmatch.io._svg_ink import pen_lines
+from sketchmatch.io._svg_style import INITIAL, Colour, Look, Styles
+from sketchmatch.io._svg_tree import LONGEST_CAUSE, invalid, named_element, tag_of
 from sketchmatch.model import FloatArray, Stroke, StrokeSet
 from sketchmatch.model.limits import check_vertices, source_limits
 
 __all__ = ["decode_svg"]
 
 _MAX_DEPTH = 200
-_LONGEST_CAUSE = 100
-# Largest distance between a curve and its stroke, as a share of the drawing's larger side.
-_TOLERANCE = 1e-3
-# Beyond this, coordinates are a broken file's, and their squares would soon overflow.
-_LARGEST = 1e15
-
-_SHAPES = {
-    "path": svgelements.Path,
-    "line": svgelements.SimpleLine,
-    "polyline": svgelements.Polyline,
-    "polygon": svgelements.Polygon,
-    "rect": svgelements.Rect,
-    "circle": svgelements.Circle,
-    "ellipse": svgelements.Ellipse,
-}
-_EXTENT = {"rect": ("width", "height"), "circle": ("r",), "ellipse": ("rx", "ry")}
-_LENGTHS = {"x", "y", "x1", "y1", "x2", "y2", "width", "height", "cx", "cy", "r", "rx", "ry"}
 _LISTS = {"d", "points"}
-_LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(px|pt|pc|mm|cm|in|)\s*", re.I)
-_UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "in": 96.0}
-_DRAWN = {*_SHAPES, "svg", "g", "a", "switch", "use"}
+_DRAWN = {*SHAPES, "svg", "g", "a", "switch", "use"}
+_VIEWPORTS = {"svg", "symbol"}
 _HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
+_NAMES = ("aria-label", f"{_INKSCAPE}label", "{http://www.serif.com/}id", "data-name")
 _EXCALIDRAW = b"svg-source:excalidraw"
 _COMMAND = re.compile(r"([MLHVCSQTAZ])([^MLHVCSQTAZ]*)", re.IGNORECASE)
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
@@ -68,12 +73,19 @@ _TOOLS_ID = re.compile(
     r"|vector|element|layer)?[\W\d_]*",
     re.IGNORECASE,
 )
-_HIDDEN = re.compile(r"(^|;)\s*display\s*:\s*none\b")
-_STROKED = re.compile(r"(^|;)\s*stroke\s*:\s*(?!none\b)")
+# Paper may leave this share of the page uncovered at each side, and so much of its own box.
+_MARGIN, _ROUNDED = 0.01, 0.03
+# Things on a ground that is no paper by its size.
+_FEW = 3
+# A filling of this share of its box, squared, encloses nothing.
+_FLAT = 1e-9
+
+Box = tuple[float, float, float, float]
+"""Least x and y, largest x and y."""
 
 
 def decode_svg(data: bytes) -> StrokeSet:
-    """Decode the shapes of an SVG document as strokes, in the order they are drawn.
+    """Decode what an SVG document shows as strokes, in the order they are drawn.
 
     Parameters
     ----------
@@ -84,8 +96,9 @@ def decode_svg(data: bytes) -> StrokeSet:
     ------
     InvalidInputError
         If it is not SVG, defines entities, is too large or nested too deeply, has nothing drawn
-        in it, or a shape cannot be read; then its path is ``shapes[k]``, counted from 0. What is
-        too large :func:`sketchmatch.model.limits.source_limits` says.
+        in it, uses what cannot be followed, or a shape cannot be read; then its path is
+        ``shapes[k]``, counted from 0. What is too large
+        :func:`sketchmatch.model.limits.source_limits` says.
 
     Examples
     --------
@@ -93,62 +106,69 @@ def decode_svg(data: bytes) -> StrokeSet:
     >>> sketch.strokes[0].points.tolist()
     [[5.0, -1.0], [7.0, -1.0], [7.0, -2.0], [5.0, -1.0]]
     """
-    root = _document(data)
-    if _tag(root) != "svg":
-        raise _invalid(
-            "", f"is XML but no SVG: it begins with <{_tag(root)[:_LONGEST_CAUSE]}>; save it as SVG"
+    root, lines = _document(data)
+    if tag_of(root) != "svg":
+        raise invalid(
+            "",
+            f"is XML but no SVG: it begins with <{tag_of(root)[:LONGEST_CAUSE]}>; save it as SVG",
         )
-    drawn = [
-        (subpath, label)
-        for k, (element, matrix, label) in enumerate(_drawn(root, _EXCALIDRAW in data))
-        for subpath in _subpaths(element, matrix, f"shapes[{k}]")
-    ]
-    if not drawn:
-        raise _invalid(
+    drawing = _Drawing(root, lines, _EXCALIDRAW in data)
+    shapes = [shape for shape in drawing.shapes() if shape.subpaths]
+    shapes, ground = _without_paper(shapes, drawing.page, drawing.background)
+    shapes = _without_twins(shapes)
+    if not shapes:
+        raise invalid(
             "", "has nothing drawn in it; text and embedded pictures are not read, so draw paths"
         )
-    tolerance = _TOLERANCE * _size([curve for subpath, _ in drawn for curve in subpath])
-    steps = sum(_steps(curve, tolerance) for subpath, _ in drawn for curve in subpath)
-    check_vertices(steps + len(drawn), "")
+    curves = [curve for shape in shapes for subpath in shape.subpaths for curve in subpath]
+    tolerance = TOLERANCE * size_of(curves)
+    check_vertices(
+        sum(steps_of(curve, tolerance) for curve in curves)
+        + sum(1 + shape.filled for shape in shapes for _ in shape.subpaths),
+        "",
+    )
     return StrokeSet(
         tuple(
-            Stroke(_flattened(subpath, tolerance) * (1.0, -1.0), None, label)
-            for subpath, label in drawn
-        )
+            Stroke(points * (1.0, -1.0), None, shape.label)
+            for shape in shapes
+            for points in _lines(shape, tolerance)
+        ),
+        tuple(f"{each.place} was taken for the paper: all else lies on it." for each in ground),
     )
 
 
-def _document(data: bytes) -> ElementTree.Element:
-    """Parse XML, but no entities and no deep nesting."""
+def _document(data: bytes) -> tuple[ElementTree.Element, list[int]]:
+    """Parse XML, but no entities and no deep nesting; the lines are those of all elements."""
     try:
-        _check(data)
-        return ElementTree.fromstring(data)
+        lines = _checked(data)
+        return ElementTree.fromstring(data), lines
     except InvalidInputError:
         raise
     except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
-        cause = str(error)[:_LONGEST_CAUSE]
-        raise _invalid("", f"is not SVG ({cause}); save it as SVG again") from None
+        cause = str(error)[:LONGEST_CAUSE]
+        raise invalid("", f"is not SVG ({cause}); save it as SVG again") from None
 
 
-def _check(data: bytes) -> None:
-    """Refuse what must not reach a parser that builds a tree."""
-    depth = elements = vertices = 0
+def _checked(data: bytes) -> list[int]:
+    """Refuse what must not reach a parser that builds a tree; return the elements' lines."""
+    depth = vertices = 0
+    lines: list[int] = []
 
     def doctype(_name: str, _system: str | None, _public: str | None, subset: int) -> None:
         if subset:
-            raise _invalid(
+            raise invalid(
                 "", "defines entities or a DTD of its own; save it as plain SVG without them"
             )
 
     def start(_name: str, attributes: dict[str, str]) -> None:
-        nonlocal depth, elements, vertices
+        nonlocal depth, vertices
         depth += 1
-        elements += 1
+        lines.append(parser.CurrentLineNumber)
         vertices += sum(_vertices(attributes.get(name, "")) for name in _LISTS)
-        _check_elements(elements)
+        _check_elements(len(lines))
         check_vertices(vertices, "")
         if depth > _MAX_DEPTH:
-            raise _invalid(
+            raise invalid(
                 "", f"is nested deeper than the limit of {_MAX_DEPTH}; flatten its groups"
             )
 
@@ -161,6 +181,7 @@ def _check(data: bytes) -> None:
     parser.StartElementHandler = start
     parser.EndElementHandler = end
     parser.Parse(data, True)
+    return lines
 
 
 def _check_elements(count: int) -> None:
@@ -186,192 +207,453 @@ def _vertices(data: str) -> int:
     )
 
 
-def _drawn(
-    root: ElementTree.Element, excalidraw: bool
-) -> Iterator[tuple[ElementTree.Element, Any, str]]:
-    """Yield the shapes that are drawn, in order, each with its matrix to the drawing and label."""
-    named = {element.get("id"): element for element in root.iter()}
-    paper = _paper(root)
-    stack = [(root, svgelements.Matrix(), "")]
-    visited = 1
-    while stack:
-        element, outer, inherited = stack.pop()
-        if element.get("display") == "none" or _HIDDEN.search(element.get("style", "")):
-            continue
-        matrix = _transform(element) * outer if "transform" in element.attrib else outer
-        if _tag(element) in _SHAPES:
-            if element is not paper:
-                yield element, matrix, _label(element) or inherited
-            continue
-        inherited = _groups_label(element) or inherited
-        if _tag(element) == "use":
-            target = named.get(_reference(element))
-            children = [] if target is None else [target]
-            matrix = _offset(element) * matrix
-        else:
-            children = [child for child in element if _tag(child) in _DRAWN]
-            if excalidraw and _tag(element) == "g":
-                last = next((child for child in reversed(children) if _tag(child) == "path"), None)
-                children = [c for c in children if _tag(c) != "path" or c is last]
-        visited += len(children)
-        _check_elements(visited)
-        stack.extend((child, matrix, inherited) for child in reversed(children))
+@dataclass(frozen=True, eq=False)
+class _Shape:
+    """A shape that can be seen.
+
+    Attributes
+    ----------
+    subpaths
+        Its curves in the drawing's coordinates.
+    label
+        A name for people.
+    fill, stroke
+        The colours of its filling and its line, None where it has none.
+    evenodd
+        Whether its filling is by that rule.
+    pen
+        Whether its filling may be the ink of a pen.
+    place
+        How a person finds it in the file.
+    box
+        Around its control points.
+    """
+
+    subpaths: list[Subpath]
+    label: str
+    fill: Colour | None
+    stroke: Colour | None
+    evenodd: bool
+    pen: bool
+    place: str
+    box: Box
+
+    @property
+    def filled(self) -> bool:
+        """Whether it has a filling."""
+        return self.fill is not None
+
+    @property
+    def bare(self) -> bool:
+        """Whether it is a filling without a line."""
+        return self.fill is not None and self.stroke is None
 
 
-def _paper(root: ElementTree.Element) -> ElementTree.Element | None:
-    """Return the rectangle that a tool laid under the drawing, if there is one."""
-    shapes = (element for element in root.iter() if _tag(element) in _SHAPES)
-    first = next(shapes, None)
-    if first is None or _tag(first) != "rect":
-        return None
-    if first.get("stroke", "none") != "none" or _STROKED.search(first.get("style", "")):
-        return None
-    frame = root.get("viewBox", "").replace(",", " ").split()[2:]
-    sizes = (root.get("width", ""), root.get("height", "")), tuple(frame), ("100%", "100%")
-    return first if (first.get("width"), first.get("height")) in sizes else None
+@dataclass(frozen=True, slots=True)
+class _Context:
+    """What an element inherits from those around it, and from those that use it."""
+
+    matrix: Any
+    look: Look
+    label: str
+    frame: Frame | None
+    clip: Box | None
+    size: tuple[str | None, str | None] = (None, None)
 
 
-def _tag(element: ElementTree.Element) -> str:
-    # Comments and processing instructions have a function for a tag.
-    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
+class _Drawing:
+    """A document, of which all that is shown is sought."""
+
+    def __init__(self, root: ElementTree.Element, lines: list[int], excalidraw: bool) -> None:
+        self._root = root
+        self._lines = dict(zip(root.iter(), lines, strict=True))
+        self._named = {each.get("id", ""): each for each in reversed([*root.iter()])}
+        self._excalidraw = excalidraw
+        self._styles = Styles(root, self._named)
+        self._visited = 1
+        self.background = self._styles.background(root)
+        self.page: Box | None = None
+
+    def shapes(self) -> Iterator[_Shape]:
+        """Yield the shapes that are shown, in the order they are drawn."""
+        count = 0
+        stack = [(self._root, _Context(svgelements.Matrix(), INITIAL, "", None, None))]
+        while stack:
+            element, outer = stack.pop()
+            look = self._styles.look(element, outer.look)
+            if not look.displayed or not _for_us(element):
+                continue
+            inner = replace(outer, look=look, size=(None, None))
+            inner = replace(inner, matrix=self._placed(element, look, inner))
+            if look.clip_path:
+                inner = replace(inner, clip=_both(inner.clip, self._clip(look.clip_path, inner)))
+            if tag_of(element) in SHAPES:
+                fill, stroke = self._styles.filled(look), self._styles.stroked(look)
+                if inner.frame is None and stroke is None and fill and _is_whole(element):
+                    self.background = fill
+                elif look.visible and (fill is not None or stroke is not None):
+                    shape = self._shape(element, inner, fill, stroke, f"shapes[{count}]")
+                    count += 1
+                    if shape.subpaths and _meet(shape.box, inner.clip):
+                        yield shape
+                continue
+            inner = replace(inner, label=_groups_label(element) or inner.label)
+            if tag_of(element) in _VIEWPORTS:
+                inside = self._viewport(element, inner, outer.size)
+                if inside is None:
+                    continue
+                inner = inside
+            children, inner = self._children(element, inner)
+            self._visit(len(children))
+            stack.extend((child, inner) for child in reversed(children))
+
+    def _visit(self, count: int) -> None:
+        self._visited += count
+        _check_elements(self._visited)
+
+    def _shape(
+        self,
+        element: ElementTree.Element,
+        context: _Context,
+        fill: Colour | None,
+        stroke: Colour | None,
+        field: str,
+    ) -> _Shape:
+        line, look = self._lines[element], context.look
+        subpaths = subpaths_of(element, look.geometry, context.frame, context.matrix, field, line)
+        # Whoever gives both the same colour has fattened the ink.
+        pen = tag_of(element) in ("path", "polygon") and fill is not None and stroke in (None, fill)
+        return _Shape(
+            subpaths,
+            _label(element) or context.label,
+            fill,
+            stroke,
+            look.fill_rule,
+            pen,
+            f"{named_element(element)} on line {line} of the file",
+            _box(subpaths),
+        )
+
+    def _children(
+        self, element: ElementTree.Element, context: _Context
+    ) -> tuple[list[ElementTree.Element], _Context]:
+        """Return what is drawn of an element, and in which context."""
+        if tag_of(element) == "use":
+            target = self._used(element)
+            size = (element.get("width"), element.get("height"))
+            context = replace(context, matrix=self._offset(element, context), size=size)
+            return ([] if target is None else [target]), context
+        children = [child for child in element if tag_of(child) in _DRAWN]
+        if tag_of(element) == "switch":
+            shown = next((child for child in element if tag_of(child) and _for_us(child)), None)
+            return [child for child in children if child is shown], context
+        if self._excalidraw and tag_of(element) == "g":
+            last = next((child for child in reversed(children) if tag_of(child) == "path"), None)
+            children = [c for c in children if tag_of(c) != "path" or c is last]
+        return children, context
+
+    def _used(self, use: ElementTree.Element) -> ElementTree.Element | None:
+        href = next((use.get(name, "") for name in _HREFS if name in use.attrib), "").strip()
+        if href and not href.startswith("#"):
+            raise self._invalid(
+                use, "draws what lies in another file, which is never opened; embed it"
+            )
+        target = self._named.get(href[1:]) if href else None
+        drawn = target is not None and tag_of(target) in {*_DRAWN, "symbol"}
+        return target if drawn else None
+
+    def _placed(self, element: ElementTree.Element, look: Look, context: _Context) -> Any:
+        """Return the matrix from an element's coordinates to the drawing's."""
+        attribute = None
+        if "transform" in element.attrib:
+            text = element.get("transform", "")
+            try:
+                attribute = svgelements.Matrix(text)
+            except (ValueError, IndexError, TypeError):
+                raise self._invalid(
+                    element, f"has a transform that cannot be read: {text[:40]!r}; correct it"
+                ) from None
+        if look.transforms:
+            try:
+                attribute = css_transform(look.transforms, context.frame, attribute)
+            except InvalidInputError as error:
+                raise self._invalid(element, error.problem) from None
+        return context.matrix if attribute is None else attribute * context.matrix
+
+    def _offset(self, use: ElementTree.Element, context: _Context) -> Any:
+        frame, said = context.frame, context.look.geometry
+        try:
+            x = length(said.get("x", use.get("x", "0")), frame and frame.width)
+            y = length(said.get("y", use.get("y", "0")), frame and frame.height)
+        except ValueError:
+            raise self._invalid(use, "has a <use> whose x or y is no length; correct it") from None
+        return svgelements.Matrix.translate(x, y) * context.matrix
+
+    def _viewport(
+        self,
+        element: ElementTree.Element,
+        context: _Context,
+        size: tuple[str | None, str | None],
+    ) -> _Context | None:
+        """Return the context within an ``svg`` or a used ``symbol``; None if it shows nothing."""
+        shown = view_box(element)
+        if shown is not None and not (shown.width and shown.height):
+            return None
+        if element is self._root:
+            return self._first_viewport(element, context, shown)
+        said, frame = context.look.geometry, context.frame
+        frame = frame or shown and Frame(0.0, 0.0, shown.width, shown.height)
+        try:
+            x, y, width, height = (
+                None
+                if frame is None and text.endswith("%")
+                else length(text, frame and (frame.width if name in "x width" else frame.height))
+                for name, text in (
+                    ("x", said.get("x", element.get("x", "0"))),
+                    ("y", said.get("y", element.get("y", "0"))),
+                    ("width", size[0] or said.get("width", element.get("width", "100%"))),
+                    ("height", size[1] or said.get("height", element.get("height", "100%"))),
+                )
+            )
+        except ValueError:
+            raise self._invalid(
+                element,
+                f"({named_element(element)}) has a place or size that is no length; correct it",
+            ) from None
+        into = None
+        if width is not None and height is not None:
+            if width <= 0.0 or height <= 0.0:
+                return None
+            into = Frame(x or 0.0, y or 0.0, width, height)
+        if into is not None and not context.look.overflow:
+            box = _boxed(into, context.matrix)
+            context = replace(context, clip=_both(context.clip, box))
+        if shown is not None and into is not None:
+            matrix = fitted(shown, into, element.get("preserveAspectRatio", ""))
+            return replace(context, matrix=matrix * context.matrix, frame=shown)
+        matrix = svgelements.Matrix.translate(x or 0.0, y or 0.0) * context.matrix
+        return replace(context, matrix=matrix, frame=into and replace(into, x=0.0, y=0.0))
+
+    def _first_viewport(
+        self, root: ElementTree.Element, context: _Context, shown: Frame | None
+    ) -> _Context | None:
+        """Return the context within the document, in its user units unless it is stretched."""
+        size: Frame | None
+        try:
+            size = Frame(
+                0.0, 0.0, length(root.get("width", ""), None), length(root.get("height", ""), None)
+            )
+        except ValueError:
+            size = None
+        if size is not None and not (size.width > 0.0 and size.height > 0.0):
+            size = None
+        frame = shown or size
+        if frame is None:
+            return context
+        if shown and size and root.get("preserveAspectRatio", "").strip() == "none":
+            stretch = (size.height / shown.height) / (size.width / shown.width)
+            context = replace(
+                context, matrix=svgelements.Matrix.scale(1.0, stretch) * context.matrix
+            )
+        self.page = _boxed(frame, context.matrix)
+        return replace(context, frame=frame)
+
+    def _clip(self, name: str, context: _Context) -> Box | None:
+        """Return a box around what a clip lets through, or None where that is not known."""
+        clip = self._named.get(name)
+        if clip is None or tag_of(clip) != "clipPath":
+            return None
+        if clip.get("clipPathUnits") == "objectBoundingBox" or any(
+            tag_of(child) in ("use", "text") for child in clip
+        ):
+            return None
+        self._visit(len(clip))
+        matrix = self._placed(clip, self._styles.look(clip, INITIAL), context)
+        subpaths = []
+        for child in clip:
+            if tag_of(child) in SHAPES:
+                look = self._styles.look(child, INITIAL)
+                inner = replace(context, matrix=matrix)
+                placed = self._placed(child, look, inner)
+                line = self._lines[child]
+                subpaths += subpaths_of(child, look.geometry, context.frame, placed, "", line)
+        return _box(subpaths)
+
+    def _invalid(self, element: ElementTree.Element, problem: str) -> InvalidInputError:
+        where = f"({named_element(element)} on line {self._lines[element]} of the file)"
+        return invalid("", f"{where} {problem}")
 
 
-def _reference(use: ElementTree.Element) -> str:
-    href = next((use.get(name, "") for name in _HREFS if name in use.attrib), "")
-    return href[1:] if href.startswith("#") else ""
+def _is_whole(element: ElementTree.Element) -> bool:
+    """Whether a rectangle is as large as a page of which nothing says how large it is."""
+    return tag_of(element) == "rect" and element.get("width") == element.get("height") == "100%"
 
 
-def _transform(element: ElementTree.Element) -> Any:
-    text = element.get("transform", "")
-    try:
-        return svgelements.Matrix(text)
-    except (ValueError, IndexError, TypeError):
-        raise _invalid(
-            "", f"has a transform that cannot be read: {text[:40]!r}; correct it"
-        ) from None
-
-
-def _offset(use: ElementTree.Element) -> Any:
-    try:
-        return svgelements.Matrix.translate(_length(use.get("x", "0")), _length(use.get("y", "0")))
-    except ValueError:
-        raise _invalid("", "has a <use> whose x or y is no length; correct it") from None
+def _for_us(element: ElementTree.Element) -> bool:
+    """Whether the conditions hold under which an element is shown."""
+    languages = element.get("systemLanguage")
+    english = languages is None or any(
+        each.strip().lower().startswith("en") for each in languages.split(",")
+    )
+    return english and "requiredExtensions" not in element.attrib
 
 
 def _label(element: ElementTree.Element) -> str:
     own = element.get("id", "")
-    return _given_label(element) or ("" if _TOOLS_ID.fullmatch(own) else own.strip())
+    return _given_label(element) or ("" if _TOOLS_ID.fullmatch(own) else _spaced(own))
 
 
 def _groups_label(element: ElementTree.Element) -> str:
     """Return what the shapes of a group are called: nothing, if it is a layer or the drawing."""
-    if _tag(element) == "svg" or element.get(f"{_INKSCAPE}groupmode") == "layer":
+    if tag_of(element) == "svg" or element.get(f"{_INKSCAPE}groupmode") == "layer":
         return ""
     return _given_label(element)
 
 
 def _given_label(element: ElementTree.Element) -> str:
-    title = next((child.text for child in element if _tag(child) == "title"), None)
-    names = (title, element.get("aria-label"), element.get(f"{_INKSCAPE}label"))
-    return next((name.strip() for name in names if name and name.strip()), "")
+    titles = ("".join(child.itertext()) for child in element if tag_of(child) == "title")
+    names = (next(titles, ""), *(element.get(name, "") for name in _NAMES))
+    return next((name for name in map(_spaced, names) if name), "")
 
 
-def _subpaths(element: ElementTree.Element, matrix: Any, field: str) -> list[list[FloatArray]]:
-    """Return a shape's subpaths, each as its curves' control points, (2…4, 2) a curve."""
-    try:
-        segments = _segments(element, matrix)
-        curves = [np.array([p for p in part if p is not None], np.float64) for part in segments]
-    except (ValueError, TypeError, IndexError, ArithmeticError, AttributeError):
-        raise _unreadable(element, field, "a geometry that cannot be read") from None
-    if element.get("d", "").strip() and not segments:
-        raise _unreadable(element, field, "path data that cannot be read")
-    subpaths: list[list[FloatArray]] = []
-    ended = True
-    for segment, controls in zip(segments, curves, strict=True):
-        if not (np.abs(controls) < _LARGEST).all():
-            raise _unreadable(element, field, "a coordinate that is no usable number")
-        if isinstance(segment, svgelements.Move):
-            ended = True
-            continue
-        if ended:
-            subpaths.append([])
-        ended = isinstance(segment, svgelements.Close)
-        subpaths[-1].append(controls)
-    return subpaths
+def _spaced(text: str) -> str:
+    """Return text with its white space as a browser shows it."""
+    return " ".join(text.split())
 
 
-def _segments(element: ElementTree.Element, matrix: Any) -> list[Any]:
-    """Return a shape's moves, lines and Bézier curves in the drawing's coordinates."""
-    path = svgelements.Path(_SHAPES[_tag(element)](_geometry(element))) * matrix
-    return [
-        part
-        for segment in path.reify()
-        for part in (
-            segment.as_cubic_curves() if isinstance(segment, svgelements.Arc) else (segment,)
-        )
-    ]
+def _box(subpaths: list[Subpath]) -> Box:
+    if not subpaths:
+        return (0.0, 0.0, -1.0, -1.0)
+    points = np.concatenate([curve for subpath in subpaths for curve in subpath])
+    x0, y0 = points.min(axis=0).tolist()
+    x1, y1 = points.max(axis=0).tolist()
+    return (x0, y0, x1, y1)
 
 
-def _geometry(element: ElementTree.Element) -> dict[str, Any]:
-    """Return the attributes that say where a shape is; what has no extent is not drawn."""
-    geometry: dict[str, Any] = dict.fromkeys(_EXTENT.get(_tag(element), ()), 0.0)
-    for name, text in element.items():
-        if name in _LENGTHS:
-            geometry[name] = _length(text)
-        elif name in _LISTS:
-            geometry[name] = text
-    return geometry
+def _boxed(frame: Frame, matrix: Any) -> Box:
+    """Return the box around a viewport, in the drawing's coordinates."""
+    right, low = frame.x + frame.width, frame.y + frame.height
+    corners = [(frame.x, frame.y), (right, frame.y), (right, low), (frame.x, low)]
+    x, y = zip(*(matrix.point_in_matrix_space(corner) for corner in corners), strict=True)
+    return (min(x), min(y), max(x), max(y))
 
 
-def _length(text: str) -> float:
-    """Return a length in user units; relative ones have none here."""
-    match = _LENGTH.fullmatch(text)
-    if match is None:
-        raise ValueError(text)
-    return float(match[1]) * _UNITS[match[2].lower()]
+def _both(first: Box | None, second: Box | None) -> Box | None:
+    if first is None or second is None:
+        return first or second
+    low = tuple(max(a, b) for a, b in zip(first[:2], second[:2], strict=True))
+    high = tuple(min(a, b) for a, b in zip(first[2:], second[2:], strict=True))
+    return (low[0], low[1], high[0], high[1])
 
 
-def _size(curves: list[FloatArray]) -> float:
-    return float(np.ptp(np.concatenate(curves), axis=0).max())
+def _meet(box: Box, other: Box | None) -> bool:
+    """Whether two boxes have a point in common; nothing is outside of an unknown one."""
+    return other is None or (
+        box[0] <= other[2] and other[0] <= box[2] and box[1] <= other[3] and other[1] <= box[3]
+    )
 
 
-def _flattened(curves: list[FloatArray], tolerance: float) -> FloatArray:
-    """Return points along curves that follow each other, shape (k, 2)."""
-    points = [curves[0][:1]]
-    points += [_samples(controls, tolerance)[1:] for controls in curves]
-    return np.concatenate(points)
+def _covers(box: Box, other: Box, margin: float = 0.0) -> bool:
+    """Whether a box covers another but for a share of its size at each side."""
+    across, down = margin * (other[2] - other[0]), margin * (other[3] - other[1])
+    return (
+        box[0] <= other[0] + across
+        and box[1] <= other[1] + down
+        and box[2] >= other[2] - across
+        and box[3] >= other[3] - down
+    )
 
 
-def _samples(controls: FloatArray, tolerance: float) -> FloatArray:
-    """Return points along a Bézier curve, no farther from it than the tolerance."""
-    steps = _steps(controls, tolerance)
-    if steps == 1:
-        return controls[[0, -1]]
-    t = np.linspace(0.0, 1.0, steps + 1)[:, None, None]
-    level = np.broadcast_to(controls, (steps + 1, *controls.shape))
-    while level.shape[1] > 1:
-        level = (1.0 - t) * level[:, :-1] + t * level[:, 1:]
-    return level[:, 0]
+def _without_paper(
+    shapes: list[_Shape], page: Box | None, background: Colour
+) -> tuple[list[_Shape], list[_Shape]]:
+    """Return the shapes that are not the paper, and paper that may have been meant as something.
 
-
-def _steps(controls: FloatArray, tolerance: float) -> int:
-    """Return into how many chords of equal steps a Bézier curve is cut.
-
-    A curve of degree d leaves the chords of n equal steps by at most d(d−1)/8n² times the
-    largest second difference of its control points.
+    Paper is a filled rectangle without a line that covers the page, or that all else lies on.
+    What has the paper's colour and no line is not seen on it.
     """
-    degree = len(controls) - 1
-    if degree < 2 or tolerance <= 0.0:
-        return 1
-    bend = float(np.hypot(*np.diff(controls, 2, axis=0).T).max())
-    return max(1, math.ceil(math.sqrt(degree * (degree - 1) / 8.0 * bend / tolerance)))
+    kept: list[_Shape] = []
+    ground = []
+    for k, shape in enumerate(shapes):
+        sheet = shape.bare and _rectangular(shape)
+        if sheet and page is not None and _covers(shape.box, page, _MARGIN):
+            background = shape.fill or ()
+        elif sheet and not kept and _lies_under(shape, shapes[k + 1 :]):
+            background = shape.fill or ()
+            ground = [shape]
+        elif not _vanishes(shape, background, kept):
+            kept.append(shape)
+    return kept, ground
 
 
-def _unreadable(element: ElementTree.Element, field: str, problem: str) -> InvalidInputError:
-    own = " ".join(element.get("id", "").split())[:_LONGEST_CAUSE]
-    name = f' id="{own}"' if own else ""
-    return _invalid(field, f"(<{_tag(element)}{name}>) has {problem}; draw it again")
+def _vanishes(shape: _Shape, background: Colour, below: list[_Shape]) -> bool:
+    """Whether a filling without a line is not seen, as all that is around it has its colour."""
+    return (
+        shape.bare
+        and shape.fill == background != ()
+        and any(_enclosed(_ends(subpath)) > 0.0 for subpath in shape.subpaths)
+        and not any(other.filled and _meet(shape.box, other.box) for other in below)
+    )
 
 
-def _invalid(field: str, problem: str) -> InvalidInputError:
-    return InvalidInputError(Reason.INVALID_FILE, field, problem)
+def _lies_under(shape: _Shape, others: list[_Shape]) -> bool:
+    return len(others) >= _FEW and all(_covers(shape.box, other.box) for other in others)
+
+
+def _rectangular(shape: _Shape) -> bool:
+    """Whether a shape fills its box, but for rounded corners."""
+    if len(shape.subpaths) != 1:
+        return False
+    x0, y0, x1, y1 = shape.box
+    return _enclosed(_ends(shape.subpaths[0])) >= (1.0 - _ROUNDED) * (x1 - x0) * (y1 - y0)
+
+
+def _ends(subpath: Subpath) -> FloatArray:
+    return np.array([curve[0] for curve in subpath] + [subpath[-1][-1]])
+
+
+def _enclosed(points: FloatArray) -> float:
+    x, y = (points - points[0]).T
+    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+
+
+def _without_twins(shapes: list[_Shape]) -> list[_Shape]:
+    """Leave out fillings whose line follows, or went before, as a shape of its own."""
+    kept: list[_Shape] = []
+    for shape in shapes:
+        last = kept[-1] if kept else None
+        if last is not None and last.bare != shape.bare and _same(last, shape):
+            line, other = (shape, last) if last.bare else (last, shape)
+            kept[-1] = replace(line, label=line.label or other.label, fill=other.fill)
+        else:
+            kept.append(shape)
+    return kept
+
+
+def _same(first: _Shape, second: _Shape) -> bool:
+    if first.box != second.box or len(first.subpaths) != len(second.subpaths):
+        return False
+    return all(
+        len(a) == len(b) and all(map(np.array_equal, a, b))
+        for a, b in zip(first.subpaths, second.subpaths, strict=True)
+    )
+
+
+def _lines(shape: _Shape, tolerance: float) -> list[FloatArray]:
+    """Return the lines that a shape is drawn with, points of shape (k, 2) each."""
+    lines = [flattened(subpath, tolerance) for subpath in shape.subpaths]
+    if not shape.filled:
+        return lines
+    x0, y0, x1, y1 = shape.box
+    flat = _FLAT * max(x1 - x0, y1 - y0) ** 2
+    bounding = [k for k, line in enumerate(lines) if _enclosed(line) > flat]
+    for k in bounding:
+        if (lines[k][0] != lines[k][-1]).any():
+            lines[k] = np.concatenate([lines[k], lines[k][:1]])
+    if not (shape.bare or shape.pen):
+        return lines
+    corners = [len(shape.subpaths[k]) if shape.pen else 0 for k in bounding]
+    drawn = pen_lines([lines[k] for k in bounding], corners, shape.evenodd)
+    found = dict(zip(bounding, drawn, strict=True))
+    inked = (found.get(k, line) for k, line in enumerate(lines))
+    return [line for line in inked if line is not None]

@@ -67,9 +67,19 @@ class Stroke:
 
 @dataclass(frozen=True, eq=False)
 class StrokeSet:
-    """The strokes of a sketch in the order they were drawn."""
+    """The strokes of a sketch in the order they were drawn.
+
+    Attributes
+    ----------
+    strokes
+        The strokes.
+    notes
+        What whoever read the sketch's file had to decide, each one sentence for people: segmenters
+        hand them on among their warnings.
+    """
 
     strokes: tuple[Stroke, ...]
+    notes: tuple[str, ...] = ()
 
     field = "stroke_set"
 

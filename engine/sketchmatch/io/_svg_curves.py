@@ -1,0 +1,167 @@
+"""The geometry of SVG shapes: Bézier curves in the drawing's coordinates, and points along them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import svgelements
+
+from sketchmatch.errors import InvalidInputError
+from sketchmatch.io._svg_frame import Frame, length
+from sketchmatch.io._svg_tree import invalid, named_element, tag_of
+from sketchmatch.model import FloatArray
+
+__all__ = ["SHAPES", "TOLERANCE", "Subpath", "flattened", "size_of", "steps_of", "subpaths_of"]
+
+Subpath = list[FloatArray]
+"""Curves that follow each other, each as its control points, shape (2…4, 2)."""
+
+SHAPES = {
+    "path": svgelements.Path,
+    "line": svgelements.SimpleLine,
+    "polyline": svgelements.Polyline,
+    "polygon": svgelements.Polygon,
+    "rect": svgelements.Rect,
+    "circle": svgelements.Circle,
+    "ellipse": svgelements.Ellipse,
+}
+TOLERANCE = 1e-3
+"""Largest distance between a curve and its stroke, as a share of the drawing's larger side."""
+# Beyond this, coordinates are a broken file's, and their squares would soon overflow.
+_LARGEST = 1e15
+
+_EXTENT = {"rect": ("width", "height"), "circle": ("r",), "ellipse": ("rx", "ry")}
+_ACROSS = {"x", "x1", "x2", "width", "cx", "rx"}
+_DOWN = {"y", "y1", "y2", "height", "cy", "ry"}
+_LISTS = {"d", "points"}
+_CSS_PATH = re.compile(r"""path\(\s*(?:(?:nonzero|evenodd)\s*,\s*)?(["'])(.*)\1\s*\)""", re.DOTALL)
+
+
+def subpaths_of(
+    element: ElementTree.Element,
+    said: Mapping[str, str],
+    frame: Frame | None,
+    matrix: Any,
+    field: str,
+    line: int,
+) -> list[Subpath]:
+    """Return the subpaths of a shape.
+
+    Parameters
+    ----------
+    element
+        The shape.
+    said
+        What CSS says of its geometry, by property.
+    frame
+        The viewport that percentages are shares of.
+    matrix
+        From the shape's coordinates to the drawing's.
+    field, line
+        Where it is in the document.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be read.
+    """
+    try:
+        geometry = _geometry(element, said, frame)
+        path = svgelements.Path(SHAPES[tag_of(element)](geometry)) * matrix
+        segments = [
+            part
+            for segment in path.reify()
+            for part in (
+                segment.as_cubic_curves() if isinstance(segment, svgelements.Arc) else (segment,)
+            )
+        ]
+        curves = [np.array([p for p in part if p is not None], np.float64) for part in segments]
+    except (ValueError, TypeError, IndexError, ArithmeticError, AttributeError):
+        raise _unreadable(element, field, "a geometry that cannot be read", line) from None
+    if str(geometry.get("d", "")).strip() and not segments:
+        raise _unreadable(element, field, "path data that cannot be read", line)
+    subpaths: list[Subpath] = []
+    ended = True
+    for segment, controls in zip(segments, curves, strict=True):
+        if not (np.abs(controls) < _LARGEST).all():
+            raise _unreadable(element, field, "a coordinate that is no usable number", line)
+        if isinstance(segment, svgelements.Move):
+            ended = True
+            continue
+        if ended:
+            subpaths.append([])
+        ended = isinstance(segment, svgelements.Close)
+        subpaths[-1].append(controls)
+    return subpaths
+
+
+def _geometry(
+    element: ElementTree.Element, said: Mapping[str, str], frame: Frame | None
+) -> dict[str, Any]:
+    """Return what says where a shape is; what has no extent is not drawn."""
+    geometry: dict[str, Any] = dict.fromkeys(_EXTENT.get(tag_of(element), ()), 0.0)
+    for name, text in (*element.items(), *said.items()):
+        if name in _LISTS:
+            path = _CSS_PATH.fullmatch(text) if name in said else None
+            geometry[name] = path[2] if path else text
+        elif text.strip() == "auto":
+            geometry.pop(name, None)
+        elif name in _ACROSS:
+            geometry[name] = length(text, frame and frame.width)
+        elif name in _DOWN:
+            geometry[name] = length(text, frame and frame.height)
+        elif name == "r":
+            across = frame and math.hypot(frame.width, frame.height) / math.sqrt(2.0)
+            geometry[name] = length(text, across)
+    return geometry
+
+
+def size_of(curves: list[FloatArray]) -> float:
+    """Return the larger side of a box around curves."""
+    return float(np.ptp(np.concatenate(curves), axis=0).max())
+
+
+def flattened(curves: Subpath, tolerance: float) -> FloatArray:
+    """Return points along curves that follow each other, shape (k, 2)."""
+    points = [curves[0][:1]]
+    points += [_samples(controls, tolerance)[1:] for controls in curves]
+    return np.concatenate(points)
+
+
+def _samples(controls: FloatArray, tolerance: float) -> FloatArray:
+    """Return points along a Bézier curve, no farther from it than the tolerance."""
+    steps = steps_of(controls, tolerance)
+    if steps == 1:
+        return controls[[0, -1]]
+    t = np.linspace(0.0, 1.0, steps + 1)[:, None, None]
+    level = np.broadcast_to(controls, (steps + 1, *controls.shape))
+    while level.shape[1] > 1:
+        level = (1.0 - t) * level[:, :-1] + t * level[:, 1:]
+    return level[:, 0]
+
+
+def steps_of(controls: FloatArray, tolerance: float) -> int:
+    """Return into how many chords of equal steps a Bézier curve is cut.
+
+    A curve of degree d leaves the chords of n equal steps by at most d(d−1)/8n² times the
+    largest second difference of its control points.
+    """
+    degree = len(controls) - 1
+    if degree < 2 or tolerance <= 0.0:
+        return 1
+    bend = float(np.hypot(*np.diff(controls, 2, axis=0).T).max())
+    return max(1, math.ceil(math.sqrt(degree * (degree - 1) / 8.0 * bend / tolerance)))
+
+
+def _unreadable(
+    element: ElementTree.Element, field: str, problem: str, line: int
+) -> InvalidInputError:
+    return invalid(
+        field,
+        f"({named_element(element)}) has {problem}, on line {line} of the file; draw it again",
+    )

@@ -1,0 +1,183 @@
+"""Pen strokes out of what tools export in their place: the outline of their ink, filled.
+
+Excalidraw, tldraw and note-taking apps save what a pen drew as a thin ribbon with its two sides,
+vector editors do so on *Stroke to Path*, and tracing a scan gives nothing else. The line that was
+drawn lies in the middle of the ribbon.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+
+from sketchmatch.model import FloatArray
+
+__all__ = ["pen_lines"]
+
+# A ribbon is at most this wide, as a share of its length: a line that ends near its beginning, as
+# around an object, and one that leads elsewhere, which a bar could be.
+_WIDEST_LOOP, _WIDEST_LINE = 1 / 8, 1 / 20
+# … and a line has this many corners or curves at least: with fewer it is a shape that was drawn.
+_CORNERS = 16
+# Ends that are this share of its size apart make a loop.
+_GAP = 0.25
+# Of the places along a ribbon this share is no wider than this many times its mean.
+_MOST, _FAR = 0.9, 3.0
+# A ring of ink is a line around something if its width is at most this share of its extent.
+_WIDEST_RING = 0.2
+# Where ends are looked for first, places compared for that, and how often the search is refined.
+_STARTS, _PLACES, _ROUNDS = 96, 24, 8
+_FEWEST, _MOST_POINTS = 48, 1000
+# Rings of one shape that are put into each other; of more, each is an outline of its own.
+_MOST_RINGS = 2000
+
+
+def pen_lines(
+    rings: list[FloatArray], corners: list[int], evenodd: bool
+) -> list[FloatArray | None]:
+    """Return what was drawn of what the subpaths of one filled shape enclose.
+
+    Parameters
+    ----------
+    rings
+        The subpaths, each closed, shape (k, 2), first point repeated.
+    corners
+        Of how many curves and lines each is made.
+    evenodd
+        Whether the fill rule is that, not ``nonzero``.
+
+    Returns
+    -------
+    list of ndarray or None
+        For each ribbon the line in its middle, for all else its outline; None for holes.
+    """
+    lines: list[FloatArray | None] = [
+        _middle(ring, count) for ring, count in zip(rings, corners, strict=True)
+    ]
+    others = [k for k, line in enumerate(lines) if line is None]
+    for k, outline in zip(others, _outlines([rings[k] for k in others], evenodd), strict=True):
+        lines[k] = outline
+    return lines
+
+
+def _middle(ring: FloatArray, corners: int) -> FloatArray | None:
+    """Return the line in the middle of a ribbon from end to end, or None if it is no ribbon."""
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ring, axis=0).T))])
+    half, area = way[-1] / 2.0, abs(_area(ring))
+    if not 0.0 < 4.0 * area < half**2:
+        return None
+    width = (half - math.sqrt(half**2 - 4.0 * area)) / 2.0
+    long = half - width
+    if width > _WIDEST_LOOP * long:
+        return None
+    sides = _sides(ring, way)
+    if (np.hypot(*(sides[0] - sides[1]).T) < _FAR * width).mean() < _MOST:
+        return None
+    middle = (sides[0] + sides[1]) / 2.0
+    size = float(np.ptp(middle, axis=0).max())
+    if math.dist(middle[0], middle[-1]) <= _GAP * size:
+        enclosed = abs(_area(np.concatenate([middle, middle[:1]])))
+        if enclosed > area:
+            return middle
+    return middle if width <= _WIDEST_LINE * long and corners >= _CORNERS else None
+
+
+def _sides(ring: FloatArray, way: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return points opposite each other on the two sides of a ribbon, each of shape (k, 2).
+
+    Its ends are where the two sides between them, walked at paces such that both take as long,
+    stay nearest to each other.
+    """
+    first, second = np.meshgrid(np.arange(_STARTS), np.arange(_STARTS), indexing="ij")
+    apart = second - first
+    able = (apart >= _STARTS // 4) & (apart <= 3 * _STARTS // 4)
+    starts, ends = first[able] / _STARTS, second[able] / _STARTS
+    step = 0.5 / _STARTS
+    for _ in range(_ROUNDS):
+        best = int(np.argmin(_distances(ring, way, starts, ends)))
+        near = step * np.arange(-2, 3)
+        starts, ends = (starts[best] + near)[:, None], (ends[best] + near)[None, :]
+        starts, ends = (each.ravel() for each in np.broadcast_arrays(starts, ends))
+        step /= 2.0
+    best = int(np.argmin(_distances(ring, way, starts, ends)))
+    count = min(max(_FEWEST, len(ring) // 2), _MOST_POINTS)
+    share = np.linspace(0.0, 1.0, count)
+    there = starts[best] + share * (ends[best] - starts[best])
+    back = starts[best] - share * (1.0 - ends[best] + starts[best])
+    return _at(ring, way, there), _at(ring, way, back)
+
+
+def _distances(
+    ring: FloatArray, way: FloatArray, starts: FloatArray, ends: FloatArray
+) -> FloatArray:
+    """Return the mean distance of the two sides between starts and ends."""
+    share = (np.arange(_PLACES) + 0.5) / _PLACES
+    there = starts[:, None] + share * (ends - starts)[:, None]
+    back = starts[:, None] - share * (1.0 - ends + starts)[:, None]
+    gaps = _at(ring, way, there) - _at(ring, way, back)
+    return np.asarray(np.hypot(gaps[..., 0], gaps[..., 1]).mean(axis=1))
+
+
+def _at(ring: FloatArray, way: FloatArray, shares: FloatArray) -> FloatArray:
+    """Return the points at shares of the way around, shape (…, 2)."""
+    along = (shares % 1.0) * way[-1]
+    x, y = ring.T
+    return np.stack([np.interp(along, way, x), np.interp(along, way, y)], axis=-1)
+
+
+def _area(ring: FloatArray) -> float:
+    """Return the area in a closed line, counter-clockwise positive; what it goes twice twice."""
+    x, y = (ring - ring[0]).T
+    return 0.5 * float(x[:-1] @ y[1:] - x[1:] @ y[:-1])
+
+
+def _outlines(rings: list[FloatArray], evenodd: bool) -> list[FloatArray | None]:
+    """Return for each ring the outline of the ink that it bounds from outside, or None."""
+    if len(rings) < 2 or len(rings) > _MOST_RINGS:
+        return list(rings)
+    areas = [_area(ring) for ring in rings]
+    order = sorted(range(len(rings)), key=lambda k: -abs(areas[k]))
+    polygons = [shapely.Polygon(ring) if len(ring) > 3 else shapely.Polygon() for ring in rings]
+    inner, outer = shapely.STRtree(polygons).query(
+        shapely.points([ring[0] for ring in rings]), predicate="within"
+    )
+    around: dict[int, list[int]] = {k: [] for k in order}
+    rank = {k: r for r, k in enumerate(order)}
+    for k, j in zip(inner.tolist(), outer.tolist(), strict=True):
+        if rank[j] < rank[k]:
+            around[k].append(j)
+    winding: dict[int, int] = {}
+    holes: dict[int, list[int]] = {k: [] for k in order}
+    outlines: list[FloatArray | None] = [None] * len(rings)
+    for k in order:
+        parent = max(around[k], key=lambda j: rank[j], default=None)
+        outside = winding[parent] if parent is not None else 0
+        winding[k] = outside + (1 if evenodd or areas[k] >= 0.0 else -1)
+        inked, was_inked = (n % 2 != 0 if evenodd else n != 0 for n in (winding[k], outside))
+        if inked and not was_inked:
+            outlines[k] = rings[k]
+        elif was_inked and not inked and parent is not None:
+            holes[parent].append(k)
+    for k, inside in holes.items():
+        if inside and outlines[k] is not None:
+            outlines[k] = _around(polygons[k], [polygons[j] for j in inside], rings[k])
+    return outlines
+
+
+def _around(
+    outer: shapely.Polygon, holes: list[shapely.Polygon], otherwise: FloatArray
+) -> FloatArray:
+    """Return the line in the middle of a ring of ink; of a shape with holes its outline."""
+    area = outer.area - sum(hole.area for hole in holes)
+    width = 2.0 * area / (outer.length + sum(hole.length for hole in holes))
+    x0, y0, x1, y1 = outer.bounds
+    if not 0.0 < width <= _WIDEST_RING * min(x1 - x0, y1 - y0):
+        return otherwise
+    # Ends of the line that stick out are as thin as it is, and vanish.
+    middle = shapely.buffer(shapely.buffer(outer, -0.75 * width), 0.25 * width)
+    parts = sorted(shapely.get_parts(middle), key=lambda part: -part.area)
+    if not parts or parts[0].is_empty:
+        return otherwise
+    return shapely.get_coordinates(parts[0].exterior)

@@ -1,0 +1,384 @@
+"""How style sheets and attributes say that an element of an SVG drawing is shown.
+
+The cascade is that of CSS: presentation attributes, then rules of ``<style>`` elements by their
+specificity, then the ``style`` attribute, and what is ``!important`` above all. Values that are no
+legal ones are ignored, as browsers ignore them. Of media rules those for any screen hold; nothing
+outside the document is ever opened, so ``@import`` has no effect.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+from xml.etree import ElementTree
+
+import cssselect2
+import tinycss2
+from cssselect2 import parser as selector_parser
+from tinycss2 import color5
+
+from sketchmatch.io._svg_frame import absolute_length, css_transform
+from sketchmatch.io._svg_tree import invalid, tag_of
+
+__all__ = ["INITIAL", "Colour", "Look", "Styles"]
+
+Colour = tuple[float, ...]
+"""Red, green and blue; empty where it is visible, but not one colour or an unknown one."""
+
+_SHARES = {"opacity", "fill-opacity", "stroke-opacity"}
+_PAINTS = {"fill", "stroke"}
+_INHERITED = {
+    *_PAINTS,
+    *{"visibility", "color", "fill-rule", "fill-opacity", "stroke-opacity", "stroke-width"},
+}
+_TRANSFORMS = {"transform", "translate", "rotate", "scale", "transform-origin", "transform-box"}
+_GEOMETRY = {"x", "y", "width", "height", "cx", "cy", "r", "rx", "ry", "d"}
+_OWN = {"opacity", "display", "clip-path", "overflow"}
+# What an attribute may say as CSS does. Of transforms and lengths its syntax is another.
+_ATTRIBUTES = {*_INHERITED, *_OWN, "transform-origin", "transform-box"}
+_KNOWN = {*_ATTRIBUTES, *_TRANSFORMS, *_GEOMETRY, "background", "background-color"}
+_WIDE = {"inherit", "initial", "unset", "revert", "revert-layer"}
+_VISIBLE = {"visible": True, "hidden": False, "collapse": False}
+_RULES = {"nonzero": False, "evenodd": True}
+
+_PLAIN = re.compile(r"[^\"'\\/{}!(]*")
+_EMBEDDED = re.compile(r"url\(\s*[\"']?data:[^)]*\)", re.IGNORECASE)
+_URL = re.compile(r"""url\(\s*["']?([^"')]*)["']?\s*\)\s*(.*)""", re.IGNORECASE | re.DOTALL)
+_SCREEN = re.compile(r"\s*((only\s+)?(all|screen))?\s*", re.IGNORECASE)
+_SHARE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(%?)", re.IGNORECASE)
+
+# A style sheet may be this long, and take this many tests of elements.
+_LONGEST, _MOST_TESTS = 2_000_000, 3_000_000
+# Selectors that look at an element's siblings are followed in drawings of this many elements.
+_FEW = 500
+_AROUND = re.compile(r"~(?!=)|:has\(|-of-type|:nth-")
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How an element is shown, as far as a sketch is concerned.
+
+    Attributes
+    ----------
+    visible
+        Whether ``visibility`` shows it.
+    fill, stroke, color
+        Paint as it is written, and what ``currentColor`` stands for.
+    fill_opacity, stroke_opacity, stroke_width
+        As shares and in user units.
+    fill_rule
+        Whether it is ``evenodd``.
+    displayed
+        Whether anything of it is shown, that is neither ``display`` nor ``opacity`` hides it.
+    clip_path
+        Identity of what it is clipped by, or empty.
+    overflow
+        Whether what lies outside of its viewport is shown.
+    transforms, geometry
+        What CSS says of where it is, by property.
+    """
+
+    visible: bool = True
+    fill: str = "black"
+    stroke: str = "none"
+    color: str = "black"
+    fill_opacity: float = 1.0
+    stroke_opacity: float = 1.0
+    stroke_width: float = 1.0
+    fill_rule: bool = False
+    displayed: bool = True
+    clip_path: str = ""
+    overflow: bool = False
+    transforms: Mapping[str, str] = field(default_factory=dict)
+    geometry: Mapping[str, str] = field(default_factory=dict)
+
+
+INITIAL = Look()
+
+
+class Styles:
+    """The style sheets of a document.
+
+    Raises
+    ------
+    InvalidInputError
+        If they are too long, or too costly to follow.
+    """
+
+    def __init__(self, root: ElementTree.Element, named: Mapping[str, ElementTree.Element]) -> None:
+        self._named = named
+        self._matcher = cssselect2.Matcher()
+        self._wrapped: dict[ElementTree.Element, cssselect2.ElementWrapper] = {}
+        sheets = [
+            "".join(element.itertext())
+            for element in root.iter()
+            if tag_of(element) == "style"
+            and element.get("type", "").strip().lower() in ("", "text/css")
+            and _SCREEN.fullmatch(element.get("media", ""))
+        ]
+        text = _EMBEDDED.sub("url()", "\n".join(sheets))
+        if len(text) > _LONGEST:
+            raise _costly("is longer than 2 million characters")
+        try:
+            rules = [
+                (rule.prelude, declared)
+                for rule in _rules(tinycss2.parse_stylesheet(text, True, True))
+                if (declared := [*_of_interest(rule.content)])
+            ]
+            if rules:
+                self._add(root, rules)
+        except (RecursionError, MemoryError, SyntaxError):
+            raise _costly("is nested too deeply") from None
+
+    def _add(self, root: ElementTree.Element, rules: list[tuple[Any, list[_Said]]]) -> None:
+        elements, names, depth = _counted(root)
+        tests = 0
+        for prelude, declared in rules:
+            if elements > _FEW and _AROUND.search(tinycss2.serialize(prelude)):
+                raise _costly("selects elements by their siblings, and the drawing is large")
+            try:
+                compiled = cssselect2.compile_selector_list(prelude)
+                trees = [each.parsed_tree for each in selector_parser.parse(prelude)]
+            except (cssselect2.SelectorError, NotImplementedError):
+                continue  # a browser drops it, too
+            for selector, tree in zip(compiled, trees, strict=True):
+                tests += _cost(tree, depth) * _candidates(selector, elements, names)
+                if tests > _MOST_TESTS:
+                    raise _costly("has too many rules for so large a drawing")
+                if selector.pseudo_element is None:
+                    self._matcher.add_selector(selector, declared)
+        wrapper = cssselect2.ElementWrapper.from_xml_root(root)
+        self._wrapped = {each.etree_element: each for each in wrapper.iter_subtree()}
+
+    def look(self, element: ElementTree.Element, parent: Look) -> Look:
+        """Return how an element is shown whose parent, or ``use``, is shown as told."""
+        values = self._declared(element)
+        changes: dict[str, Any] = {}
+        for name in _INHERITED & values.keys():
+            text = values[name].lower()
+            if text not in _WIDE:
+                changes[name.replace("-", "_")] = _VALUES[name](values[name])
+            elif text == "initial":
+                attribute = _attribute(name)
+                changes[attribute] = getattr(INITIAL, attribute)
+        if "visibility" in changes:
+            changes["visible"] = changes.pop("visibility")
+        if changes.get("color", "").lower() == "currentcolor":
+            del changes["color"]
+        own = {name: text for name, text in values.items() if text.lower() not in _WIDE}
+        return replace(
+            parent,
+            **changes,
+            displayed=own.get("display", "").lower() != "none" and _share(own.get("opacity")) > 0.0,
+            clip_path=_target(own.get("clip-path", "")),
+            overflow=own.get("overflow", "").lower() in ("visible", "auto"),
+            transforms={name: own[name] for name in _TRANSFORMS & own.keys()},
+            geometry={name: own[name] for name in _GEOMETRY & own.keys()},
+        )
+
+    def background(self, root: ElementTree.Element) -> Colour:
+        """Return the colour of the page, white where none is given."""
+        values = self._declared(root)
+        text = values.get("background-color", values.get("background", ""))
+        return self.paint(text, 1.0, "black") or (1.0, 1.0, 1.0)
+
+    def filled(self, look: Look) -> Colour | None:
+        """Return the colour of what fills a shape, or None."""
+        return self.paint(look.fill, look.fill_opacity, look.color)
+
+    def stroked(self, look: Look) -> Colour | None:
+        """Return the colour of a shape's line, or None."""
+        if look.stroke_width <= 0.0:
+            return None
+        return self.paint(look.stroke, look.stroke_opacity, look.color)
+
+    def paint(self, text: str, opacity: float, color: str) -> Colour | None:
+        """Return the colour that one sees of a paint, or None."""
+        if opacity <= 0.0:
+            return None
+        if match := _URL.match(text):
+            if match[1].strip().removeprefix("#") in self._named:
+                return ()
+            text = match[2] or "none"
+        if text.lower() == "currentcolor":
+            text = color
+        return _colour(text)
+
+    def _declared(self, element: ElementTree.Element) -> dict[str, str]:
+        """Return the legal values that hold for an element, by property."""
+        said: list[_Said] = [
+            (name, text.strip(), False) for name, text in element.items() if name in _ATTRIBUTES
+        ]
+        wrapped = self._wrapped.get(element)
+        if wrapped is not None:
+            for *_, declared in self._matcher.match(wrapped):
+                said += declared
+        said += _inline(element.get("style", ""))
+        values: dict[str, str] = {}
+        for importance in (False, True):
+            for name, text, important in said:
+                if important == importance and _legal(name, text):
+                    values[name] = text
+        return values
+
+
+_Said = tuple[str, str, bool]
+
+
+def _rules(nodes: Iterable[Any]) -> Iterator[Any]:
+    """Yield the style rules that hold on a screen, in their order."""
+    for node in nodes:
+        if node.type == "qualified-rule":
+            yield node
+        elif node.type == "at-rule" and node.content is not None:
+            name, prelude = node.lower_at_keyword, tinycss2.serialize(node.prelude)
+            if name in ("supports", "layer") or (name == "media" and _SCREEN.fullmatch(prelude)):
+                yield from _rules(tinycss2.parse_rule_list(node.content, True, True))
+
+
+def _of_interest(content: Any) -> Iterator[_Said]:
+    for node in tinycss2.parse_blocks_contents(content, True, True):
+        if node.type == "declaration" and node.lower_name in _KNOWN:
+            yield node.lower_name, tinycss2.serialize(node.value).strip(), node.important
+
+
+@lru_cache(maxsize=1024)
+def _inline(style: str) -> tuple[_Said, ...]:
+    """Return what a ``style`` attribute says."""
+    if not _PLAIN.fullmatch(style):
+        return tuple(_of_interest(style))
+    pairs = (item.partition(":") for item in style.split(";"))
+    named = ((name.strip().lower(), text.strip()) for name, _, text in pairs)
+    return tuple((name, text, False) for name, text in named if name in _KNOWN)
+
+
+@lru_cache(maxsize=4096)
+def _legal(name: str, text: str) -> bool:
+    """Whether a browser takes a value; what is no CSS of today it ignores."""
+    if text.lower() in _WIDE:
+        return True
+    try:
+        if name in _VALUES:
+            _VALUES[name](text)
+        elif name in _TRANSFORMS:
+            css_transform({name: text}, None)
+    except (ValueError, KeyError):
+        return False
+    return bool(text)
+
+
+def _paint_text(text: str) -> str:
+    if not text.lower().startswith(("url(", "var(", "context-")) and _colour(text) is None:
+        if text.lower() not in ("none", "transparent", "currentcolor") and not _transparent(text):
+            raise ValueError(text)
+    return text
+
+
+@lru_cache(maxsize=1024)
+def _parsed_colour(text: str) -> Any:
+    return color5.parse_color(text, "light")
+
+
+def _transparent(text: str) -> bool:
+    parsed = _parsed_colour(text)
+    return parsed is not None and parsed != "currentcolor" and parsed.alpha == 0.0
+
+
+def _colour(text: str) -> Colour | None:
+    """Return what a paint shows that is no reference, or None."""
+    parsed = _parsed_colour(text)
+    if parsed is None:
+        # A function that is too new to be known here shows something.
+        return () if text.lower().startswith("context-") or "(" in text else None
+    if parsed == "currentcolor":
+        return ()
+    if parsed.alpha <= 0.0:
+        return None
+    try:
+        seen = parsed.to("srgb")
+    except NotImplementedError:
+        return ()
+    return tuple(round(value or 0.0, 4) for value in seen.coordinates)
+
+
+def _share(text: str | None) -> float:
+    if text is None:
+        return 1.0
+    match = _SHARE.fullmatch(text)
+    if match is None:
+        raise ValueError(text)
+    return float(match[1]) / (100.0 if match[2] else 1.0)
+
+
+def _width(text: str) -> float:
+    return 1.0 if text.endswith("%") else absolute_length(text)
+
+
+_VALUES: dict[str, Any] = {
+    **dict.fromkeys(_PAINTS, _paint_text),
+    **dict.fromkeys(_SHARES, _share),
+    "color": _paint_text,
+    "stroke-width": _width,
+    "visibility": lambda text: _VISIBLE[text.lower()],
+    "fill-rule": lambda text: _RULES[text.lower()],
+}
+
+
+def _attribute(name: str) -> str:
+    return "visible" if name == "visibility" else name.replace("-", "_")
+
+
+def _target(text: str) -> str:
+    match = _URL.match(text)
+    return match[1].strip().removeprefix("#") if match else ""
+
+
+def _counted(root: ElementTree.Element) -> tuple[int, Counter[tuple[str, str]], int]:
+    """Return how many elements there are, in all and of each name, and how deep they nest."""
+    names: Counter[tuple[str, str]] = Counter()
+    count = deepest = 0
+    stack = [(root, 1)]
+    while stack:
+        element, depth = stack.pop()
+        count, deepest = count + 1, max(deepest, depth)
+        names["tag", tag_of(element).lower()] += 1
+        names["id", element.get("id", "")] += 1
+        names.update(("class", name) for name in set(element.get("class", "").split()))
+        stack.extend((child, depth + 1) for child in element)
+    return count, names, deepest
+
+
+def _candidates(selector: Any, elements: int, names: Counter[tuple[str, str]]) -> int:
+    """Return how many elements a selector is tested on."""
+    if selector.id is not None:
+        return names["id", selector.id]
+    if selector.class_name is not None:
+        return names["class", selector.class_name]
+    if selector.local_name is not None:
+        return names["tag", selector.lower_local_name]
+    return elements
+
+
+def _cost(tree: Any, depth: int) -> int:
+    """Return how many simple tests a selector can take on one element."""
+    if isinstance(tree, selector_parser.CombinedSelector):
+        often = depth if tree.combinator == " " else _FEW if tree.combinator == "~" else 1
+        return _cost(tree.right, depth) + often * _cost(tree.left, depth)
+    cost = 0
+    for simple in tree.simple_selectors:
+        inner = getattr(simple, "selector_list", ())
+        # Of :has(), the selectors are relative ones.
+        trees = [getattr(each, "selector", each).parsed_tree for each in inner]
+        relative = isinstance(simple, selector_parser.RelationalSelector)
+        named = getattr(simple, "name", "")
+        around = relative or "nth" in str(named) or "of-type" in str(named)
+        cost += (_FEW if around else 1) * (1 + sum(_cost(each, depth) for each in trees))
+    return max(1, cost)
+
+
+def _costly(problem: str) -> Exception:
+    return invalid("", f"has a style sheet that {problem}; save it as plain SVG without one")
