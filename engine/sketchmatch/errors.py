@@ -87,8 +87,8 @@ class InvalidInputError(SketchmatchError, ValueError):
 
     Examples
     --------
-    >>> str(InvalidInputError(Reason.INVALID_STROKE, "strokes[3]", "has one point; draw a line"))
-    'strokes[3] has one point; draw a line'
+    >>> str(InvalidInputError(Reason.INVALID_STROKE, "strokes[3]", "is missing; give a stroke"))
+    'strokes[3] is missing; give a stroke'
     """
 
     def __init__(self, reason: Reason, field: str, problem: str) -> None:

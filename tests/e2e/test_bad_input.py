@@ -210,22 +210,22 @@ CASES = [
     bad_polygons(
         "one polygon", "TOO_FEW_OBJECTS", "polygons", "holds one", "give at least two", SQUARE
     ),
-    # Strokes of one point, or none.
+    # Strokes of one point, or none, draw nothing.
     bad_strokes(
-        "stroke of one point",
-        "INVALID_STROKE",
-        "strokes[1]",
-        "has one point",
-        "draw an outline there or remove it",
+        "one stroke and a tap",
+        "TOO_FEW_OBJECTS",
+        "strokes",
+        "hold one closed outline (1 stroke was left out",
+        "draw around each object",
         CLOSED,
         [[7, 7]],
     ),
     bad_strokes(
-        "stroke of no point",
-        "INVALID_STROKE",
-        "strokes[1]",
-        "has no point",
-        "draw an outline there or remove it",
+        "one stroke and one of no point",
+        "TOO_FEW_OBJECTS",
+        "strokes",
+        "hold one closed outline, and",
+        "draw around each object",
         CLOSED,
         [],
     ),

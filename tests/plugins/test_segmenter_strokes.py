@@ -107,7 +107,8 @@ def test_an_open_stroke_is_left_out_and_named():
 def test_a_line_there_and_back_is_left_out():
     found = segmented([[0, 0], [5, 0], [0, 0]], circle(1.0), TRIANGLE)
     assert found.warnings == (
-        "strokes[0] was left out: it encloses nothing; draw around the object.",
+        "strokes[0] (14% from the left, 75% from the top) was left out: it encloses nothing; draw "
+        "around the object.",
     )
 
 
@@ -129,19 +130,64 @@ def test_simplify_is_relative_to_the_size():
 @pytest.mark.parametrize(
     ("outline", "field", "words"),
     [
-        (np.empty((0, 2)), "strokes[1]", "has no point; draw an outline there or remove it"),
-        ([[3, 3]], "strokes[1]", "has one point; draw an outline there or remove it"),
-        ([[3, 3], [3, 3]], "strokes[1]", "has no length; draw an outline there or remove it"),
         ([[3, 3], [4, np.nan]], "strokes[1].points[1]", "is not finite; give plain numbers"),
         ([[np.inf, 3], [4, 4]], "strokes[1].points[0]", "is not finite; give plain numbers"),
         ([[3, 3], [4, 4], [5, -1e200]], "strokes[1].points[2]", "is too large; give plain numbers"),
     ],
 )
-def test_a_stroke_without_an_outline_is_named(outline, field, words):
+def test_a_stroke_that_leads_nowhere_is_refused(outline, field, words):
     with pytest.raises(InvalidInputError) as caught:
         segmented(circle(1.0), outline, TRIANGLE)
     assert (caught.value.field, caught.value.problem) == (field, words)
     assert caught.value.reason == Reason.INVALID_STROKE
+
+
+@pytest.mark.parametrize("points", [[[4, -1]], [[4, -1], [4, -1]], [[4, -1]] * 5])
+def test_a_tap_of_the_pen_is_left_out_and_told_by_its_place(points):
+    found = segmented(circle(1.0), points, TRIANGLE)
+    assert [len(found.scene), found.route] == [2, None]
+    # From −1 to 24 and from 3 down to −1.
+    assert found.warnings == (
+        "strokes[1] (20% from the left, 100% from the top) was left out: a dot of the pen, which "
+        "encloses nothing.",
+    )
+
+
+def test_many_taps_share_a_sentence_and_the_strokes_keep_their_numbers():
+    taps = [[[x, 1.0]] for x in range(10)]
+    found = segmented(*taps, np.empty((0, 2)), circle(1.0), [[0, 9], [0.01, 9]], TRIANGLE)
+    empty, dots, flick = found.warnings
+    assert empty == "strokes[10] was left out: it has no point."
+    assert dots.startswith("strokes[0] (4% from the left, 80% from the top), strokes[1] (8% ")
+    assert dots.endswith(" and 3 more were left out: a dot of the pen, which encloses nothing.")
+    assert flick.startswith("strokes[12] (4% from the left, 0% from the top) was left out: far")
+
+
+def test_strokes_of_no_points_share_a_sentence():
+    found = segmented(np.empty((0, 2)), circle(1.0), np.empty((0, 2)), TRIANGLE)
+    assert found.warnings == ("strokes[0] and 1 more were left out: without a point.",)
+
+
+def test_a_tap_that_is_called_a_route_is_none():
+    found = segmented(circle(1.0), Stroke(np.array([[3.0, 3.0]]), label="route"), TRIANGLE)
+    assert found.route is None
+    assert found.warnings == (
+        "strokes[1] (route) was left out: a dot of the pen, which encloses nothing.",
+    )
+
+
+def test_taps_alone_are_too_few():
+    with pytest.raises(InvalidInputError) as caught:
+        segmented([[0, 0]], [[1, 1], [1, 1]])
+    assert caught.value.reason == Reason.TOO_FEW_OBJECTS
+    assert "no closed outline (2 strokes were left out" in caught.value.problem
+
+
+def test_notes_of_whoever_read_the_file_come_first():
+    strokes = (Stroke(circle(1.0)), Stroke(np.array([[3.0, 3.0]])), Stroke(np.array(TRIANGLE)))
+    found = StrokeSegmenter().segment(StrokeSet(strokes, ("The paper was left out.",)))
+    assert found.warnings[0] == "The paper was left out."
+    assert len(found.warnings) == 2
 
 
 def test_too_few_objects_says_how_many_strokes_were_left_out():

@@ -114,7 +114,7 @@ def test_four_sides_with_gaps_and_overshoots_are_one_object_with_its_first_label
 def test_a_stroke_across_an_object_leaves_it_whole():
     found = found_in(SQUARE, [[-2, 2], [6, 2.2]], AWAY)
     assert areas(found) == [16.0, 16.0]
-    assert "strokes[1] was left out" in found.warnings[0]
+    assert found.warnings[0].startswith("strokes[1] (15% from the left, 48% from the top) was left")
 
 
 def test_an_outline_drawn_again_counts_once():
@@ -135,7 +135,8 @@ def test_marks_inside_an_object_and_flicks_are_left_out():
     assert areas(found) == [16.0, 16.0]
     assert found.warnings == (
         "strokes[1] and strokes[2] were left out: inside strokes[0], as marks and labels are.",
-        "strokes[3] and strokes[4] were left out: far smaller than the objects.",
+        "strokes[3] (34% from the left, 21% from the top) and strokes[4] (42% from the left, 1% "
+        "from the top) were left out: far smaller than the objects.",
     )
 
 
@@ -156,7 +157,9 @@ def test_a_route_is_kept_apart():
     )
     never = found_in(SQUARE, AWAY, way, route="never")
     assert never.route is None
-    assert "strokes[2] was left out: its ends" in never.warnings[0]
+    assert "strokes[2] (50% from the left, 10% from the top) was left out: its ends" in (
+        never.warnings[0]
+    )
 
 
 def test_a_labelled_route_may_be_short_and_anywhere():

@@ -48,11 +48,10 @@ def source_of(path: Path, side: str = "") -> Source:
         return sources.image(read_bytes(path))
     match read_source(path):
         case OccupancyGrid(cells, resolution, origin, notes):
-            # Of a bag, whose notes have no room in the message.
-            for note in notes:
-                say(f"{side}: {note}" if side else note)
+            _tell(notes, side)
             return sources.occupancy_grid(cells, resolution, origin)
-        case StrokeSet(strokes):
+        case StrokeSet(strokes, notes):
+            _tell(notes, side)
             return sources.strokes(
                 [_timed(stroke.points, stroke.times) for stroke in strokes],
                 [stroke.label for stroke in strokes],
@@ -64,6 +63,12 @@ def source_of(path: Path, side: str = "") -> Source:
             )
         case Image():
             raise AssertionError("pictures pass as they are")
+
+
+def _tell(notes: tuple[str, ...], side: str) -> None:
+    """Say what has no room in the message: notes of whoever read the file."""
+    for note in notes:
+        say(f"{side}: {note}" if side else note)
 
 
 def _timed(points: Any, times: Any) -> list[Any]:

@@ -218,12 +218,12 @@ class Styles:
             for *_, declared in self._matcher.match(wrapped):
                 said += declared
         said += _inline(element.get("style", ""))
-        values: dict[str, str] = {}
-        for importance in (False, True):
-            for name, text, important in said:
-                if important == importance and _legal(name, text):
-                    values[name] = text
-        return values
+        return {
+            name: text
+            for importance in (False, True)
+            for name, text, important in said
+            if important == importance and _legal(name, text)
+        }
 
 
 _Said = tuple[str, str, bool]
@@ -272,9 +272,9 @@ def _legal(name: str, text: str) -> bool:
 
 
 def _paint_text(text: str) -> str:
-    if not text.lower().startswith(("url(", "var(", "context-")) and _colour(text) is None:
-        if text.lower() not in ("none", "transparent", "currentcolor") and not _transparent(text):
-            raise ValueError(text)
+    known = text.lower() == "none" or text.lower().startswith(("url(", "context-"))
+    if not known and _colour(text) is None and not _transparent(text):
+        raise ValueError(text)
     return text
 
 

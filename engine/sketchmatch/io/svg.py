@@ -402,7 +402,7 @@ class _Drawing:
         if element is self._root:
             return self._first_viewport(element, context, shown)
         said, frame = context.look.geometry, context.frame
-        frame = frame or shown and Frame(0.0, 0.0, shown.width, shown.height)
+        frame = frame or (shown and Frame(0.0, 0.0, shown.width, shown.height))
         try:
             x, y, width, height = (
                 None
@@ -417,8 +417,7 @@ class _Drawing:
             )
         except ValueError:
             raise self._invalid(
-                element,
-                f"({named_element(element)}) has a place or size that is no length; correct it",
+                element, "has a place or size that is no length; correct it"
             ) from None
         into = None
         if width is not None and height is not None:

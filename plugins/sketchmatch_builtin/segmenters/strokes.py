@@ -14,7 +14,7 @@ from sketchmatch.api import InvalidInputError, Params, Reason, Segmentation, Seg
 from sketchmatch.model import FloatArray, Scene, SceneObject, Stroke, StrokeSet
 
 from ._strokes_chains import closed_chains
-from ._strokes_drawing import FLICK, LONGHAND, ROUTE, TANGLED, Drawing, Outline
+from ._strokes_drawing import DOT, FLICK, LONGHAND, ROUTE, TANGLED, Drawing, Outline
 from ._strokes_marks import along_others, hosts, places, repeated, typical_span
 from ._strokes_outline import areas_of, enclosed_by, own_gap, tangled, total_of
 from ._strokes_trace import traced
@@ -125,7 +125,16 @@ class StrokeSegmenter(Segmenter):
     def segment(self, source: StrokeSet) -> Segmentation:
         """Return the closed outlines as objects, in the order in which they were begun."""
         points = [_checked(stroke, f"strokes[{k}]") for k, stroke in enumerate(source.strokes)]
-        drawing = Drawing([traced(each) for each in points], [s.label for s in source.strokes])
+        empty = [k for k, each in enumerate(points) if not len(each)]
+        numbers = [k for k, each in enumerate(points) if len(each)]
+        points = [points[k] for k in numbers]
+        drawing = Drawing(
+            [traced(each) for each in points],
+            [source.strokes[k].label for k in numbers],
+            numbers,
+        )
+        if dots := [k for k, each in enumerate(points) if len(each) == 1]:
+            drawing.explain(dots, DOT)
         route = _labelled_route(drawing) if self.params.route == "auto" else None
         outlines = self._outlines(drawing, route)
         objects = self._objects(drawing, outlines)
@@ -137,7 +146,7 @@ class StrokeSegmenter(Segmenter):
         for k in left:
             if k != route:
                 why = _why_open(points[k])
-                drawing.note(k, f"{drawing.named([k])} was left out: {why}")
+                drawing.note(k, f"{drawing.named([k], found=True)} was left out: {why}")
         if len(objects) < 2:
             raise _too_few(len(objects), len(points) - len(drawn), self.params.max_gap)
         scene = [
@@ -145,16 +154,18 @@ class StrokeSegmenter(Segmenter):
             for item in objects
         ]
         way = None if route is None else points[route]
-        return Segmentation(Scene(tuple(scene)), drawing.sentences(), way)
+        notes = (*source.notes, *_without_points(empty), *drawing.sentences())
+        return Segmentation(Scene(tuple(scene)), notes, way)
 
     def _outlines(self, drawing: Drawing, route: int | None) -> list[Outline]:
         """Return all closed outlines, of single strokes and of chains."""
         strokes, max_gap = drawing.strokes, self.params.max_gap
         closed: dict[int, list[shapely.Polygon]] = {}
         pool: dict[int, float] = {}
-        if unseen := tangled(strokes) - {route}:
+        dots = set(drawing.explained)
+        if unseen := tangled(strokes) - {route} - dots:
             drawing.explain(sorted(unseen), TANGLED)
-        seen = [k for k in range(len(strokes)) if k not in unseen]
+        seen = [k for k in range(len(strokes)) if k not in unseen | dots]
         for k, over in zip(seen, along_others([strokes[k] for k in seen]), strict=True):
             stroke = strokes[k]
             areas = enclosed_by(stroke, max_gap) if k != route else []
@@ -262,7 +273,12 @@ def _second_largest(outlines: list[Outline]) -> float:
 
 def _labelled_route(drawing: Drawing) -> int | None:
     return next(
-        (k for k, name in reversed([*enumerate(drawing.labels)]) if _ROUTE.search(name)), None
+        (
+            k
+            for k, name in reversed([*enumerate(drawing.labels)])
+            if _ROUTE.search(name) and k not in drawing.explained
+        ),
+        None,
     )
 
 
@@ -288,12 +304,14 @@ def _checked(stroke: Stroke, field: str) -> FloatArray:
         )
     moved = np.ones(len(points), dtype=bool)
     moved[1:] = (points[1:] != points[:-1]).any(axis=1)
-    if moved.sum() < 2:
-        count = {0: "no point", 1: "one point"}.get(len(points), "no length")
-        raise InvalidInputError(
-            Reason.INVALID_STROKE, field, f"has {count}; draw an outline there or remove it"
-        )
     return points[moved]
+
+
+def _without_points(empty: list[int]) -> tuple[str, ...]:
+    """Return what is said of strokes that are nowhere."""
+    if len(empty) > 1:
+        return (f"strokes[{empty[0]}] and {len(empty) - 1} more were left out: without a point.",)
+    return tuple(f"strokes[{k}] was left out: it has no point." for k in empty)
 
 
 def _why_open(points: FloatArray) -> str:
