@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 from xml.etree import ElementTree
 
@@ -36,8 +36,12 @@ TOLERANCE = 1e-3
 _LARGEST = 1e15
 
 _EXTENT = {"rect": ("width", "height"), "circle": ("r",), "ellipse": ("rx", "ry")}
-_ACROSS = {"x", "x1", "x2", "width", "cx", "rx"}
-_DOWN = {"y", "y1", "y2", "height", "cy", "ry"}
+# What percentages are shares of.
+_ALONG: dict[str, Callable[[Frame], float]] = {
+    **dict.fromkeys(("x", "x1", "x2", "width", "cx", "rx"), lambda frame: frame.width),
+    **dict.fromkeys(("y", "y1", "y2", "height", "cy", "ry"), lambda frame: frame.height),
+    "r": lambda frame: math.hypot(frame.width, frame.height) / math.sqrt(2.0),
+}
 _LISTS = {"d", "points"}
 _CSS_PATH = re.compile(r"""path\(\s*(?:(?:nonzero|evenodd)\s*,\s*)?(["'])(.*)\1\s*\)""", re.DOTALL)
 
@@ -104,20 +108,19 @@ def _geometry(
     element: ElementTree.Element, said: Mapping[str, str], frame: Frame | None
 ) -> dict[str, Any]:
     """Return what says where a shape is; what has no extent is not drawn."""
-    geometry: dict[str, Any] = dict.fromkeys(_EXTENT.get(tag_of(element), ()), 0.0)
+    extent = _EXTENT.get(tag_of(element), ())
+    geometry: dict[str, Any] = dict.fromkeys(extent, 0.0)
     for name, text in (*element.items(), *said.items()):
         if name in _LISTS:
             path = _CSS_PATH.fullmatch(text) if name in said else None
             geometry[name] = path[2] if path else text
-        elif text.strip() == "auto":
-            geometry.pop(name, None)
-        elif name in _ACROSS:
-            geometry[name] = length(text, frame and frame.width)
-        elif name in _DOWN:
-            geometry[name] = length(text, frame and frame.height)
-        elif name == "r":
-            across = frame and math.hypot(frame.width, frame.height) / math.sqrt(2.0)
-            geometry[name] = length(text, across)
+        elif name in _ALONG and text.strip() != "auto":
+            value = length(text, frame and _ALONG[name](frame))
+            geometry[name] = max(0.0, value) if name in extent else value
+    if tag_of(element) == "ellipse":
+        told = {*element.keys(), *said}
+        if not {"rx", "ry"} <= told:
+            geometry["rx"] = geometry["ry"] = geometry["rx"] or geometry["ry"]
     return geometry
 
 

@@ -14,7 +14,7 @@ import tinycss2
 
 from sketchmatch.io._svg_tree import invalid
 
-__all__ = ["Frame", "absolute_length", "css_transform", "fitted", "length", "view_box"]
+__all__ = ["Frame", "css_transform", "fitted", "length", "view_box"]
 
 _LENGTH = re.compile(
     r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(px|pt|pc|mm|cm|in|q|%|)\s*", re.IGNORECASE
@@ -65,11 +65,6 @@ def length(text: str, along: float | None) -> float:
             raise ValueError(text)
         return float(match[1]) / 100.0 * along
     return float(match[1]) * _UNITS[match[2].lower()]
-
-
-def absolute_length(text: str) -> float:
-    """Return a length in user units that is no share of anything; else raise ValueError."""
-    return length(text, None)
 
 
 def view_box(element: ElementTree.Element) -> Frame | None:

@@ -21,12 +21,12 @@ __all__ = ["pen_lines"]
 _WIDEST_LOOP, _WIDEST_LINE = 1 / 8, 1 / 20
 # … and a line has this many corners or curves at least: with fewer it is a shape that was drawn.
 _CORNERS = 16
-# Ends that are this share of its size apart make a loop.
-_GAP = 0.25
+# A loop's ends are at most this share of its size apart, and joined enclose as much of its area.
+_GAP, _ROUND = 0.5, 0.3
 # Of the places along a ribbon this share is no wider than this many times its mean.
 _MOST, _FAR = 0.9, 3.0
 # A ring of ink is a line around something if its width is at most this share of its extent.
-_WIDEST_RING = 0.2
+_WIDEST_RING = 0.25
 # Where ends are looked for first, places compared for that, and how often the search is refined.
 _STARTS, _PLACES, _ROUNDS = 96, 24, 8
 _FEWEST, _MOST_POINTS = 48, 1000
@@ -34,9 +34,7 @@ _FEWEST, _MOST_POINTS = 48, 1000
 _MOST_RINGS = 2000
 
 
-def pen_lines(
-    rings: list[FloatArray], corners: list[int], evenodd: bool
-) -> list[FloatArray | None]:
+def pen_lines(rings: list[FloatArray], corners: list[int], evenodd: bool) -> list[list[FloatArray]]:
     """Return what was drawn of what the subpaths of one filled shape enclose.
 
     Parameters
@@ -50,15 +48,15 @@ def pen_lines(
 
     Returns
     -------
-    list of ndarray or None
-        For each ribbon the line in its middle, for all else its outline; None for holes.
+    list of list of ndarray
+        For each ribbon the line in its middle, for a ring of ink the lines in its middle, for all
+        else its outline; nothing for holes.
     """
-    lines: list[FloatArray | None] = [
-        _middle(ring, count) for ring, count in zip(rings, corners, strict=True)
-    ]
-    others = [k for k, line in enumerate(lines) if line is None]
-    for k, outline in zip(others, _outlines([rings[k] for k in others], evenodd), strict=True):
-        lines[k] = outline
+    middles = [_middle(ring, count) for ring, count in zip(rings, corners, strict=True)]
+    lines = [[] if middle is None else [middle] for middle in middles]
+    others = [k for k, middle in enumerate(middles) if middle is None]
+    for k, outlines in zip(others, _outlines([rings[k] for k in others], evenodd), strict=True):
+        lines[k] = outlines
     return lines
 
 
@@ -77,10 +75,9 @@ def _middle(ring: FloatArray, corners: int) -> FloatArray | None:
         return None
     middle = (sides[0] + sides[1]) / 2.0
     size = float(np.ptp(middle, axis=0).max())
-    if math.dist(middle[0], middle[-1]) <= _GAP * size:
-        enclosed = abs(_area(np.concatenate([middle, middle[:1]])))
-        if enclosed > area:
-            return middle
+    enclosed = abs(_area(np.concatenate([middle, middle[:1]])))
+    if math.dist(middle[0], middle[-1]) <= _GAP * size and enclosed > _ROUND * area:
+        return middle
     return middle if width <= _WIDEST_LINE * long and corners >= _CORNERS else None
 
 
@@ -133,10 +130,10 @@ def _area(ring: FloatArray) -> float:
     return 0.5 * float(x[:-1] @ y[1:] - x[1:] @ y[:-1])
 
 
-def _outlines(rings: list[FloatArray], evenodd: bool) -> list[FloatArray | None]:
-    """Return for each ring the outline of the ink that it bounds from outside, or None."""
+def _outlines(rings: list[FloatArray], evenodd: bool) -> list[list[FloatArray]]:
+    """Return for each ring the outlines of what it bounds from outside."""
     if len(rings) < 2 or len(rings) > _MOST_RINGS:
-        return list(rings)
+        return [[ring] for ring in rings]
     areas = [_area(ring) for ring in rings]
     order = sorted(range(len(rings)), key=lambda k: -abs(areas[k]))
     polygons = [shapely.Polygon(ring) if len(ring) > 3 else shapely.Polygon() for ring in rings]
@@ -150,34 +147,32 @@ def _outlines(rings: list[FloatArray], evenodd: bool) -> list[FloatArray | None]
             around[k].append(j)
     winding: dict[int, int] = {}
     holes: dict[int, list[int]] = {k: [] for k in order}
-    outlines: list[FloatArray | None] = [None] * len(rings)
+    outlines: list[list[FloatArray]] = [[] for _ in rings]
     for k in order:
         parent = max(around[k], key=lambda j: rank[j], default=None)
         outside = winding[parent] if parent is not None else 0
         winding[k] = outside + (1 if evenodd or areas[k] >= 0.0 else -1)
         inked, was_inked = (n % 2 != 0 if evenodd else n != 0 for n in (winding[k], outside))
         if inked and not was_inked:
-            outlines[k] = rings[k]
+            outlines[k] = [rings[k]]
         elif was_inked and not inked and parent is not None:
             holes[parent].append(k)
     for k, inside in holes.items():
-        if inside and outlines[k] is not None:
+        if inside:
             outlines[k] = _around(polygons[k], [polygons[j] for j in inside], rings[k])
     return outlines
 
 
 def _around(
     outer: shapely.Polygon, holes: list[shapely.Polygon], otherwise: FloatArray
-) -> FloatArray:
-    """Return the line in the middle of a ring of ink; of a shape with holes its outline."""
+) -> list[FloatArray]:
+    """Return the lines in the middle of rings of ink; of a shape with holes its outline."""
     area = outer.area - sum(hole.area for hole in holes)
     width = 2.0 * area / (outer.length + sum(hole.length for hole in holes))
     x0, y0, x1, y1 = outer.bounds
     if not 0.0 < width <= _WIDEST_RING * min(x1 - x0, y1 - y0):
-        return otherwise
-    # Ends of the line that stick out are as thin as it is, and vanish.
-    middle = shapely.buffer(shapely.buffer(outer, -0.75 * width), 0.25 * width)
-    parts = sorted(shapely.get_parts(middle), key=lambda part: -part.area)
-    if not parts or parts[0].is_empty:
-        return otherwise
-    return shapely.get_coordinates(parts[0].exterior)
+        return [otherwise]
+    # Ends of the line that stick out, and lines from ring to ring, are as thin as it is and vanish.
+    rings = shapely.buffer(shapely.buffer(outer, -0.75 * width), 0.25 * width)
+    parts = [part for part in shapely.get_parts(rings) if part.area > width**2]
+    return [shapely.get_coordinates(part.exterior) for part in parts] or [otherwise]

@@ -21,7 +21,7 @@ import tinycss2
 from cssselect2 import parser as selector_parser
 from tinycss2 import color5
 
-from sketchmatch.io._svg_frame import absolute_length, css_transform
+from sketchmatch.io._svg_frame import css_transform, length
 from sketchmatch.io._svg_tree import invalid, tag_of
 
 __all__ = ["INITIAL", "Colour", "Look", "Styles"]
@@ -45,11 +45,21 @@ _WIDE = {"inherit", "initial", "unset", "revert", "revert-layer"}
 _VISIBLE = {"visible": True, "hidden": False, "collapse": False}
 _RULES = {"nonzero": False, "evenodd": True}
 
+_LENGTHS = _GEOMETRY - {"d"}
+
 _PLAIN = re.compile(r"[^\"'\\/{}!(]*")
 _EMBEDDED = re.compile(r"url\(\s*[\"']?data:[^)]*\)", re.IGNORECASE)
 _URL = re.compile(r"""url\(\s*["']?([^"')]*)["']?\s*\)\s*(.*)""", re.IGNORECASE | re.DOTALL)
 _SCREEN = re.compile(r"\s*((only\s+)?(all|screen))?\s*", re.IGNORECASE)
 _SHARE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(%?)", re.IGNORECASE)
+
+# A number without a unit, as attributes may have it.
+_UNITLESS = re.compile(
+    r"(?<![\w.%+-])([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(?=[\s,]|$)", re.IGNORECASE
+)
+_CUSTOM = "--"
+# How long a value may become by the custom properties in it, and how deep they may refer.
+_LONGEST_VALUE, _DEEPEST_VALUE = 1000, 16
 
 # A style sheet may be this long, and take this many tests of elements.
 _LONGEST, _MOST_TESTS = 2_000_000, 3_000_000
@@ -80,6 +90,8 @@ class Look:
         Whether what lies outside of its viewport is shown.
     transforms, geometry
         What CSS says of where it is, by property.
+    custom
+        The custom properties that values refer to by ``var()``.
     """
 
     visible: bool = True
@@ -95,6 +107,7 @@ class Look:
     overflow: bool = False
     transforms: Mapping[str, str] = field(default_factory=dict)
     geometry: Mapping[str, str] = field(default_factory=dict)
+    custom: Mapping[str, str] = field(default_factory=dict)
 
 
 INITIAL = Look()
@@ -124,25 +137,32 @@ class Styles:
         if len(text) > _LONGEST:
             raise _costly("is longer than 2 million characters")
         try:
+            nodes = tinycss2.parse_stylesheet(text, True, True)
             rules = [
                 (rule.prelude, declared)
-                for rule in _rules(tinycss2.parse_stylesheet(text, True, True))
+                for rule in _rules(nodes)
                 if (declared := [*_of_interest(rule.content)])
             ]
             if rules:
-                self._add(root, rules)
+                self._add(root, rules, _namespaces(nodes))
         except (RecursionError, MemoryError, SyntaxError):
             raise _costly("is nested too deeply") from None
 
-    def _add(self, root: ElementTree.Element, rules: list[tuple[Any, list[_Said]]]) -> None:
+    def _add(
+        self,
+        root: ElementTree.Element,
+        rules: list[tuple[Any, list[_Said]]],
+        namespaces: dict[str | None, str],
+    ) -> None:
         elements, names, depth = _counted(root)
         tests = 0
         for prelude, declared in rules:
             if elements > _FEW and _AROUND.search(tinycss2.serialize(prelude)):
                 raise _costly("selects elements by their siblings, and the drawing is large")
             try:
-                compiled = cssselect2.compile_selector_list(prelude)
-                trees = [each.parsed_tree for each in selector_parser.parse(prelude)]
+                compiled = cssselect2.compile_selector_list(prelude, namespaces)
+                parsed = selector_parser.parse(prelude, namespaces)
+                trees = [each.parsed_tree for each in parsed]
             except (cssselect2.SelectorError, NotImplementedError):
                 continue  # a browser drops it, too
             for selector, tree in zip(compiled, trees, strict=True):
@@ -156,7 +176,7 @@ class Styles:
 
     def look(self, element: ElementTree.Element, parent: Look) -> Look:
         """Return how an element is shown whose parent, or ``use``, is shown as told."""
-        values = self._declared(element)
+        values, custom = self._declared(element, parent.custom)
         changes: dict[str, Any] = {}
         for name in _INHERITED & values.keys():
             text = values[name].lower()
@@ -178,11 +198,12 @@ class Styles:
             overflow=own.get("overflow", "").lower() in ("visible", "auto"),
             transforms={name: own[name] for name in _TRANSFORMS & own.keys()},
             geometry={name: own[name] for name in _GEOMETRY & own.keys()},
+            custom=custom,
         )
 
     def background(self, root: ElementTree.Element) -> Colour:
         """Return the colour of the page, white where none is given."""
-        values = self._declared(root)
+        values, _ = self._declared(root, {})
         text = values.get("background-color", values.get("background", ""))
         return self.paint(text, 1.0, "black") or (1.0, 1.0, 1.0)
 
@@ -208,22 +229,26 @@ class Styles:
             text = color
         return _colour(text)
 
-    def _declared(self, element: ElementTree.Element) -> dict[str, str]:
-        """Return the legal values that hold for an element, by property."""
+    def _declared(
+        self, element: ElementTree.Element, inherited: Mapping[str, str]
+    ) -> tuple[dict[str, str], Mapping[str, str]]:
+        """Return the legal values that hold for an element, by property, and the custom ones."""
         said: list[_Said] = [
-            (name, text.strip(), False) for name, text in element.items() if name in _ATTRIBUTES
+            (name, _with_units(name, text), False)
+            for name, text in element.items()
+            if name in _ATTRIBUTES
         ]
         wrapped = self._wrapped.get(element)
         if wrapped is not None:
             for *_, declared in self._matcher.match(wrapped):
                 said += declared
         said += _inline(element.get("style", ""))
-        return {
-            name: text
-            for importance in (False, True)
-            for name, text, important in said
-            if important == importance and _legal(name, text)
-        }
+        said.sort(key=lambda each: each[2])
+        custom = inherited
+        if named := {name: text for name, text, _ in said if name.startswith(_CUSTOM)}:
+            custom = {**inherited, **named}
+        values = ((name, _substituted(text, custom)) for name, text, _ in said if name in _KNOWN)
+        return {name: text for name, text in values if _legal(name, text)}, custom
 
 
 _Said = tuple[str, str, bool]
@@ -240,10 +265,30 @@ def _rules(nodes: Iterable[Any]) -> Iterator[Any]:
                 yield from _rules(tinycss2.parse_rule_list(node.content, True, True))
 
 
+def _namespaces(nodes: Iterable[Any]) -> dict[str | None, str]:
+    """Return what prefixes of selectors stand for."""
+    spaces: dict[str | None, str] = {}
+    for node in nodes:
+        if node.type == "at-rule" and node.lower_at_keyword == "namespace":
+            tokens = [
+                token for token in node.prelude if token.type not in ("whitespace", "comment")
+            ]
+            prefix = tokens[0].value if len(tokens) > 1 and tokens[0].type == "ident" else None
+            if tokens and tokens[-1].type in ("string", "url"):
+                spaces[prefix] = tokens[-1].value
+            elif tokens and tokens[-1].type == "function" and tokens[-1].arguments:
+                spaces[prefix] = tokens[-1].arguments[0].value
+    return spaces
+
+
 def _of_interest(content: Any) -> Iterator[_Said]:
     for node in tinycss2.parse_blocks_contents(content, True, True):
-        if node.type == "declaration" and node.lower_name in _KNOWN:
-            yield node.lower_name, tinycss2.serialize(node.value).strip(), node.important
+        if node.type == "declaration":
+            name = node.name if node.name.startswith(_CUSTOM) else node.lower_name
+            if name in _KNOWN or name.startswith(_CUSTOM):
+                yield name, tinycss2.serialize(node.value).strip(), node.important
+        elif node.type == "qualified-rule" and [*_of_interest(node.content)]:
+            raise _costly("has rules within rules")
 
 
 @lru_cache(maxsize=1024)
@@ -253,7 +298,34 @@ def _inline(style: str) -> tuple[_Said, ...]:
         return tuple(_of_interest(style))
     pairs = (item.partition(":") for item in style.split(";"))
     named = ((name.strip().lower(), text.strip()) for name, _, text in pairs)
-    return tuple((name, text, False) for name, text in named if name in _KNOWN)
+    return tuple(
+        (name, text, False) for name, text in named if name in _KNOWN or name.startswith(_CUSTOM)
+    )
+
+
+def _with_units(name: str, text: str) -> str:
+    """Return the value of an attribute as CSS would have it."""
+    return _UNITLESS.sub(r"\1px", text) if name == "transform-origin" else text.strip()
+
+
+def _substituted(text: str, custom: Mapping[str, str], depth: int = 0) -> str:
+    """Return a value with the custom properties put in that it refers to, empty if it has none."""
+    if "var(" not in text.lower():
+        return text
+    if depth > _DEEPEST_VALUE:
+        return ""
+    parts = []
+    for token in tinycss2.parse_component_value_list(text):
+        if token.type != "function" or token.lower_name != "var":
+            parts.append(token.serialize())
+            continue
+        name, _, otherwise = tinycss2.serialize(token.arguments).partition(",")
+        value = custom.get(name.strip(), otherwise).strip()
+        value = _substituted(value, custom, depth + 1)
+        if not value or len(value) > _LONGEST_VALUE:
+            return ""
+        parts.append(value)
+    return "".join(parts).strip()
 
 
 @lru_cache(maxsize=4096)
@@ -266,13 +338,15 @@ def _legal(name: str, text: str) -> bool:
             _VALUES[name](text)
         elif name in _TRANSFORMS:
             css_transform({name: text}, None)
+        elif name in _LENGTHS and _UNITLESS.fullmatch(text):
+            return float(text) == 0.0
     except (ValueError, KeyError):
         return False
     return bool(text)
 
 
 def _paint_text(text: str) -> str:
-    known = text.lower() == "none" or text.lower().startswith(("url(", "context-"))
+    known = text.lower() in ("none", "") or text.lower().startswith(("url(", "context-"))
     if not known and _colour(text) is None and not _transparent(text):
         raise ValueError(text)
     return text
@@ -315,7 +389,7 @@ def _share(text: str | None) -> float:
 
 
 def _width(text: str) -> float:
-    return 1.0 if text.endswith("%") else absolute_length(text)
+    return length(text, 100.0)
 
 
 _VALUES: dict[str, Any] = {

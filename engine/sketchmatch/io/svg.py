@@ -654,5 +654,4 @@ def _lines(shape: _Shape, tolerance: float) -> list[FloatArray]:
     corners = [len(shape.subpaths[k]) if shape.pen else 0 for k in bounding]
     drawn = pen_lines([lines[k] for k in bounding], corners, shape.evenodd)
     found = dict(zip(bounding, drawn, strict=True))
-    inked = (found.get(k, line) for k, line in enumerate(lines))
-    return [line for line in inked if line is not None]
+    return [each for k, line in enumerate(lines) for each in found.get(k, [line])]
