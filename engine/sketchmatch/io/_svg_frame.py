@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import svgelements
 import tinycss2
 
+from sketchmatch.errors import InvalidInputError
 from sketchmatch.io._svg_tree import invalid
 
 __all__ = ["Frame", "css_transform", "fitted", "length", "view_box"]
@@ -258,6 +259,6 @@ def _radians(token: Any) -> float:
     raise ValueError(token.type)
 
 
-def _unfollowed(text: str) -> Exception:
+def _unfollowed(text: str) -> InvalidInputError:
     shown = " ".join(text.split())[:40]
     return invalid("", f"has a transform that cannot be followed ({shown}); write it as a matrix")

@@ -21,6 +21,7 @@ import tinycss2
 from cssselect2 import parser as selector_parser
 from tinycss2 import color5
 
+from sketchmatch.errors import InvalidInputError
 from sketchmatch.io._svg_frame import css_transform, length
 from sketchmatch.io._svg_tree import invalid, tag_of
 
@@ -58,8 +59,8 @@ _UNITLESS = re.compile(
     r"(?<![\w.%+-])([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(?=[\s,]|$)", re.IGNORECASE
 )
 _CUSTOM = "--"
-# How long a value may become by the custom properties in it, and how deep they may refer.
-_LONGEST_VALUE, _DEEPEST_VALUE = 1000, 16
+# How long a value may become by the custom properties that it refers to, and how many these are.
+_LONGEST_VALUE, _MOST_REFERENCES = 1000, 16
 
 # A style sheet may be this long, and take this many tests of elements.
 _LONGEST, _MOST_TESTS = 2_000_000, 3_000_000
@@ -176,7 +177,10 @@ class Styles:
 
     def look(self, element: ElementTree.Element, parent: Look) -> Look:
         """Return how an element is shown whose parent, or ``use``, is shown as told."""
-        values, custom = self._declared(element, parent.custom)
+        try:
+            values, custom = self._declared(element, parent.custom)
+        except RecursionError:
+            raise _costly("is nested too deeply") from None
         changes: dict[str, Any] = {}
         for name in _INHERITED & values.keys():
             text = values[name].lower()
@@ -308,24 +312,21 @@ def _with_units(name: str, text: str) -> str:
     return _UNITLESS.sub(r"\1px", text) if name == "transform-origin" else text.strip()
 
 
-def _substituted(text: str, custom: Mapping[str, str], depth: int = 0) -> str:
-    """Return a value with the custom properties put in that it refers to, empty if it has none."""
-    if "var(" not in text.lower():
-        return text
-    if depth > _DEEPEST_VALUE:
-        return ""
-    parts = []
-    for token in tinycss2.parse_component_value_list(text):
-        if token.type != "function" or token.lower_name != "var":
-            parts.append(token.serialize())
-            continue
-        name, _, otherwise = tinycss2.serialize(token.arguments).partition(",")
+def _substituted(text: str, custom: Mapping[str, str]) -> str:
+    """Return a value with the custom properties put in that it refers to; empty if it cannot be."""
+    for _ in range(_MOST_REFERENCES):
+        if "var(" not in text.lower():
+            return text
+        tokens = tinycss2.parse_component_value_list(text)
+        k = next((k for k, token in enumerate(tokens) if _refers(token)), None)
+        if k is None:
+            return text
+        name, _, otherwise = tinycss2.serialize(tokens[k].arguments).partition(",")
         value = custom.get(name.strip(), otherwise).strip()
-        value = _substituted(value, custom, depth + 1)
-        if not value or len(value) > _LONGEST_VALUE:
+        text = tinycss2.serialize(tokens[:k]) + value + tinycss2.serialize(tokens[k + 1 :])
+        if not value or len(text) > _LONGEST_VALUE:
             return ""
-        parts.append(value)
-    return "".join(parts).strip()
+    return ""
 
 
 @lru_cache(maxsize=4096)
@@ -340,9 +341,15 @@ def _legal(name: str, text: str) -> bool:
             css_transform({name: text}, None)
         elif name in _LENGTHS and _UNITLESS.fullmatch(text):
             return float(text) == 0.0
+    except InvalidInputError:
+        return True  # it is refused where it is used
     except (ValueError, KeyError):
         return False
     return bool(text)
+
+
+def _refers(token: Any) -> bool:
+    return bool(token.type == "function" and token.lower_name == "var")
 
 
 def _paint_text(text: str) -> str:
@@ -454,5 +461,5 @@ def _cost(tree: Any, depth: int) -> int:
     return max(1, cost)
 
 
-def _costly(problem: str) -> Exception:
+def _costly(problem: str) -> InvalidInputError:
     return invalid("", f"has a style sheet that {problem}; save it as plain SVG without one")

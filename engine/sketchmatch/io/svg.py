@@ -571,32 +571,42 @@ def _without_paper(
     Paper is a filled rectangle without a line that covers the page, or that all else lies on.
     What has the paper's colour and no line is not seen on it.
     """
+    boxes = np.array([shape.box for shape in shapes]).reshape(-1, 4)
+    lows = np.minimum.accumulate(boxes[::-1, :2])[::-1]
+    highs = np.maximum.accumulate(boxes[::-1, 2:])[::-1]
     kept: list[_Shape] = []
-    ground = []
+    ground: list[_Shape] = []
+    filled = np.zeros(len(shapes), dtype=bool)
     for k, shape in enumerate(shapes):
         sheet = shape.bare and _rectangular(shape)
         if sheet and page is not None and _covers(shape.box, page, _MARGIN):
             background = shape.fill or ()
-        elif sheet and not kept and _lies_under(shape, shapes[k + 1 :]):
+        elif (
+            sheet
+            and not (kept or ground)
+            and len(shapes) - k > _FEW
+            and _covers(shape.box, (*lows[k + 1], *highs[k + 1]))
+        ):
             background = shape.fill or ()
             ground = [shape]
-        elif not _vanishes(shape, background, kept):
+        elif not (_like_paper(shape, background) and not _meets_any(boxes[k], boxes[filled])):
             kept.append(shape)
+            filled[k] = shape.filled
     return kept, ground
 
 
-def _vanishes(shape: _Shape, background: Colour, below: list[_Shape]) -> bool:
-    """Whether a filling without a line is not seen, as all that is around it has its colour."""
+def _like_paper(shape: _Shape, background: Colour) -> bool:
+    """Whether a shape is a filling in the paper's colour without a line."""
     return (
         shape.bare
         and shape.fill == background != ()
         and any(_enclosed(_ends(subpath)) > 0.0 for subpath in shape.subpaths)
-        and not any(other.filled and _meet(shape.box, other.box) for other in below)
     )
 
 
-def _lies_under(shape: _Shape, others: list[_Shape]) -> bool:
-    return len(others) >= _FEW and all(_covers(shape.box, other.box) for other in others)
+def _meets_any(box: FloatArray, others: FloatArray) -> bool:
+    low, high = others[:, :2] <= box[2:], others[:, 2:] >= box[:2]
+    return bool((low & high).all(axis=1).any())
 
 
 def _rectangular(shape: _Shape) -> bool:
@@ -604,7 +614,8 @@ def _rectangular(shape: _Shape) -> bool:
     if len(shape.subpaths) != 1:
         return False
     x0, y0, x1, y1 = shape.box
-    return _enclosed(_ends(shape.subpaths[0])) >= (1.0 - _ROUNDED) * (x1 - x0) * (y1 - y0)
+    share = _enclosed(_ends(shape.subpaths[0])) / max((x1 - x0) * (y1 - y0), 1e-300)
+    return 1.0 - _ROUNDED <= share <= 1.0 + _ROUNDED
 
 
 def _ends(subpath: Subpath) -> FloatArray:
