@@ -115,7 +115,7 @@ def _geometry(
             path = _CSS_PATH.fullmatch(text) if name in said else None
             geometry[name] = path[2] if path else text
         elif name in _ALONG and text.strip() != "auto":
-            value = length(text, frame and _ALONG[name](frame))
+            value = length(text, _ALONG[name](frame) if frame else None)
             geometry[name] = max(0.0, value) if name in extent else value
     if tag_of(element) == "ellipse":
         told = {*element.keys(), *said}

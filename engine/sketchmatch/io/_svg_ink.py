@@ -8,6 +8,7 @@ drawn lies in the middle of the ribbon.
 from __future__ import annotations
 
 import math
+from functools import reduce
 
 import numpy as np
 import shapely
@@ -137,12 +138,22 @@ def _outlines(rings: list[FloatArray], evenodd: bool) -> list[list[FloatArray]]:
     areas = [_area(ring) for ring in rings]
     order = sorted(range(len(rings)), key=lambda k: -abs(areas[k]))
     polygons = [shapely.Polygon(ring) if len(ring) > 3 else shapely.Polygon() for ring in rings]
-    inner, outer = shapely.STRtree(polygons).query(
-        shapely.points([ring[0] for ring in rings]), predicate="within"
-    )
-    around: dict[int, list[int]] = {k: [] for k in order}
+    tree = shapely.STRtree(polygons)
     rank = {k: r for r, k in enumerate(order)}
-    for k, j in zip(inner.tolist(), outer.tolist(), strict=True):
+    # A ring lies in another one if some points of it do, all around.
+    inside = [
+        inner * len(rings) + outer
+        for inner, outer in (
+            tree.query(
+                shapely.points([ring[int(share * (len(ring) - 1))] for ring in rings]),
+                predicate="within",
+            )
+            for share in (0.0, 0.25, 0.5, 0.75)
+        )
+    ]
+    around: dict[int, list[int]] = {k: [] for k in order}
+    for pair in reduce(np.intersect1d, inside).tolist():
+        k, j = divmod(pair, len(rings))
         if rank[j] < rank[k]:
             around[k].append(j)
     winding: dict[int, int] = {}
@@ -157,22 +168,55 @@ def _outlines(rings: list[FloatArray], evenodd: bool) -> list[list[FloatArray]]:
             outlines[k] = [rings[k]]
         elif was_inked and not inked and parent is not None:
             holes[parent].append(k)
-    for k, inside in holes.items():
-        if inside:
-            outlines[k] = _around(polygons[k], [polygons[j] for j in inside], rings[k])
+    inked_rings = [k for k in order if outlines[k]]
+    shapes = [
+        shapely.Polygon(rings[k], [rings[j] for j in holes[k]] if holes[k] else None)
+        for k in inked_rings
+    ]
+    for k, shape in zip(inked_rings, shapes, strict=True):
+        if holes[k]:
+            outlines[k] = _around(shape, rings[k])
+    for group in _overlapping(shapes):
+        first, *others = sorted(inked_rings[k] for k in group)
+        whole = shapely.union_all([shapely.make_valid(shapes[k]) for k in group])
+        outlines[first] = [
+            line
+            for part in shapely.get_parts(whole)
+            if isinstance(part, shapely.Polygon)
+            for line in _around(part, shapely.get_coordinates(part.exterior))
+        ]
+        for k in others:
+            outlines[k] = []
     return outlines
 
 
-def _around(
-    outer: shapely.Polygon, holes: list[shapely.Polygon], otherwise: FloatArray
-) -> list[FloatArray]:
-    """Return the lines in the middle of rings of ink; of a shape with holes its outline."""
-    area = outer.area - sum(hole.area for hole in holes)
-    width = 2.0 * area / (outer.length + sum(hole.length for hole in holes))
-    x0, y0, x1, y1 = outer.bounds
-    if not 0.0 < width <= _WIDEST_RING * min(x1 - x0, y1 - y0):
-        return [otherwise]
+def _overlapping(shapes: list[shapely.Polygon]) -> list[list[int]]:
+    """Return the groups of shapes that touch, two or more each, as they look like one."""
+    first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
+    group = list(range(len(shapes)))
+
+    def top(k: int) -> int:
+        while group[k] != k:
+            group[k] = group[group[k]]
+            k = group[k]
+        return k
+
+    for k, j in zip(first.tolist(), second.tolist(), strict=True):
+        group[top(k)] = top(j)
+    groups: dict[int, list[int]] = {}
+    for k in range(len(shapes)):
+        groups.setdefault(top(k), []).append(k)
+    return [each for each in groups.values() if len(each) > 1]
+
+
+def _around(shape: shapely.Polygon, outline: FloatArray) -> list[FloatArray]:
+    """Return the lines in the middle of rings of ink; of another shape with holes its outline."""
+    outer = shapely.Polygon(shape.exterior)
+    width = 2.0 * shape.area / shape.length
+    x0, y0, x1, y1 = shape.bounds
+    if not shape.interiors or not 0.0 < width <= _WIDEST_RING * min(x1 - x0, y1 - y0):
+        return [outline]
     # Ends of the line that stick out, and lines from ring to ring, are as thin as it is and vanish.
     rings = shapely.buffer(shapely.buffer(outer, -0.75 * width), 0.25 * width)
     parts = [part for part in shapely.get_parts(rings) if part.area > width**2]
-    return [shapely.get_coordinates(part.exterior) for part in parts] or [otherwise]
+    return [shapely.get_coordinates(part.exterior) for part in parts] or [outline]

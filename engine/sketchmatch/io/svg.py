@@ -383,8 +383,8 @@ class _Drawing:
     def _offset(self, use: ElementTree.Element, context: _Context) -> Any:
         frame, said = context.frame, context.look.geometry
         try:
-            x = length(said.get("x", use.get("x", "0")), frame and frame.width)
-            y = length(said.get("y", use.get("y", "0")), frame and frame.height)
+            x = length(said.get("x", use.get("x", "0")), frame.width if frame else None)
+            y = length(said.get("y", use.get("y", "0")), frame.height if frame else None)
         except ValueError:
             raise self._invalid(use, "has a <use> whose x or y is no length; correct it") from None
         return svgelements.Matrix.translate(x, y) * context.matrix
@@ -403,16 +403,15 @@ class _Drawing:
             return self._first_viewport(element, context, shown)
         said, frame = context.look.geometry, context.frame
         frame = frame or (shown and Frame(0.0, 0.0, shown.width, shown.height))
+        across, down = (frame.width, frame.height) if frame else (None, None)
         try:
             x, y, width, height = (
-                None
-                if frame is None and text.endswith("%")
-                else length(text, frame and (frame.width if name in "x width" else frame.height))
-                for name, text in (
-                    ("x", said.get("x", element.get("x", "0"))),
-                    ("y", said.get("y", element.get("y", "0"))),
-                    ("width", size[0] or said.get("width", element.get("width", "100%"))),
-                    ("height", size[1] or said.get("height", element.get("height", "100%"))),
+                None if frame is None and text.endswith("%") else length(text, along)
+                for text, along in (
+                    (said.get("x", element.get("x", "0")), across),
+                    (said.get("y", element.get("y", "0")), down),
+                    (size[0] or said.get("width", element.get("width", "100%")), across),
+                    (size[1] or said.get("height", element.get("height", "100%")), down),
                 )
             )
         except ValueError:
