@@ -1,3 +1,5 @@
+import codecs
+
 import numpy as np
 import pytest
 
@@ -158,11 +160,19 @@ class TestMapServerMap:
             "image: 'room.pgm'  # the picture",
             "image: room.pgm # the picture",
             "image : ./room.pgm",
+            "image: &picture room.pgm",
+            "image: |-\n  room.pgm",
+            "image:\n  room.pgm",
+            'image: "r\\u006fom.pgm"',
+            "'image': !!str room.pgm",
+            "{image: room.pgm}",
+            '{"image": "room.pgm"}',
         ],
     )
     def test_finds_the_picture(self, tmp_path, line):
         (tmp_path / "room.pgm").write_bytes(b"P5")
-        yaml = f"# image: other.pgm\nresolution: 0.05\n{line}\nnegate: 0\n"
+        others = "" if line.startswith("{") else "\nresolution: 0.05\nnegate: 0\n"
+        yaml = f"# image: other.pgm\n{line}{others}"
         (tmp_path / "room.yaml").write_text(yaml, encoding="utf-8")
         made = sources.map_server_map(tmp_path / "room.yaml").map_server_map
         assert (made.yaml, made.image) == (yaml, b"P5")
@@ -186,11 +196,59 @@ class TestMapServerMap:
         (folder / "room.yaml").write_text(f"image: {picture}\n", encoding="utf-8")
         assert sources.map_server_map(folder / "room.yaml").map_server_map.image == b"P5"
 
-    @pytest.mark.parametrize("text", ["", "resolution: 0.05\n", "image:\n", "images: a.pgm\n"])
+    @pytest.mark.parametrize("mark", [codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE])
+    def test_byte_order_marks(self, tmp_path, mark):
+        coding = "utf-8" if mark == codecs.BOM_UTF8 else "utf-16-le"
+        coding = "utf-16-be" if mark == codecs.BOM_UTF16_BE else coding
+        (tmp_path / "büro.pgm").write_bytes(b"P5")
+        (tmp_path / "room.yaml").write_bytes(mark + "image: büro.pgm\n".encode(coding))
+        made = sources.map_server_map(tmp_path / "room.yaml").map_server_map
+        assert (made.yaml, made.image) == ("image: büro.pgm\n", b"P5")
+
+    @pytest.mark.parametrize(
+        "image", ["/home/robot/maps/room.pgm", r"C:\Users\me\room.pgm", r".\room.pgm", "~/room.pgm"]
+    )
+    def test_a_path_of_another_machine_is_found_beside_the_file(self, tmp_path, image):
+        (tmp_path / "room.pgm").write_bytes(b"P5")
+        (tmp_path / "room.yaml").write_text(f"image: {image}\n", encoding="utf-8")
+        with pytest.warns(UserWarning, match=r"does not exist, and room\.pgm beside room\.yaml"):
+            made = sources.map_server_map(tmp_path / "room.yaml")
+        assert made.map_server_map.image == b"P5"
+
+    def test_the_picture_and_the_folder_lead_to_the_file(self, tmp_path):
+        (tmp_path / "room.pgm").write_bytes(b"P5")
+        text = "image: room.pgm\nresolution: 0.05\n"
+        (tmp_path / "first floor.yaml").write_text(text, encoding="utf-8")
+        for path in (tmp_path, tmp_path / "room.pgm"):
+            assert sources.map_server_map(path).map_server_map.yaml == text
+
+    def test_a_picture_without_a_file_and_a_folder_of_two(self, tmp_path):
+        (tmp_path / "room.pgm").write_bytes(b"P5")
+        with pytest.raises(InvalidRequestError, match=r"no \.yaml beside it names; give the map's"):
+            sources.map_server_map(tmp_path / "room.pgm")
+        for name in ("a.yaml", "b.yaml"):
+            text = "image: room.pgm\nresolution: 0.05\n"
+            (tmp_path / name).write_text(text, encoding="utf-8")
+        for path in (tmp_path, tmp_path / "room.pgm"):
+            with pytest.raises(InvalidRequestError, match=r"give one of them: a\.yaml, b\.yaml"):
+                sources.map_server_map(path)
+
+    @pytest.mark.parametrize(
+        "text", ["resolution: 0.05\n", "image:\n", "image: ~", "images: a.pgm"]
+    )
     def test_no_picture_named(self, tmp_path, text):
         (tmp_path / "room.yaml").write_text(text, encoding="utf-8")
         with pytest.raises(InvalidRequestError, match="names no picture; add a line"):
             sources.map_server_map(tmp_path / "room.yaml")
+
+    @pytest.mark.parametrize("text", ["", "- image", "image: [", "image: a\n b: c"])
+    def test_no_yaml_of_a_map(self, tmp_path, text):
+        (tmp_path / "room.yaml").write_text(text, encoding="utf-8")
+        with pytest.raises(
+            InvalidRequestError, match="give the file that map_server saved"
+        ) as error:
+            sources.map_server_map(tmp_path / "room.yaml")
+        assert error.value.field == "map_server_map.yaml"
 
     def test_missing_picture(self, tmp_path):
         (tmp_path / "room.yaml").write_text("image: gone.pgm\n", encoding="utf-8")
@@ -200,12 +258,17 @@ class TestMapServerMap:
 
     def test_not_text(self, tmp_path):
         (tmp_path / "room.yaml").write_bytes(b"\xff\xfe\x00")
-        with pytest.raises(InvalidRequestError, match="is not text in UTF-8"):
+        with pytest.raises(InvalidRequestError, match="is not UTF-8 text; save it as UTF-8"):
             sources.map_server_map(tmp_path / "room.yaml")
 
-    def test_missing_file(self, tmp_path):
-        with pytest.raises(FileNotFoundError):
-            sources.map_server_map(tmp_path / "gone.yaml")
+    @pytest.mark.parametrize("name", ["gone.yaml", "gone/gone.yaml", "a\0b.yaml", "x" * 5000])
+    def test_missing_file(self, tmp_path, name):
+        with pytest.raises(
+            InvalidRequestError, match=r"cannot be read: .*; check the path"
+        ) as caught:
+            sources.map_server_map(tmp_path / name)
+        assert caught.value.field == "map_server_map.yaml"
+        assert caught.value.reason == "INVALID_FILE"
 
 
 class TestImage:
@@ -213,3 +276,7 @@ class TestImage:
         (tmp_path / "sketch.png").write_bytes(b"PNG")
         assert sources.image(tmp_path / "sketch.png") == sources.image(b"PNG")
         assert sources.image(str(tmp_path / "sketch.png")).image.data == b"PNG"
+
+    def test_missing_file(self, tmp_path):
+        with pytest.raises(InvalidRequestError, match=r"gone\.png\) cannot be read: No such file"):
+            sources.image(tmp_path / "gone.png")

@@ -226,11 +226,22 @@ def test_the_small_offices_legs_become_one_long_table():
     assert max(areas(found)) == pytest.approx(6.8, rel=0.1)
 
 
-def test_depots_threshold_makes_unknown_free_and_is_reported():
+def test_what_map_saver_saved_as_unknown_is_no_room_whatever_the_threshold():
     (warning,) = segmented(real_map("nav2-depot/depot.yaml")).warnings
-    assert "free_thresh 0.25 makes 5% of the map free" in warning
+    assert "5% of the map has the grey 205" in warning
     others = [segmented(real_map(name)).warnings for name in COUNTS if "depot" not in name]
     assert others == [()] * 3
+
+
+def test_a_home_has_its_furniture_and_not_its_walls():
+    # Two blocks of the kitchen, the chairs, a sideboard and ragged pieces at the door; nothing as
+    # long as the walls, which were objects while unknown cells were free.
+    home = real_map("elsabot-downstairs/downstairs.yaml")
+    found = segmented(home)
+    assert len(found.scene) == 16
+    assert sorted(areas(found))[-2:] == pytest.approx([6.4, 7.6], abs=0.1)
+    as_the_thresholds_say = segmented(home, keep_unknown=False)
+    assert len(as_the_thresholds_say.scene) == 31
 
 
 def test_sixteen_million_cells_are_no_trouble():

@@ -24,7 +24,8 @@ def test_a_missing_file_is_named(tmp_path):
 def test_a_directory_is_named(tmp_path):
     (tmp_path / "maps.yaml").mkdir()
     error = refused(tmp_path / "maps.yaml")
-    assert str(error) == f"{tmp_path / 'maps.yaml'} is a directory; give a file in it"
+    remedy = "is a folder without a map; give the .yaml that map_server saved"
+    assert str(error) == f"{tmp_path / 'maps.yaml'} {remedy}"
 
 
 @pytest.mark.parametrize("name", ["sketch.dwg", "sketch", ".svg"])
@@ -59,7 +60,7 @@ def test_contents_at_fault_are_named_after_the_path(tmp_path):
 def test_slow_libraries_wait_until_a_file_needs_them():
     script = (
         "import sys, sketchmatch.io; print([name for name in"
-        " ('cv2', 'PIL', 'svgelements', 'yaml') if name in sys.modules])"
+        " ('cv2', 'PIL', 'svgelements', 'yaml', 'grpc') if name in sys.modules])"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True

@@ -1,6 +1,7 @@
 """Maps out of ROS bags, which the tests write themselves."""
 
 import importlib.util
+import math
 import sys
 
 import numpy as np
@@ -38,6 +39,13 @@ def test_the_last_map_is_taken_with_its_pose_and_the_resolution_that_was_meant(t
     assert (found.cells == CELLS).all()
     assert found.resolution == 0.05
     assert found.origin == pytest.approx((1.0, -2.0, 0.3))
+
+
+@pytest.mark.parametrize("kind", [ROS1, MCAP])
+def test_an_orientation_of_nan_is_none_and_noted(tmp_path, kind):
+    found = read_source(write(tmp_path, kind, ("/map", CELLS, math.nan)))
+    assert found.origin == (1.0, -2.0, 0.0)
+    assert found.notes == ("the orientation of the map's origin is nan and was read as none",)
 
 
 @pytest.mark.parametrize("kind", [MCAP, SQLITE])

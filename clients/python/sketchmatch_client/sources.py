@@ -7,8 +7,8 @@ shows anything, is the server's to say.
 from __future__ import annotations
 
 import os
-import re
 import reprlib
+import warnings
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
@@ -17,6 +17,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sketchmatch_client.errors import InvalidRequestError, refused_as
+from sketchmatch_map_files import (
+    PICTURE_SUFFIXES,
+    MapFileError,
+    find_picture,
+    parse,
+    text_of,
+    yaml_in,
+    yaml_of,
+)
 from sketchmatch_proto.v1 import source_pb2
 
 __all__ = ["YAxis", "image", "map_server_map", "occupancy_grid", "polygons", "strokes"]
@@ -25,12 +34,6 @@ YAxis = Literal["up", "down"]
 """Which way y grows: screens, tablets and pictures deliver ``"down"``."""
 
 _Y_AXES = {"up": source_pb2.Y_AXIS_UP, "down": source_pb2.Y_AXIS_DOWN}
-
-# `image: room.pgm`, its path plain or in quotes, a comment after it or none.
-_IMAGE_LINE = re.compile(
-    r"""^image[ \t]*:[ \t]+(?:"([^"\n]+)"|'([^'\n]+)'|([^\s"'#].*?))[ \t]*(?:[ \t]\#.*)?$""",
-    re.MULTILINE,
-)
 
 
 def strokes(
@@ -171,35 +174,31 @@ def map_server_map(path: str | os.PathLike[str]) -> source_pb2.Source:
     Parameters
     ----------
     path
-        The .yaml file. The picture that its ``image`` names is read as well.
+        The .yaml file. The picture that its ``image`` names is read as well; where that is a path
+        of another machine, one of that name beside the file is taken, with a warning. Or the
+        picture, which a .yaml beside it names, or the folder that holds one map.
 
     Raises
     ------
     InvalidRequestError
-        If the file names no picture, or one that cannot be read.
-    OSError
-        If the file itself cannot be read.
+        If the file or its picture cannot be read, or it names none.
     """
     path = Path(path)
-    with refused_as("INVALID_FILE", "map_server_map.yaml", f"({path}) is not text in UTF-8"):
-        text = path.read_text(encoding="utf-8")
-    line = _IMAGE_LINE.search(text)
-    if line is None:
-        raise InvalidRequestError(
-            f"map_server_map.yaml ({path}) names no picture; add a line `image: FILE`",
-            "INVALID_FILE",
-            "map_server_map.yaml",
-        )
-    picture = path.parent / line[line.lastindex or 0]
+    field = "map_server_map.yaml"
     try:
-        data = picture.read_bytes()
-    except OSError as error:
-        raise InvalidRequestError(
-            f"map_server_map.image ({picture}, as {path} names it) cannot be read: "
-            f"{error.strerror}",
-            "INVALID_FILE",
-            "map_server_map.image",
-        ) from error
+        file = _map_yaml(path)
+        text = text_of(_bytes(file, field))
+        document = parse(text)
+    except MapFileError as error:
+        problem = f"{field} ({path}) {error.problem}"
+        raise InvalidRequestError(problem, error.reason, field) from None
+    if not document.images:
+        problem = f"{field} ({file}) names no picture; add a line `image: FILE`"
+        raise InvalidRequestError(problem, "INVALID_FILE", field)
+    picture, notes = find_picture(file, document)
+    for note in notes:
+        warnings.warn(note, stacklevel=2)
+    data = _bytes(picture, "map_server_map.image", f", as {file} names it")
     return source_pb2.Source(map_server_map=source_pb2.MapServerMap(yaml=text, image=data))
 
 
@@ -213,11 +212,31 @@ def image(file: str | os.PathLike[str] | bytes) -> source_pb2.Source:
 
     Raises
     ------
-    OSError
+    InvalidRequestError
         If the file cannot be read.
     """
-    data = file if isinstance(file, bytes) else Path(file).read_bytes()
+    data = file if isinstance(file, bytes) else _bytes(Path(file), "image.data")
     return source_pb2.Source(image=source_pb2.EncodedImage(data=data))
+
+
+def _map_yaml(path: Path) -> Path:
+    """Return the YAML file of a map: a path itself, or beside it, or in it."""
+    if os.path.isdir(path):  # noqa: PTH112 (no error)
+        return yaml_in(path)
+    if path.suffix.lower() not in PICTURE_SUFFIXES:
+        return path
+    if (file := yaml_of(path)) is None:
+        raise MapFileError("is a picture that no .yaml beside it names; give the map's .yaml")
+    return file
+
+
+def _bytes(path: Path, field: str, origin: str = "") -> bytes:
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        cause = getattr(error, "strerror", None) or str(error)
+        problem = f"{field} ({path}{origin}) cannot be read: {cause}; check the path"
+        raise InvalidRequestError(problem, "INVALID_FILE", field) from error
 
 
 def _stroke_points(points: Iterable[Sequence[float]], field: str) -> list[source_pb2.StrokePoint]:

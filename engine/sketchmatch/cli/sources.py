@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from sketchmatch.cli.options import say
 from sketchmatch.io.files import (
-    MAP_SUFFIXES,
     PICTURE_SUFFIXES,
     read_bytes,
-    read_map_server,
+    read_map_files,
     read_source,
 )
 from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
@@ -40,14 +40,14 @@ def source_of(path: Path, side: str = "") -> Source:
     InvalidInputError
         If it cannot be read; what is in pictures and maps is looked at where they are decoded.
     """
-    suffix = path.suffix.lower()
-    if suffix in MAP_SUFFIXES:
-        text, picture = read_map_server(path)
-        return Source(map_server_map=MapServerMap(yaml=text, image=picture))
-    if suffix in PICTURE_SUFFIXES:
+    if (files := read_map_files(path)) is not None:
+        _say_notes(files.notes, side)
+        return Source(map_server_map=MapServerMap(yaml=files.yaml, image=files.picture))
+    if path.suffix.lower() in PICTURE_SUFFIXES:
         return sources.image(read_bytes(path))
     match read_source(path):
         case OccupancyGrid(cells, resolution, origin, notes):
+            # Of a bag, whose notes have no room in the message.
             _tell(notes, side)
             return sources.occupancy_grid(cells, resolution, origin)
         case StrokeSet(strokes, notes):
@@ -65,7 +65,7 @@ def source_of(path: Path, side: str = "") -> Source:
             raise AssertionError("pictures pass as they are")
 
 
-def _tell(notes: tuple[str, ...], side: str) -> None:
+def _tell(notes: Sequence[str], side: str) -> None:
     """Say what has no room in the message: notes of whoever read the file."""
     for note in notes:
         say(f"{side}: {note}" if side else note)

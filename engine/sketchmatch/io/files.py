@@ -7,21 +7,17 @@ import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from sketchmatch.errors import InvalidInputError, Reason, quoted
+from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io.geojson import decode_geojson
+from sketchmatch.io.map_files import MapFiles, map_files
 from sketchmatch.io.ros_bag import SUFFIXES, bag_and_topic, is_bag, read_bag
 from sketchmatch.io.stroke_json import decode_strokes
 from sketchmatch.model import Source
 from sketchmatch.model.limits import check_bytes, check_source, source_limits
+from sketchmatch_map_files import PICTURE_SUFFIXES, YAML_SUFFIXES
 
-if TYPE_CHECKING:
-    from sketchmatch.io.ros_map import MapServerHeader
-
-__all__ = ["MAP_SUFFIXES", "PICTURE_SUFFIXES", "read_bytes", "read_map_server", "read_source"]
-
-_LONGEST_NAME = 500
+__all__ = ["PICTURE_SUFFIXES", "read_bytes", "read_map_files", "read_source"]
 
 
 def read_source(path: str | Path) -> Source:
@@ -31,8 +27,9 @@ def read_source(path: str | Path) -> Source:
     ----------
     path
         ``.svg`` or ``.json`` strokes, ``.geojson`` polygons, ``.yaml`` of a ROS map with its
-        picture beside it, a picture (``.png``, ``.jpg``, ``.bmp``, ``.tif``, ``.pgm`` …), or a ROS
-        bag (``.bag``, ``.mcap``, ``.db3`` or a folder), as :mod:`sketchmatch.io.ros_bag` tells.
+        picture beside it, that picture or the folder of both, another picture (``.png``, ``.jpg``,
+        ``.bmp``, ``.tif``, ``.pgm`` …), or a ROS bag (``.bag``, ``.mcap``, ``.db3`` or a folder),
+        as :mod:`sketchmatch.io.ros_bag` tells.
 
     Returns
     -------
@@ -63,8 +60,19 @@ def read_bytes(path: Path) -> bytes:
     return _read(path, str(path))
 
 
-def read_map_server(path: Path) -> tuple[str, bytes]:
-    """Read the two files of a robot's map as they are: the text of its YAML, and its picture.
+def read_map_files(path: Path) -> MapFiles | None:
+    """Read the two files of a robot's map, if a path leads to one.
+
+    Parameters
+    ----------
+    path
+        Of the YAML file; or of the picture that a YAML beside it names; or of a picture that
+        looks as map_server saves them, which gets a YAML; or of the folder of a map.
+
+    Returns
+    -------
+    MapFiles or None
+        None for every other kind of file.
 
     Raises
     ------
@@ -72,17 +80,18 @@ def read_map_server(path: Path) -> tuple[str, bytes]:
         As :func:`read_source` does, but for what is wrong with the picture.
     """
     with _placed_in(path):
-        text = _text(_read(path, str(path)))
-        return text, _parsed(path, text)[1]
+        return map_files(path, _read)
 
 
 def _decoded(path: Path) -> Source:
     bag, topic = bag_and_topic(path)
     if is_bag(bag):
         return read_bag(bag, topic)
+    if (files := map_files(path, _read)) is not None:
+        return files.grid()
     decode = _DECODERS.get(path.suffix.lower())
     if decode is None:
-        kinds = " ".join(sorted((*_DECODERS, *SUFFIXES)))
+        kinds = " ".join(sorted((*_DECODERS, *YAML_SUFFIXES, *SUFFIXES)))
         raise _invalid(str(path), f"is of no known kind; give a file that ends in one of {kinds}")
     return decode(path, _read(path, str(path)))
 
@@ -133,22 +142,6 @@ def _text(data: bytes) -> str:
 # The libraries behind some kinds are slow to import, so they wait until such a file is read.
 
 
-def _map_server(path: Path, data: bytes) -> Source:
-    header, picture = _parsed(path, _text(data))
-    return header.grid(picture)
-
-
-def _parsed(path: Path, text: str) -> tuple[MapServerHeader, bytes]:
-    """Return what a map's YAML says, and the bytes of its picture."""
-    from sketchmatch.io.ros_map import parse_header
-
-    header = parse_header(text)
-    picture = path.parent / header.image
-    name = str(picture)
-    shown = name if name.isprintable() and len(name) <= _LONGEST_NAME else quoted(header.image)
-    return header, _read(picture, f"{path}: image {shown}")
-
-
 def _picture(_: Path, data: bytes) -> Source:
     from sketchmatch.io.images import decode_image
 
@@ -173,17 +166,9 @@ def _invalid(field: str, problem: str) -> InvalidInputError:
     return InvalidInputError(Reason.INVALID_FILE, field, problem)
 
 
-MAP_SUFFIXES = (".yaml", ".yml")
-"""Of a robot's map that map_server saved."""
-PICTURE_SUFFIXES = (
-    *(".bmp", ".jpeg", ".jpg", ".pbm", ".pgm"),
-    *(".png", ".pnm", ".ppm", ".tif", ".tiff"),
-)
-"""Of pictures."""
 _DECODERS: dict[str, Callable[[Path, bytes], Source]] = {
     ".svg": _svg,
     ".json": _strokes,
     ".geojson": _polygons,
-    **dict.fromkeys(MAP_SUFFIXES, _map_server),
     **dict.fromkeys(PICTURE_SUFFIXES, _picture),
 }

@@ -117,10 +117,15 @@ def _grid(message: Any) -> OccupancyGrid:
             f"has a map of {cells.size} cells for {rows} × {columns}; record it again",
         )
     origin = message.info.origin
-    pose = (float(origin.position.x), float(origin.position.y), _yaw(origin.orientation))
+    notes: tuple[str, ...] = ()
+    yaw = _yaw(origin.orientation)
+    if not math.isfinite(yaw):
+        # As in a YAML: a map that came without an orientation.
+        yaw, notes = 0.0, ("the orientation of the map's origin is nan and was read as none",)
+    pose = (float(origin.position.x), float(origin.position.y), yaw)
     # The message holds 0.05 as 0.0500000007; its shortest digits are what was meant.
     resolution = float(str(np.float32(message.info.resolution)))
-    return OccupancyGrid(cells.reshape(rows, columns), resolution, pose)
+    return OccupancyGrid(cells.reshape(rows, columns), resolution, pose, notes)
 
 
 def _yaw(q: Any) -> float:

@@ -8,17 +8,20 @@ All keys but ``mode`` are required, as map_server requires them; others are igno
     negate: 0                     # 1: white is occupied
     occupied_thresh: 0.65
     free_thresh: 0.196
-    mode: trinary                 # or scale, or raw
+    mode: trinary                 # or scale, or raw, in capitals or not
 
 A pixel of value v is occupied with p = (255 − v)/255, or v/255 where negated; v is the mean of
 its colours. In mode ``trinary`` p > occupied_thresh is occupied (100), p < free_thresh free (0)
 and the rest unknown (−1); ``scale`` spreads the rest from 0 to 100; ``raw`` takes v itself, and
 unknown where it is above 100. Pictures of 16 bits a channel are read with 8.
 
-The thresholds decide alone, but there is a trap: nav2's map_saver writes unknown cells as the grey
-205 (p = 0.19608) and free_thresh 0.25 beside it, by which they come back as free, for the robot as
-here. Where many cells are read so, the grid's notes say it; ``free_thresh: 0.196`` keeps them
-unknown.
+There is a trap: map_saver writes unknown cells as the grey 205 (p = 0.19608), and most of nav2's
+configurations say free_thresh 0.25 beside it, by which a robot takes them for free. Here they are
+unknown where they are many, and lighter cells are free, in mode ``trinary``; the grid's notes say
+it, and its picture keeps what the thresholds alone would say.
+
+Other tools name things of the place in the same file, as in
+``table: {type: furniture, pose: [4.0, -4.7, 0, 0]}``; the grid has them as its landmarks.
 
 ROS 1's map_server [1]_ and nav2's [2]_ agree that all keys but ``mode`` are required, and the
 origin's three numbers; so do we, and assume nothing. In details they differ:
@@ -34,7 +37,9 @@ not opaque, scale      v as if it were opaque,    unknown                    unk
                        the thresholds: unknown
 not opaque, trinary    alpha counts as a colour   alpha counts as a colour   unknown
 palette                the index counts as grey   the colour                 the colour
+``mode``               in small letters           also Trinary and TRINARY   as nav2
 ``negate``             a whole number             that, or true and false    0, 1, true, false
+a key that is twice    the first                  the first                  that, and a note
 yaw of nan             no pose                    no pose                    0, and a note
 =====================  =========================  =========================  ====================
 
@@ -48,23 +53,24 @@ References
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import PIL.Image
-import yaml
 from numpy.typing import NDArray
 
 from sketchmatch.errors import InvalidInputError, Reason, quoted
-from sketchmatch.io._yaml import LOADER, check_header
 from sketchmatch.io.images import load_picture, scaled_to_8_bits
-from sketchmatch.model import OccupancyGrid
+from sketchmatch.model import GridPicture, Landmark, OccupancyGrid
 from sketchmatch.model.sources import check_placement
+from sketchmatch_map_files import MapFileError, parse
 
-__all__ = ["MapServerHeader", "decode_map_server", "parse_header"]
+__all__ = ["MapServerHeader", "decode_map_server", "header_for", "parse_header"]
 
 _EXAMPLES = {
     "image": "office.pgm",
@@ -74,11 +80,18 @@ _EXAMPLES = {
     "occupied_thresh": "0.65",
     "free_thresh": "0.196",
 }
+_KEYS = (*_EXAMPLES, "mode")
 _MODES = ("trinary", "scale", "raw")
-_SAVED_UNKNOWN = 205
-"""The grey with which map_server saves unknown cells."""
 _MANY = 0.01
 """As a share of all cells."""
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_TRUE, _FALSE = ("true", "yes", "on", "y"), ("false", "no", "off", "n")
+_SAVED_PGM = re.compile(rb"P5\s+(?:#[^\n]*\n\s*)*\d+\s+\d+\s+255\s")
+_CREATOR = re.compile(rb"# CREATOR: [^\n]* (\d+\.\d+) m/pix")
+_PLACES = ("pose", "position", "location", "centroid")
+_NAMES = ("name", "label")
+_LONGEST_NUMBER = 300
+_DEEPEST_LANDMARK = 4
 
 
 @dataclass(frozen=True)
@@ -87,8 +100,6 @@ class MapServerHeader:
 
     Attributes
     ----------
-    image
-        Path of the picture, relative to the YAML file or absolute.
     resolution
         Metres a cell.
     origin
@@ -101,9 +112,10 @@ class MapServerHeader:
         ``"trinary"``, ``"scale"`` or ``"raw"``.
     notes
         What was assumed in reading it, each one sentence.
+    landmarks
+        Things of the place that it names.
     """
 
-    image: str
     resolution: float
     origin: tuple[float, float, float]
     negate: bool
@@ -111,6 +123,7 @@ class MapServerHeader:
     free_thresh: float
     mode: str
     notes: tuple[str, ...] = ()
+    landmarks: tuple[Landmark, ...] = ()
 
     def grid(self, image: bytes) -> OccupancyGrid:
         """Return the occupancy grid that the picture's bytes hold.
@@ -124,20 +137,33 @@ class MapServerHeader:
         cells = self._occupancy()[values]
         if opaque is not None and self.mode != "raw":
             cells[~opaque] = -1
-        notes = (*self.notes, *self._trap(values, cells))
-        return OccupancyGrid(cells[::-1], self.resolution, self.origin, notes)
+        notes, picture = self.notes, None
+        if self.mode == "trinary":
+            picture = self._picture(values, opaque)
+            notes = (*notes, *self._restore_unknown(cells[::-1], picture))
+        return OccupancyGrid(
+            cells[::-1], self.resolution, self.origin, notes, picture, self.landmarks
+        )
 
-    def _trap(self, values: NDArray[np.uint8], cells: NDArray[np.int8]) -> tuple[str, ...]:
-        """Return a warning if many cells that were saved as unknown seem to be read as free."""
-        if self.mode != "trinary" or self._occupancy()[_SAVED_UNKNOWN] != 0:
+    def _picture(self, values: NDArray[np.uint8], opaque: NDArray[np.bool_] | None) -> GridPicture:
+        shades = values.copy() if self.negate else 255 - values
+        if opaque is not None:
+            shades[~opaque] = 255
+        return GridPicture(shades[::-1], self.free_thresh)
+
+    def _restore_unknown(self, cells: NDArray[np.int8], picture: GridPicture) -> tuple[str, ...]:
+        """Make cells unknown that were saved so and read as free; return what there is to say."""
+        saved = (picture.shades == picture.saved_unknown) & (cells == 0)
+        share = np.count_nonzero(saved) / cells.size
+        # Without lighter cells they are all that is free, and nobody's unknown.
+        if share < _MANY or np.count_nonzero(cells == 0) / cells.size - share < _MANY:
             return ()
-        share = np.count_nonzero((values == _SAVED_UNKNOWN) & (cells == 0)) / values.size
-        if share < _MANY:
-            return ()
+        cells[saved] = -1
         return (
-            f"free_thresh {self.free_thresh:g} makes {share:.0%} of the map free that have the "
-            f"grey {_SAVED_UNKNOWN} with which map_server saves unknown cells; if they were never "
-            "seen, set free_thresh to 0.196",
+            f"{share:.0%} of the map has the grey {picture.saved_unknown if self.negate else 205}, "
+            "with which map_server saves unknown cells, and was read as unknown although "
+            f"free_thresh {self.free_thresh:g} would call it free; if it is free, set keep_unknown "
+            "to false",
         )
 
     def _occupancy(self) -> NDArray[np.int8]:
@@ -186,36 +212,66 @@ def parse_header(yaml_text: str) -> MapServerHeader:
         With the key at fault as its path, if it is not YAML, a key is missing or its value is
         of no use.
     """
-    document = _document(yaml_text)
+    try:
+        document = parse(yaml_text)
+    except MapFileError as error:
+        raise InvalidInputError(Reason(error.reason), "", error.problem) from None
+    values = document.values
     for key, example in _EXAMPLES.items():
-        if document.get(key) is None:
+        if values.get(key) is None:
             raise _invalid(key, f"is missing; add it, for instance '{key}: {example}'")
-    origin, notes = _origin(document["origin"])
+    if not document.images:
+        raise _invalid("image", "is not a file name; give the picture's path")
+    origin, notes = _origin(values["origin"])
     header = MapServerHeader(
-        image=_image(document["image"]),
-        resolution=_number(document["resolution"], "resolution"),
+        resolution=_number(values["resolution"], "resolution"),
         origin=origin,
-        negate=_negate(document["negate"]),
-        occupied_thresh=_number(document["occupied_thresh"], "occupied_thresh"),
-        free_thresh=_number(document["free_thresh"], "free_thresh"),
-        mode=_mode(document.get("mode", "trinary")),
-        notes=notes,
+        negate=_negate(values["negate"]),
+        occupied_thresh=_number(values["occupied_thresh"], "occupied_thresh"),
+        free_thresh=_number(values["free_thresh"], "free_thresh"),
+        mode=_mode(values.get("mode")),
+        notes=(*notes, *(_repeated(key, values[key]) for key in document.repeated if key in _KEYS)),
+        landmarks=tuple(_landmarks(values)),
     )
     _check_ranges(header)
     return header
 
 
-def _document(text: str) -> Mapping[Any, Any]:
-    check_header(text)
-    try:
-        document = yaml.load(text, LOADER)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f" (line {min(mark.line, text.count(chr(10))) + 1})" if mark else ""
-        raise _invalid("", f"is not YAML{where}; give the file that map_server saved") from None
-    if not isinstance(document, Mapping):
-        raise _invalid("", "is not a list of keys and values; give the file that map_server saved")
-    return document
+def header_for(name: str, picture: bytes) -> tuple[str, str] | None:
+    """Return a YAML text for a map whose own is lost, and a sentence that says what was assumed.
+
+    Parameters
+    ----------
+    name
+        The picture's.
+    picture
+        A PGM file, which ROS 1 gives a comment with its resolution.
+
+    Returns
+    -------
+    tuple or None
+        None if it does not look as map_server saves maps: binary, and with no greys but black,
+        205 and 254, of which it has the latter two.
+    """
+    start = _SAVED_PGM.match(picture)
+    if start is None:
+        return None
+    cells = picture[start.end() :]
+    if cells.translate(None, b"\x00\xcd\xfe") or not {205, 254} <= set(cells):
+        return None
+    said = _CREATOR.search(start[0])
+    resolution = float(said[1]) if said else 0.0
+    known = 0.0 < resolution < 1e3
+    text = (
+        f"image: {json.dumps(name)}\nresolution: {resolution if known else 0.05:g}\n"
+        "origin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    cell = f"{resolution:g} m, as it says" if known else "0.05 m"
+    return text, (
+        f"{name} looks like a map that map_server saved, but no YAML beside it names it; it was "
+        f"read with cells of {cell}, and its lower left corner as the origin; give its YAML if "
+        "that is wrong"
+    )
 
 
 def _check_ranges(header: MapServerHeader) -> None:
@@ -237,49 +293,94 @@ def _check_ranges(header: MapServerHeader) -> None:
         )
 
 
-def _image(value: object) -> str:
-    if not isinstance(value, str) or not value.strip() or "\0" in value:
-        raise _invalid("image", "is not a file name; give the picture's path")
-    return value
+def _repeated(key: str, value: object) -> str:
+    return f"{key} stands in the map's YAML twice, and the first, {quoted(value)}, counts"
 
 
 def _origin(value: object) -> tuple[tuple[float, float, float], tuple[str, ...]]:
     if not isinstance(value, list) or len(value) != 3:
         raise _invalid("origin", "is not a list of three numbers; give [x, y, yaw]")
     x, y = (_number(part, f"origin[{k}]") for k, part in enumerate(value[:2]))
-    if _is_nan(value[2]):
+    # ROS 1 writes nan or -nan, nav2 .nan.
+    if isinstance(value[2], str) and value[2].strip().lower().lstrip("+-.") == "nan":
         return (x, y, 0.0), ("the yaw of the map's origin is nan and was read as 0",)
     return (x, y, _number(value[2], "origin[2]")), ()
 
 
-def _is_nan(value: object) -> bool:
-    # ROS 1 writes nan or -nan, which YAML reads as a string; nav2 .nan.
-    if isinstance(value, str):
-        return value.strip().lower().lstrip("+-.") == "nan"
-    return isinstance(value, float) and math.isnan(value)
-
-
 def _negate(value: object) -> bool:
-    if value not in (0, 1):
-        raise _invalid("negate", f"is {quoted(value)}; give 0, or 1 where white is occupied")
-    return bool(value)
+    if isinstance(value, str):
+        if (number := _float(value)) in (0.0, 1.0):
+            return bool(number)
+        if value.strip().lower() in (*_TRUE, *_FALSE):
+            return value.strip().lower() in _TRUE
+    raise _invalid("negate", f"is {_as_written(value)}; give 0, or 1 where white is occupied")
 
 
 def _mode(value: object) -> str:
-    if value not in _MODES:
+    mode = "trinary" if value is None else value
+    if not isinstance(mode, str) or mode.strip().lower() not in _MODES:
         raise _invalid("mode", f"is {quoted(value)}; give trinary, scale or raw")
-    return str(value)
+    return mode.strip().lower()
 
 
 def _number(value: object, key: str) -> float:
-    # YAML 1.1 reads 5e-2 as a string, and map_server as the number it is.
-    try:
-        number = float(value) if isinstance(value, int | float | str) else math.nan
-    except (ValueError, OverflowError):
-        number = math.nan
-    if isinstance(value, bool) or not math.isfinite(number):
-        raise _invalid(key, f"is {quoted(value)}; give a finite number")
+    number = _float(value)
+    if number is None or not math.isfinite(number):
+        raise _invalid(key, f"is {_as_written(value)}; give a finite number")
     return number
+
+
+def _float(value: object) -> float | None:
+    """Return the number that a text is to map_server, which reads decimal ones alone."""
+    if not isinstance(value, str) or len(value) > _LONGEST_NUMBER:
+        return None
+    return float(value) if _NUMBER.fullmatch(value.strip()) else None
+
+
+def _as_written(value: object) -> str:
+    """Return a value as a sentence may quote it: numbers, those of YAML too, without quotes."""
+    number = value.strip().lower().replace(".nan", "nan") if isinstance(value, str) else ""
+    number = number.replace(".inf", "inf")
+    try:
+        return f"{float(number):g}"
+    except ValueError:
+        return quoted(value)
+
+
+def _landmarks(values: Mapping[str, Any]) -> Iterator[Landmark]:
+    for key, value in values.items():
+        if key not in _KEYS:
+            yield from _named_within(key, value, _DEEPEST_LANDMARK)
+
+
+def _named_within(key: str, value: object, depth: int) -> Iterator[Landmark]:
+    """Yield the thing that a value describes, or those that are listed in it."""
+    if not depth:
+        return
+    if isinstance(value, list):
+        for item in value:
+            yield from _named_within(key, item, depth - 1)
+    elif isinstance(value, dict):
+        name = next((value[each] for each in _NAMES if isinstance(value.get(each), str)), "")
+        place = next((value[each] for each in _PLACES if each in value), value if name else None)
+        point = _point(place)
+        if point is not None:
+            kind = value.get("type")
+            yield Landmark(name or key, point, kind if isinstance(kind, str) else "")
+            return
+        for inner, item in value.items():
+            yield from _named_within(inner, item, depth - 1)
+
+
+def _point(place: object) -> tuple[float, float] | None:
+    if isinstance(place, dict) and "position" in place:
+        place = place["position"]
+    if isinstance(place, dict):
+        place = [place.get("x"), place.get("y")]
+    if not isinstance(place, list) or len(place) < 2:
+        return None
+    x, y = (_float(each) for each in place[:2])
+    return (x, y) if x is not None and y is not None and math.isfinite(x + y) else None
 
 
 def _values(picture: PIL.Image.Image) -> tuple[NDArray[np.uint8], NDArray[np.bool_] | None]:

@@ -22,8 +22,10 @@ from sketchmatch.model.relations import (
 )
 from sketchmatch.model.scene import Edges, Scene, SceneObject
 from sketchmatch.model.sources import (
+    GridPicture,
     Image,
     LabelledPolygon,
+    Landmark,
     OccupancyGrid,
     PolygonSet,
     Source,
@@ -39,9 +41,11 @@ __all__ = [
     "Edges",
     "FloatArray",
     "Fmap",
+    "GridPicture",
     "Image",
     "IntArray",
     "LabelledPolygon",
+    "Landmark",
     "ObjectMap",
     "Occm",
     "OccupancyGrid",

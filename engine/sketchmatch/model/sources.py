@@ -16,8 +16,10 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model.arrays import FloatArray, frozen, frozen_floats
 
 __all__ = [
+    "GridPicture",
     "Image",
     "LabelledPolygon",
+    "Landmark",
     "OccupancyGrid",
     "PolygonSet",
     "Source",
@@ -101,6 +103,53 @@ class PolygonSet:
     field = "polygon_set"
 
 
+@dataclass(frozen=True)
+class Landmark:
+    """A thing that whoever made a map gave a name and a place.
+
+    Attributes
+    ----------
+    name
+        For people.
+    point
+        (x, y) in the map's frame, in metres.
+    kind
+        What sort of thing it is, such as ``"door"`` or ``"room"``; empty if nobody said.
+    """
+
+    name: str
+    point: tuple[float, float]
+    kind: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class GridPicture:
+    """The picture from which thresholds made a grid, for those who want other thresholds.
+
+    Attributes
+    ----------
+    shades
+        uint8, shape (rows, columns), row 0 the lowest: 255 times the occupancy, so that 0 is free
+        and 255 occupied; what is not opaque has 255.
+    free_thresh
+        The share of occupancy below which the map's own YAML calls cells free.
+    """
+
+    shades: NDArray[np.uint8]
+    free_thresh: float
+
+    saved_unknown = 50
+    """The shade with which map_server saves what nobody saw; as a grey, 205."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "shades", frozen(np.asarray(self.shades, dtype=np.uint8)))
+
+    def free(self, threshold: float | None = None) -> NDArray[np.bool_]:
+        """Return which cells a threshold alone calls free; without one, the map's own does."""
+        share = self.free_thresh if threshold is None else threshold
+        return (np.arange(256) / 255.0 < share)[self.shades]
+
+
 @dataclass(frozen=True, eq=False)
 class OccupancyGrid:
     """A robot's occupancy grid, as in ``nav_msgs/OccupancyGrid``.
@@ -117,12 +166,18 @@ class OccupancyGrid:
     notes
         What whoever read the map's file had to decide, each one sentence for people: segmenters
         hand them on among their warnings.
+    picture
+        What the cells were read from, where thresholds decided; else None.
+    landmarks
+        What the map's file names.
     """
 
     cells: NDArray[np.int8]
     resolution: float
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     notes: tuple[str, ...] = ()
+    picture: GridPicture | None = None
+    landmarks: tuple[Landmark, ...] = ()
 
     field = "occupancy_grid"
 

@@ -30,21 +30,43 @@ __all__ = [
 
 Mask = NDArray[np.uint8]
 
+# In percent, where neither the map nor a parameter says what is free.
+_FREE = 25
+
 TOLERANCE = 0.75
 """In cells: the steps of a slanted border leave the straight line by up to √½ of a cell."""
 
 
-def free_cells(grid: OccupancyGrid, threshold: int) -> tuple[Mask, tuple[int, int]]:
+def free_cells(
+    grid: OccupancyGrid, threshold: int | None, keep_unknown: bool
+) -> tuple[Mask, tuple[int, int]]:
     """Return a mask of the free cells, cropped to them, and the (x, y) of its first cell.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    threshold
+        In percent: known cells of less occupancy are free. None for 25, or what the map's own
+        file says.
+    keep_unknown
+        Whether what was saved as unknown stays so, whatever thresholds say.
 
     Raises
     ------
     InvalidInputError
         With the path ``cells``, if none is free.
     """
-    # Seen as unsigned, unknown is 255: one comparison is enough.
-    free = (grid.cells.view(np.uint8) < threshold).view(np.uint8)
-    x, y, columns, rows = cv2.boundingRect(free)
+    picture = grid.picture
+    if picture is None or (threshold is None and keep_unknown):
+        # Seen as unsigned, unknown is 255: one comparison is enough.
+        free = grid.cells.view(np.uint8) < (_FREE if threshold is None else threshold)
+    else:
+        free = picture.free(None if threshold is None else threshold / 100.0)
+        if keep_unknown:
+            free &= (picture.shades != picture.saved_unknown) | (grid.cells >= 0)
+    mask = free.view(np.uint8)
+    x, y, columns, rows = cv2.boundingRect(mask)
     if not rows:
         raise InvalidInputError(
             Reason.TOO_FEW_OBJECTS,
@@ -52,7 +74,7 @@ def free_cells(grid: OccupancyGrid, threshold: int) -> tuple[Mask, tuple[int, in
             "has no free cell; objects are looked for inside free space, so check the "
             "thresholds of the map and free_threshold",
         )
-    return free[y : y + rows, x : x + columns], (x, y)
+    return mask[y : y + rows, x : x + columns], (x, y)
 
 
 def holes(region: Mask) -> Mask:

@@ -28,6 +28,7 @@ from sketchmatch_builtin.segmenters._cells import (
     reading_order,
     refuse_more,
 )
+from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of
 from sketchmatch_builtin.segmenters._merging import merged
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
 
@@ -54,6 +55,7 @@ class OccupancyGridSegmenter(Segmenter):
     by morphological opening [2]_. ``merge_distance`` joins the legs of a table.
 
     Objects come in reading order: by their highest point from the top down, then from the left.
+    What the map's file names, other than rooms, gives its name to the object that stands there.
 
     References
     ----------
@@ -84,12 +86,22 @@ class OccupancyGridSegmenter(Segmenter):
     class Params(Params):
         """What is free, what is too small to count, and how outlines are cleaned."""
 
-        free_threshold: int = Field(
-            25,
+        free_threshold: int | None = Field(
+            None,
             ge=1,
             le=100,
-            description="Known cells whose occupancy is below this are free.",
+            description=(
+                "Known cells whose occupancy is below this are free; when left out 25, and for a "
+                "map of map_server the thresholds in its file, in whose place this counts."
+            ),
             json_schema_extra={"unit": "%"},
+        )
+        keep_unknown: bool = Field(
+            True,
+            description=(
+                "The grey 205, with which map_server saves what nobody saw, stays unknown where "
+                "thresholds would call it free; false lets them decide."
+            ),
         )
         min_size: float = Field(
             0.2,
@@ -170,12 +182,22 @@ class OccupancyGridSegmenter(Segmenter):
             ),
             json_schema_extra={"unit": "m"},
         )
+        label_reach: float = Field(
+            0.5,
+            ge=0.0,
+            le=100.0,
+            description=(
+                "What the map's file names is the object in which its place lies, or else the "
+                "nearest up to this far away."
+            ),
+            json_schema_extra={"unit": "m"},
+        )
 
     params: Params
 
     def segment(self, source: OccupancyGrid) -> Segmentation:
         """Return the holes of the free regions, in metres in the map's frame."""
-        free, corner = free_cells(source, self.params.free_threshold)
+        free, corner = free_cells(source, self.params.free_threshold, self.params.keep_unknown)
         rooms = list(_rooms(free, self.params.region_share))
         parts = [
             (mask, (x + left + corner[0], y + below + corner[1]))
@@ -186,15 +208,14 @@ class OccupancyGridSegmenter(Segmenter):
         if len(outlines) < 2:
             largest = max(int(np.count_nonzero(room)) for room, _, _ in rooms)
             raise _too_few(len(outlines), largest, source, self.params)
-        return Segmentation(
-            Scene(
-                tuple(
-                    SceneObject.from_rings([in_map(shapely.get_coordinates(polygon), source)])
-                    for polygon in outlines
-                )
-            ),
-            source.notes,
+        rings = [in_map(shapely.get_coordinates(polygon), source) for polygon in outlines]
+        labels, left = labels_of(
+            [shapely.Polygon(ring) for ring in rings],
+            [item for item in source.landmarks if item.kind != ROOM],
+            self.params.label_reach,
         )
+        objects = [SceneObject.from_rings([r], name) for r, name in zip(rings, labels, strict=True)]
+        return Segmentation(Scene(tuple(objects)), (*source.notes, *left))
 
     def _parts(
         self, room: Mask, held: Mask, grid: OccupancyGrid

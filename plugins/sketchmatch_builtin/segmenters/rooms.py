@@ -23,6 +23,7 @@ from sketchmatch_builtin.segmenters._cells import (
     reading_order,
 )
 from sketchmatch_builtin.segmenters._doorways import divided
+from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of
 
 __all__ = ["RoomSegmenter"]
 
@@ -40,6 +41,7 @@ class RoomSegmenter(Segmenter):
     room, and two rooms are always at least a cell apart. A turned map has the same rooms, turned.
 
     Rooms come in reading order: by their highest point from the top down, then from the left.
+    One that the map's file names, with the type ``room`` and a place in it, has that name.
 
     References
     ----------
@@ -67,12 +69,22 @@ class RoomSegmenter(Segmenter):
     class Params(Params):
         """What is free, how wide doorways are, and what is too small to be a room."""
 
-        free_threshold: int = Field(
-            25,
+        free_threshold: int | None = Field(
+            None,
             ge=1,
             le=100,
-            description="Known cells whose occupancy is below this are free.",
+            description=(
+                "Known cells whose occupancy is below this are free; when left out 25, and for a "
+                "map of map_server the thresholds in its file, in whose place this counts."
+            ),
             json_schema_extra={"unit": "%"},
+        )
+        keep_unknown: bool = Field(
+            True,
+            description=(
+                "The grey 205, with which map_server saves what nobody saw, stays unknown where "
+                "thresholds would call it free; false lets them decide."
+            ),
         )
         door_width: float = Field(
             1.2,
@@ -114,7 +126,7 @@ class RoomSegmenter(Segmenter):
     def segment(self, source: OccupancyGrid) -> Segmentation:
         """Return the rooms, in metres in the map's frame."""
         params, cell = self.params, source.resolution
-        free, (left, below) = free_cells(source, params.free_threshold)
+        free, (left, below) = free_cells(source, params.free_threshold, params.keep_unknown)
         least = max(params.min_area / cell**2, 1.0)
         inside = _furnished(free, params.furniture / cell)
         rooms = divided(inside, params.door_width / cell, least)
@@ -127,13 +139,14 @@ class RoomSegmenter(Segmenter):
             raise _too_few(len(outlines), params)
         tolerance = TOLERANCE if params.tolerance is None else params.tolerance / cell
         outlines = sorted(_simplified(outlines, tolerance), key=reading_order)
-        scene = Scene(
-            tuple(
-                SceneObject.from_rings([in_map(ring, source) for ring in _rings(room)])
-                for room in outlines
-            )
+        rooms_in_map = [[in_map(ring, source) for ring in _rings(room)] for room in outlines]
+        labels, left = labels_of(
+            [shapely.Polygon(outer, inner) for outer, *inner in rooms_in_map],
+            [item for item in source.landmarks if item.kind == ROOM],
+            0.0,
         )
-        return Segmentation(scene, source.notes)
+        objects = map(SceneObject.from_rings, rooms_in_map, labels)
+        return Segmentation(Scene(tuple(objects)), (*source.notes, *left))
 
 
 def _furnished(free: Mask, longest: float) -> Mask:

@@ -1,0 +1,137 @@
+"""From a path to the two files of a robot's map: by either, or by the folder they are in."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from sketchmatch.errors import InvalidInputError, Reason, quoted
+from sketchmatch.io.ros_bag import is_bag
+from sketchmatch.model import OccupancyGrid
+from sketchmatch_map_files import (
+    PICTURE_SUFFIXES,
+    YAML_SUFFIXES,
+    MapFileError,
+    find_picture,
+    parse,
+    text_of,
+    yaml_in,
+    yaml_of,
+)
+
+if TYPE_CHECKING:
+    from sketchmatch.io.ros_map import MapServerHeader
+
+__all__ = ["MapFiles", "map_files"]
+
+_LONGEST_NAME = 500
+
+
+class MapFiles(NamedTuple):
+    """The two files of a robot's map as they are.
+
+    Attributes
+    ----------
+    yaml
+        The text of the YAML file.
+    picture
+        The bytes of the picture.
+    notes
+        What there is to say of how they were found, each one sentence.
+    """
+
+    yaml: str
+    picture: bytes
+    notes: tuple[str, ...]
+
+    def grid(self) -> OccupancyGrid:
+        """Return the occupancy grid in them, with these notes before its own.
+
+        Raises
+        ------
+        InvalidInputError
+            With the path ``image``, if the picture cannot be read.
+        """
+        grid = _header(self.yaml).grid(self.picture)
+        return replace(grid, notes=(*self.notes, *grid.notes))
+
+
+def map_files(path: Path, read: Callable[[Path, str], bytes]) -> MapFiles | None:
+    """Read the files of a robot's map, if a path leads to one.
+
+    Parameters
+    ----------
+    path
+        Of the YAML file; or of the picture that a YAML beside it names; or of a picture that
+        looks as map_server saves them, which gets a YAML; or of the folder of a map.
+    read
+        Returns the bytes of a file, given also what an error begins with.
+
+    Returns
+    -------
+    MapFiles or None
+        None for every other kind of file.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is a map, but several, or its YAML or its picture cannot be read or be used.
+    """
+    try:
+        found = _yaml(path)
+        if found is None:
+            return _bare_map(path, read) if path.suffix.lower() == ".pgm" else None
+        file, notes = found
+        text = text_of(read(file, str(path)))
+        document = parse(text)
+    except MapFileError as error:
+        raise InvalidInputError(Reason(error.reason), "", error.problem) from None
+    try:
+        _header(text)
+    except InvalidInputError as error:
+        if file == path:
+            raise
+        raise InvalidInputError(
+            error.reason, f"{file.name}: {error.field}".rstrip(": "), error.problem
+        ) from None
+    picture, more = find_picture(file, document)
+    name = str(picture)
+    shown = (
+        name if name.isprintable() and len(name) <= _LONGEST_NAME else quoted(document.images[0])
+    )
+    return MapFiles(text, read(picture, f"{path}: image {shown}"), (*notes, *more))
+
+
+def _yaml(path: Path) -> tuple[Path, tuple[str, ...]] | None:
+    """Return a map's YAML file, and what there is to say of it; None if there is no map."""
+    if os.path.isdir(path):  # noqa: PTH112 (no error)
+        if is_bag(path):
+            return None
+        file = yaml_in(path)
+        return file, (f"{path} is a folder, and its map {file.name} was read",)
+    suffix = path.suffix.lower()
+    if suffix in YAML_SUFFIXES:
+        return path, ()
+    if suffix in PICTURE_SUFFIXES and (named := yaml_of(path)) is not None:
+        return named, (f"{path.name} is the picture of a map, and {named.name} beside it was read",)
+    return None
+
+
+# NumPy, Pillow and PyYAML wait until there is a map.
+
+
+def _bare_map(path: Path, read: Callable[[Path, str], bytes]) -> MapFiles | None:
+    from sketchmatch.io.ros_map import header_for
+
+    picture = read(path, str(path))
+    made = header_for(path.name, picture)
+    return None if made is None else MapFiles(made[0], picture, (made[1],))
+
+
+def _header(text: str) -> MapServerHeader:
+    from sketchmatch.io.ros_map import parse_header
+
+    return parse_header(text)

@@ -1,0 +1,61 @@
+"""Names that a map's file gives to places, for the objects that stand there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import shapely
+
+from sketchmatch.model import Landmark
+
+__all__ = ["ROOM", "labels_of"]
+
+ROOM = "room"
+"""The kind of landmark that names a room, and no thing in it."""
+
+_MOST_NAMED = 8
+_LONGEST_NAME = 40
+
+
+def labels_of(
+    polygons: Sequence[shapely.Polygon], landmarks: Iterable[Landmark], reach: float
+) -> tuple[list[str], tuple[str, ...]]:
+    """Return a label for each object, empty if it has no name, and a warning about names left.
+
+    A name goes to the object in which its place lies, or else to the nearest within reach; of
+    several that could have it, or of several names for one object, the nearest are joined first,
+    and what lies within the same object by how near its middle is.
+
+    Parameters
+    ----------
+    polygons
+        The objects, in the map's frame.
+    landmarks
+        The names and places.
+    reach
+        In metres.
+    """
+    named = tuple(landmarks)
+    labels, left = [""] * len(polygons), set(range(len(named)))
+    if not named or not polygons:
+        return labels, ()
+    points = shapely.points([item.point for item in named])
+    objects = np.array(polygons, dtype=object)
+    away = shapely.distance(points[:, None], objects)
+    middle = shapely.distance(points[:, None], shapely.centroid(objects))
+    for k, j in sorted(np.argwhere(away <= reach).tolist(), key=lambda p: (away[*p], middle[*p])):
+        if k in left and not labels[j]:
+            labels[j] = named[k].name
+            left.remove(k)
+    return labels, _left_over([named[k].name for k in sorted(left)], reach)
+
+
+def _left_over(names: list[str], reach: float) -> tuple[str, ...]:
+    if not names:
+        return ()
+    shown = [name if name.isprintable() else repr(name) for name in names[:_MOST_NAMED]]
+    listed = ", ".join(name[:_LONGEST_NAME] for name in shown)
+    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    near = f"within {reach:g} m of" if reach else "around"
+    return (f"No object is left {near} {listed}{more}, which the map's file names.",)
