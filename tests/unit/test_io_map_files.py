@@ -90,7 +90,7 @@ def test_a_picture_of_another_machine_is_found_beside_the_yaml_and_said(name):
     note = f"the map's image {ELSEWHERE[name]} does not exist, and m.pgm beside {path.name}"
     grid = read_source(path)
     assert grid.cells.shape == (190, 215)
-    assert grid.notes[0] == f"{note} was taken"
+    assert grid.notes == (f"{note} was taken",)
 
 
 def test_a_picture_at_its_place_comes_before_one_beside_the_yaml(tmp_path):
@@ -163,14 +163,31 @@ def test_a_saved_map_without_its_yaml_gets_one_and_says_what_is_assumed(
     "picture",
     [
         PGM.replace(b"\xcd", b"\xfe"),
+        b"P5\n10 30\n255\n" + bytes([205, 205, *[254] * 298]),
+        b"P5\n10 30\n255\n" + bytes([254, 254, *[205] * 298]),
         PGM.replace(b"\xcd", b"\xcc"),
         b"P2\n2 1\n255\n205 254\n",
         b"P5\n2 2\n255\n" + bytes([205, 205, 0, 0]),
     ],
 )
-def test_a_pgm_of_other_greys_is_a_picture(tmp_path, picture):
+def test_a_pgm_of_other_greys_is_a_picture(tmp_path, picture, capsys):
     (tmp_path / "sketch.pgm").write_bytes(picture)
     assert isinstance(read_source(tmp_path / "sketch.pgm"), Image)
+    assert source_of(tmp_path / "sketch.pgm").image.data == picture
+    words = "sketch.pgm is read as a drawing; for a robot's map give its .yaml"
+    assert words in " ".join(capsys.readouterr().err.split())
+
+
+def test_white_with_which_people_clean_maps_is_no_other_grey(tmp_path):
+    (tmp_path / "map.pgm").write_bytes(PGM.replace(b"\x00", b"\xff"))
+    assert read_source(tmp_path / "map.pgm").cells.tolist() == [[0, -1, 0], [0, 0, 0]]
+
+
+def test_an_image_that_stands_twice_is_noted(tmp_path):
+    path = write(tmp_path)
+    path.write_text(path.read_text() + "image: other.pgm\n", encoding="utf-8")
+    (note,) = read_source(path).notes
+    assert note == "image stands in office.yaml twice, and the first, office.pgm, counts"
 
 
 def test_the_folder_of_a_map_is_read_as_the_map(tmp_path):

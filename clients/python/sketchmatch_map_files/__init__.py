@@ -167,7 +167,9 @@ def find_picture(file: Path, document: Document) -> tuple[Path, tuple[str, ...]]
     """
     named = file.parent / document.images[0]
     if _is_file(named):
-        return named, ()
+        if len(document.images) == 1:
+            return named, ()
+        return named, (f"image stands in {file.name} twice, and the first, {named.name}, counts",)
     for image in document.images:
         # A name from Windows has backslashes, which are letters elsewhere; this knows both.
         beside = file.parent / (PureWindowsPath(image).name or image)

@@ -75,21 +75,29 @@ class _Reader:
 
     def _value(self, event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Value:
         if isinstance(event, yaml.AliasEvent):
-            return self._alias(event.anchor)
+            return self._alias(str(event.anchor))
+        assert isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent)
         if depth > _DEEPEST:
             raise _refused(f"has lists in lists, more than {_DEEPEST} deep; {_REMEDY}")
         if event.tag not in (None, "!", *_PLAIN_TAGS):
             raise _refused("has types written with '!'; give plain values")
-        if isinstance(event, yaml.ScalarEvent):
-            plain = event.implicit[0]
-            value = None if plain and event.value in _NULLS else event.value
-        elif isinstance(event, yaml.SequenceStartEvent):
-            value = self._list(events, depth)
-        else:
-            value = self._mapping(events, depth)
+        value = self._content(event, events, depth)
         if event.anchor:
             self._anchored[event.anchor] = value
         return value
+
+    def _content(
+        self,
+        event: yaml.ScalarEvent | yaml.CollectionStartEvent,
+        events: Iterator[yaml.Event],
+        depth: int,
+    ) -> Value:
+        if isinstance(event, yaml.ScalarEvent):
+            plain = event.implicit[0]
+            return None if plain and event.value in _NULLS else event.value
+        if isinstance(event, yaml.SequenceStartEvent):
+            return self._list(events, depth)
+        return self._mapping(events, depth)
 
     def _alias(self, anchor: str) -> Value:
         self._aliases += 1

@@ -44,6 +44,10 @@ def source_of(path: Path, side: str = "") -> Source:
         _say_notes(files.notes, side)
         return Source(map_server_map=MapServerMap(yaml=files.yaml, image=files.picture))
     if path.suffix.lower() in PICTURE_SUFFIXES:
+        if path.suffix.lower() == ".pgm":
+            _say_notes(
+                [f"{path.name} is read as a drawing; for a robot's map give its .yaml"], side
+            )
         return sources.image(read_bytes(path))
     match read_source(path):
         case OccupancyGrid(cells, resolution, origin, notes):

@@ -81,12 +81,15 @@ _EXAMPLES = {
     "free_thresh": "0.196",
 }
 _KEYS = (*_EXAMPLES, "mode")
+_VALUES = _KEYS[1:]
+"""Those that are not about files."""
 _MODES = ("trinary", "scale", "raw")
 _MANY = 0.01
 """As a share of all cells."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _TRUE, _FALSE = ("true", "yes", "on", "y"), ("false", "no", "off", "n")
 _SAVED_PGM = re.compile(rb"P5\s+(?:#[^\n]*\n\s*)*\d+\s+\d+\s+255\s")
+_SAVED_GREYS = bytes((0, 205, 254, 255))
 _CREATOR = re.compile(rb"# CREATOR: [^\n]* (\d+\.\d+) m/pix")
 _PLACES = ("pose", "position", "location", "centroid")
 _NAMES = ("name", "label")
@@ -230,7 +233,10 @@ def parse_header(yaml_text: str) -> MapServerHeader:
         occupied_thresh=_number(values["occupied_thresh"], "occupied_thresh"),
         free_thresh=_number(values["free_thresh"], "free_thresh"),
         mode=_mode(values.get("mode")),
-        notes=(*notes, *(_repeated(key, values[key]) for key in document.repeated if key in _KEYS)),
+        notes=(
+            *notes,
+            *(_repeated(key, values[key]) for key in document.repeated if key in _VALUES),
+        ),
         landmarks=tuple(_landmarks(values)),
     )
     _check_ranges(header)
@@ -250,14 +256,16 @@ def header_for(name: str, picture: bytes) -> tuple[str, str] | None:
     Returns
     -------
     tuple or None
-        None if it does not look as map_server saves maps: binary, and with no greys but black,
-        205 and 254, of which it has the latter two.
+        None if it does not look as map_server saves maps: binary, with many cells of the greys
+        205 and 254, and with no others but black, and the white with which people clean maps.
     """
     start = _SAVED_PGM.match(picture)
     if start is None:
         return None
     cells = picture[start.end() :]
-    if cells.translate(None, b"\x00\xcd\xfe") or not {205, 254} <= set(cells):
+    if cells.translate(None, _SAVED_GREYS):
+        return None
+    if min(cells.count(b"\xcd"), cells.count(b"\xfe")) < _MANY * len(cells):
         return None
     said = _CREATOR.search(start[0])
     resolution = float(said[1]) if said else 0.0

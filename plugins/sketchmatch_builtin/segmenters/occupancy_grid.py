@@ -209,13 +209,13 @@ class OccupancyGridSegmenter(Segmenter):
             largest = max(int(np.count_nonzero(room)) for room, _, _ in rooms)
             raise _too_few(len(outlines), largest, source, self.params)
         rings = [in_map(shapely.get_coordinates(polygon), source) for polygon in outlines]
-        labels, left = labels_of(
+        labels, unplaced = labels_of(
             [shapely.Polygon(ring) for ring in rings],
             [item for item in source.landmarks if item.kind != ROOM],
             self.params.label_reach,
         )
         objects = [SceneObject.from_rings([r], name) for r, name in zip(rings, labels, strict=True)]
-        return Segmentation(Scene(tuple(objects)), (*source.notes, *left))
+        return Segmentation(Scene(tuple(objects)), (*source.notes, *unplaced))
 
     def _parts(
         self, room: Mask, held: Mask, grid: OccupancyGrid

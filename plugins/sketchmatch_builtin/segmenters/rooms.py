@@ -140,13 +140,13 @@ class RoomSegmenter(Segmenter):
         tolerance = TOLERANCE if params.tolerance is None else params.tolerance / cell
         outlines = sorted(_simplified(outlines, tolerance), key=reading_order)
         rooms_in_map = [[in_map(ring, source) for ring in _rings(room)] for room in outlines]
-        labels, left = labels_of(
+        labels, unplaced = labels_of(
             [shapely.Polygon(outer, inner) for outer, *inner in rooms_in_map],
             [item for item in source.landmarks if item.kind == ROOM],
             0.0,
         )
         objects = map(SceneObject.from_rings, rooms_in_map, labels)
-        return Segmentation(Scene(tuple(objects)), (*source.notes, *left))
+        return Segmentation(Scene(tuple(objects)), (*source.notes, *unplaced))
 
 
 def _furnished(free: Mask, longest: float) -> Mask:

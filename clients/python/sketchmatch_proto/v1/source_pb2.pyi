@@ -344,7 +344,7 @@ class MapServerMap(google.protobuf.message.Message):
     yaml: builtins.str
     """Text of the .yaml file. Its keys are read as map_server reads them (`resolution`, `origin`,
     `negate`, `occupied_thresh`, `free_thresh`, `mode`), except `image`, a path that only the
-    caller can open.
+    caller can open. Names with poses in it label objects.
     """
     image: builtins.bytes
     """Bytes of the picture that `image` in the .yaml names: PGM, PNG, BMP or JPEG."""
