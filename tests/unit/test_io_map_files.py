@@ -4,6 +4,9 @@ import shutil
 
 import numpy as np
 import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 import sketchmatch_map_files
 from sketchmatch.app.requests import source
@@ -232,3 +235,35 @@ def test_the_yaml_is_parsed_once_on_its_way_into_the_engine(tmp_path, monkeypatc
     assert np.array_equal(grid.cells, [[100, -1, 0], [0, 0, 0]])
     assert len(calls) == 1
     assert sketchmatch_map_files.parse is parse
+
+
+TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), max_size=12)
+VALUES = st.recursive(
+    TEXTS | st.none() | st.integers() | st.booleans() | st.floats(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(TEXTS, inner, max_size=4),
+    max_leaves=12,
+)
+
+
+def as_text(value):
+    """What yaml-cpp holds: text as it is written, and null."""
+    if isinstance(value, dict):
+        return {key: as_text(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [as_text(item) for item in value]
+    return value if value is None else yaml.load(yaml.safe_dump(value), yaml.BaseLoader)
+
+
+@given(
+    values=st.dictionaries(TEXTS, VALUES, max_size=5),
+    flow=st.sampled_from([True, False, None]),
+    start=st.booleans(),
+    unicode=st.booleans(),
+)
+def test_what_pyyaml_writes_is_read_as_the_text_that_it_wrote(values, flow, start, unicode):
+    text = yaml.safe_dump(
+        values, default_flow_style=flow, explicit_start=start, allow_unicode=unicode
+    )
+    found = parse("\ufeff" + text)
+    assert found.values == as_text(values)
+    assert found.repeated == {}

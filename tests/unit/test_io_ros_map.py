@@ -155,7 +155,7 @@ def with_greys(**shares):
             30,
             "30% of the map has the grey 205, .* 0.25",
         ),
-        (with_greys(g205=30, g0=5), {"free_thresh": 0.2}, 30, "set keep_unknown to false"),
+        (with_greys(g205=30, g0=5), {"free_thresh": 0.2}, 30, "unless keep_unknown is false"),
         (with_greys(g205=30), {}, 30, None),
         # Others than 205 are what the thresholds say, and so is one cell in 200.
         (with_greys(g204=30, g206=30), {"free_thresh": 0.25}, 0, None),

@@ -164,9 +164,8 @@ class MapServerHeader:
         cells[saved] = -1
         return (
             f"{share:.0%} of the map has the grey {picture.saved_unknown if self.negate else 205}, "
-            "with which map_server saves unknown cells, and was read as unknown although "
-            f"free_thresh {self.free_thresh:g} would call it free; if it is free, set keep_unknown "
-            "to false",
+            "with which map_server saves unknown cells; unless keep_unknown is false, they are "
+            f"unknown here too, although free_thresh {self.free_thresh:g} would call them free",
         )
 
     def _occupancy(self) -> NDArray[np.int8]:
