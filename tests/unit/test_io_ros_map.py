@@ -246,6 +246,16 @@ def test_values_may_repeat_each_other_but_not_themselves():
             decode_map_server(text, pgm([[0]]))
 
 
+def test_a_merge_key_brings_in_keys_that_are_not_there():
+    text = "base: &b {negate: 1, resolution: 7, free_thresh: 0.196}\nmore: &m {negate: 0}\n"
+    text += yaml_text(negate="left out", free_thresh="left out") + "<<: [*b, *m]\n"
+    grid = decode_map_server(text, pgm([[0, 255]]))
+    assert grid.cells.tolist() == [[0, 100]]
+    assert (grid.resolution, grid.notes) == (0.05, ())
+    with pytest.raises(InvalidInputError, match=r"negate is missing"):
+        decode_map_server(text.replace("<<: [*b, *m]", "<<: 3"), pgm([[0]]))
+
+
 LANDMARKS = """
 home: { gotopose: [ 0, 0, 0 ] }
 box1: { type: 'box', pose: [ 4.0, -4.7, 0, 0 ], light: { name: 'lamp', pose: [9, 9] } }

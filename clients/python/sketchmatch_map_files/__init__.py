@@ -3,7 +3,8 @@
 Client and engine read them here alike, and as ROS does. Its reader, yaml-cpp, keeps every value as
 the text that is written, and who asks for a number gets one; so nothing depends on whether YAML
 1.1 or 1.2 would take ``on``, ``010`` or ``1:30`` for something else. Of a key that stands twice the
-first counts, and of several documents the first. Unlike there, ``~`` is no name of a file.
+first counts, and of several documents the first. Unlike there, ``~`` is no name of a file, and
+``<<`` brings in the keys of another.
 """
 
 from __future__ import annotations

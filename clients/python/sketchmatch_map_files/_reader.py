@@ -115,14 +115,20 @@ class _Reader:
 
     def _mapping(self, events: Iterator[yaml.Event], depth: int) -> dict[str, Value]:
         items: dict[str, Value] = {}
+        merged: list[Value] = []
         while not isinstance(event := next(events), yaml.MappingEndEvent):
             key = self._value(event, events, depth + 1)
             value = self._value(next(events), events, depth + 1)
             if not isinstance(key, str):
                 continue
+            if key == "<<":
+                merged += value if isinstance(value, list) else [value]
+                continue
             if depth == 0 and key in items and items[key] != value:
                 self.repeated[key] = (*self.repeated.get(key, ()), value)
             items.setdefault(key, value)
+        for other in merged:
+            items = {**other, **items} if isinstance(other, dict) else items
         return items
 
 
