@@ -18,6 +18,7 @@ from sketchmatch.api import (
 from sketchmatch.model import (
     Confidence,
     ConfidenceWeights,
+    GridPicture,
     Image,
     LabelledPolygon,
     OccupancyGrid,
@@ -178,7 +179,10 @@ SOURCES = {
         np.array([[0, 100], [-1, 0], [100, 30]], dtype=np.int8), 0.125
     ),
     "SegmentRequest.map_server_map": OccupancyGrid(
-        np.array([[0, 100, 0], [100, 0, -1]], dtype=np.int8), 0.25, (-1.5, 2.25, 0.75)
+        np.array([[0, 100, 0], [100, 0, -1]], dtype=np.int8),
+        0.25,
+        (-1.5, 2.25, 0.75),
+        picture=GridPicture(np.array([[1, 255, 1], [255, 1, 127]], dtype=np.uint8), 0.196),
     ),
     "SegmentRequest.image": PICTURE,
 }

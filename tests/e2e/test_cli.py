@@ -300,6 +300,30 @@ def test_segment_lists_the_objects_in_lines_and_in_json(command_line, where, tmp
         assert (image.format, image.width) == ("PNG", 1000)
 
 
+def test_parameters_say_what_is_free_on_a_robots_map(command_line, where, tmp_path):
+    # A walled room with a box and, of the grey of unknown cells, a thing seen from around alone.
+    rows = [[205] * 40] * 3 + [[205, 205, *[0] * 36, 205, 205]]
+    rows += [[205, 205, 0, *[254] * 34, 0, 205, 205] for _ in range(30)] + rows[::-1]
+    for row in rows[10:20]:
+        row[8:18], row[22:32] = [205] * 10, [0] * 10
+    pixels = bytes(grey for row in rows for grey in row)
+    (tmp_path / "room.pgm").write_bytes(b"P5\n40 %d\n255\n" % len(rows) + pixels)
+    (tmp_path / "room.yaml").write_text(
+        "image: /robot/room.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: '0'\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.25\nmode: Trinary\n"
+        "cupboard: {pose: [1.3, 1.1, 0]}\n"
+    )
+    done = command_line("segment", tmp_path, *where)
+    assert done.returncode == 0
+    labels = [line.split("\t")[1] for line in done.stdout.splitlines()[1:]]
+    assert labels == ["", "cupboard"]
+    for words in ("its map room.yaml was read", "room.pgm beside room.yaml", "the grey 205"):
+        assert words in done.stderr
+    options = ("--set", "segmenter.keep_unknown=false")
+    done = command_line("segment", tmp_path / "room.pgm", *where, *options)
+    assert "only one object" in done.stderr
+
+
 def test_segment_sets_parameters_and_refuses_those_of_other_stages(command_line, where):
     few = command_line("segment", LIVING_ROOM_MAP, *where, "--set", "segmenter.min_size=0.6")
     assert 3 <= len(few.stdout.splitlines()) < 9
@@ -489,7 +513,7 @@ def assert_one_line(done, code, *words):
         (["match", *ROOM, "--time-budget", "nan"], ["time_budget", "give a positive time"]),
         (["match", *ROOM, "--overlay", "x.txt"], ["x.txt", ".png"]),
         (["match", "missing.svg", LIVING_ROOM_MAP], ["missing.svg does not exist", "check"]),
-        (["match", LIVING_ROOM_SKETCH, "."], [". is of no known kind", "give a file"]),
+        (["match", LIVING_ROOM_SKETCH, "."], [". is a folder without a map", "give the .yaml"]),
         (["segment", __file__], ["is of no known kind", ".yaml"]),
         (["plugins", "lits"], ["lits", "--help"]),
         (["plugins", "list", "--kind", "serch"], ["--kind", "'serch'", "searcher"]),

@@ -3,12 +3,14 @@
 import importlib.util
 import math
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
+from sketchmatch.io.ros_bag import _yaw
 from sketchmatch.model import OccupancyGrid
 from sketchmatch.model.limits import SourceLimits, limited_to
 from tests.bags import MCAP, ROS1, SQLITE, write
@@ -45,7 +47,15 @@ def test_the_last_map_is_taken_with_its_pose_and_the_resolution_that_was_meant(t
 def test_an_orientation_of_nan_is_none_and_noted(tmp_path, kind):
     found = read_source(write(tmp_path, kind, ("/map", CELLS, math.nan)))
     assert found.origin == (1.0, -2.0, 0.0)
-    assert found.notes == ("the orientation of the map's origin is nan and was read as none",)
+    assert found.notes == ("the orientation of the map's origin is not finite, read as none",)
+
+
+@pytest.mark.parametrize("part", "xyzw")
+def test_one_part_of_an_orientation_that_is_not_finite_is_enough(part):
+    for value in (math.nan, math.inf):
+        whole = SimpleNamespace(**{"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0, part: value})
+        assert _yaw(whole) is None
+    assert _yaw(SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)) == 0.0
 
 
 @pytest.mark.parametrize("kind", [MCAP, SQLITE])

@@ -203,7 +203,11 @@ def _document_of(file: Path) -> Document | None:
     try:
         if not _is_file(file) or file.stat().st_size > MOST_BYTES:
             return None
-        document = parse(text_of(file.read_bytes()))
+        data = file.read_bytes()
+        # Most others are told from it before they are parsed; UTF-16 has zeros between.
+        if b"image" not in data.replace(b"\0", b""):
+            return None
+        document = parse(text_of(data))
     except (MapFileError, OSError):
         return None
     return document if document.images and "resolution" in document.values else None

@@ -25,7 +25,10 @@ def match(
         typer.Argument(metavar="SKETCH", help="Sketch: .svg, stroke .json, .geojson, image."),
     ],
     map_: Annotated[
-        Path, typer.Argument(metavar="MAP", help="Map: ROS map .yaml, .geojson, .svg, image.")
+        Path,
+        typer.Argument(
+            metavar="MAP", help="Map: ROS map .yaml or its folder, .geojson, .svg, image."
+        ),
     ],
     server: options.Server = None,
     config: options.Config = None,

@@ -117,18 +117,20 @@ def _grid(message: Any) -> OccupancyGrid:
             f"has a map of {cells.size} cells for {rows} × {columns}; record it again",
         )
     origin = message.info.origin
-    notes: tuple[str, ...] = ()
     yaw = _yaw(origin.orientation)
-    if not math.isfinite(yaw):
-        # As in a YAML: a map that came without an orientation.
-        yaw, notes = 0.0, ("the orientation of the map's origin is nan and was read as none",)
+    notes: tuple[str, ...] = ()
+    if yaw is None:
+        # As in a YAML: whoever made the map had no orientation to give.
+        yaw, notes = 0.0, ("the orientation of the map's origin is not finite, read as none",)
     pose = (float(origin.position.x), float(origin.position.y), yaw)
     # The message holds 0.05 as 0.0500000007; its shortest digits are what was meant.
     resolution = float(str(np.float32(message.info.resolution)))
     return OccupancyGrid(cells.reshape(rows, columns), resolution, pose, notes)
 
 
-def _yaw(q: Any) -> float:
+def _yaw(q: Any) -> float | None:
+    if not all(math.isfinite(part) for part in (q.x, q.y, q.z, q.w)):
+        return None
     return math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
 
 
