@@ -206,7 +206,14 @@ class TestMapServerMap:
         assert (made.yaml, made.image) == ("image: büro.pgm\n", b"P5")
 
     @pytest.mark.parametrize(
-        "image", ["/home/robot/maps/room.pgm", r"C:\Users\me\room.pgm", r".\room.pgm", "~/room.pgm"]
+        "image",
+        [
+            "/home/robot/maps/room.pgm",
+            r"C:\Users\me\room.pgm",
+            r".\room.pgm",
+            "~/room.pgm",
+            "|\n  room.pgm",
+        ],
     )
     def test_a_path_of_another_machine_is_found_beside_the_file(self, tmp_path, image):
         (tmp_path / "room.pgm").write_bytes(b"P5")

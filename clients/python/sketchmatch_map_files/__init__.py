@@ -173,7 +173,7 @@ def find_picture(file: Path, document: Document) -> tuple[Path, tuple[str, ...]]
         return named, (f"image stands in {file.name} twice, and the first, {named.name}, counts",)
     for image in document.images:
         # A name from Windows has backslashes, which are letters elsewhere; this knows both.
-        beside = file.parent / (PureWindowsPath(image).name or image)
+        beside = file.parent / (PureWindowsPath(image.strip()).name or image)
         if _is_file(beside):
             return beside, (
                 f"the map's image {_shown(document.images[0])} does not exist, and {beside.name} "
