@@ -41,11 +41,11 @@ def source_of(path: Path, side: str = "") -> Source:
         If it cannot be read; what is in pictures and maps is looked at where they are decoded.
     """
     if (files := read_map_files(path)) is not None:
-        _say_notes(files.notes, side)
+        _tell(files.notes, side)
         return Source(map_server_map=MapServerMap(yaml=files.yaml, image=files.picture))
     if path.suffix.lower() in PICTURE_SUFFIXES:
         if path.suffix.lower() == ".pgm":
-            _say_notes(
+            _tell(
                 [f"{path.name} is read as a drawing; for a robot's map give its .yaml"], side
             )
         return sources.image(read_bytes(path))
