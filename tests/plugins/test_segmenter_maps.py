@@ -23,11 +23,15 @@ def saved(free_thresh=0.25):
     greys[20:30, 20:30] = greys[20:30, 50:64] = BLACK
     greys[40:52, 20:32] = UNKNOWN
     greys[40:54, 50:64] = PALE
+    return decoded(greys, free_thresh)
+
+
+def decoded(greys, free_thresh):
     text = (
         "image: map.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
         f"occupied_thresh: 0.65\nfree_thresh: {free_thresh}\n"
     )
-    return decode_map_server(text, b"P5\n90 70\n255\n" + greys.tobytes())
+    return decode_map_server(text, b"P5\n%d %d\n255\n" % greys.shape[::-1] + greys.tobytes())
 
 
 def found(grid, **params):
@@ -62,6 +66,13 @@ def test_what_was_saved_as_unknown_is_no_floor_whatever_the_files_threshold_says
 )
 def test_parameters_say_what_is_free_in_place_of_the_file(free_thresh, params, others):
     assert areas(saved(free_thresh), **params) == [*BLACKS, *others]
+
+
+def test_a_map_whose_only_floor_has_that_grey_keeps_it():
+    greys = np.full((50, 70), UNKNOWN, np.uint8)
+    greys[[0, -1]] = greys[:, [0, -1]] = greys[20:30, 20:30] = greys[20:30, 50:64] = BLACK
+    grid = decoded(greys, 0.25)
+    assert areas(grid) == areas(grid, free_threshold=30) == BLACKS
 
 
 def test_rooms_have_the_same_parameters():

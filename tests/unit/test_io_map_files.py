@@ -195,11 +195,17 @@ def test_an_image_that_stands_twice_is_noted(tmp_path):
 
 def test_the_folder_of_a_map_is_read_as_the_map(tmp_path):
     write(tmp_path)
-    (tmp_path / "nav2_params.yaml").write_text("amcl: {image: 1}\n", encoding="utf-8")
+    (tmp_path / "nav2_params.yaml").write_text("image: office.pgm\n", encoding="utf-8")
     (tmp_path / "README.md").write_text("A map.", encoding="utf-8")
     grid = read_source(tmp_path)
     assert grid.cells.shape == (2, 3)
     assert grid.notes == (f"{tmp_path} is a folder, and its map office.yaml was read",)
+
+
+def test_a_bags_folder_is_no_maps(tmp_path):
+    write(tmp_path)
+    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n", encoding="utf-8")
+    assert read_map_files(tmp_path) is None
 
 
 def test_a_folder_of_several_maps_names_them(tmp_path):

@@ -12,6 +12,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.io.ros_map import decode_map_server
 from sketchmatch.model import OccupancyGrid
+from sketchmatch_map_files import parse
 from tests.tools import ROOT, require
 
 GREYS = [0, 60, 100, 205, 254, 255]
@@ -226,9 +227,13 @@ def test_a_byte_order_mark_is_no_part_of_a_key():
 
 
 def test_of_a_key_that_stands_twice_the_first_counts_and_is_noted():
-    text = yaml_text() + "resolution: 0.1\nnegate: 0\nauthor: me\nauthor: you\n"
+    text = (
+        yaml_text()
+        + "resolution: 0.1\nnegate: 0\nauthor: me\nauthor: you\ndesk: {mode: 1, mode: 2}\n"
+    )
     grid = decode_map_server(text, pgm([[0]]))
     assert grid.resolution == 0.05
+    assert set(parse(text).repeated) == {"resolution", "author"}
     assert grid.notes == (
         "resolution stands in the map's YAML twice, and the first, '0.05', counts",
     )
@@ -281,6 +286,17 @@ def test_what_a_map_names_with_a_pose_are_its_landmarks():
         ("stool", (5.0, 6.0), ""),
         ("kitchen", (7.0, 8.0), "room"),
     ]
+
+
+def test_a_thousand_landmarks_are_enough_and_one_counts_once():
+    listed = ", ".join(f"{{name: n, x: {k % 1002}, y: 0}}" for k in range(1500))
+    grid = decode_map_server(yaml_text(all=f"[{listed}]"), pgm([[0]]))
+    assert [item.point[0] for item in grid.landmarks] == list(range(1000))
+    assert grid.notes == ("of what the map's YAML names the first 1000 count",)
+    fewer = decode_map_server(
+        yaml_text(all=f"[{listed.split(', {name: n, x: 1000')[0]}]"), pgm([[0]])
+    )
+    assert (len(fewer.landmarks), fewer.notes) == (1000, ())
 
 
 BAD_YAML = {

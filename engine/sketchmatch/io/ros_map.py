@@ -86,6 +86,7 @@ _VALUES = _KEYS[1:]
 _MODES = ("trinary", "scale", "raw")
 _MANY = 0.01
 """As a share of all cells."""
+_MOST_LANDMARKS = 1000
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _TRUE, _FALSE = ("true", "yes", "on", "y"), ("false", "no", "off", "n")
 _SAVED_PGM = re.compile(rb"P5\s+(?:#[^\n]*\n\s*)*\d+\s+\d+\s+255\s")
@@ -93,8 +94,6 @@ _SAVED_GREYS = bytes((0, 205, 254, 255))
 _CREATOR = re.compile(rb"# CREATOR: [^\n]* (\d+\.\d+) m/pix")
 _PLACES = ("pose", "position", "location", "centroid")
 _NAMES = ("name", "label")
-_LONGEST_NUMBER = 300
-_DEEPEST_LANDMARK = 4
 
 
 @dataclass(frozen=True)
@@ -225,6 +224,10 @@ def parse_header(yaml_text: str) -> MapServerHeader:
     if not document.images:
         raise _invalid("image", "is not a file name; give the picture's path")
     origin, notes = _origin(values["origin"])
+    landmarks = tuple(dict.fromkeys(_landmarks(values)))
+    if len(landmarks) > _MOST_LANDMARKS:
+        landmarks = landmarks[:_MOST_LANDMARKS]
+        notes = (*notes, f"of what the map's YAML names the first {_MOST_LANDMARKS} count")
     header = MapServerHeader(
         resolution=_number(values["resolution"], "resolution"),
         origin=origin,
@@ -236,7 +239,7 @@ def parse_header(yaml_text: str) -> MapServerHeader:
             *notes,
             *(_repeated(key, values[key]) for key in document.repeated if key in _VALUES),
         ),
-        landmarks=tuple(_landmarks(values)),
+        landmarks=landmarks,
     )
     _check_ranges(header)
     return header
@@ -339,9 +342,9 @@ def _number(value: object, key: str) -> float:
 
 def _float(value: object) -> float | None:
     """Return the number that a text is to map_server, which reads decimal ones alone."""
-    if not isinstance(value, str) or len(value) > _LONGEST_NUMBER:
+    if not isinstance(value, str) or not _NUMBER.fullmatch(value.strip()):
         return None
-    return float(value) if _NUMBER.fullmatch(value.strip()) else None
+    return float(value)
 
 
 def _as_written(value: object) -> str:
@@ -357,16 +360,14 @@ def _as_written(value: object) -> str:
 def _landmarks(values: Mapping[str, Any]) -> Iterator[Landmark]:
     for key, value in values.items():
         if key not in _KEYS:
-            yield from _named_within(key, value, _DEEPEST_LANDMARK)
+            yield from _named_within(key, value)
 
 
-def _named_within(key: str, value: object, depth: int) -> Iterator[Landmark]:
+def _named_within(key: str, value: object) -> Iterator[Landmark]:
     """Yield the thing that a value describes, or those that are listed in it."""
-    if not depth:
-        return
     if isinstance(value, list):
         for item in value:
-            yield from _named_within(key, item, depth - 1)
+            yield from _named_within(key, item)
     elif isinstance(value, dict):
         name = next((value[each] for each in _NAMES if isinstance(value.get(each), str)), "")
         place = next((value[each] for each in _PLACES if each in value), value if name else None)
@@ -376,7 +377,7 @@ def _named_within(key: str, value: object, depth: int) -> Iterator[Landmark]:
             yield Landmark(name or key, point, kind if isinstance(kind, str) else "")
             return
         for inner, item in value.items():
-            yield from _named_within(inner, item, depth - 1)
+            yield from _named_within(inner, item)
 
 
 def _point(place: object) -> tuple[float, float] | None:

@@ -42,12 +42,13 @@ def labels_of(
         return labels, ()
     points = shapely.points([item.point for item in named])
     objects = np.array(polygons, dtype=object)
-    away = shapely.distance(points[:, None], objects)
-    middle = shapely.distance(points[:, None], shapely.centroid(objects))
-    for k, j in sorted(np.argwhere(away <= reach).tolist(), key=lambda p: (away[*p], middle[*p])):
-        if k in left and not labels[j]:
-            labels[j] = named[k].name
-            left.remove(k)
+    k, j = shapely.STRtree(objects).query(points, predicate="dwithin", distance=reach)
+    away = shapely.distance(points[k], objects[j])
+    middle = shapely.distance(points[k], shapely.centroid(objects[j]))
+    for pair in np.lexsort((middle, away)).tolist():
+        if k[pair] in left and not labels[j[pair]]:
+            labels[j[pair]] = named[k[pair]].name
+            left.remove(k[pair])
     return labels, _left_over([named[k].name for k in sorted(left)], reach)
 
 
