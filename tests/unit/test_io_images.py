@@ -10,6 +10,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.io.images import decode_image
 from sketchmatch.model import Image
+from sketchmatch_builtin.segmenters.image import ImageSegmenter
 
 GREY = np.array([[0, 64, 128], [192, 254, 255]], np.uint8)
 
@@ -42,6 +43,68 @@ def test_colours_of_a_palette_are_kept_and_its_transparent_parts_are_white():
     pixels = decode_image(saved(picture, "PNG", transparency=paper)).pixels
     assert pixels[0, 0].tolist() == [255, 255, 255]
     assert abs(pixels[10, 10].astype(int) - [250, 220, 0]).max() <= 4
+
+
+def drawn(ink, under, kind="outlines"):
+    """Two boxes on transparent paper, which has a colour under it."""
+    shape = np.zeros((100, 160), np.uint8)
+    for x in (10, 90):
+        shape[20:80, x : x + 60] = 255
+        if kind == "outlines":
+            shape[23:77, x + 3 : x + 57] = 0
+    shape[20:80, 10] = 100  # an edge as programs smooth it
+    colours = np.where(shape[:, :, None] > 0, ink, under).astype(np.uint8)
+    return np.dstack([colours, shape])
+
+
+@pytest.mark.parametrize("under", [(0, 0, 0), (255, 255, 255), (90, 200, 30)])
+@pytest.mark.parametrize("ink", [(0, 0, 0), (255, 255, 255), (255, 255, 120), (200, 200, 210)])
+@pytest.mark.parametrize("kind", ["outlines", "filled"])
+def test_ink_on_transparent_paper_is_seen_whatever_its_colour_and_what_lies_under(ink, under, kind):
+    pixels = decode_image(saved(PIL.Image.fromarray(drawn(ink, under, kind)), "PNG")).pixels
+    darkest = pixels if pixels.ndim == 2 else pixels.min(axis=2)
+    alpha = drawn(ink, under, kind)[:, :, 3]
+    assert (darkest[alpha == 0] == 255).all()
+    assert (darkest[alpha == 255] <= 135).all()
+    found = ImageSegmenter(ImageSegmenter.Params()).segment(Image(pixels))
+    bounds = [item.polygon.bounds for item in found.scene.objects]
+    assert bounds == [pytest.approx(box, abs=2) for box in ((10, 20, 70, 80), (90, 20, 150, 80))]
+    assert found.warnings == ()
+
+
+def test_grey_ink_with_transparency_is_seen():
+    grey = drawn((255, 255, 255), (0, 0, 0))[:, :, [0, 3]]
+    picture = PIL.Image.merge("LA", [PIL.Image.fromarray(part) for part in np.moveaxis(grey, 2, 0)])
+    pixels = decode_image(saved(picture, "PNG")).pixels
+    assert pixels[21, 40] == 0
+    assert pixels[50, 40] == 255
+
+
+def test_black_and_white_ink_on_transparent_paper_are_both_seen():
+    pixels = drawn((255, 255, 255), (0, 0, 0))
+    pixels[:, 80:, :3] = 0
+    assert (
+        decode_image(saved(PIL.Image.fromarray(pixels), "PNG")).pixels[21, [40, 120]] == 0
+    ).all()
+
+
+def test_what_is_white_with_dark_on_it_stays_white():
+    """A room on nothing: white ground within a thin black line."""
+    pixels = np.zeros((100, 160, 4), np.uint8)
+    pixels[10:90, 10:150] = [0, 0, 0, 255]
+    pixels[11:89, 11:149] = 255
+    decoded = decode_image(saved(PIL.Image.fromarray(pixels), "PNG")).pixels
+    assert decoded[[10, 50, 5], [80, 80, 5]].tolist() == [0, 255, 255]
+
+
+def test_pictures_with_an_opaque_alpha_channel_are_as_they_are():
+    picture = PIL.Image.fromarray(COLOURS).convert("RGBA")
+    assert (decode_image(saved(picture, "PNG")).pixels == COLOURS).all()
+
+
+def test_a_picture_that_is_wholly_transparent_is_white():
+    pixels = decode_image(saved(PIL.Image.new("RGBA", (30, 20), (9, 9, 9, 0)), "PNG")).pixels
+    assert (pixels == 255).all()
 
 
 def test_a_faint_tint_and_a_few_coloured_pixels_are_grey():

@@ -1,8 +1,9 @@
 """Photographs of drawings with known truth: pen and paper, light, camera, compression.
 
-A scene is drawn with a wobbly pen or filled, on textured and maybe ruled paper; the sheet is lit
-unevenly and photographed with a slight perspective, a blur, noise and JPEG compression. Light
-multiplies what the paper returns, ink absorbs a share of it; both are in linear shares of white.
+A scene is drawn with a wobbly pen or filled, on textured and maybe ruled paper, or with chalk on a
+board; it is lit unevenly and photographed with a slight perspective, a blur, noise and JPEG
+compression. Light multiplies what the paper returns, ink absorbs a share of it, chalk returns more
+than the board, and a board reflects a lamp; all are in linear shares of white.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from sketchmatch.model import FloatArray, Image, Scene
 
 __all__ = ["Photograph", "photograph"]
 
+# Share of white that chalk returns, and how much of it a board's grain leaves out.
+_CHALK, _GRAIN = 0.85, 0.35
 # Points are drawn at 1/16 of a pixel, as OpenCV's fixed-point coordinates have it.
 _SHIFT = 4
 
@@ -63,6 +66,9 @@ def photograph(
     noise: float = 0.0,
     quality: int | None = None,
     scribbles: int = 0,
+    board: float | None = None,
+    smear: float = 0.0,
+    glare: float = 0.0,
 ) -> Photograph:
     """Draw a scene and take a photograph of it.
 
@@ -101,6 +107,13 @@ def photograph(
         JPEG quality, 1 to 100; not compressed where it is left out.
     scribbles
         How many short open lines are drawn beside the objects.
+    board
+        Share of white that a blackboard returns, on which chalk covers what ink would absorb; paper
+        and ink where it is left out.
+    smear
+        Standard deviation of the share of the board that wiped chalk covers.
+    glare
+        Share of white that the reflection of a lamp adds at its middle.
 
     Returns
     -------
@@ -124,7 +137,10 @@ def photograph(
         _ink(sheet, _scribble(drawn, rng, size), width, darkness, closed=False)
     grain = rng.normal(0.0, 1.0, (rows, columns)).astype(np.float32)
     grain = np.asarray(cv2.GaussianBlur(grain, (0, 0), 1.2), np.float32)
-    sheet *= 1.0 - texture * grain / max(float(grain.std()), 1e-9)
+    grain /= max(float(grain.std()), 1e-9)
+    sheet = sheet * (1.0 - texture * grain) if board is None else _chalked(sheet, grain, board)
+    if smear > 0.0:
+        sheet += smear * (_CHALK - sheet) * _clouds(rng, size)
     turn = _perspective(rng, size, perspective, table is not None)
     outside = 1.0 if table is None else table
     scenery = cv2.warpPerspective(
@@ -136,6 +152,8 @@ def photograph(
         borderValue=outside,
     )
     picture = 240.0 * scenery * _lit(rng, size, gradient, vignette, shadow)
+    if glare > 0.0:
+        picture += 240.0 * glare * _spot(rng, size)
     if blur > 0.0:
         picture = np.asarray(cv2.GaussianBlur(picture, (0, 0), blur), np.float64)
     picture = picture + rng.normal(0.0, noise, size)
@@ -230,6 +248,29 @@ def _rule(
         _ink(sheet, np.array([[0.0, y], [columns, y]]), width, share, closed=False)
     for x in np.arange(offset[0], columns, step) if squared else ():
         _ink(sheet, np.array([[x, 0.0], [x, rows]]), width, share, closed=False)
+
+
+def _chalked(
+    sheet: NDArray[np.float32], grain: NDArray[np.float32], board: float
+) -> NDArray[np.float32]:
+    """Return a board on which chalk covers what ink would absorb on a sheet, but for its grain."""
+    covered = np.clip((1.0 - sheet) * (1.0 - _GRAIN * np.abs(grain)), 0.0, 1.0)
+    return np.asarray(board + (_CHALK - board) * covered, np.float32)
+
+
+def _clouds(rng: np.random.Generator, size: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the share of each spot that is covered by soft clouds, of standard deviation 1."""
+    clouds = rng.normal(0.0, 1.0, size).astype(np.float32)
+    clouds = np.asarray(cv2.GaussianBlur(clouds, (0, 0), 0.03 * max(size)), np.float32)
+    return np.asarray(np.maximum(clouds / clouds.std(), 0.0), np.float32)
+
+
+def _spot(rng: np.random.Generator, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Return the reflection of a lamp somewhere in a picture, 1 at its middle."""
+    rows, columns = size
+    y, x = np.mgrid[0.0 : 1.0 : rows * 1j, 0.0 : 1.0 : columns * 1j]
+    column, row = rng.uniform(0.2, 0.8, 2)
+    return np.asarray(np.exp(-((x - column) ** 2 + (y - row) ** 2) / (2.0 * 0.12**2)))
 
 
 def _perspective(

@@ -104,6 +104,47 @@ def find_ink(pixels: Mask, blur: float, whole: bool, shade: Shade) -> Ink:
        between the local extremes, with a floor on the contrast.
     """
     rows, columns = pixels.shape[:2]
+    view = _view(pixels, blur, whole)
+    inverted = is_light_on_dark(view.grey) if shade == "auto" else shade == "light"
+    if inverted:  # before anything is rounded, so that a picture and its negative are the same
+        view = _view(negative(pixels), blur, whole)
+    absorbed = _absorbed(view.channels, [paper_light(some) for some in view.small])
+    if view.sheet is not None:
+        size = view.channels[0].shape[::-1]
+        inside = cv2.resize(view.sheet, size, interpolation=cv2.INTER_NEAREST)
+        absorbed *= np.asarray(inside, np.uint8)[:, :, None]
+    most = np.ascontiguousarray(absorbed.max(axis=2))
+    mask, ruled = _threshold(most)
+    mask[edgeless(most, mask)] = 0
+    said = (
+        (_INVERTED, inverted and shade == "auto"),
+        (_TABLE, view.sheet is not None),
+        (_RULED, ruled),
+    )
+    return Ink(
+        mask,
+        absorbed,
+        (columns / mask.shape[1], rows / mask.shape[0]),
+        tuple(warning for warning, true in said if true),
+    )
+
+
+@dataclass(frozen=True)
+class _View:
+    """A picture as ink is looked for in it: its channels, and small ones for the light.
+
+    Where the picture shows a sheet, ``small`` and ``grey``, the most telling of them, continue it
+    to where it is not.
+    """
+
+    channels: list[Mask]
+    small: list[Mask]
+    grey: Mask
+    sheet: Mask | None
+
+
+def _view(pixels: Mask, blur: float, whole: bool) -> _View:
+    rows, columns = pixels.shape[:2]
     factor = math.ceil(max(rows, columns) / _WORKING_SIDE)
     if factor > 1:
         size = (math.ceil(columns / factor), math.ceil(rows / factor))
@@ -118,24 +159,7 @@ def find_ink(pixels: Mask, blur: float, whole: bool, shade: Shade) -> Ink:
     if sheet is not None:
         small = [continued(some, sheet) for some in small]
         grey = continued(grey, sheet)
-    inverted = is_light_on_dark(grey) if shade == "auto" else shade == "light"
-    if inverted:
-        channels, small = list(map(negative, channels)), list(map(negative, small))
-    absorbed = _absorbed(channels, [paper_light(some) for some in small])
-    if sheet is not None:
-        size = channels[0].shape[::-1]
-        inside = np.asarray(cv2.resize(sheet, size, interpolation=cv2.INTER_NEAREST), np.uint8)
-        absorbed *= inside[:, :, None]
-    most = np.ascontiguousarray(absorbed.max(axis=2))
-    mask, ruled = _threshold(most)
-    mask[edgeless(most, mask)] = 0
-    said = ((_INVERTED, inverted and shade == "auto"), (_TABLE, sheet is not None), (_RULED, ruled))
-    return Ink(
-        mask,
-        absorbed,
-        (columns / mask.shape[1], rows / mask.shape[0]),
-        tuple(warning for warning, true in said if true),
-    )
+    return _View(channels, small, grey, sheet)
 
 
 def _channels(pixels: Mask) -> list[Mask]:

@@ -1,4 +1,4 @@
-"""Objects of a picture: dark shapes or outlines on light paper."""
+"""Objects of a picture: shapes or outlines on paper or a board."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ _FRAMED = (
 
 
 class ImageSegmenter(Segmenter):
-    """Takes dark or coloured shapes as objects, filled or outlined, scanned or photographed.
+    """Takes shapes as objects, filled or outlined, scanned or photographed, dark or light.
 
-    The light on the paper is found [1]_ and divided out, and ink parted from paper halfway between
+    Whether ink is darker than paper, or lighter, as chalk on a board, is told from what lies along
+    the picture's border and, where both do, from what is rare nearby. The light on the paper is found [1]_ and divided out, and ink parted from paper halfway between
     them [2]_; each shape is then traced around its outside [3]_, so that an outline counts as what
     it encloses, and nothing within an object is looked at. Gaps in outlines are closed, lines that
     enclose nothing are left out, and so are ruled lines and a table around the sheet. Outlines that
@@ -61,7 +62,7 @@ class ImageSegmenter(Segmenter):
     """
 
     name = "image"
-    summary = "Dark shapes or outlines on light paper, scanned, photographed or drawn to scale."
+    summary = "Shapes or outlines on paper or a board, scanned, photographed or drawn to scale."
     default = True
     sources = (Image,)
 
