@@ -421,6 +421,44 @@ def install(folder, distribution, code):
     about.joinpath("entry_points.txt").write_text(f"[sketchmatch]\nmine = {module}\n")
 
 
+@pytest.mark.slow
+def test_strokes_are_drawn_and_warned_about_alike_whoever_segments_them(tmp_path):
+    """A stranger's segmenter that finds what ours finds leaves the same pictures and lines."""
+    install(
+        tmp_path,
+        "acme-strokes",
+        "from sketchmatch.api import Segmenter, hookimpl\n"
+        "from sketchmatch.model import StrokeSet\n"
+        "from sketchmatch_builtin.segmenters.strokes import StrokeSegmenter\n"
+        "class Mine(Segmenter):\n"
+        "    name, summary, sources = 'by-hand', 'As ours.', (StrokeSet,)\n"
+        "    def segment(self, source): return StrokeSegmenter().segment(source)\n"
+        "@hookimpl\n"
+        "def sketchmatch_register_segmenters(): return [Mine]\n",
+    )
+    path = os.pathsep.join(filter(None, (str(tmp_path), os.environ.get("PYTHONPATH"))))
+    square = [(0, 0), (9, 0), (9, 9), (0, 9), (0, 0)]
+    strokes = [{"points": [[k * (x + 30), k * (y + 10 * k)] for x, y in square]} for k in (1, 2, 3)]
+    strokes.append({"points": [[0, 60], [20, 50], [50, 70]], "label": "route"})
+    strokes.append({"points": [[60, 0], [70, 5], [90, 5]]})
+    sketch = tmp_path / "sketch.json"
+    sketch.write_text(json.dumps({"y_axis": "up", "strokes": strokes}))
+    for command, option, picture in (
+        (("segment", sketch), "--segmenter", "--overlay"),
+        (("describe", sketch), "--segmenter", "--plot"),
+        (("match", sketch, sketch), "--segmenter-sketch", "--overlay"),
+    ):
+        answers = []
+        for name in ("strokes", "by-hand"):
+            target = tmp_path / f"{name}.png"
+            asked = (*command, option, name, picture, target)
+            done = run(*asked, env={**os.environ, "PYTHONPATH": path})
+            assert done.returncode == 0, done.stderr
+            answers.append((done.stdout, done.stderr, target.read_bytes()))
+        assert answers[0] == answers[1]
+        assert "left out" in answers[0][1]
+
+
 def test_plugins_list_says_what_became_of_each_plugin(strangers):
     algorithms, _, plugins = tables(run("plugins", "list", env=strangers))
     origins = {(line[1], line[3]) for line in algorithms}

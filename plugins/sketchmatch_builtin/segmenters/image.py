@@ -30,13 +30,14 @@ class ImageSegmenter(Segmenter):
     """Takes shapes as objects, filled or outlined, scanned or photographed, dark or light.
 
     Whether ink is darker than paper, or lighter, as chalk on a board, is told from what lies along
-    the picture's border and, where both do, from what is rare nearby. The light on the paper is found [1]_ and divided out, and ink parted from paper halfway between
-    them [2]_; each shape is then traced around its outside [3]_, so that an outline counts as what
-    it encloses, and nothing within an object is looked at. Gaps in outlines are closed, lines that
-    enclose nothing are left out, and so are ruled lines and a table around the sheet. Outlines that
-    touch or overlap are parted where that gives the fewest convex shapes. One shape around most of
-    the drawing is a frame and left out. Coordinates are pixels from the lower left corner. Objects
-    come in reading order: by their highest point from the top down, then from the left.
+    the picture's border and, where both do, from what is rare nearby. The light on the paper is
+    found [1]_ and divided out, and ink parted from paper halfway between them [2]_; each shape is
+    then traced around its outside [3]_, so that an outline counts as what it encloses, and nothing
+    within an object is looked at. Gaps in outlines are closed, lines that enclose nothing are left
+    out, and so are ruled lines and a table around the sheet. Outlines that touch or overlap are
+    parted where that gives the fewest convex shapes. One shape around most of the drawing is a
+    frame and left out. Coordinates are pixels from the lower left corner. Objects come in reading
+    order: by their highest point from the top down, then from the left.
 
     References
     ----------
