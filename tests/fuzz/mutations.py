@@ -53,7 +53,10 @@ TOKENS = {
         b' rx="|% |em|mm|in| points="1,2,3| style="display:none"| id="a"|xlink:href="#a"|'
         b'<rect width="1e308" height="1e308"/>|<symbol|<defs|<clipPath|viewBox="0 0 0 0"|'
         b'\xef\xbb\xbf|\xff\xfe|UTF-16|UTF-7|svg-source:excalidraw|inkscape:label="|aria-label="|'
-        b"<title>|</title>".split(b"|"),
+        b"<title>|</title>|<style>|</style>|{|}|:|;|!important|@media screen{|@import|:not(|~|"
+        b":has(|var(--ink)|--ink:|transform:|rotate(1e9deg)|scale(0%)|translate(1e308px)|opacity:0|"
+        b'fill="url(#a)"|clip-path="url(#a)"|viewBox="0 0 1e308 1e-308"|preserveAspectRatio="none"|'
+        b'<switch>|overflow="visible"|calc(|url(|\\'.split(b"|"),
         b"<g>" * 400,
         b'<g id="a">' + b'<use href="#a"/>' * 20 + b"</g>",
         b'<path d="' + b"A1 2 3 0 1 5 6" * 200 + b'"/>',

@@ -159,6 +159,13 @@ ATTRIBUTES = st.dictionaries(
             "ry",
             "transform",
             "style",
+            "class",
+            "fill",
+            "stroke",
+            "viewBox",
+            "preserveAspectRatio",
+            "clip-path",
+            "transform-origin",
             "id",
             "href",
         ]
@@ -185,6 +192,15 @@ ATTRIBUTES = st.dictionaries(
                 "scale(0)",
                 "skewX(90)",
                 "scale(1e200)",
+                "0 0 9 9",
+                "none",
+                "xMaxYMid slice",
+                "url(#a)",
+                "red",
+                "transform: rotate(1e9deg) scale(1e200)",
+                "transform: translate(5%) skewX(90deg); x: 5%; r: auto",
+                "fill: var(--a, var(--b)); --b: none; opacity: 0.5",
+                "M0 0h9v9h-9zM1 1h7v7h-7z",
             ]
         ),
         st.text("MmLlHhVvCcSsQqTtAaZz0123456789.,-e ", max_size=20),
@@ -200,7 +216,9 @@ ELEMENTS = st.recursive(
         st.just(()),
     ),
     lambda inner: st.tuples(
-        st.sampled_from(["g", "a", "symbol", "svg"]), ATTRIBUTES, st.lists(inner, max_size=5)
+        st.sampled_from(["g", "a", "symbol", "svg", "switch", "clipPath"]),
+        ATTRIBUTES,
+        st.lists(inner, max_size=5),
     ),
     max_leaves=15,
 )

@@ -41,6 +41,7 @@ _GEOMETRY = {"x", "y", "width", "height", "cx", "cy", "r", "rx", "ry", "d"}
 _OWN = {"opacity", "display", "clip-path", "overflow"}
 # What an attribute may say as CSS does. Of transforms and lengths its syntax is another.
 _ATTRIBUTES = {*_INHERITED, *_OWN, "transform-origin", "transform-box"}
+_TELLING = {*_ATTRIBUTES, "style"}
 _KNOWN = {*_ATTRIBUTES, *_TRANSFORMS, *_GEOMETRY, "background", "background-color"}
 _WIDE = {"inherit", "initial", "unset", "revert", "revert-layer"}
 _VISIBLE = {"visible": True, "hidden": False, "collapse": False}
@@ -112,6 +113,10 @@ class Look:
 
 
 INITIAL = Look()
+_OWN_FIELDS = {
+    name: getattr(INITIAL, name)
+    for name in ("displayed", "clip_path", "overflow", "transforms", "geometry")
+}
 
 
 class Styles:
@@ -177,6 +182,8 @@ class Styles:
 
     def look(self, element: ElementTree.Element, parent: Look) -> Look:
         """Return how an element is shown whose parent, or ``use``, is shown as told."""
+        if not self._wrapped and _TELLING.isdisjoint(element.keys()):
+            return _inherited(parent)
         try:
             values, custom = self._declared(element, parent.custom)
         except RecursionError:
@@ -195,7 +202,7 @@ class Styles:
             del changes["color"]
         own = {name: text for name, text in values.items() if text.lower() not in _WIDE}
         return replace(
-            parent,
+            _inherited(parent),
             **changes,
             displayed=own.get("display", "").lower() != "none" and _share(own.get("opacity")) > 0.0,
             clip_path=_target(own.get("clip-path", "")),
@@ -407,6 +414,13 @@ _VALUES: dict[str, Any] = {
     "visibility": lambda text: _VISIBLE[text.lower()],
     "fill-rule": lambda text: _RULES[text.lower()],
 }
+
+
+def _inherited(look: Look) -> Look:
+    """Return how a child is shown of which nothing is said."""
+    if all(getattr(look, name) == value for name, value in _OWN_FIELDS.items()):
+        return look
+    return replace(look, **_OWN_FIELDS)
 
 
 def _attribute(name: str) -> str:

@@ -283,8 +283,9 @@ class _Drawing:
             look = self._styles.look(element, outer.look)
             if not look.displayed or not _for_us(element):
                 continue
-            inner = replace(outer, look=look, size=(None, None))
-            inner = replace(inner, matrix=self._placed(element, look, inner))
+            inner = replace(
+                outer, look=look, size=(None, None), matrix=self._placed(element, look, outer)
+            )
             if look.clip_path:
                 inner = replace(inner, clip=_both(inner.clip, self._clip(look.clip_path, inner)))
             if tag_of(element) in SHAPES:
@@ -297,7 +298,8 @@ class _Drawing:
                     if shape.subpaths and _meet(shape.box, inner.clip):
                         yield shape
                 continue
-            inner = replace(inner, label=_groups_label(element) or inner.label)
+            if label := _groups_label(element):
+                inner = replace(inner, label=label)
             if tag_of(element) in _VIEWPORTS:
                 inside = self._viewport(element, inner, outer.size)
                 if inside is None:
