@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any, ClassVar
 
-from pydantic import BaseModel
-
-from sketchmatch.strict import STRICT
+from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 __all__ = ["API_VERSION", "Algorithm", "Params"]
 
 API_VERSION = 1
 """Version of the plugin API. It rises when a plugin written before would no longer work."""
+
+# The first use of pydantic reads what each installed distribution says of itself, and raises what a
+# broken one makes of that; the second does not.
+with suppress(Exception):
+    TypeAdapter(int)
 
 
 class Params(BaseModel):
@@ -30,7 +34,7 @@ class Params(BaseModel):
     Tracing(tolerance=0.5)
     """
 
-    model_config = STRICT
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Algorithm:

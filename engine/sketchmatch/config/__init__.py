@@ -5,7 +5,7 @@ names whole pipelines; ``[plugins]``, ``[server]`` and ``[limits]`` are for whoe
 Variables spell the same paths: ``SKETCHMATCH_SERVER__ADDRESS``.
 """
 
-import sketchmatch.strict  # noqa: F401  (before pydantic_settings)
+import sketchmatch.api  # noqa: F401  (before pydantic_settings, for what it does for pydantic)
 
 # isort: split
 from sketchmatch.config.configuration import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Self, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, create_model
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, create_model
 from pydantic_settings import (
     BaseSettings,
     InitSettingsSource,
@@ -17,7 +17,6 @@ from sketchmatch.config.addresses import address_fault
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
 from sketchmatch.pipeline.selection import STAGES
-from sketchmatch.strict import STRICT
 
 __all__ = ["Settings", "annotation_of", "keys_of", "static_paths"]
 
@@ -54,7 +53,7 @@ _Named = dict[str, _Parameters]
 
 
 class _Section(BaseModel):
-    model_config = STRICT
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class _Stage(_Section):

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from sketchmatch.api import Params, Similarity
+from sketchmatch.api import Similarity
 from sketchmatch.api.kernels import contrast_rows
 from sketchmatch.model import FloatArray
 
@@ -42,7 +42,7 @@ class SantiniJain(Similarity):
     name = "santini-jain"
     summary = "Fuzzy feature contrast in Tversky's ratio form (Santini and Jain)."
 
-    class Params(Params):
+    class Params(Similarity.Params):
         """How much differences count."""
 
         alpha: float = Field(
