@@ -518,7 +518,7 @@ def test_serve_refuses_limits_that_let_nothing_pass(command_line, option, value)
     assert_one_line(command_line("serve", option, value), 2, option)
 
 
-@pytest.mark.parametrize("address", ["nowhere", "256.0.0.1:1"])
+@pytest.mark.parametrize("address", ["nowhere.invalid:1", "256.0.0.1:1"])
 def test_serve_refuses_an_address_that_is_none(address):
     assert_one_line(run("serve", "--address", address), 2, "cannot be listened on")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import closing, nullcontext
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import Console, Group, RenderableType
@@ -71,20 +71,34 @@ def watch(events: Generator[MatchResponse, None, None]) -> Match:
     if not (screen.is_terminal or output.for_people()):
         return _collected(events, None)
     best = _BestSoFar()
-    live = Live(_busy(screen, "starting"), console=screen, transient=True)
-
-    def shown(progress: match_pb2.MatchProgress) -> None:
-        best.take(progress)
-        live.update(_progress(screen, progress))
-
     try:
-        with live if screen.is_terminal else nullcontext():
+        with _moving(screen, _busy(screen, "starting")) as live:
+
+            def shown(progress: match_pb2.MatchProgress) -> None:
+                best.take(progress)
+                live.update(_progress(screen, progress))
+
             return _collected(best.looking_at(events), shown)
     except KeyboardInterrupt:
         if best.progress is not None:
             seen = screen if screen.is_terminal else output.console()
             seen.print(_interrupted(best.progress, best.scenes))
         raise
+
+
+@contextmanager
+def _moving(screen: Console, what: RenderableType) -> Iterator[Live]:
+    """Show what is being done, if there is a terminal for it.
+
+    It is gone afterwards, even where somebody interrupts it while it begins.
+    """
+    live = Live(what, console=screen, transient=True)
+    try:
+        if screen.is_terminal:
+            live.start()
+        yield live
+    finally:
+        live.stop()
 
 
 class _BestSoFar:
@@ -123,7 +137,7 @@ def follow(work: Generator[float, None, _Value], what: str) -> _Value:
         bar.update(share)
         return ()
 
-    with Live(_busy(screen, what, bar), console=screen, transient=True):
+    with _moving(screen, _busy(screen, what, bar)):
         return finish(retold(work, shown))
 
 
