@@ -1,5 +1,6 @@
 """Configuration: file, environment and flags, what each says, and every way to say it wrongly."""
 
+import errno
 import json
 import re
 import subprocess
@@ -11,6 +12,7 @@ import pytest
 from sketchmatch import Scene, match, read_scene
 from sketchmatch.config import Origin, builtin, check, entries, load, open_registry, template
 from sketchmatch.config.addresses import address_fault
+from sketchmatch.config.layers import found_file
 from sketchmatch.config.settings import static_paths
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.pipeline.match import run_match
@@ -543,3 +545,19 @@ def test_help_starts_without_what_reads_the_configuration():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_without_a_home_or_with_one_that_is_closed_the_defaults_are_in_force(monkeypatch):
+    def homeless(*_):
+        raise RuntimeError("could not determine the home directory")
+
+    def closed(path, **_):
+        raise PermissionError(errno.EACCES, "Permission denied", path)
+
+    monkeypatch.delenv("SKETCHMATCH_CONFIG", raising=False)
+    with monkeypatch.context() as patch:
+        patch.setattr("platformdirs.user_config_path", homeless)
+        assert found_file(None) is None
+    with monkeypatch.context() as patch:
+        patch.setattr("os.stat", closed)
+        assert found_file(None) is None

@@ -369,11 +369,22 @@ def test_where_there_can_be_no_folder_kernels_are_kept_in_a_temporary_one(caches
     ]
 
 
+def homeless(*_, **__):
+    raise RuntimeError("could not determine the home directory")
+
+
+def unexpanded(*_, **__):
+    return Path("~/.cache/sketchmatch")
+
+
 @compiled_only
-def test_without_a_home_kernels_are_kept_in_a_temporary_folder(caches, caplog, monkeypatch):
+@pytest.mark.parametrize("cache_path", [homeless, unexpanded])
+def test_without_a_home_kernels_are_kept_in_a_temporary_folder(
+    caches, cache_path, caplog, monkeypatch
+):
     _, temporary = caches
     monkeypatch.delenv("NUMBA_CACHE_DIR")
-    monkeypatch.setattr(_jit, "user_cache_path", lambda *_, **__: Path("~/.cache/sketchmatch"))
+    monkeypatch.setattr(_jit, "user_cache_path", cache_path)
     assert compiled_by_a_call() == ["doubled"]
     assert compiled_by_a_call() == []
     (folder,) = temporary.iterdir()

@@ -45,9 +45,25 @@ def test_every_item_is_done_once_and_the_share_rises_to_one(cpus, total):
     assert sorted(done) == list(range(total))
     assert shares == sorted(shares)
     assert shares[-1:] == ([1.0] if total else [])
-    if total == 100:
-        assert len(names - {threading.main_thread().name}) == (0 if cpus == 1 else min(cpus, 4))
+    assert len(names - {threading.main_thread().name}) <= (0 if cpus == 1 else min(cpus, 4))
     assert len(pool_threads()) <= 4, "the same threads do everybody's work"
+
+
+@pytest.mark.usefixtures("quick_to_pool")
+def test_as_many_ranges_as_there_are_processors_are_done_at_once_and_four_at_most(cpus):
+    there, wanted = set(), min(cpus, 4)
+    all_there = threading.Event()
+
+    def work(first, last):
+        time.sleep(0.001 * (last - first))
+        if module._is_helping():
+            there.add(first)
+            if len(there) == wanted:
+                all_there.set()
+            assert all_there.wait(20)
+
+    list(in_slices(200, work))
+    assert all_there.is_set() == (cpus > 1)
 
 
 @pytest.mark.usefixtures("cpus")

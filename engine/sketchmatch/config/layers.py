@@ -105,7 +105,8 @@ def found_file(named: str | Path | None) -> Path | None:
             problem = f"does not exist; write one with `sketchmatch config init {path}`"
             raise InvalidInputError(Reason.INVALID_FILE, place, problem)
         return path
-    return next((path for path in _usual_places() if path.is_file()), None)
+    # A file in a home that is closed to this user is not there.
+    return next((path for path in _usual_places() if os.path.isfile(path)), None)  # noqa: PTH113
 
 
 @cache
@@ -247,7 +248,10 @@ def variable_of(path: Sequence[str]) -> str:
 def _usual_places() -> tuple[Path, ...]:
     from platformdirs import user_config_path
 
-    return (Path(FILE_NAME), user_config_path("sketchmatch") / FILE_NAME)
+    try:
+        return (Path(FILE_NAME), user_config_path("sketchmatch") / FILE_NAME)
+    except RuntimeError:  # there is no home
+        return (Path(FILE_NAME),)
 
 
 def _parsed(path: Path) -> dict[str, Any]:

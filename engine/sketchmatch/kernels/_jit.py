@@ -168,8 +168,11 @@ def _usual_folder() -> Path | None:
     """Return the folder that the environment names, or else the user's; None without a home."""
     if given := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(given)
-    own = user_cache_path("sketchmatch", appauthor=False) / "kernels"
-    return own if own.is_absolute() else None
+    try:
+        own = user_cache_path("sketchmatch", appauthor=False) / "kernels"
+    except RuntimeError:
+        return None
+    return own if own.is_absolute() else None  # an older platformdirs says ~/.cache
 
 
 def _temporary_folder() -> Path | None:
