@@ -1,5 +1,6 @@
 """Pen strokes whose ink alone was exported are read as the lines that were drawn."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -92,13 +93,27 @@ def test_ink_is_a_filling_with_no_other_line(paint, ink):
         "M0 0h20v80h60v-80h20v100h-100z",  # … around three sides
         data_of(loop(0, 360)),
         data_of(loop(0, 180)),
-        data_of(ribbon(np.linspace((0, 0), (150, 0), 40), 10)),  # a bar of 1 : 15
+        data_of(ribbon(np.linspace((0, 0), (70, 0), 40), 10)),  # a bar of 1 : 7
+        data_of(ribbon(np.linspace((0, 0), (150, 0), 7), 10)),  # … and of 14 corners
     ],
 )
 def test_a_shape_is_no_ink(shape):
     (found,) = read(shape)
     (outline,) = read(shape, paint='stroke="red"')
     assert found.tolist() == outline.tolist()
+
+
+def test_things_drawn_with_several_strokes_are_joined():
+    data = []
+    for x, y in ((0, 0), (300, 40)):
+        corners = [(x, y), (x + 200, y), (x + 200, y + 90), (x, y + 90), (x, y)]
+        for start, end in itertools.pairwise(corners):
+            data.append(data_of(ribbon(np.linspace(start, end, 25), 9.0)))
+    body = "".join(f'<path d="{each}"/>' for each in data)
+    found = StrokeSegmenter().segment(decode_svg(f"<svg>{body}</svg>".encode()))
+    boxes = [(0, -90, 200, 0), (300, -130, 500, -40)]
+    for item, expected in zip(found.scene.objects, boxes, strict=True):
+        assert item.polygon.bounds == pytest.approx(expected, abs=5)
 
 
 def test_a_rectangle_is_no_ink():

@@ -17,10 +17,10 @@ from sketchmatch.model import FloatArray
 
 __all__ = ["pen_lines"]
 
-# A ribbon is at most this wide, as a share of its length: a line that ends near its beginning, as
-# around an object, and one that leads elsewhere, which a bar could be.
-_WIDEST_LOOP, _WIDEST_LINE = 1 / 8, 1 / 20
-# … and a line has this many corners or curves at least: with fewer it is a shape that was drawn.
+# A ribbon is at most this wide, as a share of its length.
+_WIDEST = 1 / 8
+# One that leads elsewhere than to its beginning has this many corners or curves: with fewer it is a
+# bar that was drawn.
 _CORNERS = 16
 # A loop's ends are at most this share of its size apart, and joined enclose as much of its area.
 _GAP, _ROUND = 0.5, 0.3
@@ -69,7 +69,7 @@ def _middle(ring: FloatArray, corners: int) -> FloatArray | None:
         return None
     width = (half - math.sqrt(half**2 - 4.0 * area)) / 2.0
     long = half - width
-    if width > _WIDEST_LOOP * long:
+    if width > _WIDEST * long:
         return None
     sides = _sides(ring, way)
     if (np.hypot(*(sides[0] - sides[1]).T) < _FAR * width).mean() < _MOST:
@@ -79,7 +79,7 @@ def _middle(ring: FloatArray, corners: int) -> FloatArray | None:
     enclosed = abs(_area(np.concatenate([middle, middle[:1]])))
     if math.dist(middle[0], middle[-1]) <= _GAP * size and enclosed > _ROUND * area:
         return middle
-    return middle if width <= _WIDEST_LINE * long and corners >= _CORNERS else None
+    return middle if corners >= _CORNERS else None
 
 
 def _sides(ring: FloatArray, way: FloatArray) -> tuple[FloatArray, FloatArray]:
