@@ -1,5 +1,7 @@
 """The segmenter of pictures: outlines and filled shapes, noise, frames, light on dark."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -15,7 +17,20 @@ INVERTED = (
 
 
 def segmented(pixels, **params):
-    return ImageSegmenter(ImageSegmenter.Params(**params)).segment(Image(pixels))
+    """What is found in a picture: the same as in its negative, which every test looks at too."""
+    segmenter = ImageSegmenter(ImageSegmenter.Params(**params))
+    try:
+        found = segmenter.segment(Image(pixels))
+    except InvalidInputError as error:
+        with pytest.raises(InvalidInputError, match=re.escape(str(error))):
+            segmenter.segment(Image(255 - pixels))
+        raise
+    negative = segmenter.segment(Image(255 - pixels))
+    assert [item.rings[0].tolist() for item in negative.scene.objects] == [
+        item.rings[0].tolist() for item in found.scene.objects
+    ]
+    assert (INVERTED in negative.warnings) is not (INVERTED in found.warnings)
+    return found
 
 
 def paper(shape=(300, 400), grey=240):

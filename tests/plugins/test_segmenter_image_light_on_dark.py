@@ -175,14 +175,24 @@ def test_masks_of_hand_drawn_objects_are_matched_with_their_map_as_people_did(na
     assert answer.object_map == {int(drawn): mapped for drawn, mapped in truth.items()}
 
 
-@pytest.mark.parametrize("name", [*(f"sketches/{k:02}" for k in range(12)), "model_simple"])
-def test_a_floor_plan_gives_objects_or_a_sentence_and_its_negative_the_same(name):
-    pixels = picture(f"rooms-rsi/{name}.png")
+def same_as_negative(pixels):
     answers = []
     for each in (pixels, 255 - pixels):
         try:
             answers.append(rings(found_in(each)))
         except InvalidInputError as error:
             answers.append(str(error))
-    assert answers[0] == answers[1]
-    assert answers[0]
+    return answers[0] == answers[1]
+
+
+@pytest.mark.parametrize("name", [*(f"sketches/{k:02}" for k in range(12)), "model_simple"])
+def test_a_floor_plan_gives_objects_or_a_sentence_and_its_negative_the_same(name):
+    assert same_as_negative(picture(f"rooms-rsi/{name}.png"))
+
+
+@pytest.mark.slow
+def test_the_plan_of_a_building_and_its_negative_have_the_same_objects():
+    plans = sorted((SKETCHES.parent / "floors-ipa").glob("*_furnitures.png"))
+    require(plans, "shared/data/floors-ipa")
+    for plan in plans:
+        assert same_as_negative(read_source(plan).pixels), plan
