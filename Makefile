@@ -17,7 +17,7 @@ KERNEL_SHARE := 95
 says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 
 .PHONY: demo test test-slow test-all test-units test-interpreted mutation lint proto bench \
-  bench-histograms bench-searchers bench-startup experiments fuzz reference serve clean
+  bench-histograms bench-searchers bench-startup experiments fuzz reference api serve clean
 
 demo: $(VENV)/runtime
 	@$(BIN)/sketchmatch demo
@@ -78,6 +78,10 @@ experiments: $(VENV)/dev
 reference: $(VENV)/runtime
 	$(BIN)/sketchmatch plugins reference > plugins/REFERENCE.md.new
 	mv plugins/REFERENCE.md.new plugins/REFERENCE.md
+
+api: $(VENV)/dev
+	$(BIN)/python plugins/api_page.py > plugins/API.md.new
+	mv plugins/API.md.new plugins/API.md
 
 MINUTES ?= 10
 fuzz: $(VENV)/dev

@@ -13,7 +13,7 @@ __all__ = ["Histogram", "HistogramParams"]
 
 
 class HistogramParams(_algorithm.Params):
-    """What every histogram is asked for."""
+    """What every histogram is asked for: ``directions``, how many there are over the full turn."""
 
     directions: int = Field(
         default=180,

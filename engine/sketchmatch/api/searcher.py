@@ -19,9 +19,16 @@ class Outcome(StrEnum):
     """Why a search ended; the same names as ``sketchmatch.v1.Outcome``."""
 
     CONVERGED = "CONVERGED"
+    """It found nothing better for as long as it waits."""
+
     OPTIMAL = "OPTIMAL"
+    """No object map has a higher ζ, and that is proved."""
+
     TIME_BUDGET = "TIME_BUDGET"
+    """The host stopped it by then; a searcher does not return it."""
+
     ITERATION_LIMIT = "ITERATION_LIMIT"
+    """It has done as much as its parameters allow."""
 
 
 @dataclass(frozen=True)

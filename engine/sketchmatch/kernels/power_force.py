@@ -39,9 +39,14 @@ __all__ = [
     "power_force_histograms",
 ]
 
-OVERLAPPING, TOUCHING, MEETING, APART = 0, 1, 2, 3
-"""How two objects lie to each other: they overlap, or nobody knows; touch along a line; meet at
-points alone; lie apart."""
+OVERLAPPING = 0
+"""Two objects overlap, or nobody knows."""
+TOUCHING = 1
+"""Two objects touch along a line."""
+MEETING = 2
+"""Two objects meet at points alone."""
+APART = 3
+"""Two objects lie apart."""
 PLAIN = 0.9
 """Up to this r the plain powers keep their digits, however objects lie to each other."""
 

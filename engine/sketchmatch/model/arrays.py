@@ -12,8 +12,11 @@ __all__ = ["BoolArray", "FloatArray", "IntArray", "frozen", "frozen_floats", "se
 _DType = TypeVar("_DType", bound=np.generic)
 
 BoolArray = NDArray[np.bool_]
+"""An array of truth values."""
 FloatArray = NDArray[np.float64]
+"""An array of float64."""
 IntArray = NDArray[np.int64]
+"""An array of int64."""
 
 
 def frozen(array: NDArray[_DType]) -> NDArray[_DType]:

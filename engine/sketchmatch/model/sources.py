@@ -247,3 +247,4 @@ def check_placement(resolution: float, origin: tuple[float, ...]) -> None:
 
 
 Source = StrokeSet | PolygonSet | OccupancyGrid | Image
+"""What a segmenter may be given."""

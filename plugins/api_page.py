@@ -1,0 +1,61 @@
+"""Write the reference page of all that a plugin may import, ``API.md``, from the docstrings.
+
+``make api`` runs it. The sources are read, and nothing of them is imported.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from griffe2md import ConfigDict, render_package_docs
+
+__all__ = ["page"]
+
+_ENGINE = Path(__file__).parents[1] / "engine"
+_MODULES = (
+    "sketchmatch.api",
+    "sketchmatch.api.kernels",
+    "sketchmatch.api.forces",
+    "sketchmatch.api.pixels",
+    "sketchmatch.model",
+    "sketchmatch.testing",
+)
+_OPTIONS = ConfigDict(
+    docstring_style="numpy",
+    inherited_members=False,
+    search_paths=[str(_ENGINE)],
+    show_if_no_docstring=False,
+    show_object_full_path=False,
+    show_root_members_full_path=False,
+    show_signature_annotations=True,
+    show_submodules=False,
+    summary=False,
+)
+_PREAMBLE = """# The plugin API
+
+<!-- Written by `make api`. -->
+
+All that a plugin may import. [CONTRIBUTING](../CONTRIBUTING.md#adding-an-algorithm) tells how to
+write one, and [REFERENCE](REFERENCE.md) describes the algorithms that there are.
+"""
+
+
+def page() -> str:
+    """Return the page, in Markdown."""
+    anchors = ((module, module.replace(".", "")) for module in _MODULES)
+    contents = "\n".join(f"- [`{module}`](#{anchor})" for module, anchor in anchors)
+    return "\n".join([_PREAMBLE, contents, "", *map(_module, _MODULES)])
+
+
+def _module(name: str) -> str:
+    """Return what there is to say of a module, without links to what has no anchor, and roles."""
+    text = render_package_docs(name, _OPTIONS)
+    text = re.sub(r"\[([^][]+)\]\(#[^()]*\)", r"\1", text)
+    text = re.sub(r":\w+:`~?(?:[\w.]*\.)?(\w+)`", r"`\1`", text)
+    text = re.sub(r"(?<!`)``(?!`)", "`", text)
+    return re.sub(r"::$", ":", text, flags=re.MULTILINE).rstrip() + "\n"
+
+
+if __name__ == "__main__":
+    print(page(), end="")
