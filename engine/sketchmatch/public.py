@@ -67,7 +67,8 @@ def match(
     ----------
     sketch, map
         Scenes, sources, or paths of files that hold them: SVG or stroke JSON sketches, GeoJSON
-        polygons, ROS map YAML, images.
+        polygons, ROS map YAML, images, and whatever plugins read; ``"plan.dxf#walls"`` names a
+        part of a file.
     profile
         A pipeline to start from, e.g. ``"fast"`` or ``"proof"``; what is said beside it wins.
     sketch_segmenter, map_segmenter
@@ -135,8 +136,8 @@ def match(
     }
     with engine.limited():
         request = MatchRequest(
-            sketch=_loaded("sketch", sketch),
-            map=_loaded("map", map),
+            sketch=_loaded("sketch", sketch, engine),
+            map=_loaded("map", map, engine),
             selection=_selection(names, params or {}),
             seed=seed,
             time_budget=time_budget,
@@ -184,7 +185,7 @@ def read_scene(
     """
     engine = _engine(config)
     with engine.limited():
-        source = read_source(Path(path))
+        source = read_source(Path(path), engine.registry.readers)
     choice = Choice(segmenter or "", _mapping("params", params))
     chosen = engine.resolve_segmenter(choice, source, profile or "")
     return engine.segment(source, chosen, f"{path}: {source.field}").scene
@@ -230,7 +231,7 @@ def compare(
     """
     engine = _engine(config)
     with engine.limited():
-        given = _loaded("sketch", sketch), _loaded("map", map)
+        given = _loaded("sketch", sketch, engine), _loaded("map", map, engine)
     names = {
         "sketch_segmenter": sketch_segmenter,
         "map_segmenter": map_segmenter,
@@ -403,7 +404,7 @@ def _object(name: str, polygon: Any) -> SceneObject:
         raise error.within(name) from None
 
 
-def _loaded(side: str, given: Scene | Source | str | Path) -> Scene | Source:
+def _loaded(side: str, given: Scene | Source | str | Path, engine: Engine) -> Scene | Source:
     if isinstance(given, Scene | Source):
         return given
     if not isinstance(given, str | Path):
@@ -414,7 +415,7 @@ def _loaded(side: str, given: Scene | Source | str | Path) -> Scene | Source:
             "path of a file",
         )
     try:
-        return read_source(Path(given))
+        return read_source(Path(given), engine.registry.readers)
     except InvalidInputError as error:
         raise error.within(side) from None
 

@@ -1,11 +1,11 @@
-"""The algorithms that come with sketchmatch, registered as any plugin's are.
+"""The algorithms and readers that come with sketchmatch, registered as any plugin's are.
 
 Each hook imports its kind alone: listing one kind does not load the others.
 """
 
 from __future__ import annotations
 
-from sketchmatch.api import Histogram, Searcher, Segmenter, Similarity, hookimpl
+from sketchmatch.api import Histogram, Reader, Searcher, Segmenter, Similarity, hookimpl
 
 
 @hookimpl
@@ -63,3 +63,23 @@ def sketchmatch_register_searchers() -> list[type[Searcher]]:
     from sketchmatch_builtin.searchers.nn_pso import NnPso
 
     return [Auto, Nn, NnPso, FsnnPso, Easm, Direct, Exact]
+
+
+@hookimpl
+def sketchmatch_register_readers() -> list[type[Reader]]:
+    """Offer the built-in readers."""
+    from sketchmatch_builtin.readers.coco import CocoReader
+    from sketchmatch_builtin.readers.cvat import CvatReader
+    from sketchmatch_builtin.readers.dxf import DxfReader
+    from sketchmatch_builtin.readers.excalidraw import ExcalidrawReader
+    from sketchmatch_builtin.readers.labelme import LabelmeReader
+    from sketchmatch_builtin.readers.scene_graph import SceneGraphReader
+
+    return [
+        ExcalidrawReader,
+        LabelmeReader,
+        CocoReader,
+        CvatReader,
+        DxfReader,
+        SceneGraphReader,
+    ]

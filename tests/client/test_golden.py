@@ -16,6 +16,7 @@ from tests.contract.golden import NAMES, golden
 
 BAR = [[(2, 12), (8, 12), (8, 20), (2, 20)], [(3, 17), (5, 17), (5, 13), (3, 13)]]
 PICTURE = b"P2\n3 2\n255\n0 64 128 192 224 255\n"
+SHEET = b"1.5 2.5 4.5 3.5 0.5 6.5"
 YAML = """\
 image: room.pgm
 resolution: 0.25
@@ -138,6 +139,7 @@ class TestRequests:
             "occupancy_grid": sources.occupancy_grid([[0, 100], [-1, 0], [100, 30]], 0.125),
             "map_server_map": sources.map_server_map(map_files),
             "image": sources.image(PICTURE),
+            "file": sources.file(SHEET, name="room.sheet", part="cellar"),
         }
         for source in sent.values():
             call(server.address, "segment", source)

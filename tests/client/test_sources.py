@@ -287,3 +287,9 @@ class TestImage:
     def test_missing_file(self, tmp_path):
         with pytest.raises(InvalidRequestError, match=r"gone\.png\) cannot be read: No such file"):
             sources.image(tmp_path / "gone.png")
+
+
+def test_a_label_that_utf_8_cannot_hold_is_sent_as_well_as_can_be():
+    square = [(0, 0), (1, 0), (1, 1)]
+    sent = sources.polygons([square, square], ["\ud800x", "\ud83d\ude00"]).polygon_set
+    assert [polygon.label for polygon in sent.polygons] == ["\N{REPLACEMENT CHARACTER}x", "😀"]

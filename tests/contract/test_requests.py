@@ -4,7 +4,7 @@ import pytest
 
 from tests.contract.conversions import requests
 from tests.contract.golden import NAMES, golden
-from tests.contract.values import MATCHES, SOURCES, plain
+from tests.contract.values import MATCHES, REGISTRY, SOURCES, plain
 
 
 def test_every_golden_request_that_holds_something_is_read_here():
@@ -19,7 +19,7 @@ def test_a_request_to_match_is_read_field_by_field(name):
 
 @pytest.mark.parametrize("name", SOURCES)
 def test_each_form_of_source_is_read(name):
-    read = requests.source(golden(name).source, "source", True)
+    read = requests.source(golden(name).source, "source", True, REGISTRY.readers)
     assert plain(read) == plain(SOURCES[name])
 
 

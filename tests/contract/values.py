@@ -10,6 +10,7 @@ from sketchmatch.api import (
     Histogram,
     Outcome,
     Params,
+    Reader,
     Searcher,
     Segmentation,
     Segmenter,
@@ -38,7 +39,14 @@ from sketchmatch.pipeline.result import (
     Statistics,
 )
 from sketchmatch.pipeline.selection import Choice, Defaults, Pipeline, Profile
-from sketchmatch.registry import Kind, PluginState, PluginStatus, Registered, Registry
+from sketchmatch.registry import (
+    Kind,
+    PluginState,
+    PluginStatus,
+    Registered,
+    RegisteredReader,
+    Registry,
+)
 
 
 def box(x0, x1, y0, y1):
@@ -78,6 +86,20 @@ class Tracing(Segmenter):
 
     def segment(self, source):
         raise NotImplementedError
+
+
+class Sheets(Reader):
+    """Sheets, one polygon each."""
+
+    name = "sheets"
+    summary = "Sheets of paper."
+    suffixes = (".sheet", ".sheet.json")
+    keys = ("paper",)
+    source = PolygonSet
+
+    def read(self, data, part=""):
+        corners = np.array(data.split(), dtype=float).reshape(-1, 2)
+        return PolygonSet((LabelledPolygon((corners,), part),))
 
 
 class Tiling(Segmenter):
@@ -185,6 +207,9 @@ SOURCES = {
         picture=GridPicture(np.array([[1, 255, 1], [255, 1, 127]], dtype=np.uint8), 0.196),
     ),
     "SegmentRequest.image": PICTURE,
+    "SegmentRequest.file": PolygonSet(
+        (LabelledPolygon((np.array([[1.5, 2.5], [4.5, 3.5], [0.5, 6.5]]),), "cellar"),)
+    ),
 }
 NOTHING_CHOSEN = {
     "sketch_segmenter": Choice(),
@@ -389,6 +414,7 @@ REGISTRY = Registry(
             "rulers", "acme-rulers", "5.6", PluginState.FAILED, "No module named 'straight'"
         ),
     ],
+    [RegisteredReader(Sheets, "acme-sheets", "7.5")],
 )
 DEFAULTS = Defaults(
     pipeline={"sketch_segmenter": Choice("tracing")},

@@ -340,7 +340,11 @@ def test_plugins_list_says_the_same_here_and_of_a_server(command_line, address):
     assert catalogue == Parse(there.stdout, ListAlgorithmsResponse())
     here, there = (command_line("plugins", "list", *where) for where in everywhere)
     assert here.stdout == there.stdout
-    algorithms, profiles, plugins = tables(here)
+    algorithms, profiles, plugins, readers = tables(here)
+    assert readers[0] == ["reader", "files", "distribution", "version", "summary"]
+    known = {name: files for name, files, *_ in readers[1:]}
+    assert known["dxf"] == ".dxf"
+    assert known["excalidraw"] == ".excalidraw {type, elements}"
     head = ["kind", "name", "default", "distribution", "version", "summary", "source"]
     assert algorithms[0] == head
     assert ["searcher", "auto", "true", "sketchmatch"] in [line[:4] for line in algorithms]

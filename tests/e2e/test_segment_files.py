@@ -105,3 +105,73 @@ def test_serve_takes_its_limits_on_sources_from_options(command_line, tmp_path):
     assert (done.returncode, few.returncode) == (2, 2)
     assert "more than the limit of 1000 pixels" in done.stderr
     assert "has 3 objects, more than the limit of 2 objects" in few.stderr
+
+
+FOREIGN = {
+    "sketch.excalidraw": {
+        "type": "excalidraw",
+        "elements": [
+            {"type": "rectangle", "id": "a", "x": 0, "y": 0, "width": 9, "height": 5},
+            {"type": "text", "containerId": "a", "text": "writing\n\x1b[1mdesk", "x": 1, "y": 1},
+            {"type": "ellipse", "id": "b", "x": 20, "y": 0, "width": 4, "height": 9},
+            {"type": "arrow", "id": "c", "x": 0, "y": 0, "points": [[0, 0], [9, 9]]},
+        ],
+    },
+    "labels.json": {
+        "shapes": [
+            {"label": "writing\ndesk", "points": [[0, 0], [9, 0], [9, 5], [0, 5]]},
+            {"label": "", "shape_type": "rectangle", "points": [[20, 0], [24, 9]]},
+            {"label": "door", "shape_type": "line", "points": [[0, 9], [5, 9]]},
+        ]
+    },
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_files_of_other_tools_are_read_by_whoever_answers(command_line, where, tmp_path, name):
+    file = tmp_path / name
+    file.write_text(json.dumps(FOREIGN[name]))
+    done = command_line("segment", file, "--overlay", tmp_path / "x.png", *where)
+    assert done.returncode == 0, done.stderr
+    assert [line.split("\t")[:2] for line in done.stdout.splitlines()[1:]] == [
+        ["0", "writing desk"],
+        ["1", ""],
+    ]
+    assert done.stderr.count("sketchmatch: ") == 1
+    assert (tmp_path / "x.png").stat().st_size > 0
+
+
+def test_a_fault_in_a_file_of_another_tool_begins_with_its_path(command_line, where, tmp_path):
+    file = tmp_path / "labels.json"
+    file.write_text('{"shapes": [{"points": 3}]}')
+    done = command_line("segment", file, *where)
+    words = "shapes[0].points is 3; give a list of [x, y]"
+    assert (done.returncode, done.stderr) == (2, f"sketchmatch: {file}: {words}\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("a.json", "is JSON, an object with 'walls', which nothing here reads; known are strokes"),
+        ("a.dwg", "is of no known kind; give a file that ends in one of .bag "),
+        ("a.json#x", "is JSON, an object with 'walls'"),
+    ],
+)
+def test_of_a_file_that_nobody_reads_it_is_said_what_was_seen(
+    command_line, where, tmp_path, name, words
+):
+    (tmp_path / name.partition("#")[0]).write_text('{"walls": []}')
+    done = command_line("segment", tmp_path / name, *where)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert f"sketchmatch: {tmp_path / name} {words}" in done.stderr
+
+
+def test_what_a_file_leaves_out_is_told(command_line, where, tmp_path):
+    file = tmp_path / "room.geojson"
+    ring = [[0, 0], [1, 0], [1, 1], [0, 0]]
+    polygons = [{"type": "Polygon", "coordinates": [ring]}] * 2
+    nowhere = {"type": "Feature", "geometry": None, "properties": {}}
+    file.write_text("\n".join(json.dumps(each) for each in (*polygons, nowhere)))
+    done = command_line("segment", file, *where)
+    assert done.returncode == 0
+    assert "[2] is without a place: left out." in done.stderr

@@ -80,6 +80,30 @@ TOKENS["json"] = [
         b"|"
     ),
 ]
+TOKENS["json"] += [
+    *b'"type":"excalidraw"|"elements":|"shapes":|"shape_type":|"mask":|"circle"|"images":|"id":|'
+    b'"annotations":|"segmentation":|"bbox":|"counts":|"size":|[99999,99999]|"nodes":|"edges":|'
+    b'"layer_ids":|"attributes":|"bounding_box":|"dimensions":|"OBB"|"boundary":|"layer":4|'
+    b'"source":3|"roundness":{"type":2}|"angle":|"containerId":|"groupIds":|[["g"]]|{"g":0}'.split(
+        b"|"
+    ),
+]
+TOKENS["excalidraw"] = TOKENS["json"]
+TOKENS["xml"] = [
+    *b'<image id="1">|</image>|<annotations>|<track>|<mask rle="1,2" left="0" top="0" width="9" '
+    b'height="9"/>|<polygon points="|0,0;|;;|nan,inf;| rotation="|1e999| rle="|,,| frame="|'
+    b' width="99999999"|<!DOCTYPE a [<!ENTITY l "ha">]>|&l;|<!--|-->|<?xml encoding="UTF-16"?>|'
+    b"\xff\xfe|\0".split(b"|"),
+    b"<track>" * 400,
+    b'<box xtl="' * 200,
+    b"0,0;" * 2000,
+]
+TOKENS["dxf"] = [
+    *b"0\nINSERT\n2\nCHAIR\n|0\nHATCH\n|0\nSPLINE\n71\n3\n|0\nLWPOLYLINE\n90\n3\n70\n1\n|0\nBLOCK\n|"
+    b"0\nENDSEC\n|0\nEOF\n|0\nENTITIES\n|10\n1e308\n|20\nnan\n|42\n1e9\n|70\n32767\n|71\n32767\n|"
+    b"44\n1e300\n|8\n\xff\xfe\n|$INSUNITS|1\nAC1032\n|AutoCAD Binary DXF\r\n\x1a\0|999\n|\r\n|\0|"
+    b"40\n0\n|40\n-1\n|0\nELLIPSE\n11\n0\n21\n0\n|0\nTEXT\n".split(b"|"),
+]
 _WORDS = [0, 1, 255, 65535, 65536, 2**31 - 1, 2**31, 2**32 - 1]
 _NUMBER = re.compile(rb"-?\d+(\.\d+)?")
 

@@ -18,7 +18,7 @@ from tests.fuzz.mutations import TOKENS, mutated
 from tests.fuzz.property import KINDS, SEEDS, check, seeds
 from tests.tools import ROOT
 
-RUNS = dict.fromkeys(KINDS, 1500) | {"yaml": 500, "bmp": 300, "tiff": 300, "jpg": 300}
+RUNS = dict.fromkeys(KINDS, 1500) | {"yaml": 500, "bmp": 300, "tiff": 300, "jpg": 300, "dxf": 200}
 FOUND_EARLIER = sorted((SEEDS.parent / "found_earlier").iterdir())
 
 # What Pillow has to say of broken tags is no error here.

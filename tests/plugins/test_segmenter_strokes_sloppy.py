@@ -157,8 +157,9 @@ def test_a_route_is_kept_apart():
     )
     never = found_in(SQUARE, AWAY, way, route="never")
     assert never.route is None
-    assert "strokes[2] (50% from the left, 10% from the top) was left out: its ends" in (
-        never.warnings[0]
+    assert (
+        "strokes[2] (50% from the left, 10% from the top) was left out: its ends"
+        in (never.warnings[0])
     )
 
 

@@ -2,8 +2,13 @@
 
 import re
 
+import numpy as np
+
 import sketchmatch
-from sketchmatch.model import Scene
+from sketchmatch.api import Reader, hookimpl
+from sketchmatch.api.documents import decode_text, load_json
+from sketchmatch.io.files import _JSON_SUFFIXES, _KINDS, PICTURE_SUFFIXES
+from sketchmatch.model import LabelledPolygon, PolygonSet, Scene
 from sketchmatch.registry import OWN_DISTRIBUTION, default_registry
 from tests.tools import ROOT
 
@@ -26,6 +31,35 @@ def test_the_readme_lists_exactly_the_algorithms_there_are():
     )
     registered = {(str(item.kind), item.name) for item in BUILT_IN}
     assert listed == registered
+
+
+def test_the_readme_names_the_files_of_every_reader():
+    (rows,) = re.findall(r"^\| file \| holds \|\n(.*?)\n\n", README, re.M | re.S)
+    words = {"scene-graph": "Hydra"}
+    for item in default_registry().readers:
+        for suffix in item.reader.suffixes:
+            assert f"`{suffix}`" in rows
+        assert words.get(item.name, item.name).lower() in rows.lower()
+    for suffix in {*_KINDS, *_JSON_SUFFIXES} - {*PICTURE_SUFFIXES}:
+        assert f"`{suffix}`" in rows
+
+
+def test_the_reader_that_is_shown_reads():
+    text = CONTRIBUTING.split("\n## Reading files of another kind\n")[1].split("\n## ")[0]
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    names = {
+        "Reader": Reader,
+        "PolygonSet": PolygonSet,
+        "LabelledPolygon": LabelledPolygon,
+        "load_json": load_json,
+        "decode_text": decode_text,
+        "np": np,
+        "hookimpl": hookimpl,
+    }
+    exec(block, names)
+    (reader,) = names["sketchmatch_register_readers"]()
+    found = reader().read(b'{"boxes": [[0, 0, 2, 1]]}')
+    assert found.polygons[0].rings[0].tolist() == [[0, 0], [2, 0], [2, 1], [0, 1]]
 
 
 def test_the_readme_gives_each_algorithm_the_source_that_it_names_itself():

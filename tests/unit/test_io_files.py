@@ -1,5 +1,6 @@
 """The door for every kind of file."""
 
+import json
 import subprocess
 import sys
 
@@ -7,6 +8,8 @@ import pytest
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
+from sketchmatch.io.files import file_and_part, kind_of_file
+from sketchmatch.model import PolygonSet, StrokeSet
 
 
 def refused(path):
@@ -55,6 +58,62 @@ def test_contents_at_fault_are_named_after_the_path(tmp_path):
     path.write_text('{"strokes": [{"points": [[0, 0], [1, null]]}]}')
     expected = f"{path}: strokes[0].points[1][1] is missing; give a finite number"
     assert str(refused(path)) == expected
+
+
+def test_a_part_follows_the_name_of_a_file_that_is_there(tmp_path):
+    path = tmp_path / "a#b.excalidraw"
+    path.touch()
+    assert file_and_part(path) == (path, "")
+    assert file_and_part(tmp_path / "a#b.excalidraw#hall #2") == (path, "hall #2")
+    assert file_and_part(tmp_path / "none.dxf#x") == (tmp_path / "none.dxf#x", "")
+
+
+@pytest.mark.parametrize("name", ["x.svg", "x.json", "x.png", "x.yaml"])
+def test_a_file_without_parts_has_none_to_choose(tmp_path, name):
+    (tmp_path / name).write_text('{"strokes": []}')
+    assert (
+        "has no part 'x', nor any other; leave out what follows '#'"
+        in refused(tmp_path / f"{name}#x").problem
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "seen"),
+    [
+        ("{}", "is JSON, an empty object, which nothing here reads; known are strokes as"),
+        ('{"b": 1, "a": 2}', "is JSON, an object with 'b', 'a', which nothing here reads"),
+        ('{"type": "Topology", "arcs": []}', "with 'type', 'arcs' and type 'Topology', which"),
+        ("[]", "is JSON, a list of 0, which"),
+        ("[[1]]", "is JSON, a list of 1, which"),
+        ('[{"x": 1}, 2]', "is JSON, a list of 2, the first an object with 'x', which"),
+        ("3", "is JSON, 3, which"),
+        ('"\\ud800"', "is JSON, '\\ud800', which"),
+    ],
+)
+def test_of_json_of_no_known_kind_it_is_said_what_was_seen_and_what_is_known(tmp_path, text, seen):
+    (tmp_path / "x.json").write_text(text)
+    problem = refused(tmp_path / "x.json").problem
+    assert seen in problem
+    assert "GeoJSON with its type; coco with 'images', 'annotations'; excalidraw with" in problem
+
+
+def test_many_keys_are_not_all_shown(tmp_path):
+    (tmp_path / "x.json").write_text(json.dumps({f"key {k}": 0 for k in range(50)}))
+    problem = refused(tmp_path / "x.json").problem
+    assert "'key 5' and 44 more, which" in problem
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "kind"),
+    [
+        ("a.json", '{"type": "FeatureCollection", "features": []}', PolygonSet),
+        ("a.geojson", '{"strokes": []}', StrokeSet),
+        ("a.json", '{"shapes": []}', PolygonSet),
+        ("a.ndjson", '{"type": "Polygon", "coordinates": []}\n' * 2, PolygonSet),
+    ],
+)
+def test_json_is_known_by_what_is_in_it(name, text, kind):
+    assert kind_of_file(name, text.encode()).source is kind
 
 
 def test_slow_libraries_wait_until_a_file_needs_them():

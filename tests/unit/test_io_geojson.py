@@ -7,7 +7,8 @@ import pytest
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.io.geojson import decode_geojson
-from sketchmatch.model import PolygonSet
+from sketchmatch.io.scene_files import encode_geojson
+from sketchmatch.model import PolygonSet, Scene
 
 SQUARE = [[[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]]
 WITH_HOLE = [*SQUARE, [[1, 1], [1, 2], [2, 2], [2, 1], [1, 1]]]
@@ -59,13 +60,13 @@ def features(*geometries):
 
 
 WRONG = {
-    "a line": (
-        features(polygon(), {"type": "LineString", "coordinates": [[0, 0], [1, 1]]}),
+    "another geometry": (
+        features(polygon(), {"type": "CurvePolygon", "coordinates": []}),
         "features[1].geometry.type",
-        'is "LineString"; give Polygon or MultiPolygon',
+        'is "CurvePolygon", which GeoJSON does not have; give Polygon or MultiPolygon',
     ),
     "no geometry": (
-        features(None),
+        {"type": "FeatureCollection", "features": [{"type": "Feature", "properties": {}}]},
         "features[0].geometry",
         "is missing; give a GeoJSON object",
     ),
@@ -113,6 +114,103 @@ def test_deep_nesting_is_refused():
     deep = '{"type":"GeometryCollection","geometries":[' * 600 + json.dumps(polygon()) + "]}" * 600
     with pytest.raises(InvalidInputError, match="nested too deeply"):
         decode_geojson(deep)
+
+
+def test_features_without_a_place_are_left_out_with_a_note():
+    nowhere = [None, {"type": "MultiPolygon", "coordinates": []}]
+    found = decode_geojson(json.dumps(features(polygon(), *nowhere, polygon())))
+    assert len(found.polygons) == 2
+    assert found.notes == ("features[1] and 1 more are without a place: left out.",)
+
+
+def test_points_and_open_lines_are_left_out_and_closed_lines_are_outlines():
+    found = decode_geojson(
+        json.dumps(
+            features(
+                polygon(),
+                {"type": "Point", "coordinates": [1, 1]},
+                {"type": "LineString", "coordinates": [[0, 0], [6, 0]]},
+                {"type": "LineString", "coordinates": SQUARE[0]},
+                {"type": "LineString", "coordinates": [[0, 0], [6, 0], [0, 0]]},
+            )
+        )
+    )
+    assert [item.rings[0].tolist() for item in found.polygons] == [SQUARE[0], SQUARE[0]]
+    assert found.notes == (
+        "features[1].geometry is a point, which encloses no area: left out.",
+        "features[2].geometry and 1 more are an open line, which encloses no area: left out.",
+        "features[3].geometry is a closed line: taken as the outline of an object.",
+    )
+
+
+def test_labels_are_texts_numbers_and_truths_and_else_the_id():
+    one = {"type": "Feature", "geometry": polygon()}
+    found = decode(
+        {
+            "type": "FeatureCollection",
+            "features": [
+                {**one, "properties": {"label": 0, "name": "other"}},
+                {**one, "properties": {"label": None, "name": True}},
+                {**one, "properties": {"label": [], "name": {}}, "id": "desk"},
+                {**one, "properties": {"name": 1.5}, "id": 7},
+                {**one, "properties": None, "id": 7},
+            ],
+        }
+    )
+    assert [item.label for item in found] == ["0", "true", "desk", "1.5", "7"]
+
+
+@pytest.mark.parametrize(
+    "text", ["{0}\n{1}\n", "{0}\r\n\n{1}", "\x1e{0}\n\x1e{1}\n", "[{0},\n{1}]"]
+)
+def test_several_texts_are_read_like_a_collection(text):
+    first, second = json.dumps(feature(polygon(), name="a")), json.dumps(polygon(WITH_HOLE))
+    found = decode_geojson(text.replace("{0}", first).replace("{1}", second)).polygons
+    assert [(item.label, len(item.rings)) for item in found] == [("a", 1), ("", 2)]
+
+
+def test_a_fault_in_one_of_several_texts_is_found_in_that_one():
+    good = json.dumps(polygon())
+    with pytest.raises(InvalidInputError, match=r"^\[1\] is not JSON"):
+        decode_geojson(f"{good}\n{{\n")
+    with pytest.raises(InvalidInputError, match=r"^\[1\]\.coordinates is missing"):
+        decode_geojson(f'{good}\n{{"type": "Polygon"}}')
+
+
+def test_degrees_become_metres_where_they_are_meant():
+    corners = [[11.0, 60.0], [11.0001, 60.0], [11.0001, 60.0001], [11.0, 60.0001]]
+    found = decode_geojson(json.dumps(polygon([corners])))
+    assert found.notes == ("The coordinates are longitudes and latitudes: turned into metres.",)
+    # 1e-4 degrees of a great circle of 40 030 km; half of it along the parallel of 60°.
+    width, height = found.polygons[0].rings[0].max(axis=0) - found.polygons[0].rings[0].min(axis=0)
+    assert (width, height) == pytest.approx((5.5597, 11.1195), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("crs", "turned"),
+    [
+        ({"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}, True),
+        ({"type": "name", "properties": {"name": "EPSG:4326"}}, True),
+        ({"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3857"}}, False),
+        ({"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::14326"}}, False),
+        (None, False),
+    ],
+)
+def test_a_member_crs_says_whether_coordinates_are_degrees(crs, turned):
+    found = decode_geojson(json.dumps({**features(polygon()), "crs": crs}))
+    assert bool(found.notes) is turned
+    tiny = [[[30, 40], [30.01, 40], [30.01, 40.01]]]
+    found = decode_geojson(json.dumps({**features(polygon(tiny)), "crs": crs}))
+    assert bool(found.notes) is (crs is not None)
+
+
+def test_a_scene_that_we_wrote_is_never_taken_for_degrees():
+    tiny = Scene.from_polygons(
+        [[[9, 9], [9.01, 9], [9, 9.01]], [[9.05, 9], [9.06, 9], [9.05, 9.01]]]
+    )
+    found = decode_geojson(encode_geojson(tiny))
+    assert found.notes == ()
+    assert found.polygons[0].rings[0].max() == 9.01
 
 
 def test_a_file_is_read_by_its_suffix(tmp_path):

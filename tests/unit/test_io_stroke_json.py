@@ -33,6 +33,17 @@ def test_labels_and_times_are_kept():
     assert sketch.strokes[1].points.shape == (0, 2)
 
 
+def test_numbers_and_truths_are_labels_too():
+    found = decode([{"points": [], "label": label} for label in (0, True, None, "", "desk")])
+    assert [stroke.label for stroke in found.strokes] == ["0", "true", "", "", "desk"]
+
+
+def test_times_that_are_null_throughout_are_none():
+    (stroke,) = decode([{"points": [[0, 0, None], [1, 2, None]]}]).strokes
+    assert stroke.times is None
+    assert stroke.points.tolist() == [[0, 0], [1, 2]]
+
+
 WRONG = {
     '{"strokes": [{"points": [[0, 0], [1, NaN]]}]}': (
         "strokes[0].points[1][1]",
@@ -61,7 +72,13 @@ WRONG = {
     '{"strokes": [{"points": [0, 1]}]}': ("strokes[0].points[0]", "is 0; give [x, y]"),
     '{"strokes": [[[0, 0], [1, 1]]]}': ("strokes[0]", 'give an object with "points"'),
     '{"strokes": [{}]}': ("strokes[0].points", "is missing; give a list of [x, y] pairs"),
-    '{"strokes": [{"points": [], "label": 3}]}': ("strokes[0].label", "is 3; give a name"),
+    '{"strokes": [{"points": [], "label": []}]}': ("strokes[0].label", "a list of 0; give a name"),
+    '{"strokes": [], "yAxis": "down"}': ("'yAxis'", 'is no key that is read; write "y_axis"'),
+    '{"strokes": [], "Y-axis": "up"}': ("'Y-axis'", 'is no key that is read; write "y_axis"'),
+    '{"strokes": [{"points": [[0, 0, 1], [1, 1, null]]}]}': (
+        "strokes[0].points[1][2]",
+        "is missing; give a finite number",
+    ),
     '{"strokes": {}}': ("strokes", "is an object; give a list of strokes"),
     '{"lines": []}': ("strokes", "is missing; give a list of strokes"),
     '{"strokes": [], "y_axis": "left"}': ("y_axis", 'is "left"; give "up" or "down"'),

@@ -15,9 +15,12 @@ from sketchmatch.registry import (
     PluginRules,
     PluginState,
     Registered,
+    RegisteredReader,
     Registry,
     default_registry,
     discover,
+    reader_by_keys,
+    reader_by_name,
 )
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from tests.tools import ROOT, require
@@ -443,6 +446,85 @@ def sketchmatch_register_similarities():
     assert registry.find(Kind.SEARCHER, "lucky").algorithm.__name__ == "Lucky"
     assert registry.find(Kind.SIMILARITY, "lucky").algorithm.__name__ == "Other"
     assert [item.name for item in registry.of_kind(Kind.HISTOGRAM)] == []
+
+
+READER = """
+from sketchmatch.api import Reader, hookimpl
+from sketchmatch.model import PolygonSet
+
+class Plans(Reader):
+    name = "plans"
+    summary = "Plans."
+    suffixes = (".plan", ".plan.json")
+    keys = ("walls",)
+    source = PolygonSet
+
+    def read(self, data, part=""):
+        return PolygonSet(())
+
+@hookimpl
+def sketchmatch_register_readers():
+    return [Plans]
+"""
+
+
+def test_a_plugin_may_bring_readers_alone(install):
+    registry = discover(install(READER, "acme-plans", "0.2"))
+    (reader,) = registry.readers
+    assert reader.origin == "reader plans of acme-plans 0.2"
+    assert reader.read(b"").polygons == ()
+    assert registry.statuses[0].state is PluginState.ACTIVE
+    assert registry.without("acme-plans").readers == ()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ("return [Plans]", "return [3]", "offers 3, which is not a Reader"),
+        ("def read(", "def look(", "Plans does not define read"),
+        ('name = "plans"', 'name = "My Plans"', "use small letters, digits and hyphens"),
+        ('(".plan", ".plan.json")', '".plan"', "Plans.suffixes is no tuple of strings"),
+        ('(".plan", ".plan.json")', '(".json",)', "Plans reads '.json'; use small letters, as in"),
+        ('(".plan", ".plan.json")', '("plan",)', "Plans reads 'plan'; use small letters"),
+        ('("walls",)', "(3,)", "Plans.keys is no tuple of strings"),
+        ("source = PolygonSet", "source = dict", "Plans.source is none of StrokeSet, PolygonSet"),
+        (
+            'suffixes = (".plan", ".plan.json")\n    keys = ("walls",)',
+            "",
+            "Plans has neither suffixes nor keys to know its files by",
+        ),
+    ],
+)
+def test_a_reader_that_is_none_is_reported(install, before, after, words):
+    assert before in READER
+    (status,) = discover(install(READER.replace(before, after), "acme-plans")).statuses
+    assert status.state is PluginState.FAILED
+    assert words in status.reason
+
+
+def test_of_several_readers_the_longest_suffix_and_the_most_keys_decide(install):
+    other = (
+        READER.replace("plans", "longer")
+        .replace(".plan", ".my.plan")
+        .replace('("walls",)', '("walls", "doors")')
+    )
+    readers = discover([*install(READER, "acme-a"), *install(other, "acme-b")]).readers
+    assert reader_by_name(readers, "house.plan").name == "plans"
+    assert reader_by_name(readers, "house.My.PLAN").name == "longer"
+    assert reader_by_name(readers, "house.json") is None
+    assert reader_by_keys(readers, ["walls", "roof"]).name == "plans"
+    assert reader_by_keys(readers, ["roof", "doors", "walls"]).name == "longer"
+    assert reader_by_keys(readers, ["doors"]) is None
+
+
+def test_of_two_readers_of_the_same_files_ours_is_taken_and_otherwise_both_are_named(install):
+    readers = discover([*install(READER, "acme-a"), *install(READER, "acme-b")]).readers
+    with pytest.raises(InvalidInputError, match=r"reader plans of acme-a 1\.0 and reader plans of"):
+        reader_by_name(readers, "x.plan")
+    with pytest.raises(InvalidInputError, match=r"deny one of them in plugins\.deny"):
+        reader_by_keys(readers, ["walls"])
+    ours = RegisteredReader(readers[0].reader, "sketchmatch", "1")
+    assert reader_by_name([*readers, ours], "x.plan") is ours
 
 
 def test_without_any_plugin_nothing_can_be_chosen():

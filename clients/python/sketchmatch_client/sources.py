@@ -28,7 +28,7 @@ from sketchmatch_map_files import (
 )
 from sketchmatch_proto.v1 import source_pb2
 
-__all__ = ["YAxis", "image", "map_server_map", "occupancy_grid", "polygons", "strokes"]
+__all__ = ["YAxis", "file", "image", "map_server_map", "occupancy_grid", "polygons", "strokes"]
 
 YAxis = Literal["up", "down"]
 """Which way y grows: screens, tablets and pictures deliver ``"down"``."""
@@ -217,6 +217,44 @@ def image(file: str | os.PathLike[str] | bytes) -> source_pb2.Source:
     """
     data = file if isinstance(file, bytes) else _bytes(Path(file), "image.data")
     return source_pb2.Source(image=source_pb2.EncodedImage(data=data))
+
+
+def file(
+    file: str | os.PathLike[str] | bytes, *, name: str = "", part: str = ""
+) -> source_pb2.Source:
+    r"""Return a file that the server reads, such as a drawing of another tool.
+
+    Parameters
+    ----------
+    file
+        The file, or its bytes. :meth:`Client.algorithms` lists under ``readers`` what there is.
+    name
+        Its name, of which the ending tells what it is; for bytes, or in place of the file's own.
+    part
+        Which part of it to read, such as layers of a drawing or one picture of many.
+
+    Raises
+    ------
+    InvalidRequestError
+        If bytes have no name.
+        Or if the file cannot be read.
+
+    Examples
+    --------
+    >>> file(b'{"shapes": []}', name="room.json").file.name
+    'room.json'
+    """
+    if isinstance(file, bytes):
+        data = file
+    else:
+        data, name = _bytes(Path(file), "file"), name or Path(file).name
+    if not name:
+        raise InvalidRequestError(
+            "file.name is empty; give bytes a name whose ending tells what they are",
+            "INVALID_FILE",
+            "file.name",
+        )
+    return source_pb2.Source(file=source_pb2.EncodedFile(name=name, data=data, part=part))
 
 
 def _map_yaml(path: Path) -> Path:

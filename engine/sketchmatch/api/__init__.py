@@ -1,7 +1,8 @@
 """All that a plugin may import from the engine, beside ``sketchmatch.model``.
 
-A distribution offers its algorithms through one entry point in the group ``sketchmatch``, naming
-a module with any of the four hooks, each marked with :data:`hookimpl` and returning classes::
+A distribution offers its algorithms, and readers of files, through one entry point in the group
+``sketchmatch``, naming a module with any of five hooks, each marked with :data:`hookimpl` and
+returning classes::
 
     from sketchmatch.api import hookimpl
 
@@ -13,6 +14,7 @@ a module with any of the four hooks, each marked with :data:`hookimpl` and retur
 from sketchmatch.api._algorithm import API_VERSION, Algorithm, Params
 from sketchmatch.api._hooks import hookimpl
 from sketchmatch.api.histogram import Histogram, HistogramParams
+from sketchmatch.api.reader import Reader
 from sketchmatch.api.searcher import MatchProblem, Outcome, Searcher, SearchProgress
 from sketchmatch.api.segmenter import Segmentation, Segmenter
 from sketchmatch.api.similarity import Alignment, ProductSimilarity, Similarity
@@ -29,6 +31,7 @@ __all__ = [
     "Outcome",
     "Params",
     "ProductSimilarity",
+    "Reader",
     "Reason",
     "SearchProgress",
     "Searcher",

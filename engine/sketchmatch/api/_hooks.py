@@ -5,4 +5,4 @@ import pluggy
 __all__ = ["hookimpl"]
 
 hookimpl = pluggy.HookimplMarker("sketchmatch")
-"""Marks a function as one of the four ``sketchmatch_register_…`` hooks."""
+"""Marks a function as one of the ``sketchmatch_register_…`` hooks."""

@@ -32,7 +32,7 @@ from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 if TYPE_CHECKING:
     from multiprocessing.context import SpawnProcess
 
-    from sketchmatch.registry import Registered
+    from sketchmatch.registry import Registered, RegisteredReader
 
 __all__ = ["ChildError", "Children"]
 
@@ -67,7 +67,7 @@ class _Watch:
         Seconds for the whole request once its kernels are compiled, or None for no limit.
     """
 
-    strangers: tuple[Registered, ...]
+    strangers: tuple[Registered | RegisteredReader, ...]
     patience: float
     time_budget: float | None = None
 

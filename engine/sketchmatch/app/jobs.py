@@ -12,7 +12,7 @@ from sketchmatch.app import requests, responses
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.pipeline.selection import Choice, chosen_algorithms, stage_of
-from sketchmatch.registry import Registered
+from sketchmatch.registry import Registered, RegisteredReader
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest
 
@@ -51,22 +51,25 @@ def answers(job: Job, setup: Setup) -> Generator[Message, None, None]:
     raise TypeError(f"a {type(job.request).__name__} is no request for work")
 
 
-def algorithms(job: Job, setup: Setup) -> tuple[Registered, ...]:
-    """Return the algorithms that a request names, as far as it can be told without decoding it.
+def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, ...]:
+    """Return what a request asks of plugins, as far as it can be told without decoding it.
 
-    A name that is not known is refused where the job is done.
+    These are the algorithms that it names and the readers of its files. A name that is not known is
+    refused where the job is done.
     """
     request, profile = job.request, ""
+    readers = setup.engine.registry.readers
     match request:
         case MatchRequest():
             selection, profile = requests.selection(request), request.pipeline.profile
             types = {
-                "sketch_segmenter": requests.source_type(request.sketch),
-                "map_segmenter": requests.source_type(request.map),
+                "sketch_segmenter": requests.source_type(request.sketch, readers),
+                "map_segmenter": requests.source_type(request.map, readers),
             }
+            files = [request.sketch, request.map]
         case SegmentRequest(profile=profile):
-            found = requests.source_type(request.source)
-            stage = "" if found is None else stage_of(found)
+            found, files = requests.source_type(request.source, readers), [request.source]
+            stage = "sketch_segmenter" if found is None else stage_of(found)
             selection, types = {stage: requests.choice(request.segmenter)}, {stage: found}
         case _:
             return ()
@@ -76,12 +79,15 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered, ...]:
         for stage, choice in selection.items()
         if stage in sources or not stage.endswith("segmenter")
     }
+    kinds = (requests.file_kind(file, readers) for file in files)
+    reading = tuple(kind.reader for kind in kinds if kind is not None and kind.reader is not None)
     try:
-        return chosen_algorithms(
+        chosen = chosen_algorithms(
             setup.engine.registry, known, sources, setup.engine.defaults, profile
         )
     except InvalidInputError:
-        return ()
+        return reading
+    return (*reading, *chosen)
 
 
 def time_budget(job: Job, setup: Setup) -> float | None:
@@ -94,7 +100,9 @@ def time_budget(job: Job, setup: Setup) -> float | None:
 def _match(name: str, request: MatchRequest, setup: Setup) -> Generator[Message, None, None]:
     engine = setup.engine
     with engine.limited():
-        value = requests.match_request(request, setup.limits.max_time_budget)
+        value = requests.match_request(
+            request, setup.limits.max_time_budget, engine.registry.readers
+        )
     writer = responses.ResponseWriter(value)
     with requests.paths_of(request), closing(engine.match(value, name)) as events:
         for event in events:
@@ -104,7 +112,9 @@ def _match(name: str, request: MatchRequest, setup: Setup) -> Generator[Message,
 def _segment(request: SegmentRequest, setup: Setup) -> Generator[Message, None, None]:
     engine = setup.engine
     with engine.limited():
-        source = requests.source(request.source, "source", request.HasField("source"))
+        source = requests.source(
+            request.source, "source", request.HasField("source"), engine.registry.readers
+        )
     segmenter = engine.resolve_segmenter(
         requests.choice(request.segmenter), source, request.profile
     )

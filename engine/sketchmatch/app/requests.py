@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from google.protobuf import struct_pb2
 
 from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io.files import FileKind, decode_file, kind_of_file
 from sketchmatch.io.images import decode_image
 from sketchmatch.io.ros_map import decode_map_server
 from sketchmatch.model import (
@@ -27,6 +28,7 @@ from sketchmatch.model import (
 from sketchmatch.model.limits import check_objects, check_pixels, check_vertices
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import STAGES, Choice, Selection
+from sketchmatch.registry import RegisteredReader
 from sketchmatch_proto.v1 import (
     match_pb2,
     match_service_pb2,
@@ -37,6 +39,7 @@ from sketchmatch_proto.v1 import (
 
 __all__ = [
     "choice",
+    "file_kind",
     "match_request",
     "paths_of",
     "selection",
@@ -45,9 +48,11 @@ __all__ = [
     "time_budget",
 ]
 
-_KINDS = "stroke_set, polygon_set, occupancy_grid, map_server_map or image"
+_KINDS = "stroke_set, polygon_set, occupancy_grid, map_server_map, image or file"
 _OPTIONS = ("alternatives", "allow_unmatched", "unmatched_price")
 """Fields that mean the same as those of that name in the engine's request."""
+_WHOLE = ("pixels", "cells")
+"""What errors call a picture or a grid as a whole."""
 _TYPES: dict[str, type[Source]] = {
     "stroke_set": StrokeSet,
     "polygon_set": PolygonSet,
@@ -58,9 +63,11 @@ _TYPES: dict[str, type[Source]] = {
 
 
 def match_request(
-    request: match_service_pb2.MatchRequest, max_time_budget: float | None
+    request: match_service_pb2.MatchRequest,
+    max_time_budget: float | None,
+    readers: Sequence[RegisteredReader] = (),
 ) -> MatchRequest:
-    """Read a request to match.
+    """Read a request to match; ``readers`` are those of plugins.
 
     Raises
     ------
@@ -68,8 +75,8 @@ def match_request(
         If it cannot be used, with the path of the field.
     """
     return MatchRequest(
-        sketch=source(request.sketch, "sketch", request.HasField("sketch")),
-        map=source(request.map, "map", request.HasField("map")),
+        sketch=source(request.sketch, "sketch", request.HasField("sketch"), readers),
+        map=source(request.map, "map", request.HasField("map"), readers),
         selection=selection(request),
         seed=request.seed,
         time_budget=time_budget(request, max_time_budget),
@@ -90,7 +97,12 @@ def choice(message: pipeline_pb2.AlgorithmSelection) -> Choice:
     return Choice(message.name, {name: _plain(value) for name, value in fields.items()})
 
 
-def source(message: source_pb2.Source, field: str, present: bool) -> Source:
+def source(
+    message: source_pb2.Source,
+    field: str,
+    present: bool,
+    readers: Sequence[RegisteredReader] = (),
+) -> Source:
     """Read a sketch or a map.
 
     Parameters
@@ -101,11 +113,15 @@ def source(message: source_pb2.Source, field: str, present: bool) -> Source:
         Its path in the request, for errors.
     present
         Whether the request has it at all.
+    readers
+        Those of plugins, for files.
 
     Raises
     ------
     InvalidInputError
         If it is missing or cannot be read.
+    PluginError
+        If a reader fails.
     """
     kind = message.WhichOneof("kind")
     if not present or kind is None:
@@ -123,14 +139,30 @@ def source(message: source_pb2.Source, field: str, present: bool) -> Source:
                 return decode_map_server(packed.yaml, packed.image)
             case "image":
                 return decode_image(message.image.data)
+            case "file":
+                file = message.file
+                return decode_file(file.name, file.data, file.part, readers)
     except InvalidInputError as error:
         raise error.within(f"{field}.{kind}") from None
     raise AssertionError(kind)
 
 
-def source_type(message: source_pb2.Source) -> type[Source] | None:
-    """Return what :func:`source` makes of a sketch or a map; None where it is not set."""
-    return _TYPES.get(message.WhichOneof("kind") or "")
+def source_type(
+    message: source_pb2.Source, readers: Sequence[RegisteredReader] = ()
+) -> type[Source] | None:
+    """Return what :func:`source` makes of a sketch or a map; None where nobody knows."""
+    kind = file_kind(message, readers)
+    return _TYPES.get(message.WhichOneof("kind") or "") if kind is None else kind.source
+
+
+def file_kind(message: source_pb2.Source, readers: Sequence[RegisteredReader]) -> FileKind | None:
+    """Return what kind of file a source is; None if it is none, or of no known kind."""
+    if message.WhichOneof("kind") != "file":
+        return None
+    try:
+        return kind_of_file(message.file.name, message.file.data, readers)
+    except InvalidInputError:
+        return None
 
 
 def time_budget(
@@ -164,11 +196,15 @@ def paths_of(
         yield
     except InvalidInputError as error:
         side, _, path = error.field.partition(".")
-        if path == "image.pixels":
+        given = getattr(request, side, None)
+        kind = given.WhichOneof("kind") if isinstance(given, source_pb2.Source) else ""
+        if kind == "file":
+            place = path.partition(".")[2]
+            path = f"file.{'data' if place in _WHOLE else place}".removesuffix(".")
+        elif path == "image.pixels":
             path = "image.data"
-        elif path == "occupancy_grid.cells":
-            kind = getattr(request, side).WhichOneof("kind")
-            path = "map_server_map.image" if kind == "map_server_map" else path
+        elif path == "occupancy_grid.cells" and kind == "map_server_map":
+            path = "map_server_map.image"
         field = f"{side}.{path}" if path else side
         raise InvalidInputError(error.reason, field, error.problem) from None
 

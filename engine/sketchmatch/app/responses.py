@@ -32,7 +32,7 @@ from sketchmatch.pipeline.selection import (
     default_names,
     default_parameters,
 )
-from sketchmatch.registry import Kind, PluginStatus, Registered, Registry
+from sketchmatch.registry import Kind, PluginStatus, Registered, RegisteredReader, Registry
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     match_pb2,
@@ -210,6 +210,7 @@ def catalogue(
         ],
         plugins=[_plugin(status) for status in registry.statuses],
         profiles=[_profile(profile, profile.name == defaults.profile) for profile in profiles],
+        readers=[_reader(item) for item in registry.readers],
     )
 
 
@@ -333,8 +334,25 @@ def _algorithm(
     message.parameters_schema.update(schema)
     if issubclass(item.algorithm, Segmenter):
         for kind in item.algorithm.sources:
-            message.source_kinds.extend(_SOURCE_KINDS[kind])
+            message.source_kinds.extend(_source_kinds(kind))
     return message
+
+
+def _source_kinds(source: type[Any]) -> list[catalog_service_pb2.SourceKind.ValueType]:
+    """Return the forms of a type of source, or of what a plugin made of it."""
+    return next(_SOURCE_KINDS[base] for base in source.__mro__ if base in _SOURCE_KINDS)
+
+
+def _reader(item: RegisteredReader) -> catalog_service_pb2.FileReader:
+    return catalog_service_pb2.FileReader(
+        name=item.name,
+        summary=item.reader.summary,
+        suffixes=item.reader.suffixes,
+        json_keys=item.reader.keys,
+        source_kind=_source_kinds(item.reader.source)[0],
+        distribution=item.distribution,
+        distribution_version=item.version,
+    )
 
 
 def _plugin(status: PluginStatus) -> catalog_service_pb2.Plugin:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from sketchmatch.pipeline.engine import Engine
-from sketchmatch.registry import OWN_DISTRIBUTION, Registered
+from sketchmatch.registry import OWN_DISTRIBUTION, Registered, RegisteredReader
 from sketchmatch.registry.distributions import canonical
 
 __all__ = ["Isolation", "RequestLimits", "Setup"]
+
+_Offered = TypeVar("_Offered", Registered, Registered | RegisteredReader)
 
 
 @dataclass(frozen=True)
@@ -53,8 +56,8 @@ class Isolation:
     trusted: frozenset[str] = frozenset()
     patience: float = 30.0
 
-    def strangers(self, algorithms: Iterable[Registered]) -> tuple[Registered, ...]:
-        """Return those of some algorithms that run in a process of their own."""
+    def strangers(self, algorithms: Iterable[_Offered]) -> tuple[_Offered, ...]:
+        """Return those of some algorithms and readers that run in a process of their own."""
         if "*" in self.trusted:
             return ()
         trusted = {OWN_DISTRIBUTION, *self.trusted}

@@ -13,6 +13,7 @@ from google.protobuf.json_format import MessageToDict
 from sketchmatch_proto.v1.catalog_service_pb2 import (
     Algorithm,
     AlgorithmKind,
+    FileReader,
     Plugin,
     PluginState,
     SourceKind,
@@ -21,6 +22,7 @@ from sketchmatch_proto.v1.catalog_service_pb2 import (
 __all__ = [
     "KINDS",
     "Parameter",
+    "files",
     "kind",
     "origin",
     "parameters",
@@ -76,10 +78,22 @@ def kind(item: Algorithm) -> str:
     return AlgorithmKind.Name(item.kind).removeprefix(_KIND).lower()
 
 
-def origin(item: Algorithm | Plugin) -> str:
+def origin(item: Algorithm | FileReader | Plugin) -> str:
     """Return the distribution that something comes from, with its version."""
     version = item.version if isinstance(item, Plugin) else item.distribution_version
     return f"{item.distribution} {version}".rstrip()
+
+
+def files(reader: FileReader) -> str:
+    """Return by what a reader knows its files: what their names end in, and keys of JSON.
+
+    Examples
+    --------
+    >>> files(FileReader(suffixes=[".plan", ".plan.json"], json_keys=["walls", "doors"]))
+    '.plan .plan.json {walls, doors}'
+    """
+    keys = f"{{{', '.join(reader.json_keys)}}}" if reader.json_keys else ""
+    return " ".join(filter(None, (*reader.suffixes, keys)))
 
 
 def state(plugin: Plugin) -> str:

@@ -101,7 +101,7 @@ def described(
     engine = open_engine(load(config))
     chosen = _choices(("segmenter", "histogram"), names, params)
     with engine.limited(), announcing_compilation(say):
-        source = read_source(file)
+        source = read_source(file, engine.registry.readers)
         segmenter = engine.resolve_segmenter(chosen.pop("segmenter"), source, profile)
         histogram = engine.resolve(chosen, profile=profile).histogram
         scene = _told(engine.segment(source, segmenter, f"scene.{source.field}"), "", verbose)
@@ -145,7 +145,8 @@ def compared(
     """
     engine = open_engine(load(config))
     with engine.limited(), announcing_compilation(say):
-        sources = (read_source(sketch), read_source(map_))
+        readers = engine.registry.readers
+        sources = (read_source(sketch, readers), read_source(map_, readers))
         pipeline = engine.resolve(_choices((*names,), names, params), *sources, profile)
         drawn, mapped = (
             _told(engine.segment_side(side, source, pipeline), side, verbose)

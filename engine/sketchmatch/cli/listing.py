@@ -13,6 +13,7 @@ from rich.text import Text
 from sketchmatch.cli import output
 from sketchmatch.cli.catalogue import (
     Parameter,
+    files,
     kind,
     origin,
     parameters,
@@ -25,6 +26,7 @@ from sketchmatch.cli.output import clean, write, write_line
 from sketchmatch.cli.tables import Column, Rows, plain
 from sketchmatch_proto.v1.catalog_service_pb2 import (
     Algorithm,
+    FileReader,
     ListAlgorithmsResponse,
     Plugin,
     Profile,
@@ -42,6 +44,8 @@ def show_catalogue(found: ListAlgorithmsResponse) -> None:
         if found.profiles:
             tables.append(_profile_table(found.profiles))
         tables.append(_plugin_table(found.plugins))
+        if found.readers:
+            tables.append(_reader_table(found.readers))
         output.show(Group(*tables[:1], *(part for table in tables[1:] for part in ("", table))))
         return
     write_line("kind", "name", "default", "distribution", "version", "summary", "source")
@@ -57,6 +61,12 @@ def show_catalogue(found: ListAlgorithmsResponse) -> None:
     write_line("plugin", "version", "state", "reason")
     for plugin in found.plugins:
         write_line(plugin.distribution, plugin.version, state(plugin), plugin.reason)
+    if found.readers:
+        write("\n")
+        write_line("reader", "files", "distribution", "version", "summary")
+    for reader in found.readers:
+        owner = (reader.distribution, reader.distribution_version)
+        write_line(reader.name, files(reader), *owner, reader.summary)
 
 
 def show_algorithm(item: Algorithm) -> None:
@@ -103,6 +113,20 @@ def _profile_table(profiles: Iterable[Profile]) -> Rows:
 
 def _default(item: Algorithm | Profile) -> Text:
     return plain(item.name).append(" (default)" if item.is_default else "", "dim")
+
+
+def _reader_table(readers: Iterable[FileReader]) -> Rows:
+    columns = [
+        Column("reader"),
+        Column("files", least=12, wraps=True),
+        Column("from", least=12, wraps=True),
+        Column("summary", least=24, wraps=True),
+    ]
+    rows = [
+        [plain(reader.name), plain(files(reader)), plain(origin(reader)), plain(reader.summary)]
+        for reader in readers
+    ]
+    return Rows("", columns, rows)
 
 
 def _plugin_table(plugins: Iterable[Plugin]) -> Rows:

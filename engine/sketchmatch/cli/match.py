@@ -22,12 +22,12 @@ __all__ = ["match"]
 def match(
     sketch: Annotated[
         Path,
-        typer.Argument(metavar="SKETCH", help="Sketch: .svg, stroke .json, .geojson, image."),
+        typer.Argument(metavar="SKETCH", help="Sketch: .svg, .json, .excalidraw, .geojson, image."),
     ],
     map_: Annotated[
         Path,
         typer.Argument(
-            metavar="MAP", help="Map: ROS map .yaml or its folder, .geojson, .svg, image."
+            metavar="MAP", help="Map: ROS map .yaml or its folder, .geojson, .dxf, .svg, image."
         ),
     ],
     server: options.Server = None,

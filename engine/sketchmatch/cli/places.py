@@ -11,7 +11,7 @@ from sketchmatch_client import InvalidRequestError
 
 __all__ = ["places_in"]
 
-_KINDS = ("stroke_set", "polygon_set", "occupancy_grid", "map_server_map", "image")
+_KINDS = ("stroke_set", "polygon_set", "occupancy_grid", "map_server_map", "image", "file")
 _WHOLE = ("", "cells", "pixels", "data", "yaml")
 _ABOUT_PICTURES = ("INVALID_IMAGE", "LIMIT_EXCEEDED")
 

@@ -40,9 +40,9 @@ def plugins() -> None:
 def list_(
     kind: _Kind = "", server: Server = None, config: Config = None, json: Json = False
 ) -> None:
-    """List the algorithms, the profiles, and what became of each plugin.
+    """List the algorithms, the profiles, what became of each plugin, and the readers of files.
 
-    In a pipe these are three tables of tab-separated lines, with an empty line between them.
+    In a pipe these are four tables of tab-separated lines, with an empty line between them.
     """
     from sketchmatch.cli import listing
 

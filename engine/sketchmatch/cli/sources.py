@@ -9,6 +9,8 @@ from typing import Any
 from sketchmatch.cli.options import say
 from sketchmatch.io.files import (
     PICTURE_SUFFIXES,
+    file_and_part,
+    is_read_here,
     read_bytes,
     read_map_files,
     read_source,
@@ -26,7 +28,7 @@ def in_metres(source: Source) -> bool:
 
 
 def source_of(path: Path, side: str = "") -> Source:
-    """Return a file as a source: pictures and maps as they are, others as what they hold.
+    """Return a file as a source: pictures, maps and other tools' files as they are, others decoded.
 
     Parameters
     ----------
@@ -38,24 +40,26 @@ def source_of(path: Path, side: str = "") -> Source:
     Raises
     ------
     InvalidInputError
-        If it cannot be read; what is in pictures and maps is looked at where they are decoded.
+        If it cannot be read; what is in files that stay as they are is looked at where they are
+        decoded.
     """
     if (files := read_map_files(path)) is not None:
         _tell(files.notes, side)
         return Source(map_server_map=MapServerMap(yaml=files.yaml, image=files.picture))
     if path.suffix.lower() in PICTURE_SUFFIXES:
         if path.suffix.lower() == ".pgm":
-            _tell(
-                [f"{path.name} is read as a drawing; for a robot's map give its .yaml"], side
-            )
+            _tell([f"{path.name} is read as a drawing; for a robot's map give its .yaml"], side)
         return sources.image(read_bytes(path))
-    match read_source(path):
-        case OccupancyGrid(cells, resolution, origin, notes):
-            # Of a bag, whose notes have no room in the message.
-            _tell(notes, side)
+    file, part = file_and_part(path)
+    if not is_read_here(file):
+        return sources.file(read_bytes(file), name=file.name, part=part)
+    source = read_source(path)
+    # They have no room in the messages of what is decoded already.
+    _tell(getattr(source, "notes", ()), side)
+    match source:
+        case OccupancyGrid(cells, resolution, origin):
             return sources.occupancy_grid(cells, resolution, origin)
-        case StrokeSet(strokes, notes):
-            _tell(notes, side)
+        case StrokeSet(strokes):
             return sources.strokes(
                 [_timed(stroke.points, stroke.times) for stroke in strokes],
                 [stroke.label for stroke in strokes],

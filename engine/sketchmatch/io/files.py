@@ -4,32 +4,55 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, NamedTuple
 
-from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.io.geojson import decode_geojson
+from sketchmatch.api.documents import decode_text, listed, no_parts
+from sketchmatch.errors import InvalidInputError, Reason, quoted
+from sketchmatch.io.geojson import is_geojson, load_sequence, polygons_of
 from sketchmatch.io.map_files import MapFiles, map_files
 from sketchmatch.io.ros_bag import SUFFIXES, bag_and_topic, is_bag, read_bag
-from sketchmatch.io.stroke_json import decode_strokes
-from sketchmatch.model import Source
+from sketchmatch.io.stroke_json import strokes_of
+from sketchmatch.model import Image, PolygonSet, Source, StrokeSet
 from sketchmatch.model.limits import check_bytes, check_source, source_limits
+from sketchmatch.registry import (
+    RegisteredReader,
+    default_registry,
+    reader_by_keys,
+    reader_by_name,
+)
 from sketchmatch_map_files import PICTURE_SUFFIXES, YAML_SUFFIXES
 
-__all__ = ["PICTURE_SUFFIXES", "read_bytes", "read_map_files", "read_source"]
+__all__ = [
+    "PICTURE_SUFFIXES",
+    "FileKind",
+    "decode_file",
+    "file_and_part",
+    "is_read_here",
+    "kind_of_file",
+    "read_bytes",
+    "read_map_files",
+    "read_source",
+]
+
+_Readers = Sequence[RegisteredReader]
 
 
-def read_source(path: str | Path) -> Source:
-    """Read a sketch or a map; the file's suffix tells what it is.
+def read_source(path: str | Path, readers: _Readers | None = None) -> Source:
+    """Read a sketch or a map; the file's suffix, and of JSON its content, tells what it is.
 
     Parameters
     ----------
     path
         ``.svg`` or ``.json`` strokes, ``.geojson`` polygons, ``.yaml`` of a ROS map with its
         picture beside it, that picture or the folder of both, another picture (``.png``, ``.jpg``,
-        ``.bmp``, ``.tif``, ``.pgm`` …), or a ROS bag (``.bag``, ``.mcap``, ``.db3`` or a folder),
-        as :mod:`sketchmatch.io.ros_bag` tells.
+        ``.bmp``, ``.tif``, ``.pgm`` …), a ROS bag (``.bag``, ``.mcap``, ``.db3`` or a folder), as
+        :mod:`sketchmatch.io.ros_bag` tells, or what a plugin reads. After ``#`` it may say which
+        part of the file: ``plan.dxf#walls``.
+    readers
+        Those of plugins; of all that are installed when left out.
 
     Returns
     -------
@@ -44,9 +67,127 @@ def read_source(path: str | Path) -> Source:
     """
     path = Path(path)
     with _placed_in(path):
-        source = _decoded(path)
+        source = _decoded(path, readers)
         check_source(source)
         return source
+
+
+class FileKind(NamedTuple):
+    """What a file is, before any of it is decoded.
+
+    Attributes
+    ----------
+    source
+        The type of source in it.
+    reader
+        The reader of a plugin that reads it, or None for what we read ourselves.
+    document
+        What is in it, if it is JSON.
+    """
+
+    source: type[Any]
+    reader: RegisteredReader | None = None
+    document: Any = None
+
+
+def kind_of_file(name: str, data: bytes, readers: _Readers | None = None) -> FileKind:
+    """Say what a file is by its name and, if it is JSON, by what is in it.
+
+    Parameters
+    ----------
+    name
+        Its name, of which the suffix counts.
+    data
+        The file.
+    readers
+        As in :func:`read_source`.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is of no known kind: then it says what was seen, and what is known.
+    """
+    suffix = Path(name).suffix.lower()
+    if suffix in _KINDS:
+        return FileKind(_KINDS[suffix][0])
+    if readers is None:
+        readers = default_registry().readers
+    named = reader_by_name(readers, name)
+    if named is not None:
+        return FileKind(named.reader.source, named)
+    if suffix in _JSON_SUFFIXES:
+        return _kind_of_document(load_sequence(decode_text(data)), readers)
+    if suffix in YAML_SUFFIXES or suffix in SUFFIXES:
+        raise _invalid(
+            "",
+            "is a map that is more than one file, or a bag; give its path, or send it as "
+            "map_server_map or occupancy_grid",
+        )
+    raise _invalid("", f"is of no known kind; give a file that ends in one of {_suffixes(readers)}")
+
+
+def is_read_here(path: Path) -> bool:
+    """Whether a file is of a kind that needs no plugin's reader; of JSON, what is in it decides.
+
+    Raises
+    ------
+    InvalidInputError
+        If it has to be looked into and cannot be read.
+    """
+    if path.suffix.lower() not in _JSON_SUFFIXES:
+        return path.suffix.lower() in (*_KINDS, *YAML_SUFFIXES) or is_bag(bag_and_topic(path)[0])
+    try:
+        return kind_of_file(path.name, _read(path, str(path)), ()).reader is None
+    except InvalidInputError as error:
+        if error.field.startswith(str(path)):
+            raise
+        return False
+
+
+def decode_file(name: str, data: bytes, part: str = "", readers: _Readers | None = None) -> Source:
+    """Return what is in a file; of what stands in its error, the path is one within the file.
+
+    Parameters
+    ----------
+    name, data, readers
+        As in :func:`kind_of_file`.
+    part
+        Which part of it, for kinds that have some; empty for all.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is of no known kind, too large, or cannot be used.
+    PluginError
+        If a plugin's reader fails.
+    """
+    check_bytes(len(data), "data")
+    kind = kind_of_file(name, data, readers)
+    if kind.reader is not None:
+        source: Source = kind.reader.read(data, part)
+    else:
+        no_parts(part)
+        if kind.document is None:
+            source = _KINDS[Path(name).suffix.lower()][1](data)
+        else:
+            decode = strokes_of if kind.source is StrokeSet else polygons_of
+            source = decode(kind.document)
+    check_source(source)
+    return source
+
+
+def file_and_part(path: Path) -> tuple[Path, str]:
+    """Split ``plan.dxf#walls`` into the file's path and the part, empty if none is named.
+
+    A file that has such a name as a whole is that file.
+    """
+    text = str(path)
+    if "#" not in text or path.exists():
+        return path, ""
+    for k in (k for k, c in enumerate(text) if c == "#"):
+        if os.path.isfile(text[:k]):  # noqa: PTH113 (no error)
+            return Path(text[:k]), text[k + 1 :]
+    return path, ""
 
 
 def read_bytes(path: Path) -> bytes:
@@ -83,17 +224,56 @@ def read_map_files(path: Path) -> MapFiles | None:
         return map_files(path, _read)
 
 
-def _decoded(path: Path) -> Source:
+def _decoded(path: Path, readers: _Readers | None) -> Source:
     bag, topic = bag_and_topic(path)
     if is_bag(bag):
         return read_bag(bag, topic)
     if (files := map_files(path, _read)) is not None:
         return files.grid()
-    decode = _DECODERS.get(path.suffix.lower())
-    if decode is None:
-        kinds = " ".join(sorted((*_DECODERS, *YAML_SUFFIXES, *SUFFIXES)))
-        raise _invalid(str(path), f"is of no known kind; give a file that ends in one of {kinds}")
-    return decode(path, _read(path, str(path)))
+    file, part = file_and_part(path)
+    if file.suffix.lower() in YAML_SUFFIXES:
+        no_parts(part)
+    return decode_file(file.name, _read(file, str(file)), part, readers)
+
+
+def _kind_of_document(document: Any, readers: _Readers) -> FileKind:
+    """Say what a JSON document is by its keys."""
+    if is_geojson(document):
+        return FileKind(PolygonSet, document=document)
+    if isinstance(document, dict):
+        if "strokes" in document:
+            return FileKind(StrokeSet, document=document)
+        reader = reader_by_keys(readers, document)
+        if reader is not None:
+            return FileKind(reader.reader.source, reader, document)
+    known = "; ".join(
+        [
+            'strokes as {"y_axis": …, "strokes": […]}',
+            "GeoJSON with its type",
+            *(
+                f"{each.name} with {listed(each.reader.keys)}"
+                for each in readers
+                if each.reader.keys
+            ),
+        ]
+    )
+    raise _invalid("", f"is JSON, {_seen(document)}, which nothing here reads; known are {known}")
+
+
+def _seen(document: Any) -> str:
+    """Say in a few words what a JSON document is."""
+    if isinstance(document, dict):
+        kind = document.get("type")
+        typed = f" and type {quoted(kind)}" if isinstance(kind, str) else ""
+        return f"an object with {listed(document)}{typed}" if document else "an empty object"
+    if isinstance(document, list) and document and isinstance(document[0], dict):
+        return f"a list of {len(document)}, the first an object with {listed(document[0])}"
+    return f"a list of {len(document)}" if isinstance(document, list) else quoted(document)
+
+
+def _suffixes(readers: _Readers) -> str:
+    others = (suffix for each in readers for suffix in each.reader.suffixes)
+    return " ".join(sorted({*_KINDS, *_JSON_SUFFIXES, *YAML_SUFFIXES, *SUFFIXES, *others}))
 
 
 @contextmanager
@@ -132,43 +312,27 @@ def _read(path: Path, field: str) -> bytes:
     return data
 
 
-def _text(data: bytes) -> str:
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise _invalid("", "is not UTF-8 text; save it as UTF-8") from None
-
-
 # The libraries behind some kinds are slow to import, so they wait until such a file is read.
 
 
-def _picture(_: Path, data: bytes) -> Source:
+def _picture(data: bytes) -> Source:
     from sketchmatch.io.images import decode_image
 
     return decode_image(data)
 
 
-def _svg(_: Path, data: bytes) -> Source:
+def _svg(data: bytes) -> Source:
     from sketchmatch.io.svg import decode_svg
 
     return decode_svg(data)
-
-
-def _strokes(_: Path, data: bytes) -> Source:
-    return decode_strokes(_text(data))
-
-
-def _polygons(_: Path, data: bytes) -> Source:
-    return decode_geojson(_text(data))
 
 
 def _invalid(field: str, problem: str) -> InvalidInputError:
     return InvalidInputError(Reason.INVALID_FILE, field, problem)
 
 
-_DECODERS: dict[str, Callable[[Path, bytes], Source]] = {
-    ".svg": _svg,
-    ".json": _strokes,
-    ".geojson": _polygons,
-    **dict.fromkeys(PICTURE_SUFFIXES, _picture),
+_JSON_SUFFIXES = (".geojson", ".geojsonl", ".json", ".ndjson")
+_KINDS: dict[str, tuple[type[Source], Callable[[bytes], Source]]] = {
+    ".svg": (StrokeSet, _svg),
+    **dict.fromkeys(PICTURE_SUFFIXES, (Image, _picture)),
 }

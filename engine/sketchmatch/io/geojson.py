@@ -1,25 +1,63 @@
 """Polygons as GeoJSON (RFC 7946), read as plain coordinates: x right, y up, in any one unit.
 
-A ``FeatureCollection``, ``Feature``, ``GeometryCollection``, ``Polygon`` or ``MultiPolygon``; each
-polygon becomes one object. A feature's property ``label``, or else ``name``, is its label. Heights
-(a third coordinate) are ignored, and rings need not repeat their first point.
+A ``FeatureCollection``, ``Feature``, ``GeometryCollection``, ``Polygon`` or ``MultiPolygon``, or
+several of them in a list, in a line each, or as a text sequence (RFC 8142); each polygon becomes
+one object. A feature's property ``label``, or else ``name``, or else its ``id``, is its label.
+Heights (a third coordinate) are ignored, and rings need not repeat their first point.
+
+A feature whose geometry is null or empty has no place; points and lines are no areas. Both are left
+out with a note. A closed line of four or more positions is what the RFC calls a linear ring, and
+taken as an outline, with a note.
+
+Longitudes and latitudes become metres east and north of their middle, with a note: the polygons are
+taken for such where a member ``crs`` says so, or where they lie within a tenth of a degree, as no
+place in metres does. ``"crs": null``, as in what we write, says that they are not.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from sketchmatch.api.documents import (
+    check_values,
+    load_json,
+    mapping,
+    number,
+    plain_name,
+    sequence,
+    shown,
+)
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.io._fields import load_json, mapping, number, sequence, shown
 from sketchmatch.model import FloatArray, LabelledPolygon, PolygonSet
 from sketchmatch.model.arrays import frozen_floats
 
-__all__ = ["decode_geojson"]
+__all__ = ["decode_geojson", "is_geojson", "load_sequence", "polygons_of"]
 
 _POLYGON = Reason.INVALID_POLYGON
+_GEOMETRIES = {
+    "Polygon": "",
+    "MultiPolygon": "",
+    "GeometryCollection": "",
+    "Point": "a point",
+    "MultiPoint": "points",
+    "LineString": "an open line",
+    "MultiLineString": "lines",
+}
+_TYPES = {*_GEOMETRIES, "Feature", "FeatureCollection"}
+_RECORD_SEPARATOR = "\x1e"
+# Degrees. A place in metres is larger than that, and a globe's place mostly smaller.
+_SPAN = 0.1
+_EARTH_RADIUS = 6_371_008.8
+_Remarks = list[tuple[str, str]]
+_DEGREES = re.compile(r"CRS84|EPSG:+4326\b|EPSG:[\d.]*:4326\b|WGS ?84", re.IGNORECASE)
 
 
 def decode_geojson(text: str) -> PolygonSet:
@@ -29,7 +67,7 @@ def decode_geojson(text: str) -> PolygonSet:
     ------
     InvalidInputError
         With a path such as ``features[3].geometry.coordinates[0][2]``, if the text is not
-        GeoJSON or has geometry other than polygons.
+        GeoJSON.
 
     Examples
     --------
@@ -37,50 +75,117 @@ def decode_geojson(text: str) -> PolygonSet:
     >>> decode_geojson(square).polygons[0].rings[0].shape
     (4, 2)
     """
+    return polygons_of(load_sequence(text))
+
+
+def load_sequence(text: str) -> Any:
+    """Parse a JSON text, or several, one in a line or after a record separator, as a list.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is not JSON.
+    """
+    check_values(text)
+    if text.startswith(_RECORD_SEPARATOR):
+        return _all_of(text.split(_RECORD_SEPARATOR))
+    first, _, others = text.lstrip().partition("\n")
+    return _all_of(text.split("\n")) if others.strip() and _is_json(first) else load_json(text)
+
+
+def _all_of(texts: Iterable[str]) -> list[Any]:
+    documents: list[Any] = []
+    for each in filter(str.strip, texts):
+        try:
+            documents.append(load_json(each))
+        except InvalidInputError as error:
+            raise error.within(f"[{len(documents)}]") from None
+    return documents
+
+
+def is_geojson(document: Any) -> bool:
+    """Whether a parsed JSON document says that it is GeoJSON, or a list of such."""
+    if isinstance(document, list):
+        return bool(document) and all(map(is_geojson, document))
+    kind = document.get("type") if isinstance(document, dict) else None
+    return isinstance(kind, str) and kind in _TYPES
+
+
+def polygons_of(document: Any) -> PolygonSet:
+    """Return the polygons of a parsed document, as :func:`decode_geojson` does."""
+    remarks: _Remarks = []
+    members = document if isinstance(document, list) and document else [document]
+    paths = [f"[{k}]" for k in range(len(members))] if members is document else [""]
     try:
-        return PolygonSet(tuple(_polygons(load_json(text), "", "")))
+        polygons = tuple(
+            polygon
+            for member, path in zip(members, paths, strict=True)
+            for polygon in _polygons(member, path, "", remarks)
+        )
     except RecursionError:
         raise InvalidInputError(
             _POLYGON, "", "is nested too deeply; give its polygons as features"
         ) from None
+    found = PolygonSet(polygons, _notes(remarks))
+    return _in_metres(found) if _in_degrees(found, members[0]) else found
 
 
-def _polygons(value: Any, field: str, label: str) -> Iterator[LabelledPolygon]:
+def _is_json(line: str) -> bool:
+    try:
+        json.loads(line)
+    except (ValueError, RecursionError):
+        return False
+    return True
+
+
+def _polygons(value: Any, field: str, label: str, remarks: _Remarks) -> Iterator[LabelledPolygon]:
     """Yield the polygons of any GeoJSON object; ``field`` is its path."""
     item = mapping(value, field, _POLYGON, "a GeoJSON object")
-    match item.get("type"):
+    kind, at = item.get("type"), _path(field, "coordinates")
+    match kind:
         case "FeatureCollection":
-            yield from _members(item, field, "features", label)
+            yield from _members(item, field, "features", label, remarks)
         case "GeometryCollection":
-            yield from _members(item, field, "geometries", label)
+            yield from _members(item, field, "geometries", label, remarks)
+        case "Feature" if item.get("geometry", 0) is None:
+            remarks.append((field, "nowhere"))
         case "Feature":
-            yield from _polygons(item.get("geometry"), _path(field, "geometry"), _label(item))
+            name = _label(item)
+            yield from _polygons(item.get("geometry"), _path(field, "geometry"), name, remarks)
+        case str() if kind in _GEOMETRIES and item.get("coordinates") == []:
+            remarks.append((field, "nowhere"))
         case "Polygon":
-            yield _polygon(item.get("coordinates"), _path(field, "coordinates"), label)
+            yield _polygon(item.get("coordinates"), at, label)
         case "MultiPolygon":
-            at = _path(field, "coordinates")
             for k, part in enumerate(sequence(item.get("coordinates"), at, _POLYGON, "polygons")):
                 yield _polygon(part, f"{at}[{k}]", label)
-        case other:
+        case "LineString" if _is_ring(item.get("coordinates")):
+            remarks.append((field, "a closed line"))
+            yield LabelledPolygon((_ring(item["coordinates"], at),), label)
+        case str() if kind in _GEOMETRIES:
+            remarks.append((field, _GEOMETRIES[kind]))
+        case _:
             raise InvalidInputError(
                 _POLYGON,
                 _path(field, "type"),
-                f"is {shown(other)}; give Polygon or MultiPolygon, alone or in features",
+                f"is {shown(kind)}{'' if kind is None else ', which GeoJSON does not have'}; "
+                "give Polygon or MultiPolygon, alone or in features",
             )
 
 
-def _members(item: dict[str, Any], field: str, key: str, label: str) -> Iterator[LabelledPolygon]:
+def _members(
+    item: dict[str, Any], field: str, key: str, label: str, remarks: _Remarks
+) -> Iterator[LabelledPolygon]:
     at = _path(field, key)
     for k, member in enumerate(sequence(item.get(key), at, _POLYGON, f"a list of {key}")):
-        yield from _polygons(member, f"{at}[{k}]", label)
+        yield from _polygons(member, f"{at}[{k}]", label, remarks)
 
 
 def _label(feature: dict[str, Any]) -> str:
     properties = feature.get("properties")
-    if not isinstance(properties, dict):
-        return ""
-    names = (properties.get(key) for key in ("label", "name"))
-    return next((str(name) for name in names if isinstance(name, str | int | float) and name), "")
+    given = properties if isinstance(properties, dict) else {}
+    names = (given.get("label"), given.get("name"), feature.get("id"))
+    return next((name for name in map(plain_name, names) if name), "")
 
 
 def _polygon(value: Any, field: str, label: str) -> LabelledPolygon:
@@ -88,6 +193,11 @@ def _polygon(value: Any, field: str, label: str) -> LabelledPolygon:
     return LabelledPolygon(
         tuple(_ring(ring, f"{field}[{k}]") for k, ring in enumerate(rings)), label
     )
+
+
+def _is_ring(value: Any) -> bool:
+    """Whether a line is what the RFC calls a linear ring."""
+    return isinstance(value, list) and len(value) >= 4 and value[0] == value[-1]
 
 
 def _ring(value: Any, field: str) -> FloatArray:
@@ -105,3 +215,54 @@ def _position(value: Any, field: str) -> list[float]:
 
 def _path(field: str, key: str) -> str:
     return f"{field}.{key}" if field else key
+
+
+def _notes(remarks: _Remarks) -> tuple[str, ...]:
+    """Say of each kind of remark how many things it is about, and where the first one is."""
+    counts = Counter(kind for _, kind in remarks)
+    first = {kind: field for field, kind in reversed(remarks)}
+    notes = []
+    for kind, count in counts.items():
+        others = f" and {count - 1} more" if count > 1 else ""
+        where = f"{first[kind] or 'The whole'}{others} {'are' if count > 1 else 'is'}"
+        if kind == "a closed line":
+            notes.append(f"{where} a closed line: taken as the outline of an object.")
+        elif kind == "nowhere":
+            notes.append(f"{where} without a place: left out.")
+        else:
+            notes.append(f"{where} {kind}, which encloses no area: left out.")
+    return tuple(notes)
+
+
+def _in_degrees(found: PolygonSet, document: Any) -> bool:
+    """Whether coordinates are longitudes and latitudes."""
+    points = _points(found)
+    if not len(points) or (np.abs(points) > (360.0, 90.0)).any():
+        return False
+    named = document.get("crs", "") if isinstance(document, dict) else ""
+    if named is None:
+        return False
+    return bool(_DEGREES.search(json.dumps(named)) or np.ptp(points, axis=0).max() < _SPAN)
+
+
+def _in_metres(found: PolygonSet) -> PolygonSet:
+    """Turn longitudes and latitudes into metres east and north of their middle."""
+    points = _points(found)
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    unit = math.radians(1.0) * _EARTH_RADIUS
+    scale = np.array([unit * math.cos(math.radians(float(middle[1]))), unit])
+    note = "The coordinates are longitudes and latitudes: turned into metres."
+    return PolygonSet(
+        tuple(
+            replace(
+                item, rings=tuple(frozen_floats((ring - middle) * scale) for ring in item.rings)
+            )
+            for item in found.polygons
+        ),
+        (*found.notes, note),
+    )
+
+
+def _points(found: PolygonSet) -> FloatArray:
+    rings = [ring for item in found.polygons for ring in item.rings]
+    return np.concatenate(rings) if rings else np.empty((0, 2))

@@ -22,12 +22,12 @@ def encode_geojson(scene: Scene) -> str:
     --------
     >>> scene = Scene.from_polygons([[[0, 0], [1, 0], [0, 1]], [[3, 0], [4, 0], [3, 1]]])
     >>> encode_geojson(scene).splitlines()[0]
-    '{"type": "FeatureCollection", "features": ['
+    '{"type": "FeatureCollection", "crs": null, "features": ['
     """
     features = ",\n".join(
         json.dumps(_feature(item), ensure_ascii=False, allow_nan=False) for item in scene.objects
     )
-    return f'{{"type": "FeatureCollection", "features": [\n{features}\n]}}\n'
+    return f'{{"type": "FeatureCollection", "crs": null, "features": [\n{features}\n]}}\n'
 
 
 def check_scene_path(path: str | Path, field: str = "out") -> None:

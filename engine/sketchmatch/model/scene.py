@@ -16,6 +16,7 @@ from shapely.validation import explain_validity
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model.arrays import FloatArray, IntArray, frozen_floats, sealed
 from sketchmatch.model.caching import cached_property
+from sketchmatch.model.labels import cleaned_label
 from sketchmatch.model.text import listed, name, shortened
 
 __all__ = ["Edges", "Scene", "SceneObject"]
@@ -38,11 +39,15 @@ class SceneObject:
         The outer ring, counter-clockwise, then the holes, clockwise; each a read-only array of
         shape (k, 2), k ≥ 3, in metres or sketch units, without a repeated last point.
     label
-        A name for people. It never influences a match.
+        A name for people, in one line: :func:`~sketchmatch.model.labels.cleaned_label` makes it
+        so. It never influences a match.
     """
 
     rings: tuple[FloatArray, ...]
     label: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "label", cleaned_label(self.label))
 
     @classmethod
     def from_rings(cls, rings: Iterable[Any], label: Any = "") -> Self:

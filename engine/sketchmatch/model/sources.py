@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model.arrays import FloatArray, frozen, frozen_floats
+from sketchmatch.model.labels import cleaned_label
 
 __all__ = [
     "GridPicture",
@@ -56,6 +57,7 @@ class Stroke:
                 Reason.INVALID_STROKE, "points", "is not a list of [x, y] pairs of numbers"
             )
         object.__setattr__(self, "points", points)
+        object.__setattr__(self, "label", cleaned_label(self.label))
         if self.times is not None:
             times = frozen_floats(self.times)
             if times.shape != (len(points),):
@@ -76,8 +78,8 @@ class StrokeSet:
     strokes
         The strokes.
     notes
-        What whoever read the sketch's file had to decide, each one sentence for people: segmenters
-        hand them on among their warnings.
+        What whoever read the file left out or had to decide, each one sentence for people: they
+        stand before the segmenter's own warnings.
     """
 
     strokes: tuple[Stroke, ...]
@@ -93,12 +95,24 @@ class LabelledPolygon:
     rings: tuple[FloatArray, ...]
     label: str = ""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "label", cleaned_label(self.label))
+
 
 @dataclass(frozen=True, eq=False)
 class PolygonSet:
-    """Polygons drawn or exported by a tool, one for each object."""
+    """Polygons drawn or exported by a tool, one for each object.
+
+    Attributes
+    ----------
+    polygons
+        The polygons.
+    notes
+        What whoever read the file left out or had to decide, as in :class:`StrokeSet`.
+    """
 
     polygons: tuple[LabelledPolygon, ...]
+    notes: tuple[str, ...] = ()
 
     field = "polygon_set"
 

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from sketchmatch.api import Segmentation, Segmenter
-from sketchmatch.errors import InvalidInputError
+from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import Scene, Source
+from sketchmatch.model.labels import cleaned_label
 from sketchmatch.model.limits import check_objects, check_source
 from sketchmatch.pipeline.guard import blaming, inspecting
 from sketchmatch.pipeline.selection import Pipeline
 from sketchmatch.registry import Registry
 
 __all__ = ["segment", "segment_side"]
+
+_LONGEST = 400
 
 
 def segment(source: Source, segmenter: Segmenter, registry: Registry, field: str) -> Segmentation:
@@ -33,10 +37,10 @@ def segment(source: Source, segmenter: Segmenter, registry: Registry, field: str
             with inspecting(segmenter, registry, source):
                 found = segmenter.segment(source)
         except InvalidInputError as error:
-            raise error.within(field) from None
+            raise _with_reasons(error, source).within(field) from None
         _check_contract(found)
     check_objects(len(found.scene), field)
-    return found
+    return _with_notes(found, source)
 
 
 def segment_side(
@@ -54,6 +58,25 @@ def segment_side(
     segmenter = pipeline.segmenter(side)
     assert segmenter is not None
     return segment(given, segmenter, registry, f"{side}.{given.field}")
+
+
+def _with_notes(found: Segmentation, source: Source) -> Segmentation:
+    """Put what a file's reader noted before the warnings, unless the segmenter handed it on."""
+    notes = (note for note in _notes(source) if note not in found.warnings)
+    return replace(found, warnings=(*notes, *found.warnings))
+
+
+def _with_reasons(error: InvalidInputError, source: Source) -> InvalidInputError:
+    """Let the refusal of too few objects tell what a file's reader had left out."""
+    notes = " ".join(_notes(source))
+    if error.reason is not Reason.TOO_FEW_OBJECTS or not notes:
+        return error
+    return InvalidInputError(error.reason, error.field, f"{error.problem} ({notes[:_LONGEST]})")
+
+
+def _notes(source: Source) -> tuple[str, ...]:
+    """Return what a file's reader noted, in which names of the file may stand as they were."""
+    return tuple(map(cleaned_label, getattr(source, "notes", ())))
 
 
 def _check_contract(found: Any) -> None:

@@ -178,7 +178,7 @@ STAGES = tuple(each.name for each in fields(Pipeline) if each.name != "profile")
 
 def stage_of(source: type[Source]) -> str:
     """Return the stage that sources of a type are mostly segmented in, where nothing is matched."""
-    return _MOSTLY[source]
+    return next(_MOSTLY[base] for base in source.__mro__ if base in _MOSTLY)
 
 
 def kind_of(stage: str) -> Kind:
@@ -375,7 +375,7 @@ def default_parameters(
     if not issubclass(item.algorithm, Segmenter):
         return levels.folded(item.kind, named).parameters
     source = item.algorithm.sources[0]
-    return levels.folded(_MOSTLY[source], named, source).parameters
+    return levels.folded(stage_of(source), named, source).parameters
 
 
 def fault_of(given: Any, message: str) -> str:

@@ -10,6 +10,7 @@ from sketchmatch.registry.distributions import (
     PluginState,
     PluginStatus,
 )
+from sketchmatch.registry.readers import RegisteredReader, reader_by_keys, reader_by_name
 from sketchmatch.registry.registry import Conflict, Kind, Registered, Registry
 
 __all__ = [
@@ -21,9 +22,12 @@ __all__ = [
     "PluginState",
     "PluginStatus",
     "Registered",
+    "RegisteredReader",
     "Registry",
     "default_registry",
     "discover",
+    "reader_by_keys",
+    "reader_by_name",
 ]
 
 

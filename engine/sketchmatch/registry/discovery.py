@@ -10,11 +10,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from importlib.metadata import Distribution, EntryPoint, distributions
 from pathlib import PurePath
-from typing import Any
+from typing import Any, NamedTuple
 
 import pluggy
 
-from sketchmatch.api import API_VERSION, Algorithm, Params, Segmenter
+from sketchmatch.api import API_VERSION, Algorithm, Params, Reader, Segmenter
 from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
 from sketchmatch.registry import hookspecs
 from sketchmatch.registry.distributions import (
@@ -24,6 +24,7 @@ from sketchmatch.registry.distributions import (
     PluginStatus,
     canonical,
 )
+from sketchmatch.registry.readers import RegisteredReader
 from sketchmatch.registry.registry import Kind, Registered, Registry
 
 __all__ = ["ENTRY_POINT_GROUP", "discover"]
@@ -32,7 +33,14 @@ ENTRY_POINT_GROUP = "sketchmatch"
 _LOADING_SECONDS = 30.0
 _NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 _SOURCES = (StrokeSet, PolygonSet, OccupancyGrid, Image)
-_Offered = list[tuple[Kind, type[Algorithm]]]
+_SUFFIX = re.compile(r"(\.[a-z0-9_+-]+)+")
+
+
+class _Offered(NamedTuple):
+    """What one plugin offers."""
+
+    algorithms: list[tuple[Kind, type[Algorithm]]]
+    readers: list[type[Reader]]
 
 
 def discover(
@@ -58,6 +66,7 @@ def discover(
         distribution that seems to have plugins and cannot be read.
     """
     algorithms: list[Registered] = []
+    readers: list[RegisteredReader] = []
     statuses: list[PluginStatus] = []
     for point, status in _installed() if points is None else map(_presumed, points):
         if objection := rules.objection(status.distribution):
@@ -73,8 +82,11 @@ def discover(
         else:
             statuses.append(status)
             origin = (status.distribution, status.version)
-            algorithms += [Registered(kind, algorithm, *origin) for kind, algorithm in offered]
-    return Registry(algorithms, statuses)
+            algorithms += [
+                Registered(kind, algorithm, *origin) for kind, algorithm in offered.algorithms
+            ]
+            readers += [RegisteredReader(reader, *origin) for reader in offered.readers]
+    return Registry(algorithms, statuses, readers)
 
 
 def _installed() -> Iterator[tuple[EntryPoint | None, PluginStatus]]:
@@ -180,12 +192,17 @@ def _load(point: EntryPoint) -> _Offered:
         for classes in getattr(manager.hook, kind.hook)()
         for offered in classes
     ]
-    if not found:
-        raise ValueError("it offers no algorithm")
+    readers = [
+        _checked_reader(offered)
+        for classes in manager.hook.sketchmatch_register_readers()
+        for offered in classes
+    ]
+    if not (found or readers):
+        raise ValueError("it offers no algorithm and no reader")
     for (kind, name), times in Counter((kind, item.name) for kind, item in found).items():
         if times > 1:
             raise ValueError(f"it offers {times} {kind.plural} named {name!r}")
-    return found
+    return _Offered(found, readers)
 
 
 def _check_version(version: Any) -> None:
@@ -210,6 +227,38 @@ def _checked(kind: Kind, offered: Any) -> type[Algorithm]:
     if inspect.isabstract(offered):
         missing = ", ".join(sorted(getattr(offered, "__abstractmethods__", ())))
         raise TypeError(f"{offered.__name__} does not define {missing}")
+    _check_texts(offered)
+    _check_params(offered)
+    if issubclass(offered, Segmenter):
+        _check_sources(offered)
+    return offered
+
+
+def _checked_reader(offered: Any) -> type[Reader]:
+    """Return what a plugin offered if it is a reader."""
+    if not (isinstance(offered, type) and issubclass(offered, Reader)):
+        raise TypeError(f"sketchmatch_register_readers offers {offered!r}, which is not a Reader")
+    if inspect.isabstract(offered):
+        raise TypeError(f"{offered.__name__} does not define read")
+    _check_texts(offered)
+    for attribute in ("suffixes", "keys"):
+        texts = getattr(offered, attribute)
+        if not (isinstance(texts, tuple) and all(isinstance(text, str) for text in texts)):
+            raise TypeError(f"{offered.__name__}.{attribute} is no tuple of strings")
+    for suffix in offered.suffixes:
+        if not _SUFFIX.fullmatch(suffix) or suffix == ".json":
+            raise ValueError(
+                f"{offered.__name__} reads {suffix!r}; use small letters, as in '.plan', and keys "
+                "for .json"
+            )
+    if not (offered.suffixes or offered.keys):
+        raise ValueError(f"{offered.__name__} has neither suffixes nor keys to know its files by")
+    if not _is_source(getattr(offered, "source", None)):
+        raise TypeError(f"{offered.__name__}.source is none of {_KNOWN_SOURCES}")
+    return offered
+
+
+def _check_texts(offered: type[Any]) -> None:
     for attribute in ("name", "summary"):
         if not isinstance(getattr(offered, attribute, None), str):
             raise TypeError(f"{offered.__name__}.{attribute} is not a string")
@@ -217,10 +266,6 @@ def _checked(kind: Kind, offered: Any) -> type[Algorithm]:
         raise ValueError(
             f"{offered.__name__}.name is {offered.name!r}; use small letters, digits and hyphens"
         )
-    _check_params(offered)
-    if issubclass(offered, Segmenter):
-        _check_sources(offered)
-    return offered
 
 
 def _check_params(offered: type[Algorithm]) -> None:
@@ -235,6 +280,13 @@ def _check_params(offered: type[Algorithm]) -> None:
 
 def _check_sources(offered: type[Segmenter]) -> None:
     sources = getattr(offered, "sources", None)
-    if not (isinstance(sources, tuple) and sources and set(sources) <= set(_SOURCES)):
-        known = ", ".join(source.__name__ for source in _SOURCES)
-        raise TypeError(f"{offered.__name__}.sources is no tuple of some of {known}")
+    if not (isinstance(sources, tuple) and sources and all(map(_is_source, sources))):
+        raise TypeError(f"{offered.__name__}.sources is no tuple of some of {_KNOWN_SOURCES}")
+
+
+def _is_source(kind: Any) -> bool:
+    """Whether it is a type of source, or a plugin's own with more in it."""
+    return isinstance(kind, type) and issubclass(kind, _SOURCES)
+
+
+_KNOWN_SOURCES = ", ".join(source.__name__ for source in _SOURCES)

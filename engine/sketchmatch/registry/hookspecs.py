@@ -1,10 +1,10 @@
-"""The four hooks that a plugin can implement, each returning classes."""
+"""The hooks that a plugin can implement, each returning classes."""
 
 from __future__ import annotations
 
 import pluggy
 
-from sketchmatch.api import Histogram, Searcher, Segmenter, Similarity
+from sketchmatch.api import Histogram, Reader, Searcher, Segmenter, Similarity
 
 _hookspec = pluggy.HookspecMarker("sketchmatch")
 
@@ -27,3 +27,8 @@ def sketchmatch_register_similarities() -> list[type[Similarity]]:  # type: igno
 @_hookspec
 def sketchmatch_register_searchers() -> list[type[Searcher]]:  # type: ignore[empty-body]
     """Return searchers."""
+
+
+@_hookspec
+def sketchmatch_register_readers() -> list[type[Reader]]:  # type: ignore[empty-body]
+    """Return readers of files."""

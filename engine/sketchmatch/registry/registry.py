@@ -7,11 +7,13 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import Any, get_args
 
 from sketchmatch.api import Algorithm, Histogram, Searcher, Segmenter, Similarity
 from sketchmatch.errors import InvalidInputError, PluginError, Reason, quoted
+from sketchmatch.model import Source
 from sketchmatch.registry.distributions import OWN_DISTRIBUTION, PluginState, PluginStatus
+from sketchmatch.registry.readers import RegisteredReader
 
 __all__ = ["Conflict", "Kind", "Registered", "Registry"]
 
@@ -138,11 +140,15 @@ class Registry:
         distribution is selected, and otherwise none.
     statuses
         What became of each plugin.
+    readers
+        The readers of files that were offered.
 
     Attributes
     ----------
     algorithms
         All that a name selects.
+    readers
+        The readers of files, by name.
     conflicts
         The names that several distributions offer.
     statuses
@@ -150,8 +156,12 @@ class Registry:
     """
 
     def __init__(
-        self, algorithms: Iterable[Registered], statuses: Iterable[PluginStatus] = ()
+        self,
+        algorithms: Iterable[Registered],
+        statuses: Iterable[PluginStatus] = (),
+        readers: Iterable[RegisteredReader] = (),
     ) -> None:
+        self.readers = tuple(sorted(readers, key=lambda item: (item.name, item.distribution)))
         offered: dict[tuple[Kind, str], list[Registered]] = {}
         for item in algorithms:
             offered.setdefault((item.kind, item.name), []).append(item)
@@ -200,6 +210,7 @@ class Registry:
         return Registry(
             (item for item in self.algorithms if item.distribution not in distributions),
             (status for status in self.statuses if status.distribution not in distributions),
+            (item for item in self.readers if item.distribution not in distributions),
         )
 
     def find(self, kind: Kind, name: str) -> Registered:
@@ -228,8 +239,19 @@ class Registry:
         kind
             The kind of algorithm.
         source
-            For a segmenter, the type of source that it shall read.
+            For a segmenter, the type of source that it shall read. A plugin's own type goes to
+            the one segmenter that names it, if there is just one.
         """
+        naming = [
+            item
+            for item in self.of_kind(kind)
+            if source is not None
+            and source not in get_args(Source)
+            and issubclass(item.algorithm, Segmenter)
+            and source in item.algorithm.sources
+        ]
+        if len(naming) == 1:
+            return naming[0].name
         for item in self.of_kind(kind):
             ours = item.distribution == OWN_DISTRIBUTION and vars(item.algorithm).get("default")
             if ours and (source is None or item.reads(source)):

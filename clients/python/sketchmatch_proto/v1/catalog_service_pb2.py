@@ -18,35 +18,37 @@ from sketchmatch_proto.v1 import match_pb2 as sketchmatch_dot_v1_dot_match__pb2
 from sketchmatch_proto.v1 import pipeline_pb2 as sketchmatch_dot_v1_dot_pipeline__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$sketchmatch/v1/catalog_service.proto\x12\x0esketchmatch.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1cgoogle/protobuf/struct.proto\x1a\x1asketchmatch/v1/match.proto\x1a\x1dsketchmatch/v1/pipeline.proto\"\x17\n\x15ListAlgorithmsRequest\"\x9b\x01\n\x16ListAlgorithmsResponse\x12-\n\nalgorithms\x18\x01 \x03(\x0b\x32\x19.sketchmatch.v1.Algorithm\x12\'\n\x07plugins\x18\x02 \x03(\x0b\x32\x16.sketchmatch.v1.Plugin\x12)\n\x08profiles\x18\x03 \x03(\x0b\x32\x17.sketchmatch.v1.Profile\"\xb5\x01\n\x07Profile\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0f\n\x07summary\x18\x02 \x01(\t\x12*\n\x08pipeline\x18\x03 \x01(\x0b\x32\x18.sketchmatch.v1.Pipeline\x12\x12\n\nis_default\x18\x04 \x01(\x08\x12\x32\n\x07weights\x18\x05 \x01(\x0b\x32!.sketchmatch.v1.ConfidenceWeights\x12\x17\n\x0f\x61llow_unmatched\x18\x06 \x01(\x08\"\xaa\x02\n\tAlgorithm\x12+\n\x04kind\x18\x01 \x01(\x0e\x32\x1d.sketchmatch.v1.AlgorithmKind\x12\x0c\n\x04name\x18\x02 \x01(\t\x12\x0f\n\x07summary\x18\x03 \x01(\t\x12\x13\n\x0b\x64\x65scription\x18\x04 \x01(\t\x12\x14\n\x0c\x64istribution\x18\x05 \x01(\t\x12\x1c\n\x14\x64istribution_version\x18\x06 \x01(\t\x12\x32\n\x11parameters_schema\x18\x07 \x01(\x0b\x32\x17.google.protobuf.Struct\x12\x12\n\nis_default\x18\x08 \x01(\x08\x12\x30\n\x0csource_kinds\x18\t \x03(\x0e\x32\x1a.sketchmatch.v1.SourceKind\x12\x0e\n\x06source\x18\n \x01(\t\"k\n\x06Plugin\x12\x14\n\x0c\x64istribution\x18\x01 \x01(\t\x12\x0f\n\x07version\x18\x02 \x01(\t\x12*\n\x05state\x18\x03 \x01(\x0e\x32\x1b.sketchmatch.v1.PluginState\x12\x0e\n\x06reason\x18\x04 \x01(\t\"\x16\n\x14GetServerInfoRequest\"\xb2\x01\n\x15GetServerInfoResponse\x12\x0f\n\x07version\x18\x01 \x01(\t\x12\x13\n\x0b\x61pi_version\x18\x02 \x01(\t\x12\x1a\n\x12plugin_api_version\x18\x03 \x01(\r\x12,\n\x06limits\x18\x04 \x01(\x0b\x32\x1c.sketchmatch.v1.ServerLimits\x12)\n\x06uptime\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\"\xe2\x01\n\x0cServerLimits\x12\x1e\n\x11max_request_bytes\x18\x01 \x01(\x04H\x00\x88\x01\x01\x12\x18\n\x0bmax_objects\x18\x02 \x01(\rH\x01\x88\x01\x01\x12#\n\x16max_concurrent_matches\x18\x03 \x01(\rH\x02\x88\x01\x01\x12\x32\n\x0fmax_time_budget\x18\x04 \x01(\x0b\x32\x19.google.protobuf.DurationB\x14\n\x12_max_request_bytesB\x0e\n\x0c_max_objectsB\x19\n\x17_max_concurrent_matches*\xa7\x01\n\rAlgorithmKind\x12\x1e\n\x1a\x41LGORITHM_KIND_UNSPECIFIED\x10\x00\x12\x1c\n\x18\x41LGORITHM_KIND_SEGMENTER\x10\x01\x12\x1c\n\x18\x41LGORITHM_KIND_HISTOGRAM\x10\x02\x12\x1d\n\x19\x41LGORITHM_KIND_SIMILARITY\x10\x03\x12\x1b\n\x17\x41LGORITHM_KIND_SEARCHER\x10\x04*\xb9\x01\n\nSourceKind\x12\x1b\n\x17SOURCE_KIND_UNSPECIFIED\x10\x00\x12\x1a\n\x16SOURCE_KIND_STROKE_SET\x10\x01\x12\x1b\n\x17SOURCE_KIND_POLYGON_SET\x10\x02\x12\x1e\n\x1aSOURCE_KIND_OCCUPANCY_GRID\x10\x03\x12\x1e\n\x1aSOURCE_KIND_MAP_SERVER_MAP\x10\x04\x12\x15\n\x11SOURCE_KIND_IMAGE\x10\x05*x\n\x0bPluginState\x12\x1c\n\x18PLUGIN_STATE_UNSPECIFIED\x10\x00\x12\x17\n\x13PLUGIN_STATE_ACTIVE\x10\x01\x12\x19\n\x15PLUGIN_STATE_DISABLED\x10\x02\x12\x17\n\x13PLUGIN_STATE_FAILED\x10\x03\x32\xcf\x01\n\x0e\x43\x61talogService\x12_\n\x0eListAlgorithms\x12%.sketchmatch.v1.ListAlgorithmsRequest\x1a&.sketchmatch.v1.ListAlgorithmsResponse\x12\\\n\rGetServerInfo\x12$.sketchmatch.v1.GetServerInfoRequest\x1a%.sketchmatch.v1.GetServerInfoResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$sketchmatch/v1/catalog_service.proto\x12\x0esketchmatch.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1cgoogle/protobuf/struct.proto\x1a\x1asketchmatch/v1/match.proto\x1a\x1dsketchmatch/v1/pipeline.proto\"\x17\n\x15ListAlgorithmsRequest\"\xc8\x01\n\x16ListAlgorithmsResponse\x12-\n\nalgorithms\x18\x01 \x03(\x0b\x32\x19.sketchmatch.v1.Algorithm\x12\'\n\x07plugins\x18\x02 \x03(\x0b\x32\x16.sketchmatch.v1.Plugin\x12)\n\x08profiles\x18\x03 \x03(\x0b\x32\x17.sketchmatch.v1.Profile\x12+\n\x07readers\x18\x04 \x03(\x0b\x32\x1a.sketchmatch.v1.FileReader\"\xb5\x01\n\nFileReader\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0f\n\x07summary\x18\x02 \x01(\t\x12\x10\n\x08suffixes\x18\x03 \x03(\t\x12\x11\n\tjson_keys\x18\x04 \x03(\t\x12/\n\x0bsource_kind\x18\x05 \x01(\x0e\x32\x1a.sketchmatch.v1.SourceKind\x12\x14\n\x0c\x64istribution\x18\x06 \x01(\t\x12\x1c\n\x14\x64istribution_version\x18\x07 \x01(\t\"\xb5\x01\n\x07Profile\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0f\n\x07summary\x18\x02 \x01(\t\x12*\n\x08pipeline\x18\x03 \x01(\x0b\x32\x18.sketchmatch.v1.Pipeline\x12\x12\n\nis_default\x18\x04 \x01(\x08\x12\x32\n\x07weights\x18\x05 \x01(\x0b\x32!.sketchmatch.v1.ConfidenceWeights\x12\x17\n\x0f\x61llow_unmatched\x18\x06 \x01(\x08\"\xaa\x02\n\tAlgorithm\x12+\n\x04kind\x18\x01 \x01(\x0e\x32\x1d.sketchmatch.v1.AlgorithmKind\x12\x0c\n\x04name\x18\x02 \x01(\t\x12\x0f\n\x07summary\x18\x03 \x01(\t\x12\x13\n\x0b\x64\x65scription\x18\x04 \x01(\t\x12\x14\n\x0c\x64istribution\x18\x05 \x01(\t\x12\x1c\n\x14\x64istribution_version\x18\x06 \x01(\t\x12\x32\n\x11parameters_schema\x18\x07 \x01(\x0b\x32\x17.google.protobuf.Struct\x12\x12\n\nis_default\x18\x08 \x01(\x08\x12\x30\n\x0csource_kinds\x18\t \x03(\x0e\x32\x1a.sketchmatch.v1.SourceKind\x12\x0e\n\x06source\x18\n \x01(\t\"k\n\x06Plugin\x12\x14\n\x0c\x64istribution\x18\x01 \x01(\t\x12\x0f\n\x07version\x18\x02 \x01(\t\x12*\n\x05state\x18\x03 \x01(\x0e\x32\x1b.sketchmatch.v1.PluginState\x12\x0e\n\x06reason\x18\x04 \x01(\t\"\x16\n\x14GetServerInfoRequest\"\xb2\x01\n\x15GetServerInfoResponse\x12\x0f\n\x07version\x18\x01 \x01(\t\x12\x13\n\x0b\x61pi_version\x18\x02 \x01(\t\x12\x1a\n\x12plugin_api_version\x18\x03 \x01(\r\x12,\n\x06limits\x18\x04 \x01(\x0b\x32\x1c.sketchmatch.v1.ServerLimits\x12)\n\x06uptime\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\"\xe2\x01\n\x0cServerLimits\x12\x1e\n\x11max_request_bytes\x18\x01 \x01(\x04H\x00\x88\x01\x01\x12\x18\n\x0bmax_objects\x18\x02 \x01(\rH\x01\x88\x01\x01\x12#\n\x16max_concurrent_matches\x18\x03 \x01(\rH\x02\x88\x01\x01\x12\x32\n\x0fmax_time_budget\x18\x04 \x01(\x0b\x32\x19.google.protobuf.DurationB\x14\n\x12_max_request_bytesB\x0e\n\x0c_max_objectsB\x19\n\x17_max_concurrent_matches*\xa7\x01\n\rAlgorithmKind\x12\x1e\n\x1a\x41LGORITHM_KIND_UNSPECIFIED\x10\x00\x12\x1c\n\x18\x41LGORITHM_KIND_SEGMENTER\x10\x01\x12\x1c\n\x18\x41LGORITHM_KIND_HISTOGRAM\x10\x02\x12\x1d\n\x19\x41LGORITHM_KIND_SIMILARITY\x10\x03\x12\x1b\n\x17\x41LGORITHM_KIND_SEARCHER\x10\x04*\xcf\x01\n\nSourceKind\x12\x1b\n\x17SOURCE_KIND_UNSPECIFIED\x10\x00\x12\x1a\n\x16SOURCE_KIND_STROKE_SET\x10\x01\x12\x1b\n\x17SOURCE_KIND_POLYGON_SET\x10\x02\x12\x1e\n\x1aSOURCE_KIND_OCCUPANCY_GRID\x10\x03\x12\x1e\n\x1aSOURCE_KIND_MAP_SERVER_MAP\x10\x04\x12\x15\n\x11SOURCE_KIND_IMAGE\x10\x05\x12\x14\n\x10SOURCE_KIND_FILE\x10\x06*x\n\x0bPluginState\x12\x1c\n\x18PLUGIN_STATE_UNSPECIFIED\x10\x00\x12\x17\n\x13PLUGIN_STATE_ACTIVE\x10\x01\x12\x19\n\x15PLUGIN_STATE_DISABLED\x10\x02\x12\x17\n\x13PLUGIN_STATE_FAILED\x10\x03\x32\xcf\x01\n\x0e\x43\x61talogService\x12_\n\x0eListAlgorithms\x12%.sketchmatch.v1.ListAlgorithmsRequest\x1a&.sketchmatch.v1.ListAlgorithmsResponse\x12\\\n\rGetServerInfo\x12$.sketchmatch.v1.GetServerInfoRequest\x1a%.sketchmatch.v1.GetServerInfoResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'sketchmatch_proto.v1.catalog_service_pb2', _globals)
 if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
-  _globals['_ALGORITHMKIND']._serialized_start=1389
-  _globals['_ALGORITHMKIND']._serialized_end=1556
-  _globals['_SOURCEKIND']._serialized_start=1559
-  _globals['_SOURCEKIND']._serialized_end=1744
-  _globals['_PLUGINSTATE']._serialized_start=1746
-  _globals['_PLUGINSTATE']._serialized_end=1866
+  _globals['_ALGORITHMKIND']._serialized_start=1618
+  _globals['_ALGORITHMKIND']._serialized_end=1785
+  _globals['_SOURCEKIND']._serialized_start=1788
+  _globals['_SOURCEKIND']._serialized_end=1995
+  _globals['_PLUGINSTATE']._serialized_start=1997
+  _globals['_PLUGINSTATE']._serialized_end=2117
   _globals['_LISTALGORITHMSREQUEST']._serialized_start=177
   _globals['_LISTALGORITHMSREQUEST']._serialized_end=200
   _globals['_LISTALGORITHMSRESPONSE']._serialized_start=203
-  _globals['_LISTALGORITHMSRESPONSE']._serialized_end=358
-  _globals['_PROFILE']._serialized_start=361
-  _globals['_PROFILE']._serialized_end=542
-  _globals['_ALGORITHM']._serialized_start=545
-  _globals['_ALGORITHM']._serialized_end=843
-  _globals['_PLUGIN']._serialized_start=845
-  _globals['_PLUGIN']._serialized_end=952
-  _globals['_GETSERVERINFOREQUEST']._serialized_start=954
-  _globals['_GETSERVERINFOREQUEST']._serialized_end=976
-  _globals['_GETSERVERINFORESPONSE']._serialized_start=979
-  _globals['_GETSERVERINFORESPONSE']._serialized_end=1157
-  _globals['_SERVERLIMITS']._serialized_start=1160
-  _globals['_SERVERLIMITS']._serialized_end=1386
-  _globals['_CATALOGSERVICE']._serialized_start=1869
-  _globals['_CATALOGSERVICE']._serialized_end=2076
+  _globals['_LISTALGORITHMSRESPONSE']._serialized_end=403
+  _globals['_FILEREADER']._serialized_start=406
+  _globals['_FILEREADER']._serialized_end=587
+  _globals['_PROFILE']._serialized_start=590
+  _globals['_PROFILE']._serialized_end=771
+  _globals['_ALGORITHM']._serialized_start=774
+  _globals['_ALGORITHM']._serialized_end=1072
+  _globals['_PLUGIN']._serialized_start=1074
+  _globals['_PLUGIN']._serialized_end=1181
+  _globals['_GETSERVERINFOREQUEST']._serialized_start=1183
+  _globals['_GETSERVERINFOREQUEST']._serialized_end=1205
+  _globals['_GETSERVERINFORESPONSE']._serialized_start=1208
+  _globals['_GETSERVERINFORESPONSE']._serialized_end=1386
+  _globals['_SERVERLIMITS']._serialized_start=1389
+  _globals['_SERVERLIMITS']._serialized_end=1615
+  _globals['_CATALOGSERVICE']._serialized_start=2120
+  _globals['_CATALOGSERVICE']._serialized_end=2327
 # @@protoc_insertion_point(module_scope)

@@ -73,6 +73,8 @@ class _SourceKindEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._Enu
     """`Source.map_server_map`."""
     SOURCE_KIND_IMAGE: _SourceKind.ValueType  # 5
     """`Source.image`."""
+    SOURCE_KIND_FILE: _SourceKind.ValueType  # 6
+    """`Source.file`; never sent, since what a file holds has one of the other forms."""
 
 class SourceKind(_SourceKind, metaclass=_SourceKindEnumTypeWrapper):
     """The forms of a source: the fields of `Source.kind`."""
@@ -89,6 +91,8 @@ SOURCE_KIND_MAP_SERVER_MAP: SourceKind.ValueType  # 4
 """`Source.map_server_map`."""
 SOURCE_KIND_IMAGE: SourceKind.ValueType  # 5
 """`Source.image`."""
+SOURCE_KIND_FILE: SourceKind.ValueType  # 6
+"""`Source.file`; never sent, since what a file holds has one of the other forms."""
 global___SourceKind = SourceKind
 
 class _PluginState:
@@ -140,6 +144,7 @@ class ListAlgorithmsResponse(google.protobuf.message.Message):
     ALGORITHMS_FIELD_NUMBER: builtins.int
     PLUGINS_FIELD_NUMBER: builtins.int
     PROFILES_FIELD_NUMBER: builtins.int
+    READERS_FIELD_NUMBER: builtins.int
     @property
     def algorithms(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Algorithm]:
         """Algorithms of all active plugins, by kind and name."""
@@ -152,16 +157,67 @@ class ListAlgorithmsResponse(google.protobuf.message.Message):
     def profiles(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Profile]:
         """The pipelines that requests can name, by name."""
 
+    @property
+    def readers(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___FileReader]:
+        """What reads the files of other tools in `Source.file`, by name."""
+
     def __init__(
         self,
         *,
         algorithms: collections.abc.Iterable[global___Algorithm] | None = ...,
         plugins: collections.abc.Iterable[global___Plugin] | None = ...,
         profiles: collections.abc.Iterable[global___Profile] | None = ...,
+        readers: collections.abc.Iterable[global___FileReader] | None = ...,
     ) -> None: ...
-    def ClearField(self, field_name: typing.Literal["algorithms", b"algorithms", "plugins", b"plugins", "profiles", b"profiles"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["algorithms", b"algorithms", "plugins", b"plugins", "profiles", b"profiles", "readers", b"readers"]) -> None: ...
 
 global___ListAlgorithmsResponse = ListAlgorithmsResponse
+
+@typing.final
+class FileReader(google.protobuf.message.Message):
+    """Reads one kind of file."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: builtins.int
+    SUMMARY_FIELD_NUMBER: builtins.int
+    SUFFIXES_FIELD_NUMBER: builtins.int
+    JSON_KEYS_FIELD_NUMBER: builtins.int
+    SOURCE_KIND_FIELD_NUMBER: builtins.int
+    DISTRIBUTION_FIELD_NUMBER: builtins.int
+    DISTRIBUTION_VERSION_FIELD_NUMBER: builtins.int
+    name: builtins.str
+    """What errors call it."""
+    summary: builtins.str
+    """One line for lists."""
+    source_kind: global___SourceKind.ValueType
+    """The form of source that such a file holds: segmenters for that form find its objects."""
+    distribution: builtins.str
+    """Python distribution that it comes from."""
+    distribution_version: builtins.str
+    """Version of that distribution."""
+    @property
+    def suffixes(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.str]:
+        """What the names of its files end in, such as ".dxf"."""
+
+    @property
+    def json_keys(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.str]:
+        """Keys by which it knows a JSON document, whatever its name; empty if it reads no JSON."""
+
+    def __init__(
+        self,
+        *,
+        name: builtins.str = ...,
+        summary: builtins.str = ...,
+        suffixes: collections.abc.Iterable[builtins.str] | None = ...,
+        json_keys: collections.abc.Iterable[builtins.str] | None = ...,
+        source_kind: global___SourceKind.ValueType = ...,
+        distribution: builtins.str = ...,
+        distribution_version: builtins.str = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["distribution", b"distribution", "distribution_version", b"distribution_version", "json_keys", b"json_keys", "name", b"name", "source_kind", b"source_kind", "suffixes", b"suffixes", "summary", b"summary"]) -> None: ...
+
+global___FileReader = FileReader
 
 @typing.final
 class Profile(google.protobuf.message.Message):

@@ -63,6 +63,7 @@ class Source(google.protobuf.message.Message):
     OCCUPANCY_GRID_FIELD_NUMBER: builtins.int
     MAP_SERVER_MAP_FIELD_NUMBER: builtins.int
     IMAGE_FIELD_NUMBER: builtins.int
+    FILE_FIELD_NUMBER: builtins.int
     @property
     def stroke_set(self) -> global___StrokeSet:
         """Pen strokes of a sketch pad."""
@@ -83,6 +84,10 @@ class Source(google.protobuf.message.Message):
     def image(self) -> global___EncodedImage:
         """A picture of a map or of a sketch: dark shapes or outlines on light paper."""
 
+    @property
+    def file(self) -> global___EncodedFile:
+        """A file of another tool, as it is: one of the kinds that `ListAlgorithms` lists as `readers`."""
+
     def __init__(
         self,
         *,
@@ -91,10 +96,11 @@ class Source(google.protobuf.message.Message):
         occupancy_grid: global___OccupancyGrid | None = ...,
         map_server_map: global___MapServerMap | None = ...,
         image: global___EncodedImage | None = ...,
+        file: global___EncodedFile | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["image", b"image", "kind", b"kind", "map_server_map", b"map_server_map", "occupancy_grid", b"occupancy_grid", "polygon_set", b"polygon_set", "stroke_set", b"stroke_set"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["image", b"image", "kind", b"kind", "map_server_map", b"map_server_map", "occupancy_grid", b"occupancy_grid", "polygon_set", b"polygon_set", "stroke_set", b"stroke_set"]) -> None: ...
-    def WhichOneof(self, oneof_group: typing.Literal["kind", b"kind"]) -> typing.Literal["stroke_set", "polygon_set", "occupancy_grid", "map_server_map", "image"] | None: ...
+    def HasField(self, field_name: typing.Literal["file", b"file", "image", b"image", "kind", b"kind", "map_server_map", b"map_server_map", "occupancy_grid", b"occupancy_grid", "polygon_set", b"polygon_set", "stroke_set", b"stroke_set"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["file", b"file", "image", b"image", "kind", b"kind", "map_server_map", b"map_server_map", "occupancy_grid", b"occupancy_grid", "polygon_set", b"polygon_set", "stroke_set", b"stroke_set"]) -> None: ...
+    def WhichOneof(self, oneof_group: typing.Literal["kind", b"kind"]) -> typing.Literal["stroke_set", "polygon_set", "occupancy_grid", "map_server_map", "image", "file"] | None: ...
 
 global___Source = Source
 
@@ -136,7 +142,7 @@ class Stroke(google.protobuf.message.Message):
     """
     @property
     def points(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___StrokePoint]:
-        """Its points in the order they were drawn, at least two."""
+        """Its points in the order they were drawn. What has no length is a mark, and encloses nothing."""
 
     def __init__(
         self,
@@ -375,3 +381,33 @@ class EncodedImage(google.protobuf.message.Message):
     def ClearField(self, field_name: typing.Literal["data", b"data"]) -> None: ...
 
 global___EncodedImage = EncodedImage
+
+@typing.final
+class EncodedFile(google.protobuf.message.Message):
+    """A file that the server reads: with one of its readers, or as SVG, GeoJSON, strokes in JSON or a
+    picture.
+    """
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: builtins.int
+    DATA_FIELD_NUMBER: builtins.int
+    PART_FIELD_NUMBER: builtins.int
+    name: builtins.str
+    """Its name, of which the ending counts: "plan.dxf". Of JSON the content counts."""
+    data: builtins.bytes
+    """Its bytes."""
+    part: builtins.str
+    """Which part of it to read, where it has several: layers of a drawing, one picture of many.
+    `FileReader.summary` says what there is. Empty: all of it, or the only one.
+    """
+    def __init__(
+        self,
+        *,
+        name: builtins.str = ...,
+        data: builtins.bytes = ...,
+        part: builtins.str = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["data", b"data", "name", b"name", "part", b"part"]) -> None: ...
+
+global___EncodedFile = EncodedFile

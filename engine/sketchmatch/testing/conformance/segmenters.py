@@ -30,16 +30,18 @@ _LONGEST_SENTENCE = 500
 
 def contracts(algorithm: type[Any]) -> tuple[Contract, ...]:
     """Return the contracts of a segmenter, which depend on the sources that it reads."""
-    kinds = tuple(getattr(algorithm, "sources", ()))
+    kinds = _kinds(algorithm)
     on_grids = _ON_GRIDS if OccupancyGrid in kinds else ()
     return (*_ON_ALL, *contracts_of_use(partial(_uses, kinds)), *on_grids)
 
 
 def sources_are_known(algorithm: type[Any]) -> None:
-    """Have a tuple ``sources`` of some of StrokeSet, PolygonSet, OccupancyGrid and Image."""
+    """Have a tuple ``sources`` of StrokeSet, PolygonSet, OccupancyGrid, Image, or subclasses."""
     sources = getattr(algorithm, "sources", None)
-    fits = isinstance(sources, tuple) and sources and set(sources) <= set(get_args(Source))
-    require(fits, f"sources is {sources!r}")
+    require(isinstance(sources, tuple) and len(sources) > 0, f"sources is {sources!r}")
+    for kind in sources or ():
+        known = isinstance(kind, type) and issubclass(kind, get_args(Source))
+        require(known, f"sources is {sources!r}")
 
 
 def scenes_are_found(algorithm: type[Any]) -> None:
@@ -72,7 +74,7 @@ def notes_are_handed_on(algorithm: type[Any]) -> None:
 
 def blank_sources_are_refused(algorithm: type[Any]) -> None:
     """Refuse what has no two objects, in one sentence, with a path from the source's fields."""
-    for kind in algorithm.sources:
+    for kind in _kinds(algorithm):
         for what, source in blank_sources(kind).items():
             _refused(algorithm, what, source)
 
@@ -130,7 +132,13 @@ _ON_GRIDS: tuple[Contract, ...] = (
 
 
 def _samples(algorithm: type[Any]) -> Iterator[Source]:
-    return (sample_source(kind) for kind in algorithm.sources)
+    return (sample_source(kind) for kind in _kinds(algorithm))
+
+
+def _kinds(algorithm: type[Any]) -> tuple[type[Any], ...]:
+    """Return the types of source of which there are samples: not those that a plugin made."""
+    sources = getattr(algorithm, "sources", ())
+    return tuple(kind for kind in sources if kind in get_args(Source))
 
 
 def _grid() -> OccupancyGrid:

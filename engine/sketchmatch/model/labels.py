@@ -1,0 +1,43 @@
+"""Names for people, made fit to be shown anywhere: in a table, on a terminal, in a message."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from typing import Any
+
+__all__ = ["cleaned_label"]
+
+# A terminal would obey these: ESC [ … letter, ESC ] … BEL or ESC \, and ESC with one character.
+_ESCAPES = re.compile(
+    r"(?:\x1b\[|\x9b)[0-?]*[ -/]*[@-~]"
+    r"|(?:\x1b[\]P^_X]|[\x9d\x90\x9e\x9f\x98])[^\x07\x1b\x9c]*(?:\x07|\x1b\\|\x9c)"
+    r"|\x1b[ -/]*[0-~]"
+)
+# Invisible, and yet part of words and of single pictures: joiners, and the tags in some flags.
+_KEPT = frozenset("\u200c\u200d") | frozenset(map(chr, range(0xE0020, 0xE0080)))
+
+
+def cleaned_label(label: Any) -> str:
+    r"""Return a name in one line: no escape sequences, controls or direction marks.
+
+    Line breaks, tabs and runs of blanks become one blank, what UTF-8 cannot hold becomes U+FFFD.
+    What is no text is written as text; None is no name.
+
+    Examples
+    --------
+    >>> cleaned_label("desk\tleft\nside \x1b[31mred\x1b[0m")
+    'desk left side red'
+    >>> cleaned_label("\ud800sofa") == "\N{REPLACEMENT CHARACTER}sofa"
+    True
+    """
+    text = label if isinstance(label, str) else "" if label is None else str(label)
+    if text.isascii() and text.isprintable() and "  " not in text:
+        return text.strip()
+    text = text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "replace")
+    text = _ESCAPES.sub("", text)
+    shown = (c for c in text if c.isspace() or c in _KEPT or unicodedata.category(c) not in _UNSEEN)
+    return " ".join("".join(shown).split())
+
+
+_UNSEEN = ("Cc", "Cf")

@@ -1,0 +1,1 @@
+"""The built-in readers: files of other tools, one kind in a file."""

@@ -1,0 +1,139 @@
+"""Annotations of labelme."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from sketchmatch.api import InvalidInputError, Reader, Reason
+from sketchmatch.api.documents import (
+    decode_text,
+    load_json,
+    mapping,
+    no_parts,
+    number,
+    plain_name,
+    sequence,
+    shown,
+)
+from sketchmatch.model import FloatArray, PolygonSet
+from sketchmatch.model.limits import check_pixels, check_vertices
+
+from ._areas import Areas, area_within, box, ellipse, runs_area
+
+__all__ = ["LabelmeReader"]
+
+_POLYGON = Reason.INVALID_POLYGON
+_NO_AREA = {
+    "point": "points",
+    "points": "points",
+    "line": "lines",
+    "linestrip": "lines",
+}
+
+
+class LabelmeReader(Reader):
+    """Reads what labelme, or one of the tools that write its format, drew on a picture.
+
+    Polygons, rectangles, circles, turned rectangles and masks are objects with their labels, in
+    pixels; points and lines are left out with a note.
+
+    References
+    ----------
+    K. Wada, "labelme: Image Polygonal Annotation with Python", github.com/wkentaro/labelme.
+
+    Examples
+    --------
+    >>> square = '{"label": "desk", "shape_type": "rectangle", "points": [[0, 0], [4, 2]]}'
+    >>> found = LabelmeReader().read(f'{{"shapes": [{square}]}}'.encode())
+    >>> found.polygons[0].label, found.polygons[0].rings[0].min(axis=0).tolist()
+    ('desk', [0.0, -2.0])
+    """
+
+    name = "labelme"
+    summary = "Shapes drawn on a picture with labelme."
+    keys = ("shapes",)
+    source = PolygonSet
+
+    def read(self, data: bytes, part: str = "") -> PolygonSet:
+        """Return the shapes as polygons, in pixels, y upwards."""
+        no_parts(part)
+        document = mapping(load_json(decode_text(data)), "", _POLYGON, "an object with shapes")
+        shapes = sequence(document.get("shapes"), "shapes", _POLYGON, "a list of shapes")
+        areas = Areas()
+        for k, shape in enumerate(shapes):
+            _add(areas, mapping(shape, f"shapes[{k}]", _POLYGON, "a shape"), f"shapes[{k}]")
+        return areas.polygon_set()
+
+
+def _add(areas: Areas, shape: dict[str, Any], field: str) -> None:
+    kind, label = shape.get("shape_type") or "polygon", plain_name(shape.get("label"))
+    points = _points(shape.get("points"), f"{field}.points")
+    match kind:
+        case "polygon" | "rotation" | "oriented_rectangle":
+            areas.add(area_within(points), label)
+        case "rectangle" if len(points) >= 2:
+            areas.add(area_within(box(*points.min(axis=0), *points.max(axis=0))), label)
+        case "circle" if len(points) == 2:
+            radius = float(np.hypot(*(points[1] - points[0])))
+            x, y = points[0]
+            areas.add(area_within(ellipse(x, y, radius, radius)), label)
+        case "mask" if len(points) == 2:
+            areas.add(_mask(shape.get("mask"), points[0], f"{field}.mask"), label)
+        case "rectangle" | "circle" | "mask":
+            raise InvalidInputError(
+                _POLYGON, f"{field}.points", f"is a list of {len(points)}; give two for a {kind}"
+            )
+        case _ if isinstance(kind, str) and kind in _NO_AREA:
+            areas.leave_out(_NO_AREA[kind])
+        case _:
+            raise InvalidInputError(
+                _POLYGON,
+                f"{field}.shape_type",
+                f"is {shown(kind)}, which is not known; give polygon, rectangle, circle or mask",
+            )
+
+
+def _points(value: Any, field: str) -> FloatArray:
+    points = sequence(value, field, _POLYGON, "a list of [x, y]")
+    rows = []
+    for k, point in enumerate(points):
+        pair = sequence(point, f"{field}[{k}]", _POLYGON, "[x, y]")
+        if len(pair) < 2:
+            raise InvalidInputError(_POLYGON, f"{field}[{k}]", f"is {shown(pair)}; give [x, y]")
+        rows.append([number(pair[i], f"{field}[{k}][{i}]", _POLYGON) for i in (0, 1)])
+    return np.array(rows, dtype=np.float64).reshape(-1, 2)
+
+
+def _mask(value: Any, corner: FloatArray, field: str) -> Any:
+    """Return the area of a mask, a picture in base64 whose first pixel lies at a corner."""
+    import shapely
+
+    pixels = _pixels(value, field)
+    padded = np.pad(pixels, ((0, 0), (1, 1))).astype(np.int8)
+    rows, begins = np.nonzero(np.diff(padded, axis=1) == 1)
+    _, ends = np.nonzero(np.diff(padded, axis=1) == -1)
+    check_vertices(4 * len(rows), field)
+    runs = list(zip(rows.tolist(), begins.tolist(), ends.tolist(), strict=True))
+    area = runs_area(runs, columns=False)
+    return shapely.transform(area, lambda points: points + np.floor(corner))
+
+
+def _pixels(value: Any, field: str) -> Any:
+    from PIL import Image as Picture
+
+    problem = "is no picture in base64; save the file with labelme again"
+    if not isinstance(value, str):
+        raise InvalidInputError(_POLYGON, field, f"is {shown(value)}; give a picture in base64")
+    try:
+        with Picture.open(BytesIO(base64.b64decode(value)), formats=["PNG"]) as picture:
+            check_pixels(*picture.size, field)
+            return np.asarray(picture.convert("L")) > 0
+    except InvalidInputError:
+        raise
+    except (OSError, ValueError, SyntaxError, binascii.Error, Picture.DecompressionBombError):
+        raise InvalidInputError(_POLYGON, field, problem) from None

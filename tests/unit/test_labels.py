@@ -1,0 +1,75 @@
+"""Names are cleaned where they are set, whoever sets them."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sketchmatch.io.geojson import decode_geojson
+from sketchmatch.io.stroke_json import decode_strokes
+from sketchmatch.model import LabelledPolygon, Scene, SceneObject, Stroke
+from sketchmatch.model.labels import cleaned_label
+
+SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
+CLEANED = {
+    "desk": "desk",
+    "  two  blanks ": "two blanks",
+    "writing\n      desk": "writing desk",
+    "shelf\tleft\r\nside": "shelf left side",
+    "a\u2028b\u2029c\x85d\x0be": "a b c d e",
+    "\x1b[31mred\x1b[0m": "red",
+    "\x1b]0;a title\x07desk": "desk",
+    "\x1b]8;;http://x\x1b\\link\x1b]8;;\x1b\\": "link",
+    "\x9b31mred": "red",
+    "\x1bc\x1b(Bdesk": "desk",
+    "\x1b[31": "31",
+    "de\0sk\x7f\x08": "desk",
+    "\u202edesk\u202c\u2066x\u2069\u200f": "deskx",
+    "\ufeffdesk\u200b\u00ad": "desk",
+    "\ud800desk": "\ufffddesk",
+    "\ud83d\ude00": "😀",
+    "👩\u200d🔧 می\u200cخواهم": "👩\u200d🔧 می\u200cخواهم",
+    "Tür 机 ~é": "Tür 机 ~é",
+    "[bold]x[/bold]": "[bold]x[/bold]",
+}
+
+
+@pytest.mark.parametrize("given_", CLEANED, ids=ascii)
+def test_a_label_is_one_line_that_a_terminal_obeys_in_nothing(given_):
+    assert cleaned_label(given_) == CLEANED[given_]
+
+
+def test_what_is_no_text_is_written_as_text():
+    assert [cleaned_label(value) for value in (None, 0, 1.5, np.str_("a\nb"))] == [
+        "",
+        "0",
+        "1.5",
+        "a b",
+    ]
+
+
+@given(
+    st.text(st.characters(codec=None), max_size=30)
+    | st.text("\x1b[]0;m\x07\\ \ud800\udc00a", max_size=12)
+)
+def test_every_label_can_be_written_and_is_as_clean_as_can_be(text):
+    label = cleaned_label(text)
+    assert cleaned_label(label) == label
+    assert label.encode("utf-8").decode("utf-8") == label
+    assert label == " ".join(label.split())
+    assert not any(c < " " or "\x7f" <= c < "\xa0" for c in label)
+
+
+def test_whoever_sets_a_label_it_is_cleaned():
+    raw, clean = "a\n\x1b[1mb\ud800", "a b\ufffd"
+    assert SceneObject.from_rings([SQUARE], raw).label == clean
+    assert Scene.from_polygons([SQUARE, SQUARE], [raw, "x"]).labels == (clean, "x")
+    assert Stroke(np.zeros((2, 2)), label=raw).label == clean
+    assert LabelledPolygon((np.array(SQUARE),), raw).label == clean
+    strokes = {"strokes": [{"points": [[0, 0]], "label": raw}]}
+    assert decode_strokes(json.dumps(strokes)).strokes[0].label == clean
+    feature = {"type": "Polygon", "coordinates": [SQUARE]}
+    feature = {"type": "Feature", "geometry": feature, "properties": {"name": raw}}
+    assert decode_geojson(json.dumps(feature)).polygons[0].label == clean
