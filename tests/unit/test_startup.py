@@ -8,7 +8,7 @@ import pytest
 NUMERICAL = {"numba", "llvmlite", "cv2", "scipy"}
 HEAVY = {
     *NUMERICAL,
-    *("numpy", "shapely", "PIL", "svgelements", "yaml", "rosbags"),
+    *("numpy", "shapely", "PIL", "svgelements", "tinycss2", "yaml", "rosbags"),
     *("grpc", "asyncio", "uvicorn", "pluggy", "pydantic_settings", "hypothesis"),
     *("sketchmatch.model", "sketchmatch.api", "sketchmatch.registry", "sketchmatch.pipeline"),
     *("sketchmatch.io", "sketchmatch.server", "sketchmatch_builtin", "sketchmatch_client"),
