@@ -148,6 +148,10 @@ def test_a_style_sheet_does_not_hide_or_move(css):
         ("transform:scale(.5);transform-origin:bottom left", (175, 350, 215, 380)),
         ("transform:scale(.5);transform-origin:top", (375, 50, 415, 80)),
         ("transform:translate(7px);transform-box:fill-box", (357, 100, 437, 160)),
+        (
+            "transform:scale(.5);transform-box:fill-box;transform-origin:center",
+            (370, 115, 410, 145),
+        ),
         ("x:5px;width:13px", (5, 100, 18, 160)),
         ("x:50%", (400, 100, 480, 160)),
     ],
@@ -319,7 +323,7 @@ def test_what_lies_beyond_the_page_is_read():
         ),
         ('<g style="rotate:x 10deg"/>', "cannot be followed (rotate about an axis)"),
         (
-            '<rect style="transform:scale(2);transform-box:fill-box"/>',
+            '<g style="transform:scale(2);transform-box:fill-box"/>',
             "about its own box (transform-box: fill-box)",
         ),
         (

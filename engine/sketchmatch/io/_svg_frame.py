@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
@@ -30,7 +30,8 @@ _ALIGN = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
 _ASPECT = re.compile(r"\s*(?:defer\s+)?x(Min|Mid|Max)Y(Min|Mid|Max)(?:\s+(meet|slice))?\s*")
 _KEYWORDS = {"left": (0, 0.0), "right": (0, 1.0), "top": (1, 0.0), "bottom": (1, 1.0)}
 _ORDER = ("translate", "rotate", "scale", "transform")
-_OWN_BOXES = {"fill-box", "stroke-box", "content-box", "border-box"}
+_FILL_BOXES = {"fill-box", "content-box"}
+_OWN_BOXES = {*_FILL_BOXES, "stroke-box", "border-box"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,12 @@ def fitted(shown: Frame, into: Frame, aspect: str) -> Any:
     return svgelements.Matrix(across, 0.0, 0.0, down, x - across * shown.x, y - down * shown.y)
 
 
-def css_transform(said: Mapping[str, str], frame: Frame | None, attribute: Any = None) -> Any:
+def css_transform(
+    said: Mapping[str, str],
+    frame: Frame | None,
+    attribute: Any = None,
+    own: Callable[[], Frame | None] = lambda: None,
+) -> Any:
     """Return the matrix of the transforms that CSS tells of an element.
 
     Parameters
@@ -101,6 +107,9 @@ def css_transform(said: Mapping[str, str], frame: Frame | None, attribute: Any =
         The nearest viewport, which percentages are shares of.
     attribute
         Matrix of the attribute ``transform``, which the property replaces.
+    own
+        Returns the box around the element itself, which percentages are shares of with
+        ``transform-box: fill-box``; None where that is not known.
 
     Raises
     ------
@@ -109,7 +118,10 @@ def css_transform(said: Mapping[str, str], frame: Frame | None, attribute: Any =
     InvalidInputError
         If it is legal, but cannot be followed here.
     """
-    size = (frame.width, frame.height) if frame else (None, None)
+    box = said.get("transform-box", "").strip().lower()
+    inner = own() if box in _FILL_BOXES else None
+    reference = inner or frame
+    size = (reference.width, reference.height) if reference else (None, None)
     matrix = svgelements.Matrix()
     for name in _ORDER:
         if name in said:
@@ -117,8 +129,9 @@ def css_transform(said: Mapping[str, str], frame: Frame | None, attribute: Any =
         elif name == "transform" and attribute is not None:
             matrix = attribute * matrix
     x, y = _origin(said.get("transform-origin", "0 0"), size)
-    box = said.get("transform-box", "").strip().lower()
-    if box in _OWN_BOXES and not _moves(matrix):
+    if inner is not None:
+        x, y = x + inner.x, y + inner.y
+    elif box in _OWN_BOXES and not _moves(matrix):
         raise invalid(
             "", f"has a transform about its own box (transform-box: {box}); write it as a matrix"
         )

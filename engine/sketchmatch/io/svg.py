@@ -377,10 +377,27 @@ class _Drawing:
                 ) from None
         if look.transforms:
             try:
-                attribute = css_transform(look.transforms, context.frame, attribute)
+                attribute = css_transform(
+                    look.transforms,
+                    context.frame,
+                    attribute,
+                    lambda: self._own_box(element, look, context.frame),
+                )
             except InvalidInputError as error:
                 raise self._invalid(element, error.problem) from None
         return context.matrix if attribute is None else attribute * context.matrix
+
+    def _own_box(
+        self, element: ElementTree.Element, look: Look, frame: Frame | None
+    ) -> Frame | None:
+        """Return the box around a shape in its own coordinates; of a group it is not known."""
+        if tag_of(element) not in SHAPES:
+            return None
+        line = self._lines[element]
+        identity = svgelements.Matrix()
+        subpaths = subpaths_of(element, look.geometry, frame, identity, "", line)
+        x0, y0, x1, y1 = _box(subpaths)
+        return Frame(x0, y0, x1 - x0, y1 - y0)
 
     def _offset(self, use: ElementTree.Element, context: _Context) -> Any:
         frame, said = context.frame, context.look.geometry
