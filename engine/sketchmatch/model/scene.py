@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 from shapely.validation import explain_validity
 
 from sketchmatch.errors import InvalidInputError, Reason, quoted
@@ -115,7 +116,7 @@ class SceneObject:
         >>> SceneObject.from_polygon(desk, "desk").area
         1.5
         """
-        if isinstance(polygon, shapely.Geometry):
+        if isinstance(polygon, BaseGeometry):
             return cls.from_rings(_rings_of(polygon), label)
         return cls.from_rings([polygon] if _is_ring(polygon) else list(polygon), label)
 
@@ -292,7 +293,7 @@ class Scene:
         return (float(x0), float(y0), float(x1), float(y1))
 
 
-def _rings_of(shape: shapely.Geometry) -> list[FloatArray]:
+def _rings_of(shape: BaseGeometry) -> list[FloatArray]:
     """Return the rings of a shape that is one polygon, without heights."""
     if isinstance(shape, shapely.MultiPolygon) and len(shape.geoms) == 1:
         shape = shape.geoms[0]

@@ -110,8 +110,8 @@ def plugin_checks(
     """
     kind = every_kind.kind_of_class(algorithm)
     for contract in (*every_kind.CONTRACTS, *_CONTRACTS[kind](algorithm)):
-        compiles = time_limit is not None and contract is every_kind.warm_up_can_be_repeated
-        limit = time_limit * _COMPILING if compiles else time_limit
+        compiles = contract is every_kind.warm_up_can_be_repeated
+        limit = time_limit and time_limit * (_COMPILING if compiles else 1)
         yield PluginCheck.of(contract, algorithm, limit)
 
 

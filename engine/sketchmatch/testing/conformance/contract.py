@@ -186,8 +186,8 @@ class PluginCheck:
     def _place(self, stack: traceback.StackSummary) -> str:
         """Say where in the plugin a stack is: its last line in a folder that the class is from."""
         methods = (getattr(self.algorithm, name, None) for name in _METHODS)
-        files = (method.__code__.co_filename for method in methods if hasattr(method, "__code__"))
-        folders = {Path(file).parent for file in files}
+        codes = (getattr(method, "__code__", None) for method in methods)
+        folders = {Path(code.co_filename).parent for code in codes if code}
         for frame in reversed(stack):
             if Path(frame.filename).parent in folders:
                 return f" at {Path(frame.filename).name}, line {frame.lineno}, in {frame.name}"

@@ -251,8 +251,9 @@ def closing_ends_the_search(algorithm: type[Searcher]) -> None:
 def _uses() -> Iterator[Use]:
     for seed in (1, 2):
         table = random_relations(np.random.default_rng(seed), 4, 6)
-        arrays = (view_within(a) for a in (table.similarity, table.rotation, table.dilation))
-        own = RelationTable(*arrays, 4, 6)  # it holds these, and no copies
+        similarity, rotation = view_within(table.similarity), view_within(table.rotation)
+        dilation = view_within(table.dilation)
+        own = RelationTable(similarity, rotation, dilation, 4, 6)  # it holds these, and no copies
         problem = MatchProblem(own, (1.0, 2.0, 0.5), alternatives=2)
         inputs = {f"table.{name}": getattr(own, name) for name in _ARRAYS}
         yield Use("a problem of 4 on 6 objects", inputs, partial(_answer, problem))

@@ -74,8 +74,9 @@ def combine_agrees_with_compare(algorithm: type[Any]) -> None:
 def _uses() -> Iterator[Use]:
     first, second = _histograms()
     for one, other in ((first, second), (second, second[::-1])):
-        rows = {"aligned": view_within(one), "argument": view_within(other)}
-        yield Use(f"{_ROWS} pairs of rows", rows, partial(_answer, *rows.values()))
+        aligned, argument = view_within(one), view_within(other)
+        rows = {"aligned": aligned, "argument": argument}
+        yield Use(f"{_ROWS} pairs of rows", rows, partial(_answer, aligned, argument))
 
 
 def _answer(first: FloatArray, second: FloatArray, similarity: Similarity) -> Hashable:
