@@ -406,9 +406,17 @@ def sharing(self, problem, rng):
     return (yield from RandomMaps.search(self, self.problem, rng))
 
 
+def opened(array):
+    """Whether a view of what can be written to is made to be one that can."""
+    if array.base is None or not array.base.flags.writeable:
+        return False
+    array.flags.writeable = True
+    return True
+
+
 def writing(self, problem, rng):
     values = problem.table.similarity
-    if values.flags.writeable:
+    if opened(values):
         values[0, 0] += 1e-13
     return (yield from RandomMaps.search(self, problem, rng))
 
@@ -492,7 +500,7 @@ def mostly_along_the_axes(rows, *_):
 
 
 def changing_the_pairs(rows, _, pairs, __):
-    if pairs.flags.writeable and len(pairs) > 1:
+    if len(pairs) > 1 and opened(pairs):
         pairs[0] = pairs[0, ::-1].copy()
     return rows
 
@@ -568,7 +576,7 @@ def sharing_rows(self, aligned, argument):
 
 def writing_rows(self, aligned, argument):
     for rows in (aligned, argument):
-        if rows.flags.writeable:
+        if opened(rows):
             np.multiply(rows, 1.0 + 1e-13, out=rows)
     return Cosine.compare(self, aligned, argument)
 
@@ -627,8 +635,9 @@ def sharing_the_source(self, source):
 
 def writing_the_source(self, source):
     found = Boxes.segment(self, source)
-    if source.polygons[0].rings[0].flags.writeable:
-        source.polygons[0].rings[0][0] += 1e-9
+    ring = source.polygons[0].rings[0]
+    ring.flags.writeable = True
+    ring[0] += 1e-9
     return found
 
 

@@ -27,6 +27,7 @@ __all__ = [
     "PluginCheck",
     "require",
     "require_applicable",
+    "writing_behind",
 ]
 
 TIME_LIMIT = 120.0
@@ -169,7 +170,7 @@ class PluginCheck:
             seen += "" if overdue.ended else ", and goes on in a thread that cannot be ended"
             raise ContractViolationError(self, seen, overdue=True) from None
         except BrokenError as broken:
-            writing = _writing(broken)
+            writing = writing_behind(broken)
             seen = self._said(writing) if writing else str(broken)
             raise ContractViolationError(self, seen) from writing
         except (Exception, SystemExit) as error:  # a plugin may raise anything, and exit
@@ -177,7 +178,7 @@ class PluginCheck:
 
     def _said(self, error: BaseException) -> str:
         """Say what an error shows that the class did, and where."""
-        writing = _writing(error)
+        writing = writing_behind(error)
         did = "wrote to what it is given, which is read-only, and" if writing else ""
         cause = writing or error
         words = " ".join(f"{did} raised {type(cause).__name__}: {cause}".split())
@@ -214,7 +215,7 @@ def require_applicable(applies: Any, reason: str) -> None:
         raise NotApplicableError(reason)
 
 
-def _writing(error: BaseException) -> BaseException | None:
+def writing_behind(error: BaseException) -> BaseException | None:
     """Return the error that comes from writing to what is read-only, if that is behind another."""
     cause: BaseException | None = error
     while cause is not None:
