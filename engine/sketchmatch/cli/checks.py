@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.metadata import version
 from typing import Any
 
-from rich.console import Console
+from rich.console import Group
 from rich.padding import Padding
 from rich.text import Text
 
+from sketchmatch.cli import output
 from sketchmatch.cli.options import say
+from sketchmatch.cli.tables import plain
 from sketchmatch.testing import CheckState
 from sketchmatch.testing.conformance.apart import Checked
 
@@ -25,49 +25,48 @@ _INDENT = 20
 
 
 def show(distribution: str, results: Iterable[Checked], *, as_json: bool) -> bool:
-    """Print what came of each check of a distribution, and return whether none failed."""
+    """Write what came of each check of a distribution, and return whether none failed."""
     if as_json:
         done = list(results)
-        print(json.dumps(_document(distribution, done), ensure_ascii=False, indent=2))
+        output.write_json(_document(distribution, done))
     else:
-        done = list(_printed(results))
+        done = list(_written(results))
     counts, seconds = _counts(done), sum(each.result.seconds for each in done)
     how_many = ", ".join(f"{count} {state}" for state, count in counts.items())
     say(f"{distribution} {version(distribution)}: {how_many} in {seconds:.1f} s")
     return not counts["failed"]
 
 
-def _printed(results: Iterable[Checked]) -> Iterator[Checked]:
-    show_one = _on_a_terminal() if sys.stdout.isatty() else _in_a_pipe()
+def _written(results: Iterable[Checked]) -> Iterator[Checked]:
+    show_one = _on_a_terminal() if output.for_people() else _in_a_pipe()
     for each in results:
         show_one(each)
         yield each
 
 
 def _on_a_terminal() -> Callable[[Checked], None]:
-    console, shown = Console(), set[tuple[str, str]]()
+    shown = set[tuple[str, str]]()
 
     def show_one(each: Checked) -> None:
-        result = each.result
+        result, heading = each.result, []
         if (each.kind, each.algorithm) not in shown:
             shown.add((each.kind, each.algorithm))
-            console.print(Text(f"{each.kind} {each.algorithm}".strip(), "bold"))
+            heading = [plain(f"{each.kind} {each.algorithm}".strip(), "bold")]
         state = (f"{result.state:8} {result.seconds:7.2f} s  ", _STYLES[result.state])
-        console.print(Text.assemble(state, result.name))
-        console.print(
-            Padding(Text(_sentence(each), "" if result.seen else "dim"), (0, 0, 0, _INDENT))
-        )
+        sentence = plain(_sentence(each), "" if result.seen else "dim")
+        line = Text.assemble(state, result.name)
+        output.show(Group(*heading, line, Padding(sentence, (0, 0, 0, _INDENT))))
 
     return show_one
 
 
 def _in_a_pipe() -> Callable[[Checked], None]:
-    print(*_COLUMNS, sep="\t", flush=True)
+    output.write_line(*_COLUMNS)
 
     def show_one(each: Checked) -> None:
         result = each.result
         cells = (each.kind, each.algorithm, result.name, result.state, f"{result.seconds:.2f}")
-        print(*cells, _sentence(each), sep="\t", flush=True)
+        output.write_line(*cells, _sentence(each))
 
     return show_one
 

@@ -73,6 +73,7 @@ def show(
 
 
 @app.command("check")
+@answering
 def check(
     distribution: Annotated[
         str,

@@ -309,7 +309,8 @@ def _cures(grid: OccupancyGrid, params: OccupancyGridSegmenter.Params) -> Iterat
         wider = params.model_copy(update={"attached": _USUAL_ATTACHED})
         if found := _count(OccupancyGridSegmenter(wider), grid):
             yield f"set attached to {_USUAL_ATTACHED:g}, which finds {found} objects at the walls"
-    rooms = RoomSegmenter(RoomSegmenter.Params(free_threshold=params.free_threshold))
+    same = {"free_threshold": params.free_threshold, "keep_unknown": params.keep_unknown}
+    rooms = RoomSegmenter(RoomSegmenter.Params.model_validate(same))
     if found := _count(rooms, grid):
         yield f"choose the segmenter rooms, which finds {found} rooms"
 
