@@ -725,8 +725,8 @@ def test_a_parameter_of_any_length_gets_an_answer_that_fits_into_a_trailer(stub,
 
 def test_segment_names_the_path_in_its_own_request(address):
     with Client(address) as client, pytest.raises(InvalidRequestError) as raised:
-        client.segment(sources.strokes([CLOSED, [(7, 7)]]))
-    assert raised.value.field == "source.stroke_set.strokes[1]"
+        client.segment(sources.strokes([CLOSED, [(7, 7), (float("nan"), 8)]]))
+    assert raised.value.field == "source.stroke_set.strokes[1].points[1]"
     with Client(address) as client, pytest.raises(InvalidRequestError) as raised:
         client.segment(sources.strokes([CLOSED, CLOSED]), params={"max_gap": 2})
     assert raised.value.field == "segmenter.parameters.max_gap"

@@ -464,7 +464,8 @@ def test_strokes_are_drawn_and_warned_about_alike_whoever_segments_them(tmp_path
 
 
 def test_plugins_list_says_what_became_of_each_plugin(strangers):
-    algorithms, _, plugins = tables(run("plugins", "list", env=strangers))
+    algorithms, _, plugins, readers = tables(run("plugins", "list", env=strangers))
+    assert ["dxf", ".dxf"] in [line[:2] for line in readers]
     origins = {(line[1], line[3]) for line in algorithms}
     assert {("exact", "acme-plugins"), ("exact", "sketchmatch")} <= origins
     states = {line[0]: line[1:] for line in plugins}
@@ -479,7 +480,7 @@ def test_the_configuration_shows_in_the_lists(strangers, tmp_path):
         "[pipeline.searcher]\nname = 'easm'\nparameters = { population = 77 }\n"
         "[plugins]\ndeny = ['acme-plugins']\n"
     )
-    algorithms, _, plugins = tables(run("plugins", "list", "--config", file, env=strangers))
+    algorithms, _, plugins, _ = tables(run("plugins", "list", "--config", file, env=strangers))
     assert {line[1] for line in algorithms if line[:3:2] == ["searcher", "true"]} == {"easm"}
     assert "acme-plugins" not in {line[3] for line in algorithms}
     states = {line[0]: line[2:] for line in plugins}

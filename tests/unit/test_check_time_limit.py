@@ -188,7 +188,7 @@ def test_an_interrupt_ends_the_check_too():
 
     with pytest.raises(KeyboardInterrupt):
         the_check(Interrupting, time_limit=60.0)()
-    assert not workers()
+    all_end()
 
 
 def test_every_check_that_is_made_for_pytest_has_the_limit():

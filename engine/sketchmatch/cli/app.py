@@ -17,6 +17,7 @@ from sketchmatch.cli import (
     config,
     demo,
     describe,
+    interrupts,
     match,
     output,
     plugins,
@@ -76,9 +77,11 @@ def main() -> NoReturn:
     # An odd tag in a picture is no news to whoever drew it.
     warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\.")
     output.use_any_encoding()
+    interrupts.listen()
     code, message = _run()
     if message:
         output.tell(f"sketchmatch: {message}")
+    interrupts.settle()
     sys.exit(code)
 
 

@@ -15,7 +15,7 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
-from sketchmatch.cli import output
+from sketchmatch.cli import interrupts, output
 from sketchmatch.cli.options import say
 from sketchmatch.cli.tables import Column, Rows, plain
 from sketchmatch_client import Match, MatchCollector
@@ -130,12 +130,12 @@ def follow(work: Generator[float, None, _Value], what: str) -> _Value:
 
     screen = output.console(error=True)
     if not screen.is_terminal:
-        return finish(work)
+        return finish(retold(work, interrupts.check))
     bar = _bar()
 
     def shown(share: float) -> Iterable[None]:
         bar.update(share)
-        return ()
+        return interrupts.check()
 
     with _moving(screen, _busy(screen, what, bar)):
         return finish(retold(work, shown))
@@ -148,6 +148,7 @@ def _collected(
     collector = MatchCollector(on_progress)
     with closing(events):
         for event in events:
+            interrupts.check()
             collector.add(event)
     return collector.match()
 
