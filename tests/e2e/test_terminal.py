@@ -30,6 +30,8 @@ NOISY = """
 import ctypes, os
 print("noise at import")
 from sketchmatch.api import Similarity, hookimpl
+
+pytestmark = pytest.mark.slow
 class Noisy(Similarity):
     '''Noise.'''
     name, summary = "noisy", "Prints."

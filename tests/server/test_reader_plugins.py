@@ -14,6 +14,8 @@ from sketchmatch.registry import default_registry, discover
 from sketchmatch_client import Client, InvalidRequestError, ServerFailedError, sources
 from tests.server.harness import hosting
 
+pytestmark = pytest.mark.slow
+
 SHELVES = {"shelves": [["a", 0, 0, 2.0], ["b", 5, 0, 1.5], ["low", 9, 9, 0.2], ["c", 3, 8, 1.0]]}
 
 

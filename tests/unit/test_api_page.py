@@ -12,6 +12,7 @@ WRITTEN = (ROOT / "plugins" / "API.md").read_text(encoding="utf-8")
 MODULES = re.findall(r"^## `(.*)`$", WRITTEN, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_the_page_is_fresh():
     require(find_spec("griffe2md"), "griffe2md (`pip install --editable '.[dev]'`)")
     from plugins.api_page import page

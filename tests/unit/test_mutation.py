@@ -133,6 +133,7 @@ def test_equivalent_mutants_are_mutants_of_today_and_have_a_reason():
     assert all(reason.endswith(".") for reason in listed.values())
 
 
+@pytest.mark.slow
 def test_a_mutant_is_tried_in_a_copy_and_killed_where_a_test_fails(tmp_path, monkeypatch):
     home = tmp_path / "home"
     for path, text in {
