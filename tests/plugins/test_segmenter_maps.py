@@ -44,9 +44,9 @@ def areas(grid, **params):
 
 def test_what_was_saved_as_unknown_is_no_floor_whatever_the_files_threshold_says():
     assert areas(saved(0.25)) == areas(saved(0.196)) == [*BLACKS, UNSEEN, SPOT]
-    assert found(saved(0.196)).warnings == ()
-    (warning,) = found(saved(0.25)).warnings
-    assert "has the grey 205" in warning
+    assert saved(0.196).notes == ()
+    (note,) = saved(0.25).notes
+    assert "has the grey 205" in note
 
 
 @pytest.mark.parametrize(

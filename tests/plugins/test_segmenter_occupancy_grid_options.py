@@ -133,11 +133,6 @@ def test_too_many_parts_to_merge_are_refused():
         segmented(cells, merge_distance=0.1, close_gaps=0.0)
 
 
-def test_notes_of_the_source_are_among_the_warnings():
-    grid = OccupancyGrid(room(*BOXES), 0.1, notes=("Something was assumed.",))
-    assert segmented(grid).warnings == ("Something was assumed.",)
-
-
 OPTIONS = ({}, {"merge_distance": 0.6}, {"attached": 1.0}, {"region_share": 0.01})
 
 
@@ -227,9 +222,9 @@ def test_the_small_offices_legs_become_one_long_table():
 
 
 def test_what_map_saver_saved_as_unknown_is_no_room_whatever_the_threshold():
-    (warning,) = segmented(real_map("nav2-depot/depot.yaml")).warnings
-    assert "5% of the map has the grey 205" in warning
-    others = [segmented(real_map(name)).warnings for name in COUNTS if "depot" not in name]
+    (note,) = real_map("nav2-depot/depot.yaml").notes
+    assert "5% of the map has the grey 205" in note
+    others = [real_map(name).notes for name in COUNTS if "depot" not in name]
     assert others == [()] * 3
 
 

@@ -154,11 +154,6 @@ def test_too_few_rooms_say_what_was_found_and_the_remedy(case):
     assert (caught.value.field, caught.value.reason) == ("cells", Reason.TOO_FEW_OBJECTS)
 
 
-def test_notes_of_the_source_are_handed_on():
-    grid = OccupancyGrid(floor(), CELL, notes=("Something was assumed.",))
-    assert segmented(grid).warnings == ("Something was assumed.",)
-
-
 def offices(rng):
     """Offices on both sides of a corridor, their walls, doors and furniture at random."""
     count = int(rng.integers(2, 5))

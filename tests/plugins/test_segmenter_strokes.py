@@ -183,13 +183,6 @@ def test_taps_alone_are_too_few():
     assert "no closed outline (2 strokes were left out" in caught.value.problem
 
 
-def test_notes_of_whoever_read_the_file_come_first():
-    strokes = (Stroke(circle(1.0)), Stroke(np.array([[3.0, 3.0]])), Stroke(np.array(TRIANGLE)))
-    found = StrokeSegmenter().segment(StrokeSet(strokes, ("The paper was left out.",)))
-    assert found.warnings[0] == "The paper was left out."
-    assert len(found.warnings) == 2
-
-
 def test_too_few_objects_says_how_many_strokes_were_left_out():
     with pytest.raises(InvalidInputError) as caught:
         segmented(TRIANGLE, circle(0.6), [[0, 0], [1, 0]])

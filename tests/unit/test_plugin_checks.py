@@ -135,7 +135,7 @@ class Blocks(Segmenter):
         boxes = [self.placed(corners, source) for corners in groups(source.cells)]
         if len(boxes) < 2:
             raise InvalidInputError(Reason.TOO_FEW_OBJECTS, "cells", "hold too little; map more")
-        return Segmentation(Scene.from_polygons(boxes), source.notes)
+        return Segmentation(Scene.from_polygons(boxes))
 
     def placed(self, corners, source):
         x, y, yaw = source.origin
@@ -672,10 +672,6 @@ SEGMENTERS = {
     "y-points-up": (
         "of polygon_set",
         like(Boxes, segment=segment(lambda ring, _: ring * [1.0, -1.0])),
-    ),
-    "notes-are-handed-on": (
-        "the warnings are ()",
-        like(Blocks, segment=lambda *given: Segmentation(Blocks.segment(*given).scene)),
     ),
     "grids-are-in-the-frame-of-the-map": (
         "m off",

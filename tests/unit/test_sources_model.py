@@ -1,10 +1,15 @@
 """Sources by hand: their form is checked where they are made."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.model import Image, OccupancyGrid, Stroke
+from sketchmatch.model import Image, OccupancyGrid, PolygonSet, Stroke, StrokeSet
+from sketchmatch.pipeline.segment import segment
+from sketchmatch.registry import Kind, default_registry
+from sketchmatch.testing.conformance.sources import sample_source
 
 CELLS = np.array([[0, 100], [-1, 50]])
 
@@ -78,3 +83,22 @@ def test_an_image_is_grey_or_red_green_and_blue_of_eight_bits(pixels):
 @pytest.mark.parametrize("shape", [(2, 3), (2, 3, 3)])
 def test_an_image_cannot_be_written_to(shape):
     assert not Image(np.zeros(shape, np.uint8)).pixels.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("strokes", StrokeSet),
+        ("polygons", PolygonSet),
+        ("occupancy-grid", OccupancyGrid),
+        ("rooms", OccupancyGrid),
+    ],
+)
+def test_what_a_reader_noted_stands_once_before_the_warnings(name, kind):
+    registry = default_registry()
+    segmenter = registry.find(Kind.SEGMENTER, name).algorithm()
+    source = sample_source(kind)
+    warnings = segmenter.segment(source).warnings
+    noted = replace(source, notes=("The\tpaper  was left out.",))
+    found = segment(noted, segmenter, registry, "sketch")
+    assert found.warnings == ("The paper was left out.", *warnings)

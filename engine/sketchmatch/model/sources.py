@@ -78,8 +78,8 @@ class StrokeSet:
     strokes
         The strokes.
     notes
-        What whoever read the file left out or had to decide, each one sentence for people: they
-        stand before the segmenter's own warnings.
+        What whoever read the file left out or had to decide, each one sentence for people: the
+        engine puts them before the segmenter's warnings.
     """
 
     strokes: tuple[Stroke, ...]
@@ -178,8 +178,7 @@ class OccupancyGrid:
         Pose (x, y, yaw) of the lower left corner of cell (0, 0) in the map's frame, in metres
         and radians counter-clockwise.
     notes
-        What whoever read the map's file had to decide, each one sentence for people: segmenters
-        hand them on among their warnings.
+        What whoever read the map's file had to decide, as in :class:`StrokeSet`.
     picture
         What the cells were read from, where thresholds decided; else None.
     landmarks

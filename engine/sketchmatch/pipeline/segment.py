@@ -61,9 +61,8 @@ def segment_side(
 
 
 def _with_notes(found: Segmentation, source: Source) -> Segmentation:
-    """Put what a file's reader noted before the warnings, unless the segmenter handed it on."""
-    notes = (note for note in _notes(source) if note not in found.warnings)
-    return replace(found, warnings=(*notes, *found.warnings))
+    """Put what a file's reader noted before the segmenter's warnings."""
+    return replace(found, warnings=(*_notes(source), *found.warnings))
 
 
 def _with_reasons(error: InvalidInputError, source: Source) -> InvalidInputError:

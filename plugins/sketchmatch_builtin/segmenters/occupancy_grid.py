@@ -215,7 +215,7 @@ class OccupancyGridSegmenter(Segmenter):
             self.params.label_reach,
         )
         objects = [SceneObject.from_rings([r], name) for r, name in zip(rings, labels, strict=True)]
-        return Segmentation(Scene(tuple(objects)), (*source.notes, *unplaced))
+        return Segmentation(Scene(tuple(objects)), unplaced)
 
     def _parts(
         self, room: Mask, held: Mask, grid: OccupancyGrid

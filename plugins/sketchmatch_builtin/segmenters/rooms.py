@@ -146,7 +146,7 @@ class RoomSegmenter(Segmenter):
             0.0,
         )
         objects = map(SceneObject.from_rings, rooms_in_map, labels)
-        return Segmentation(Scene(tuple(objects)), (*source.notes, *unplaced))
+        return Segmentation(Scene(tuple(objects)), unplaced)
 
 
 def _furnished(free: Mask, longest: float) -> Mask:

@@ -154,8 +154,8 @@ class StrokeSegmenter(Segmenter):
             for item in objects
         ]
         way = None if route is None else points[route]
-        notes = (*source.notes, *_without_points(empty), *drawing.sentences())
-        return Segmentation(Scene(tuple(scene)), notes, way)
+        warnings = (*_without_points(empty), *drawing.sentences())
+        return Segmentation(Scene(tuple(scene)), warnings, way)
 
     def _outlines(self, drawing: Drawing, route: int | None) -> list[Outline]:
         """Return all closed outlines, of single strokes and of chains."""

@@ -65,13 +65,6 @@ def warnings_are_sentences(algorithm: type[Any]) -> None:
             require(fits, f"a warning is {warning!r}")
 
 
-def notes_are_handed_on(algorithm: type[Any]) -> None:
-    """Hand the notes on a grid's file on among the warnings."""
-    grid = _grid()
-    warnings = algorithm().segment(grid).warnings
-    require(set(grid.notes) <= set(warnings), f"of {grid.notes}, the warnings are {warnings}")
-
-
 def blank_sources_are_refused(algorithm: type[Any]) -> None:
     """Refuse what has no two objects, in one sentence, with a path from the source's fields."""
     for kind in _kinds(algorithm):
@@ -125,7 +118,6 @@ _ON_ALL: tuple[Contract, ...] = (
     y_points_up,
 )
 _ON_GRIDS: tuple[Contract, ...] = (
-    notes_are_handed_on,
     grids_are_in_the_frame_of_the_map,
     resolution_scales_the_scene,
 )

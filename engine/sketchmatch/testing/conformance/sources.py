@@ -41,9 +41,7 @@ def sample_source(kind: type[Any], *, mirrored: bool = False) -> Source:
     """
     if kind is OccupancyGrid:
         cells = _two_rooms()
-        return OccupancyGrid(
-            cells[:, ::-1] if mirrored else cells, RESOLUTION, notes=("The map is made up.",)
-        )
+        return OccupancyGrid(cells[:, ::-1] if mirrored else cells, RESOLUTION)
     scene = random_scene(np.random.default_rng(4), 5)
     factor = [-1.0, 1.0] if mirrored else [1.0, 1.0]
     rings = [item.rings[0] * factor for item in scene.objects]
