@@ -48,14 +48,13 @@ def _on_a_terminal() -> Callable[[Checked], None]:
     shown = set[tuple[str, str]]()
 
     def show_one(each: Checked) -> None:
-        result, heading = each.result, []
+        result = each.result
         if (each.kind, each.algorithm) not in shown:
             shown.add((each.kind, each.algorithm))
-            heading = [plain(f"{each.kind} {each.algorithm}".strip(), "bold")]
+            output.show(plain(f"{each.kind} {each.algorithm}".strip(), "bold"))
         state = (f"{result.state:8} {result.seconds:7.2f} s  ", _STYLES[result.state])
-        sentence = plain(_sentence(each), "" if result.seen else "dim")
-        line = Text.assemble(state, result.name)
-        output.show(Group(*heading, line, Padding(sentence, (0, 0, 0, _INDENT))))
+        said = plain(_sentence(each), "" if result.seen else "dim")
+        output.show(Group(Text.assemble(state, result.name), Padding(said, (0, 0, 0, _INDENT))))
 
     return show_one
 
