@@ -93,6 +93,7 @@ def test_options_that_are_given_win():
         (":50051", "give host and port"),
         ("localhost:0", "give a port from 1 to 65535"),
         ("localhost:65536", "give a port from 1 to 65535"),
+        ("unix:", "name a file by at most 107 bytes, as in 'unix:/run/sketchmatch.sock'"),
         ("", "give host and port"),
         (" ", "give host and port"),
         (None, "give host and port"),
@@ -106,9 +107,18 @@ def test_what_is_no_address_is_refused_at_once(kind, address, remedy):
     assert (caught.value.reason, caught.value.field) == ("INVALID_FIELD", "address")
 
 
+def test_the_path_of_a_socket_is_no_longer_than_a_socket_takes():
+    Client(f"unix:{107 * 'x'}").close()
+    with pytest.raises(InvalidRequestError, match="; name a file by at most 107 bytes"):
+        Client(f"unix:{108 * 'x'}")
+
+
 @pytest.mark.parametrize(
     "address",
-    ["localhost:1", "my_robot:65535", "[::1]:1", "unix:a", "xds:///robot", "dns:///robot"],
+    [
+        *("localhost:1", "my_robot:65535", "[::1]:1", "unix:a", "xds:///robot", "dns:///robot"),
+        "ipv4:10.0.0.1:50051,10.0.0.2:50051",
+    ],
 )
 def test_what_grpc_takes_is_an_address(address):
     Client(address).close()

@@ -323,23 +323,28 @@ def test_of_208_notes_one_is_told_and_how_many_more_there_are(command_line, plan
 
 
 @pytest.mark.parametrize(
-    ("address", "words"),
+    ("address", "listening", "asked"),
     [
-        ("127.0.0.1", "should have a port, as in 127.0.0.1:50051"),
-        ("", "should have a port, as in 127.0.0.1:50051"),
-        ("::1", "should have brackets around an IPv6 address, as in [::1]:50051"),
-        ("http://robot:50051", "should be no URL but HOST:PORT"),
-        ("robot:http", "should end with a port from"),
-        ("robot:65536", "should end with a port from"),
-        (":50051", "should begin with a host"),
-        ("unix:", "should name a file"),
+        ("127.0.0.1", "have a port, as in 127.0.0.1:50051", "add the port, as in"),
+        ("", "have a port, as in 127.0.0.1:50051", "give host and port, as in"),
+        ("::1", "have brackets around an IPv6 address, as in [::1]:50051", "give host and port"),
+        ("http://robot:50051", "be no URL but HOST:PORT", "give host and port alone"),
+        ("robot:http", "end with a port from", "give host and port"),
+        ("robot:65536", "end with a port from", "give a port from"),
+        (":50051", "begin with a host", "give host and port"),
+        ("unix:", "name a file", "name a file"),
     ],
 )
-def test_an_address_that_grpc_would_complete_by_guessing_is_refused(command_line, address, words):
-    for command, option in ((["serve"], "--address"), (["plugins", "list"], "--server")):
-        done = command_line(*command, option, address)
+def test_an_address_that_grpc_would_complete_by_guessing_is_refused(
+    command_line, address, listening, asked
+):
+    for command, words in (
+        (["serve", "--address"], f"it should {listening}"),
+        (["plugins", "list", "--server"], asked),
+    ):
+        done = command_line(*command, address)
         assert (done.returncode, done.stdout) == (ExitCode.INVALID_INPUT, "")
-        assert done.stderr.startswith(f"sketchmatch: {option} is {address!r}; it {words}")
+        assert done.stderr.startswith(f"sketchmatch: {command[-1]} is {address!r}; {words}")
 
 
 def test_a_server_listens_at_a_file_that_no_second_one_takes(command_line, tmp_path, monkeypatch):

@@ -11,7 +11,6 @@ import pytest
 
 from sketchmatch import Scene, match, read_scene
 from sketchmatch.config import Origin, builtin, check, entries, load, open_registry, template
-from sketchmatch.config.addresses import address_fault
 from sketchmatch.config.layers import found_file
 from sketchmatch.config.settings import static_paths
 from sketchmatch.errors import InvalidInputError, Reason
@@ -398,21 +397,6 @@ def test_an_address_to_listen_at_is_whole(file, address, fault):
     error = refused(load, path)
     assert error.field == f"{path}: server.address"
     assert f"; it should {fault}" in error.problem
-
-
-@pytest.mark.parametrize(
-    ("address", "sound"),
-    [
-        ("robot:50051", True),
-        ("dns:///robot:50051", True),
-        ("ipv4:10.0.0.1:50051,10.0.0.2:50051", True),
-        ("unix:s.sock", True),
-        ("robot:0", False),
-        ("https://robot:50051", False),
-    ],
-)
-def test_an_address_to_find_a_server_at_may_be_any_that_grpc_resolves(address, sound):
-    assert (address_fault(address, found=True) == "") is sound
 
 
 # Profiles ---------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 import reprlib
 from ipaddress import ip_address
@@ -52,6 +53,8 @@ HEALTH_POLL_SECONDS = 0.05
 _FOR_EVER = 1e8
 
 _SCHEMES = re.compile(r"(dns|ipv4|ipv6|unix|unix-abstract|vsock|xds|passthrough|google-c2p):")
+_FILE = re.compile(r"unix:(?://)?(.*)", re.DOTALL)
+_LONGEST_PATH = 107
 _WITHIN_MACHINE = ("unix:", "unix-abstract:", "vsock:")
 # A host and a port, perhaps behind the scheme and the name server that look the host up.
 _HOST_AND_PORT = re.compile(
@@ -71,10 +74,15 @@ def check_address(address: str, encrypted: bool) -> None:
     Raises
     ------
     InvalidRequestError
-        If it is a URL, or lacks a port where there is no default one, as there is for TLS.
+        If it is a URL, lacks a port where there is no default one, as there is for TLS, or names
+        no file that can be a socket.
     """
     if not isinstance(address, str) or not address.strip():
         raise _refused(address, "give host and port, as in 'localhost:50051'")
+    file = _FILE.fullmatch(address)
+    if file is not None and not 0 < len(os.fsencode(file[1])) <= _LONGEST_PATH:
+        remedy = f"name a file by at most {_LONGEST_PATH} bytes, as in 'unix:/run/sketchmatch.sock'"
+        raise _refused(address, remedy)
     if _SCHEMES.match(address):
         return
     if "://" in address:

@@ -10,10 +10,17 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Unpack, cast
 
-from sketchmatch.cli.options import check_server, say
+from sketchmatch.cli.options import say
 from sketchmatch.config import load, open_engine
+from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model.limits import limited_to
-from sketchmatch_client import Client, MatchOptions, match_request, segment_request
+from sketchmatch_client import (
+    Client,
+    InvalidRequestError,
+    MatchOptions,
+    match_request,
+    segment_request,
+)
 from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsResponse
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
@@ -53,11 +60,10 @@ class Answerer(Protocol):
 @contextmanager
 def answerer(server: str | None, config: Path | None) -> Iterator[Answerer]:
     """Yield the server at an address, or this process; files may be as large as it says."""
-    check_server(server)
     configuration = load(config)
     with limited_to(configuration.limits):
-        if server:
-            with Client(server) as client:
+        if server is not None:
+            with _client(server) as client:
                 yield client
         else:
             from sketchmatch.app.application import Application
@@ -66,6 +72,14 @@ def answerer(server: str | None, config: Path | None) -> Iterator[Answerer]:
             engine = open_engine(configuration)
             everybody = Isolation(trusted=frozenset("*"))
             yield _Here(Application(Setup(engine, isolation=everybody)))
+
+
+def _client(address: str) -> Client:
+    try:
+        return Client(address)
+    except InvalidRequestError as error:
+        problem = str(error).removeprefix(f"{error.field} ")
+        raise InvalidInputError(Reason.INVALID_FIELD, "--server", problem) from None
 
 
 class _Here:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from sketchmatch.cli.output import clean, tell
-from sketchmatch.errors import InvalidInputError, Reason, quoted
+from sketchmatch.errors import InvalidInputError, Reason
 
 __all__ = [
     "Config",
@@ -25,7 +25,6 @@ __all__ = [
     "Settings",
     "SketchSegmenter",
     "Verbose",
-    "check_server",
     "parse_pairs",
     "parse_settings",
     "refuse_config",
@@ -140,22 +139,6 @@ def parse_settings(
     return stages
 
 
-def check_server(address: str | None) -> None:
-    """Refuse an address at which no server can be found.
-
-    Raises
-    ------
-    InvalidInputError
-        If it lacks its port, for example: gRPC would take another one.
-    """
-    from sketchmatch.config.addresses import address_fault
-
-    if address is not None and (fault := address_fault(address, found=True)):
-        raise InvalidInputError(
-            Reason.INVALID_FIELD, "--server", f"is {quoted(address)}; it {fault}"
-        )
-
-
 def refuse_config(config: Path | None, server: str | None) -> None:
     """Refuse a configuration for an answer that is another's.
 
@@ -164,7 +147,7 @@ def refuse_config(config: Path | None, server: str | None) -> None:
     InvalidInputError
         If there is one, and a server.
     """
-    if config is not None and server:
+    if config is not None and server is not None:
         problem = "is for computing here, and the server has one of its own; drop one of the two"
         raise InvalidInputError(Reason.INVALID_FIELD, "--config", problem)
 

@@ -1,4 +1,4 @@
-"""Where servers listen and are found: what an address must have, before gRPC guesses the rest."""
+"""Where servers listen: what an address must have, before gRPC guesses the rest."""
 
 from __future__ import annotations
 
@@ -8,21 +8,17 @@ __all__ = ["address_fault"]
 
 _LOCAL = re.compile(r"unix(?:-abstract)?:(.*)", re.S)
 _URL = re.compile(r"[a-z][a-z0-9+.-]*://", re.I)
-# gRPC's own ways to find a server.
-_RESOLVED = ("dns:", "ipv4:", "ipv6:", "xds:", "vsock:")
 _PORTS = 65_535
 _LONGEST_PATH = 107
 
 
-def address_fault(address: str, *, found: bool = False) -> str:
-    """Return what an address should be and is not, to follow "it"; empty where it is sound.
+def address_fault(address: str) -> str:
+    """Return what an address to listen on should be and is not, to follow "it"; empty if sound.
 
     Parameters
     ----------
     address
         ``HOST:PORT``, ``[IPv6]:PORT``, ``unix:PATH`` or ``unix-abstract:NAME``.
-    found
-        Whether a server is to be found there, not to listen there.
 
     Examples
     --------
@@ -33,9 +29,7 @@ def address_fault(address: str, *, found: bool = False) -> str:
     """
     if local := _LOCAL.fullmatch(address):
         return _file_fault(local[1])
-    if found and address.startswith(_RESOLVED):
-        return ""
-    return _network_fault(address, 1 if found else 0)
+    return _network_fault(address)
 
 
 def _file_fault(path: str) -> str:
@@ -46,10 +40,10 @@ def _file_fault(path: str) -> str:
     return ""
 
 
-def _network_fault(address: str, first: int) -> str:
+def _network_fault(address: str) -> str:
     host, colon, port = address.rpartition(":")
     bracketed = host.startswith("[") and host.endswith("]")
-    numbered = port.isascii() and port.isdecimal() and first <= int(port) <= _PORTS
+    numbered = port.isascii() and port.isdecimal() and int(port) <= _PORTS
     faults = (
         (_URL.match(address), "be no URL but HOST:PORT, as in 127.0.0.1:50051"),
         (not colon, f"have a port, as in {address or '127.0.0.1'}:50051"),
@@ -61,6 +55,6 @@ def _network_fault(address: str, first: int) -> str:
             not host.strip("[]") or host.split() != [host],
             "begin with a host, as in 127.0.0.1:50051, or 0.0.0.0:50051 for all addresses",
         ),
-        (not numbered, f"end with a port from {first} to {_PORTS}, as in {host}:50051"),
+        (not numbered, f"end with a port from 0 to {_PORTS}, as in {host}:50051"),
     )
     return next((f"should {fault}" for wrong, fault in faults if wrong), "")
