@@ -7,9 +7,10 @@ import numpy as np
 import sketchmatch
 from sketchmatch.api import Reader, hookimpl
 from sketchmatch.api.documents import decode_text, load_json
-from sketchmatch.io.files import _JSON_SUFFIXES, _KINDS, PICTURE_SUFFIXES
+from sketchmatch.io.files import _JSON_SUFFIXES, _KINDS
 from sketchmatch.model import LabelledPolygon, PolygonSet, Scene
 from sketchmatch.registry import OWN_DISTRIBUTION, default_registry
+from sketchmatch_map_files import PICTURE_SUFFIXES
 from tests.tools import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")

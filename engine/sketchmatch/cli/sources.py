@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from sketchmatch.cli.options import say
+from sketchmatch.cli.display import say_notes
 from sketchmatch.io.files import (
-    PICTURE_SUFFIXES,
     file_and_part,
     is_read_here,
     read_bytes,
@@ -17,6 +15,7 @@ from sketchmatch.io.files import (
 )
 from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
 from sketchmatch_client import sources
+from sketchmatch_map_files import PICTURE_SUFFIXES
 from sketchmatch_proto.v1.source_pb2 import MapServerMap, Source
 
 __all__ = ["in_metres", "source_of"]
@@ -44,18 +43,19 @@ def source_of(path: Path, side: str = "") -> Source:
         decoded.
     """
     if (files := read_map_files(path)) is not None:
-        _tell(files.notes, side)
+        say_notes(side, files.notes, verbose=True)
         return Source(map_server_map=MapServerMap(yaml=files.yaml, image=files.picture))
     if path.suffix.lower() in PICTURE_SUFFIXES:
         if path.suffix.lower() == ".pgm":
-            _tell([f"{path.name} is read as a drawing; for a robot's map give its .yaml"], side)
+            note = f"{path.name} is read as a drawing; for a robot's map give its .yaml"
+            say_notes(side, [note], verbose=True)
         return sources.image(read_bytes(path))
     file, part = file_and_part(path)
     if not is_read_here(file):
         return sources.file(read_bytes(file), name=file.name, part=part)
     source = read_source(path)
-    # They have no room in the messages of what is decoded already.
-    _tell(getattr(source, "notes", ()), side)
+    # There is no room for them in the messages of what is decoded already.
+    say_notes(side, getattr(source, "notes", ()), verbose=True)
     match source:
         case OccupancyGrid(cells, resolution, origin):
             return sources.occupancy_grid(cells, resolution, origin)
@@ -71,12 +71,6 @@ def source_of(path: Path, side: str = "") -> Source:
             )
         case Image():
             raise AssertionError("pictures pass as they are")
-
-
-def _tell(notes: Sequence[str], side: str) -> None:
-    """Say what has no room in the message: notes of whoever read the file."""
-    for note in notes:
-        say(f"{side}: {note}" if side else note)
 
 
 def _timed(points: Any, times: Any) -> list[Any]:

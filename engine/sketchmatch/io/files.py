@@ -26,7 +26,6 @@ from sketchmatch.registry import (
 from sketchmatch_map_files import PICTURE_SUFFIXES, YAML_SUFFIXES
 
 __all__ = [
-    "PICTURE_SUFFIXES",
     "FileKind",
     "decode_file",
     "file_and_part",
