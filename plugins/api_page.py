@@ -1,6 +1,6 @@
 """Write the reference page of all that a plugin may import, ``API.md``, from the docstrings.
 
-``make api`` runs it. The sources are read, and nothing of them is imported.
+``make api`` runs it.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from pathlib import Path
 
 from griffe2md import ConfigDict, render_package_docs
 
+from sketchmatch.cli.reference import markdown
+
 __all__ = ["page"]
 
 _ENGINE = Path(__file__).parents[1] / "engine"
@@ -18,6 +20,7 @@ _MODULES = (
     "sketchmatch.api.kernels",
     "sketchmatch.api.forces",
     "sketchmatch.api.pixels",
+    "sketchmatch.api.documents",
     "sketchmatch.model",
     "sketchmatch.testing",
 )
@@ -52,9 +55,7 @@ def _module(name: str) -> str:
     """Return what there is to say of a module, without links to what has no anchor, and roles."""
     text = render_package_docs(name, _OPTIONS)
     text = re.sub(r"\[([^][]+)\]\(#[^()]*\)", r"\1", text)
-    text = re.sub(r":\w+:`~?(?:[\w.]*\.)?(\w+)`", r"`\1`", text)
-    text = re.sub(r"(?<!`)``(?!`)", "`", text)
-    return re.sub(r"::$", ":", text, flags=re.MULTILINE).rstrip() + "\n"
+    return re.sub(r"::$", ":", markdown(text), flags=re.MULTILINE).rstrip() + "\n"
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from sketchmatch.cli.catalogue import KINDS, Parameter, kind, parameters, prose,
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch_proto.v1.catalog_service_pb2 import Algorithm, ListAlgorithmsResponse
 
-__all__ = ["page"]
+__all__ = ["markdown", "page"]
 
 _HEADINGS = {
     "segmenter": "Segmenters",
@@ -63,7 +63,7 @@ def _lines(items: list[Algorithm], distribution: str) -> Iterator[str]:
 def _section(item: Algorithm) -> Iterator[str]:
     yield from ("", f"### `{item.name}`", "", item.summary)
     for paragraph in prose(item):
-        yield from ("", _markdown(paragraph))
+        yield from ("", markdown(paragraph))
     if item.is_default:
         yield from ("", "It is the default" + (" for what it reads." if reads(item) else "."))
     if item.source_kinds:
@@ -80,20 +80,20 @@ def _table(named: Iterable[Parameter]) -> Iterator[str]:
     for each in named:
         default = f"`{each.default}`" if each.default else ""
         type_ = " or ".join(f"`{part}`" for part in each.type.split(" | "))
-        yield _row((f"`{each.name}`", type_, default, each.bounds, each.unit, _markdown(each.text)))
+        yield _row((f"`{each.name}`", type_, default, each.bounds, each.unit, markdown(each.text)))
 
 
 def _row(cells: Iterable[str]) -> str:
     return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
 
 
-def _markdown(text: str) -> str:
+def markdown(text: str) -> str:
     """Return a docstring's reStructuredText as Markdown.
 
     Examples
     --------
-    >>> _markdown("Of ``near`` and :class:`~a.Scene`, after [1]_.")
+    >>> markdown("Of ``near`` and :class:`~a.Scene`, after [1]_.")
     'Of `near` and `Scene`, after [1].'
     """
     text = re.sub(r":\w+:`~?(?:[\w.]*\.)?(\w+)`", r"`\1`", text)
-    return re.sub(r"(\[\d+\])_", r"\1", text.replace("``", "`"))
+    return re.sub(r"(\[\d+\])_", r"\1", re.sub(r"(?<!`)``(?!`)", "`", text))

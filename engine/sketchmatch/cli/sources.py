@@ -54,7 +54,7 @@ def source_of(path: Path, side: str = "") -> Source:
     if not is_read_here(file):
         return sources.file(read_bytes(file), name=file.name, part=part)
     source = read_source(path)
-    # There is no room for them in the messages of what is decoded already.
+    # The messages of what is decoded already have no room for notes.
     say_notes(side, getattr(source, "notes", ()), verbose=True)
     match source:
         case OccupancyGrid(cells, resolution, origin):
