@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -25,7 +25,6 @@ __all__ = [
     "sequence",
     "shown",
 ]
-
 
 # Values that a vertex takes at most, with its share of everything around it.
 _VALUES = 8
@@ -81,27 +80,41 @@ def check_values(text: str) -> None:
     check_vertices(values // _VALUES, "", f"has {values} values")
 
 
-def load_xml(data: bytes) -> ElementTree.Element:
+def load_xml(
+    data: bytes, kind: str = "XML", watch: Callable[[Mapping[str, str], int], None] | None = None
+) -> ElementTree.Element:
     """Parse XML without entities of its own, of no more elements and numbers than are allowed.
+
+    Parameters
+    ----------
+    data
+        The document, in any encoding that it declares.
+    kind
+        What errors call it.
+    watch
+        Called with the attributes and the line of each element before any tree is built, in the
+        order in which the elements begin; it raises what refuses the document. Left out, elements
+        and numbers are counted.
 
     Raises
     ------
     InvalidInputError
         If it is not XML, defines entities, is nested too deeply or too large.
     """
-    depth = values = 0
+    depth, see = 0, watch or _counting()
 
     def doctype(_name: str, _system: str | None, _public: str | None, subset: int) -> None:
         if subset:
-            raise _refused("defines entities or a DTD of its own; save it without them")
+            raise _refused(
+                f"defines entities or a DTD of its own; save it as plain {kind} without them"
+            )
 
     def start(_name: str, attributes: dict[str, str]) -> None:
-        nonlocal depth, values
+        nonlocal depth
         depth += 1
-        values += 1 + sum(1 + text.count(",") for text in attributes.values())
-        check_vertices(values // _VALUES, "", f"has {values} values")
+        see(attributes, parser.CurrentLineNumber)
         if depth > _DEEPEST:
-            raise _refused(f"is nested deeper than the limit of {_DEEPEST}; save it again")
+            raise _refused(f"is nested deeper than the limit of {_DEEPEST}; flatten it")
 
     def end(_name: str) -> None:
         nonlocal depth
@@ -118,7 +131,7 @@ def load_xml(data: bytes) -> ElementTree.Element:
         raise
     except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
         cause = str(error)[:_LONGEST_CAUSE]
-        raise _refused(f"is not XML ({cause}); save it from the tool again") from None
+        raise _refused(f"is not {kind} ({cause}); save it as {kind} again") from None
 
 
 def mapping(value: Any, field: str, reason: Reason, expected: str) -> dict[str, Any]:
@@ -194,6 +207,18 @@ def no_parts(part: str) -> None:
     """
     if part:
         raise _refused(f"has no part {quoted(part)}, nor any other; leave out what follows '#'")
+
+
+def _counting() -> Callable[[Mapping[str, str], int], None]:
+    """Return what refuses XML that has more values than the allowed vertices take."""
+    values = 0
+
+    def count(attributes: Mapping[str, str], _line: int) -> None:
+        nonlocal values
+        values += 1 + sum(1 + text.count(",") for text in attributes.values())
+        check_vertices(values // _VALUES, "", f"has {values} values")
+
+    return count
 
 
 def _refused(problem: str) -> InvalidInputError:

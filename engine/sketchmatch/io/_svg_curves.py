@@ -16,7 +16,16 @@ from sketchmatch.io._svg_frame import Frame, length
 from sketchmatch.io._svg_tree import invalid, named_element, tag_of
 from sketchmatch.model import FloatArray
 
-__all__ = ["SHAPES", "TOLERANCE", "Subpath", "flattened", "size_of", "steps_of", "subpaths_of"]
+__all__ = [
+    "LISTS",
+    "SHAPES",
+    "TOLERANCE",
+    "Subpath",
+    "flattened",
+    "size_of",
+    "steps_of",
+    "subpaths_of",
+]
 
 Subpath = list[FloatArray]
 """Curves that follow each other, each as its control points, shape (2…4, 2)."""
@@ -42,7 +51,8 @@ _ALONG: dict[str, Callable[[Frame], float]] = {
     **dict.fromkeys(("y", "y1", "y2", "height", "cy", "ry"), lambda frame: frame.height),
     "r": lambda frame: math.hypot(frame.width, frame.height) / math.sqrt(2.0),
 }
-_LISTS = {"d", "points"}
+LISTS = {"d", "points"}
+"""Attributes that are lists of vertices."""
 _CSS_PATH = re.compile(r"""path\(\s*(?:(?:nonzero|evenodd)\s*,\s*)?(["'])(.*)\1\s*\)""", re.DOTALL)
 
 
@@ -111,7 +121,7 @@ def _geometry(
     extent = _EXTENT.get(tag_of(element), ())
     geometry: dict[str, Any] = dict.fromkeys(extent, 0.0)
     for name, text in (*element.items(), *said.items()):
-        if name in _LISTS:
+        if name in LISTS:
             path = _CSS_PATH.fullmatch(text) if name in said else None
             geometry[name] = path[2] if path else text
         elif name in _ALONG and text.strip() != "auto":

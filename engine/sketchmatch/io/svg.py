@@ -29,17 +29,18 @@ Nothing outside the document is ever opened, and a document that defines entitie
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 from xml.etree import ElementTree
-from xml.parsers import expat
 
 import numpy as np
 import svgelements
 
+from sketchmatch.api.documents import load_xml
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io._svg_curves import (
+    LISTS,
     SHAPES,
     TOLERANCE,
     Subpath,
@@ -57,8 +58,6 @@ from sketchmatch.model.limits import check_vertices, source_limits
 
 __all__ = ["decode_svg"]
 
-_MAX_DEPTH = 200
-_LISTS = {"d", "points"}
 _DRAWN = {*SHAPES, "svg", "g", "a", "switch", "use"}
 _VIEWPORTS = {"svg", "symbol"}
 _HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
@@ -138,50 +137,18 @@ def decode_svg(data: bytes) -> StrokeSet:
 
 
 def _document(data: bytes) -> tuple[ElementTree.Element, list[int]]:
-    """Parse XML, but no entities and no deep nesting; the lines are those of all elements."""
-    try:
-        lines = _checked(data)
-        return ElementTree.fromstring(data), lines
-    except InvalidInputError:
-        raise
-    except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
-        cause = str(error)[:LONGEST_CAUSE]
-        raise invalid("", f"is not SVG ({cause}); save it as SVG again") from None
-
-
-def _checked(data: bytes) -> list[int]:
-    """Refuse what must not reach a parser that builds a tree; return the elements' lines."""
-    depth = vertices = 0
+    """Parse a document whose tree is not too large to be built; the lines are those of elements."""
+    vertices = 0
     lines: list[int] = []
 
-    def doctype(_name: str, _system: str | None, _public: str | None, subset: int) -> None:
-        if subset:
-            raise invalid(
-                "", "defines entities or a DTD of its own; save it as plain SVG without them"
-            )
-
-    def start(_name: str, attributes: dict[str, str]) -> None:
-        nonlocal depth, vertices
-        depth += 1
-        lines.append(parser.CurrentLineNumber)
-        vertices += sum(_vertices(attributes.get(name, "")) for name in _LISTS)
+    def watch(attributes: Mapping[str, str], line: int) -> None:
+        nonlocal vertices
+        lines.append(line)
+        vertices += sum(_vertices(attributes.get(name, "")) for name in LISTS)
         _check_elements(len(lines))
         check_vertices(vertices, "")
-        if depth > _MAX_DEPTH:
-            raise invalid(
-                "", f"is nested deeper than the limit of {_MAX_DEPTH}; flatten its groups"
-            )
 
-    def end(_name: str) -> None:
-        nonlocal depth
-        depth -= 1
-
-    parser = expat.ParserCreate()
-    parser.StartDoctypeDeclHandler = doctype
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.Parse(data, True)
-    return lines
+    return load_xml(data, "SVG", watch), lines
 
 
 def _check_elements(count: int) -> None:
