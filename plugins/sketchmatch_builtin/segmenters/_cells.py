@@ -9,13 +9,15 @@ import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from pydantic import Field
 
-from sketchmatch.api import InvalidInputError, Reason
+from sketchmatch.api import InvalidInputError, Params, Reason
 from sketchmatch.model import FloatArray, OccupancyGrid
 from sketchmatch_builtin.segmenters._border import outer_border
 
 __all__ = [
     "TOLERANCE",
+    "FreeSpaceParams",
     "Mask",
     "closed",
     "components",
@@ -37,27 +39,37 @@ TOLERANCE = 0.75
 """In cells: the steps of a slanted border leave the straight line by up to √½ of a cell."""
 
 
-def free_cells(
-    grid: OccupancyGrid, threshold: int | None, keep_unknown: bool
-) -> tuple[Mask, tuple[int, int]]:
-    """Return a mask of the free cells, cropped to them, and the (x, y) of its first cell.
+class FreeSpaceParams(Params):
+    """What is free."""
 
-    Parameters
-    ----------
-    grid
-        The map.
-    threshold
-        In percent: known cells of less occupancy are free. None for 25, or what the map's own
-        file says.
-    keep_unknown
-        Whether what was saved as unknown stays so, whatever thresholds say.
+    free_threshold: int | None = Field(
+        None,
+        ge=1,
+        le=100,
+        description=(
+            "Known cells whose occupancy is below this are free; when left out 25, and for a "
+            "map of map_server the thresholds in its file, in whose place this counts."
+        ),
+        json_schema_extra={"unit": "%"},
+    )
+    keep_unknown: bool = Field(
+        True,
+        description=(
+            "The grey 205, with which map_server saves what nobody saw, stays unknown where "
+            "thresholds would call it free; false lets them decide."
+        ),
+    )
+
+
+def free_cells(grid: OccupancyGrid, params: FreeSpaceParams) -> tuple[Mask, tuple[int, int]]:
+    """Return a mask of the free cells, cropped to them, and the (x, y) of its first cell.
 
     Raises
     ------
     InvalidInputError
         With the path ``cells``, if none is free.
     """
-    picture = grid.picture
+    picture, threshold, keep_unknown = grid.picture, params.free_threshold, params.keep_unknown
     if picture is None or (threshold is None and keep_unknown):
         # Seen as unsigned, unknown is 255: one comparison is enough.
         free = grid.cells.view(np.uint8) < (_FREE if threshold is None else threshold)

@@ -12,11 +12,12 @@ import shapely
 from numpy.typing import NDArray
 from pydantic import Field
 
-from sketchmatch.api import InvalidInputError, Params, Reason, Segmentation, Segmenter
+from sketchmatch.api import InvalidInputError, Reason, Segmentation, Segmenter
 from sketchmatch.model import IntArray, OccupancyGrid, Scene, SceneObject
 from sketchmatch.model.limits import source_limits
 from sketchmatch_builtin.segmenters._cells import (
     TOLERANCE,
+    FreeSpaceParams,
     Mask,
     closed,
     components,
@@ -83,26 +84,9 @@ class OccupancyGridSegmenter(Segmenter):
     default = True
     sources = (OccupancyGrid,)
 
-    class Params(Params):
+    class Params(FreeSpaceParams):
         """What is free, what is too small to count, and how outlines are cleaned."""
 
-        free_threshold: int | None = Field(
-            None,
-            ge=1,
-            le=100,
-            description=(
-                "Known cells whose occupancy is below this are free; when left out 25, and for a "
-                "map of map_server the thresholds in its file, in whose place this counts."
-            ),
-            json_schema_extra={"unit": "%"},
-        )
-        keep_unknown: bool = Field(
-            True,
-            description=(
-                "The grey 205, with which map_server saves what nobody saw, stays unknown where "
-                "thresholds would call it free; false lets them decide."
-            ),
-        )
         min_size: float = Field(
             0.2,
             ge=0.0,
@@ -197,7 +181,7 @@ class OccupancyGridSegmenter(Segmenter):
 
     def segment(self, source: OccupancyGrid) -> Segmentation:
         """Return the holes of the free regions, in metres in the map's frame."""
-        free, corner = free_cells(source, self.params.free_threshold, self.params.keep_unknown)
+        free, corner = free_cells(source, self.params)
         rooms = list(_rooms(free, self.params.region_share))
         parts = [
             (mask, (x + left + corner[0], y + below + corner[1]))

@@ -9,11 +9,12 @@ import numpy as np
 import shapely
 from pydantic import Field
 
-from sketchmatch.api import InvalidInputError, Params, Reason, Segmentation, Segmenter
+from sketchmatch.api import InvalidInputError, Reason, Segmentation, Segmenter
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene, SceneObject
 from sketchmatch.model.limits import source_limits
 from sketchmatch_builtin.segmenters._cells import (
     TOLERANCE,
+    FreeSpaceParams,
     Mask,
     components,
     free_cells,
@@ -66,26 +67,9 @@ class RoomSegmenter(Segmenter):
     summary = "Rooms of a robot's occupancy grid, cut at the doorways."
     sources = (OccupancyGrid,)
 
-    class Params(Params):
+    class Params(FreeSpaceParams):
         """What is free, how wide doorways are, and what is too small to be a room."""
 
-        free_threshold: int | None = Field(
-            None,
-            ge=1,
-            le=100,
-            description=(
-                "Known cells whose occupancy is below this are free; when left out 25, and for a "
-                "map of map_server the thresholds in its file, in whose place this counts."
-            ),
-            json_schema_extra={"unit": "%"},
-        )
-        keep_unknown: bool = Field(
-            True,
-            description=(
-                "The grey 205, with which map_server saves what nobody saw, stays unknown where "
-                "thresholds would call it free; false lets them decide."
-            ),
-        )
         door_width: float = Field(
             1.2,
             gt=0.0,
@@ -126,7 +110,7 @@ class RoomSegmenter(Segmenter):
     def segment(self, source: OccupancyGrid) -> Segmentation:
         """Return the rooms, in metres in the map's frame."""
         params, cell = self.params, source.resolution
-        free, (left, below) = free_cells(source, params.free_threshold, params.keep_unknown)
+        free, (left, below) = free_cells(source, params)
         least = max(params.min_area / cell**2, 1.0)
         inside = _furnished(free, params.furniture / cell)
         rooms = divided(inside, params.door_width / cell, least)
