@@ -21,10 +21,9 @@ from sketchmatch_map_files import (
     PICTURE_SUFFIXES,
     MapFileError,
     find_picture,
+    find_yaml,
     parse,
     text_of,
-    yaml_in,
-    yaml_of,
 )
 from sketchmatch_proto.v1 import source_pb2
 
@@ -259,13 +258,10 @@ def file(
 
 def _map_yaml(path: Path) -> Path:
     """Return the YAML file of a map: a path itself, or beside it, or in it."""
-    if os.path.isdir(path):  # noqa: PTH112 (no error)
-        return yaml_in(path)
-    if path.suffix.lower() not in PICTURE_SUFFIXES:
-        return path
-    if (file := yaml_of(path)) is None:
+    found = find_yaml(path)
+    if found is None and path.suffix.lower() in PICTURE_SUFFIXES:
         raise MapFileError("is a picture that no .yaml beside it names; give the map's .yaml")
-    return file
+    return path if found is None else found[0]
 
 
 def _bytes(path: Path, field: str, origin: str = "") -> bytes:

@@ -10,6 +10,7 @@ first counts, and of several documents the first. Unlike there, ``~`` is no name
 from __future__ import annotations
 
 import codecs
+import os
 import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,10 +24,9 @@ __all__ = [
     "Document",
     "MapFileError",
     "find_picture",
+    "find_yaml",
     "parse",
     "text_of",
-    "yaml_in",
-    "yaml_of",
 ]
 
 YAML_SUFFIXES = (".yaml", ".yml")
@@ -114,43 +114,33 @@ def parse(text: str) -> Document:
     return read_document(text.removeprefix("\ufeff"))
 
 
-def yaml_in(folder: Path) -> Path:
-    """Return the one YAML file in a folder that describes a map.
+def find_yaml(path: Path) -> tuple[Path, tuple[str, ...]] | None:
+    """Return the YAML file of a map, and what there is to say of how it was found.
+
+    Parameters
+    ----------
+    path
+        Of that file, of the picture that one beside it names, or of the folder that holds one map.
+
+    Returns
+    -------
+    tuple or None
+        None where a path leads to no map.
 
     Raises
     ------
     MapFileError
-        If there is none, or more than one.
+        If a folder holds no map, or if it could be one of several.
     """
-    try:
-        found = [file for file in _yamls(folder) if _document_of(file) is not None]
-    except OSError as error:
-        raise MapFileError(f"cannot be read ({str(error.strerror).lower()})") from None
-    if not found:
-        raise MapFileError("is a folder without a map; give the .yaml that map_server saved")
-    if len(found) > 1:
-        raise MapFileError(f"is a folder of several maps; give one of them: {_named(found)}")
-    return found[0]
-
-
-def yaml_of(picture: Path) -> Path | None:
-    """Return the YAML file beside a picture that names it; None if there is none.
-
-    Of several the one that is called as the picture is counts.
-
-    Raises
-    ------
-    MapFileError
-        If several name it, and none is called so.
-    """
-    try:
-        found = [file for file in _yamls(picture.parent) if _names(file, picture)]
-    except (OSError, ValueError):
-        return None
-    own = [file for file in found if file.stem == picture.stem]
-    if len(found) > 1 and not own:
-        raise MapFileError(f"is the picture of several maps; give one of them: {_named(found)}")
-    return next(iter(own or found), None)
+    if os.path.isdir(path):  # noqa: PTH112 (no error)
+        file = _yaml_in(path)
+        return file, (f"{path} is a folder, and its map {file.name} was read",)
+    suffix = path.suffix.lower()
+    if suffix in YAML_SUFFIXES:
+        return path, ()
+    if suffix in PICTURE_SUFFIXES and (named := _yaml_of(path)) is not None:
+        return named, (f"{path.name} is the picture of a map, and {named.name} beside it was read",)
+    return None
 
 
 def find_picture(file: Path, document: Document) -> tuple[Path, tuple[str, ...]]:
@@ -180,6 +170,34 @@ def find_picture(file: Path, document: Document) -> tuple[Path, tuple[str, ...]]
                 f"beside {file.name} was taken",
             )
     return named, ()
+
+
+def _yaml_in(folder: Path) -> Path:
+    """Return the one YAML file in a folder that describes a map."""
+    try:
+        found = [file for file in _yamls(folder) if _document_of(file) is not None]
+    except OSError as error:
+        raise MapFileError(f"cannot be read ({str(error.strerror).lower()})") from None
+    if not found:
+        raise MapFileError("is a folder without a map; give the .yaml that map_server saved")
+    if len(found) > 1:
+        raise MapFileError(f"is a folder of several maps; give one of them: {_named(found)}")
+    return found[0]
+
+
+def _yaml_of(picture: Path) -> Path | None:
+    """Return the YAML file beside a picture that names it; None if there is none.
+
+    Of several the one that is called as the picture is counts.
+    """
+    try:
+        found = [file for file in _yamls(picture.parent) if _names(file, picture)]
+    except (OSError, ValueError):
+        return None
+    own = [file for file in found if file.stem == picture.stem]
+    if len(found) > 1 and not own:
+        raise MapFileError(f"is the picture of several maps; give one of them: {_named(found)}")
+    return next(iter(own or found), None)
 
 
 def _yamls(folder: Path) -> list[Path]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,16 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io.ros_bag import is_bag
 from sketchmatch.model import OccupancyGrid
-from sketchmatch_map_files import (
-    PICTURE_SUFFIXES,
-    YAML_SUFFIXES,
-    MapFileError,
-    find_picture,
-    parse,
-    text_of,
-    yaml_in,
-    yaml_of,
-)
+from sketchmatch_map_files import MapFileError, find_picture, find_yaml, parse, text_of
 
 if TYPE_CHECKING:
     from sketchmatch.io.ros_map import MapServerHeader
@@ -81,7 +71,7 @@ def map_files(path: Path, read: Callable[[Path, str], bytes]) -> MapFiles | None
         If there is a map, but several, or its YAML or its picture cannot be read or be used.
     """
     try:
-        found = _yaml(path)
+        found = None if is_bag(path) else find_yaml(path)
         if found is None:
             return _bare_map(path, read) if path.suffix.lower() == ".pgm" else None
         file, notes = found
@@ -103,21 +93,6 @@ def map_files(path: Path, read: Callable[[Path, str], bytes]) -> MapFiles | None
         name if name.isprintable() and len(name) <= _LONGEST_NAME else quoted(document.images[0])
     )
     return MapFiles(text, read(picture, f"{path}: image {shown}"), (*notes, *more))
-
-
-def _yaml(path: Path) -> tuple[Path, tuple[str, ...]] | None:
-    """Return a map's YAML file, and what there is to say of it; None if there is no map."""
-    if os.path.isdir(path):  # noqa: PTH112 (no error)
-        if is_bag(path):
-            return None
-        file = yaml_in(path)
-        return file, (f"{path} is a folder, and its map {file.name} was read",)
-    suffix = path.suffix.lower()
-    if suffix in YAML_SUFFIXES:
-        return path, ()
-    if suffix in PICTURE_SUFFIXES and (named := yaml_of(path)) is not None:
-        return named, (f"{path.name} is the picture of a map, and {named.name} beside it was read",)
-    return None
 
 
 # NumPy, Pillow and PyYAML wait until there is a map.
