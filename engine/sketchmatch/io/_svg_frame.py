@@ -15,17 +15,17 @@ import tinycss2
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.io._svg_tree import invalid
 
-__all__ = ["Frame", "css_transform", "fitted", "length", "view_box"]
+__all__ = ["NUMBER", "Frame", "css_transform", "fitted", "length", "view_box"]
 
-_LENGTH = re.compile(
-    r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(px|pt|pc|mm|cm|in|q|%|)\s*", re.IGNORECASE
-)
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
+"""Pattern of a number, in whatever case."""
+
+_LENGTH = re.compile(rf"\s*({NUMBER})(px|pt|pc|mm|cm|in|q|%|)\s*", re.IGNORECASE)
 _UNITS = {
     **{"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "in": 96.0},
     **{"mm": 96 / 25.4, "cm": 96 / 2.54, "q": 96 / 101.6},
 }
 _DEGREES = {"deg": 1.0, "rad": 180.0 / math.pi, "grad": 0.9, "turn": 360.0}
-_NUMBERS = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
 _ALIGN = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
 _ASPECT = re.compile(r"\s*(?:defer\s+)?x(Min|Mid|Max)Y(Min|Mid|Max)(?:\s+(meet|slice))?\s*")
 _KEYWORDS = {"left": (0, 0.0), "right": (0, 1.0), "top": (1, 0.0), "bottom": (1, 1.0)}
@@ -71,7 +71,7 @@ def length(text: str, along: float | None) -> float:
 
 def view_box(element: ElementTree.Element) -> Frame | None:
     """Return the part of the plane that an element shows, or None where it does not say so."""
-    numbers = [float(each) for each in _NUMBERS.findall(element.get("viewBox", ""))]
+    numbers = [float(each) for each in re.findall(NUMBER, element.get("viewBox", ""), re.I)]
     if len(numbers) != 4 or not all(map(math.isfinite, numbers)) or min(numbers[2:]) < 0.0:
         return None
     return Frame(*numbers)
@@ -131,7 +131,7 @@ def css_transform(
     x, y = _origin(said.get("transform-origin", "0 0"), size)
     if inner is not None:
         x, y = x + inner.x, y + inner.y
-    elif box in _OWN_BOXES and not _moves(matrix):
+    elif box in _OWN_BOXES and not _only_shifts(matrix):
         raise invalid(
             "", f"has a transform about its own box (transform-box: {box}); write it as a matrix"
         )
@@ -143,7 +143,7 @@ def css_transform(
 _Size = tuple[float | None, float | None]
 
 
-def _moves(matrix: Any) -> bool:
+def _only_shifts(matrix: Any) -> bool:
     return bool((matrix.a, matrix.b, matrix.c, matrix.d) == (1.0, 0.0, 0.0, 1.0))
 
 

@@ -22,7 +22,7 @@ from cssselect2 import parser as selector_parser
 from tinycss2 import color5
 
 from sketchmatch.errors import InvalidInputError
-from sketchmatch.io._svg_frame import css_transform, length
+from sketchmatch.io._svg_frame import NUMBER, css_transform, length
 from sketchmatch.io._svg_tree import invalid, tag_of
 
 __all__ = ["INITIAL", "Colour", "Look", "Styles"]
@@ -53,12 +53,10 @@ _PLAIN = re.compile(r"[^\"'\\/{}!(]*")
 _EMBEDDED = re.compile(r"url\(\s*[\"']?data:[^)]*\)", re.IGNORECASE)
 _URL = re.compile(r"""url\(\s*["']?([^"')]*)["']?\s*\)\s*(.*)""", re.IGNORECASE | re.DOTALL)
 _SCREEN = re.compile(r"\s*((only\s+)?(all|screen))?\s*", re.IGNORECASE)
-_SHARE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(%?)", re.IGNORECASE)
+_SHARE = re.compile(rf"({NUMBER})(%?)", re.IGNORECASE)
 
 # A number without a unit, as attributes may have it.
-_UNITLESS = re.compile(
-    r"(?<![\w.%+-])([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(?=[\s,]|$)", re.IGNORECASE
-)
+_UNITLESS = re.compile(rf"(?<![\w.%+-])({NUMBER})(?=[\s,]|$)", re.IGNORECASE)
 _CUSTOM = "--"
 # How long a value may become by the custom properties that it refers to, and how many these are.
 _LONGEST_VALUE, _MOST_REFERENCES = 1000, 16

@@ -49,7 +49,7 @@ from sketchmatch.io._svg_curves import (
     steps_of,
     subpaths_of,
 )
-from sketchmatch.io._svg_frame import Frame, css_transform, fitted, length, view_box
+from sketchmatch.io._svg_frame import NUMBER, Frame, css_transform, fitted, length, view_box
 from sketchmatch.io._svg_ink import pen_lines
 from sketchmatch.io._svg_style import INITIAL, Colour, Look, Styles
 from sketchmatch.io._svg_tree import LONGEST_CAUSE, invalid, named_element, tag_of
@@ -65,7 +65,7 @@ _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 _NAMES = ("aria-label", f"{_INKSCAPE}label", "{http://www.serif.com/}id", "data-name")
 _EXCALIDRAW = b"svg-source:excalidraw"
 _COMMAND = re.compile(r"([MLHVCSQTAZ])([^MLHVCSQTAZ]*)", re.IGNORECASE)
-_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
+_NUMBER = re.compile(NUMBER, re.IGNORECASE)
 _ARITY = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 1}
 _TOOLS_ID = re.compile(
     r"(path|line|polyline|polygon|rect|circle|ellipse|use|g|svg|svgid|xmlid|shape|stroke|object"
