@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from numbers import Number
 from typing import Any
 
-__all__ = ["cleaned_label"]
+import numpy as np
+
+from sketchmatch.errors import InvalidInputError, Reason, quoted
+
+__all__ = ["cleaned_label", "label_from"]
 
 # A terminal would obey these: ESC [ … letter, ESC ] … BEL or ESC \, and ESC with one character.
 _ESCAPES = re.compile(
@@ -14,6 +19,8 @@ _ESCAPES = re.compile(
     r"|(?:\x1b[\]P^_X]|[\x9d\x90\x9e\x9f\x98])[^\x07\x1b\x9c]*(?:\x07|\x1b\\|\x9c)"
     r"|\x1b[ -/]*[0-~]"
 )
+# Controls, and what is invisible and steers the text around it.
+_UNSEEN = ("Cc", "Cf")
 # Invisible, and yet part of words and of single pictures: joiners, and the tags in some flags.
 _KEPT = frozenset("\u200c\u200d") | frozenset(map(chr, range(0xE0020, 0xE0080)))
 
@@ -40,4 +47,23 @@ def cleaned_label(label: Any) -> str:
     return " ".join("".join(shown).split())
 
 
-_UNSEEN = ("Cc", "Cf")
+def label_from(given: Any) -> str:
+    """Return what people give as a label as text: they number objects, from 0 or as ``True``.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is neither text nor a number nor None.
+
+    Examples
+    --------
+    >>> [label_from(given) for given in ("desk", 0, True, None, float("nan"))]
+    ['desk', '0', 'True', '', '']
+    """
+    if isinstance(given, Number | np.bool_):
+        return str(given) if given == given else ""  # noqa: PLR0124 (nan, as in tables with gaps)
+    if given is None or isinstance(given, str):
+        return str(given or "")
+    raise InvalidInputError(
+        Reason.INVALID_FIELD, "label", f"is {quoted(given)}, which is no name; give text"
+    )

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from html import escape
-from numbers import Number
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -17,7 +16,7 @@ from shapely.validation import explain_validity
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model.arrays import FloatArray, IntArray, frozen_floats, sealed
 from sketchmatch.model.caching import cached_property
-from sketchmatch.model.labels import cleaned_label
+from sketchmatch.model.labels import cleaned_label, label_from
 from sketchmatch.model.text import listed, name, shortened
 
 __all__ = ["Edges", "Scene", "SceneObject"]
@@ -90,7 +89,7 @@ class SceneObject:
             frozen_floats(ring if (_signed_area(ring) > 0) == (k == 0) else ring[::-1])
             for k, ring in enumerate(arrays)
         )
-        return cls(oriented, _name(label))
+        return cls(oriented, label_from(label))
 
     @classmethod
     def from_polygon(cls, polygon: Any, label: Any = "") -> Self:
@@ -317,17 +316,6 @@ def _path(item: SceneObject) -> str:
     """Return an outline as SVG draws it."""
     rings = ("L".join(f"{x:.6g},{y:.6g}" for x, y in ring) for ring in item.rings)
     return "".join(f"M{ring}Z" for ring in rings)
-
-
-def _name(given: Any) -> str:
-    """Return a label as text: people number their objects, from 0 or as ``True``."""
-    if isinstance(given, Number | np.bool_):
-        return str(given) if given == given else ""  # noqa: PLR0124 (nan, as in tables with gaps)
-    if given is None or isinstance(given, str):
-        return str(given or "")
-    raise InvalidInputError(
-        Reason.INVALID_FIELD, "label", f"is {quoted(given)}, which is no name; give text"
-    )
 
 
 def _is_ring(polygon: Any) -> bool:
