@@ -22,6 +22,7 @@ __all__ = [
     "TOLERANCE",
     "Subpath",
     "flattened",
+    "signed_area",
     "size_of",
     "steps_of",
     "subpaths_of",
@@ -137,6 +138,15 @@ def _geometry(
 def size_of(curves: list[FloatArray]) -> float:
     """Return the larger side of a box around curves."""
     return float(np.ptp(np.concatenate(curves), axis=0).max())
+
+
+def signed_area(points: FloatArray) -> float:
+    """Return the area in a line that is closed, or will be, counter-clockwise positive.
+
+    What it goes around twice counts twice.
+    """
+    x, y = (points - points[0]).T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def flattened(curves: Subpath, tolerance: float) -> FloatArray:

@@ -13,6 +13,7 @@ from functools import reduce
 import numpy as np
 import shapely
 
+from sketchmatch.io._svg_curves import signed_area
 from sketchmatch.model import FloatArray
 
 __all__ = ["pen_lines"]
@@ -64,7 +65,7 @@ def pen_lines(rings: list[FloatArray], corners: list[int], evenodd: bool) -> lis
 def _middle(ring: FloatArray, corners: int) -> FloatArray | None:
     """Return the line in the middle of a ribbon from end to end, or None if it is no ribbon."""
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ring, axis=0).T))])
-    half, area = way[-1] / 2.0, abs(_area(ring))
+    half, area = way[-1] / 2.0, abs(signed_area(ring))
     if not 0.0 < 4.0 * area < half**2:
         return None
     width = (half - math.sqrt(half**2 - 4.0 * area)) / 2.0
@@ -76,7 +77,7 @@ def _middle(ring: FloatArray, corners: int) -> FloatArray | None:
         return None
     middle = (sides[0] + sides[1]) / 2.0
     size = float(np.ptp(middle, axis=0).max())
-    enclosed = abs(_area(np.concatenate([middle, middle[:1]])))
+    enclosed = abs(signed_area(middle))
     if math.dist(middle[0], middle[-1]) <= _GAP * size and enclosed > _ROUND * area:
         return middle
     return middle if corners >= _CORNERS else None
@@ -125,17 +126,11 @@ def _at(ring: FloatArray, way: FloatArray, shares: FloatArray) -> FloatArray:
     return np.stack([np.interp(along, way, x), np.interp(along, way, y)], axis=-1)
 
 
-def _area(ring: FloatArray) -> float:
-    """Return the area in a closed line, counter-clockwise positive; what it goes twice twice."""
-    x, y = (ring - ring[0]).T
-    return 0.5 * float(x[:-1] @ y[1:] - x[1:] @ y[:-1])
-
-
 def _outlines(rings: list[FloatArray], evenodd: bool) -> list[list[FloatArray]]:
     """Return for each ring the outlines of what it bounds from outside."""
     if len(rings) < 2 or len(rings) > _MOST_RINGS:
         return [[ring] for ring in rings]
-    areas = [_area(ring) for ring in rings]
+    areas = [signed_area(ring) for ring in rings]
     order = sorted(range(len(rings)), key=lambda k: -abs(areas[k]))
     polygons = [shapely.Polygon(ring) if len(ring) > 3 else shapely.Polygon() for ring in rings]
     tree = shapely.STRtree(polygons)

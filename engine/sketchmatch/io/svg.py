@@ -45,6 +45,7 @@ from sketchmatch.io._svg_curves import (
     TOLERANCE,
     Subpath,
     flattened,
+    signed_area,
     size_of,
     steps_of,
     subpaths_of,
@@ -585,7 +586,7 @@ def _like_paper(shape: _Shape, background: Colour) -> bool:
     return (
         shape.bare
         and shape.fill == background != ()
-        and any(_enclosed(_ends(subpath)) > 0.0 for subpath in shape.subpaths)
+        and any(signed_area(_ends(subpath)) != 0.0 for subpath in shape.subpaths)
     )
 
 
@@ -599,17 +600,12 @@ def _rectangular(shape: _Shape) -> bool:
     if len(shape.subpaths) != 1:
         return False
     x0, y0, x1, y1 = shape.box
-    share = _enclosed(_ends(shape.subpaths[0])) / max((x1 - x0) * (y1 - y0), 1e-300)
+    share = abs(signed_area(_ends(shape.subpaths[0]))) / max((x1 - x0) * (y1 - y0), 1e-300)
     return 1.0 - _ROUNDED <= share <= 1.0 + _ROUNDED
 
 
 def _ends(subpath: Subpath) -> FloatArray:
     return np.array([curve[0] for curve in subpath] + [subpath[-1][-1]])
-
-
-def _enclosed(points: FloatArray) -> float:
-    x, y = (points - points[0]).T
-    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
 
 
 def _without_twins(shapes: list[_Shape]) -> list[_Shape]:
@@ -641,7 +637,7 @@ def _lines(shape: _Shape, tolerance: float) -> list[FloatArray]:
         return lines
     x0, y0, x1, y1 = shape.box
     flat = _FLAT * max(x1 - x0, y1 - y0) ** 2
-    bounding = [k for k, line in enumerate(lines) if _enclosed(line) > flat]
+    bounding = [k for k, line in enumerate(lines) if abs(signed_area(line)) > flat]
     for k in bounding:
         if (lines[k][0] != lines[k][-1]).any():
             lines[k] = np.concatenate([lines[k], lines[k][:1]])
