@@ -58,33 +58,31 @@ class CocoReader(Reader):
         """Return the annotations of a picture as polygons, in pixels, y upwards."""
         document = mapping(load_json(decode_text(data)), "", _POLYGON, "an object")
         pictures = {
-            _key(image.get("id")): plain_name(image.get("file_name"))
+            plain_name(image.get("id")): plain_name(image.get("file_name"))
             for image in _items(document, "images")
         }
         names = {
-            _key(category.get("id")): plain_name(category.get("name"))
+            plain_name(category.get("id")): plain_name(category.get("name"))
             for category in _items(document, "categories")
         }
         by_picture: dict[str, list[tuple[int, dict[str, Any]]]] = {}
         for k, annotation in enumerate(_items(document, "annotations")):
-            by_picture.setdefault(_key(annotation.get("image_id")), []).append((k, annotation))
+            by_picture.setdefault(plain_name(annotation.get("image_id")), []).append(
+                (k, annotation)
+            )
         wanted = chosen_picture(
             {key: pictures.get(key, "") for key in (*pictures, *by_picture)}, by_picture, part
         )
         areas = Areas()
         for k, annotation in by_picture.get(wanted, []):
             area = _area(annotation, f"annotations[{k}]")
-            areas.add(area, names.get(_key(annotation.get("category_id")), ""))
+            areas.add(area, names.get(plain_name(annotation.get("category_id")), ""))
         return areas.polygon_set()
 
 
 def _items(document: dict[str, Any], key: str) -> list[dict[str, Any]]:
     items = sequence(document.get(key, []), key, _POLYGON, f"a list of {key}")
     return [mapping(item, f"{key}[{k}]", _POLYGON, "an object") for k, item in enumerate(items)]
-
-
-def _key(value: Any) -> str:
-    return plain_name(value)
 
 
 def _area(annotation: dict[str, Any], field: str) -> Any:
