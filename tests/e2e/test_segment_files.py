@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -56,6 +57,33 @@ def test_lines_and_overlay_come_beside_it(command_line, where, tmp_path):
     lines = done.stdout.splitlines()
     assert len(lines) >= len(json.loads(saved.read_text())["features"]) > 1
     assert picture.stat().st_size > 0
+
+
+def test_a_map_lies_under_its_objects_however_it_is_given(command_line, tmp_path):
+    for file in (LIVING_ROOM_MAP, LIVING_ROOM_MAP.with_suffix(".pgm")):
+        shutil.copy(file, tmp_path)
+    given = (tmp_path / LIVING_ROOM_MAP.name, tmp_path / "living_room.pgm", tmp_path)
+    pictures = []
+    for k, path in enumerate(given):
+        picture = tmp_path / f"{k}.png"
+        assert command_line("segment", path, "--overlay", picture).returncode == 0
+        pictures.append(picture.read_bytes())
+    assert pictures[1:] == pictures[:1] * 2
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a.pgm", "rooms/a.png"])
+def test_a_part_may_be_named_as_pictures_are(command_line, where, tmp_path, name):
+    file = tmp_path / "instances.json"
+    outlines = [(1, [0, 0, 4, 0, 4, 4]), (1, [9, 9, 13, 9, 13, 13]), (2, [0, 0, 8, 0, 8, 8])]
+    coco = {
+        "images": [{"id": 1, "file_name": name}, {"id": 2, "file_name": "b.jpg"}],
+        "annotations": [{"image_id": k, "segmentation": [outline]} for k, outline in outlines],
+    }
+    file.write_text(json.dumps(coco))
+    done = command_line("segment", f"{file}#{name}", *where)
+    assert done.returncode == 0, done.stderr
+    assert [line.split("\t")[3] for line in done.stdout.splitlines()[1:]] == ["8", "8"]
+    assert [len(each.rings) for each in read_scene(f"{file}#{name}").objects] == [1, 1]
 
 
 def test_a_bag_is_read_here_and_sent_to_a_server(command_line, where, tmp_path):

@@ -10,8 +10,8 @@ import numpy as np
 
 from sketchmatch.cli.display import facts
 from sketchmatch.cli.options import say
-from sketchmatch.io import read_source
-from sketchmatch.io.ros_bag import bag_and_topic, is_bag
+from sketchmatch.io.files import read_map_files
+from sketchmatch.io.ros_bag import bag_and_topic, is_bag, read_bag
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene, SceneObject, StrokeSet
 from sketchmatch.model.arrays import frozen_floats
 from sketchmatch.pictures.overlay import (
@@ -113,7 +113,7 @@ def _way(points: Sequence[Point]) -> FloatArray | None:
 
 def _grid(path: Path) -> OccupancyGrid | None:
     """Return the robot's map in a file, if it is one."""
-    if path.suffix.lower() not in {".yaml", ".yml"} and not is_bag(bag_and_topic(path)[0]):
-        return None
-    source = read_source(path)
-    return source if isinstance(source, OccupancyGrid) else None
+    if (files := read_map_files(path)) is not None:
+        return files.grid()
+    bag, topic = bag_and_topic(path)
+    return read_bag(bag, topic) if is_bag(bag) else None

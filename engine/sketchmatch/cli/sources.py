@@ -45,12 +45,12 @@ def source_of(path: Path, side: str = "") -> Source:
     if (files := read_map_files(path)) is not None:
         say_notes(side, files.notes, verbose=True)
         return Source(map_server_map=MapServerMap(yaml=files.yaml, image=files.picture))
-    if path.suffix.lower() in PICTURE_SUFFIXES:
-        if path.suffix.lower() == ".pgm":
+    file, part = file_and_part(path)
+    if not part and file.suffix.lower() in PICTURE_SUFFIXES:
+        if file.suffix.lower() == ".pgm":
             note = f"{path.name} is read as a drawing; for a robot's map give its .yaml"
             say_notes(side, [note], verbose=True)
-        return sources.image(read_bytes(path))
-    file, part = file_and_part(path)
+        return sources.image(read_bytes(file))
     if not is_read_here(file):
         return sources.file(read_bytes(file), name=file.name, part=part)
     source = read_source(path)

@@ -220,16 +220,16 @@ def read_map_files(path: Path) -> MapFiles | None:
         As :func:`read_source` does, but for what is wrong with the picture.
     """
     with _placed_in(path):
-        return map_files(path, _read)
+        return None if file_and_part(path)[1] else map_files(path, _read)
 
 
 def _decoded(path: Path, readers: _Readers | None) -> Source:
     bag, topic = bag_and_topic(path)
     if is_bag(bag):
         return read_bag(bag, topic)
-    if (files := map_files(path, _read)) is not None:
-        return files.grid()
     file, part = file_and_part(path)
+    if not part and (files := map_files(path, _read)) is not None:
+        return files.grid()
     if file.suffix.lower() in YAML_SUFFIXES:
         no_parts(part)
     return decode_file(file.name, _read(file, str(file)), part, readers)
