@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import PIL.Image
+import PIL.ImageChops
 import pytest
 
 from sketchmatch import read_scene
@@ -69,6 +70,14 @@ def test_the_demo_draws_the_answer(demo):
     assert f"the picture is in {demo.overlay}" in demo.stderr
     with PIL.Image.open(demo.overlay) as picture:
         assert (picture.format, picture.width) == ("PNG", 1600)
+
+
+def test_the_readme_shows_what_the_demo_draws(demo):
+    kept = LIVING_ROOM_MAP.with_name("living_room_match.png")
+    with PIL.Image.open(demo.overlay) as drawn, PIL.Image.open(kept) as shown:
+        assert shown.size == drawn.size
+        difference = PIL.ImageChops.difference(shown.convert("RGB"), drawn.convert("RGB"))
+    assert max(most for _, most in difference.getextrema()) < 64  # of a palette, not of other words
 
 
 def test_the_demo_asks_a_real_server_and_leaves_none_behind(demo):

@@ -164,6 +164,12 @@ def test_every_number_is_that_of_the_object_in_its_own_scene(drawn):
     assert drawn.legend() == [1, 4, 3, 2]
 
 
+def test_confidences_are_written_as_the_table_beside_writes_them(drawn):
+    draw_overlay(row([0, 1]), row([0, 1]), [OverlayMatch(0, 0, 0.9954), OverlayMatch(1, 1, 0.8)])
+    shares = [text for text, _ in drawn.texts if text.startswith("0.") or text.endswith("%")]
+    assert shares == ["0.995", "0.800"]
+
+
 def test_numbers_of_a_scene_by_itself_are_those_beside_its_partners(drawn):
     scene = row([1, 3, 0, 2])
     draw_scene(Scene.from_polygons([item.rings for item in scene.objects], ["a", "", "c", ""]))

@@ -168,7 +168,7 @@ def draw_entry(canvas: Canvas, entry: Entry, x: float, y: float, width: float) -
         start = right - 130.0 if entry.name else left
         end = min(start + 80.0, right - 50.0)
         _draw_bar(canvas, (start, y - 3.5, end, y + 3.5), share, entry.colour)
-        canvas.text((end + 10.0, y), f"{share:.0%}", 16.0, INK)
+        canvas.text((end + 10.0, y), f"{share:.3f}", 16.0, INK)
         right = start - 12.0
     if entry.name:
         canvas.text((left, y), canvas.truncated(entry.name, 16.0, right - left), 16.0, INK)
