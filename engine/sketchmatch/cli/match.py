@@ -22,12 +22,19 @@ __all__ = ["match"]
 def match(
     sketch: Annotated[
         Path,
-        typer.Argument(metavar="SKETCH", help="Sketch: .svg, .json, .excalidraw, .geojson, image."),
+        typer.Argument(
+            metavar="SKETCH",
+            help="Sketch: .svg, .json, .excalidraw, .geojson, image; FILE#PART names a part of it, "
+            "such as a frame.",
+        ),
     ],
     map_: Annotated[
         Path,
         typer.Argument(
-            metavar="MAP", help="Map: ROS map .yaml or its folder, .geojson, .dxf, .svg, image."
+            metavar="MAP",
+            help="Map: ROS map .yaml, its picture or folder, bag, .geojson, .dxf, .svg, image, "
+            "annotations, scene graph; `sketchmatch plugins list` shows all readers. FILE#PART "
+            "names a part of it, such as layers.",
         ),
     ],
     server: options.Server = None,
