@@ -297,3 +297,77 @@ def test_files_are_known_by_their_content_or_name(tmp_path):
     (tmp_path / "c.xml").write_text("<annotations/>")
     for name in ("a.json", "b.json", "c.xml"):
         assert read_source(tmp_path / name).polygons == ()
+
+
+def mask_of_coco(k, width, height):
+    size = {"size": [height, width], "counts": [0, width * height]}
+    return {"id": k, "image_id": 1, "category_id": 1, "segmentation": size}
+
+
+def coco_of(annotations):
+    return json.dumps({"images": [{"id": 1}], "annotations": annotations}).encode()
+
+
+def test_a_mask_alike_on_many_lines_costs_as_little_as_one_line():
+    with limited_to(SourceLimits(max_vertices=50_000)):
+        found = CocoReader().read(coco_of([mask_of_coco(k, 40_000, 900) for k in range(20)]))
+    assert len(found.polygons) == 20
+    assert objects(found)[0] == ("", 36e6, (0, -900, 40_000, 0))
+
+
+@pytest.mark.parametrize("reader", [CocoReader, CvatReader])
+def test_all_masks_together_may_have_so_many_runs(reader):
+    ones = [1] * 400
+    if reader is CocoReader:
+        of_20 = {"size": [19, 20], "counts": [*ones[:379], 1]}
+        data = coco_of([{"image_id": 1, "segmentation": of_20}] * 9)
+    else:
+        rle = ",".join(map(str, ones[:380]))
+        one = f'<mask label="a" left="0" top="0" width="19" height="20" rle="{rle}"/>'
+        data = f'<annotations><image id="0">{one * 9}</image></annotations>'.encode()
+    with limited_to(SourceLimits(max_vertices=10_000)):
+        assert len(reader().read(data).polygons) == 9
+    with (
+        limited_to(SourceLimits(max_vertices=4000)),
+        pytest.raises(
+            InvalidInputError,
+            match=r"and the masks before have .* more than the limit of 4000 vertices",
+        ),
+    ):
+        reader().read(data)
+
+
+def test_masks_lie_where_their_runs_say():
+    pixels = np.random.default_rng(5).random((9, 7)) < 0.7
+    pixels[4] = True
+    columns = np.flatnonzero(np.diff(pixels.T.ravel(), prepend=False, append=False))
+    counts = np.diff(np.concatenate([[0], columns, [pixels.size]])).tolist()
+    coco = coco_of([{"image_id": 1, "segmentation": {"size": [9, 7], "counts": counts}}])
+    given = labelme(shape("mask", [[0, 0], [6, 8]], "", mask=png(pixels)))
+    (first,), (second,) = objects(CocoReader().read(coco)), objects(given)
+    assert first[1:] == second[1:]
+    assert first[1] <= pixels.sum()
+
+
+@pytest.mark.parametrize("points", [3000, 30_000])
+def test_an_outline_that_is_all_crossings_is_refused_at_once(points):
+    scribble = np.random.default_rng(0).random((points, 2)).tolist()
+    with pytest.raises(InvalidInputError, match="crosses itself more than 10000 times; draw it"):
+        labelme(shape("polygon", scribble))
+
+
+def test_more_shapes_than_a_file_may_have_are_refused_before_they_are_looked_at():
+    box = {"image_id": 1, "bbox": [0, 0, 1, 1]}
+    with pytest.raises(InvalidInputError, match="has 1001 objects or more, more than the limit"):
+        CocoReader().read(coco_of([box] * 5000))
+    with (
+        limited_to(SourceLimits(max_vertices=4000)),
+        pytest.raises(InvalidInputError, match="has 401 shapes"),
+    ):
+        CocoReader().read(coco_of([box | {"bbox": [0, 0, 0, 0]}] * 401))
+
+
+def test_a_mask_of_cvat_has_as_many_pixels_as_a_picture_may():
+    mask = '<mask label="a" left="0" top="0" width="1000000000" height="1" rle="0,1000000000"/>'
+    with pytest.raises(InvalidInputError, match="more than the limit of 64 million pixels"):
+        CvatReader().read(f'<annotations><image id="0">{mask}</image></annotations>'.encode())

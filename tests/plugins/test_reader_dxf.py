@@ -9,6 +9,7 @@ import pytest
 from sketchmatch.api import InvalidInputError, Reason
 from sketchmatch.model.limits import SourceLimits, limited_to
 from sketchmatch_builtin.readers.dxf import DxfReader
+from tests.pace import within
 
 ezdxf = pytest.importorskip("ezdxf", reason="ezdxf is not installed")
 SQUARE = [(0, 0), (2000, 0), (2000, 1000), (0, 1000)]
@@ -188,3 +189,40 @@ def test_without_the_package_one_sentence_says_what_to_install(drawing, monkeypa
     monkeypatch.setitem(sys.modules, "ezdxf", None)
     with pytest.raises(InvalidInputError, match=r"pip install 'sketchmatch\[dxf\]'"):
         DxfReader().read(data)
+
+
+def test_counting_shapes_stops_far_above_what_is_allowed(drawing):
+    drawing.blocks.new("CHAIR").add_lwpolyline(SQUARE, close=True)
+    grid = {"row_count": 200, "column_count": 200, "row_spacing": 9, "column_spacing": 9}
+    drawing.modelspace().add_blockref("CHAIR", (0, 0), grid)
+    with limited_to(SourceLimits(max_objects=20)), pytest.raises(InvalidInputError) as caught:
+        read(drawing)
+    assert "has more than 100 closed shapes, and the limit is 20 objects" in str(caught.value)
+
+
+def test_hundreds_of_hatches_over_each_other_are_compared_soon(drawing):
+    for k in range(300):
+        hatch = drawing.modelspace().add_hatch()
+        side = 1.04**k
+        corners = [(0, 0), (side, 0), (side, side), (0, side)]
+        hatch.paths.add_polyline_path(corners, is_closed=True)
+    with within(4.0):
+        assert len(read(drawing).polygons) == 300
+
+
+def test_islands_in_islands_have_an_end(drawing):
+    hatch = drawing.modelspace().add_hatch()
+    for k in range(200):
+        corners = [(k, k), (999 - k, k), (999 - k, 999 - k), (k, 999 - k)]
+        hatch.paths.add_polyline_path(corners, is_closed=True)
+    with pytest.raises(InvalidInputError, match="islands in islands, more than 50 deep; draw it"):
+        read(drawing)
+
+
+def test_a_text_names_the_smallest_shape_around_it(drawing):
+    space = drawing.modelspace()
+    for radius in (5, 3, 1):
+        space.add_circle((0, 0), radius)
+    for name, x in (("inner", 0), ("middle", 2), ("outer", 4), ("nobody's", 9), ("too", 0.5)):
+        space.add_text(name, dxfattribs={"insert": (x, 0)})
+    assert [polygon.label for polygon in read(drawing).polygons] == ["outer", "middle", "inner too"]

@@ -12,6 +12,7 @@ from sketchmatch.pipeline.segment import segment
 from sketchmatch.pipeline.selection import Choice, resolve_segmenter
 from sketchmatch.registry import default_registry
 from sketchmatch_builtin.readers.excalidraw import ExcalidrawReader
+from tests.pace import within
 from tests.tools import ROOT
 
 CASES = ROOT.parent / "shared" / "data" / "cases" / "31-strokes-json"
@@ -171,3 +172,22 @@ def test_the_files_that_people_had_are_read_or_refused_as_what_they_are():
     assert len(read_source(CASES / "excalidraw.json").strokes) == 1
     with pytest.raises(InvalidInputError, match="elements has no shape in it"):
         read_source(CASES / "excalidraw.excalidraw")
+
+
+def test_groups_that_are_none_are_left_alone():
+    box = {"type": "rectangle", "id": "a", "x": 0, "y": 0, "width": 4, "height": 2}
+    text = {"type": "text", "text": "desk", "x": 9, "y": 9, "groupIds": ["g", ["h"], 5]}
+    for groups in (5, "g", [["g"]], {"g": 1}, None):
+        document = {"type": "excalidraw", "elements": [box | {"groupIds": groups}, text]}
+        (stroke,) = ExcalidrawReader().read(json.dumps(document).encode()).strokes
+        assert stroke.label == ""
+
+
+def test_thousands_of_texts_over_thousands_of_shapes_are_read_soon():
+    corner = [[0, 0], [4, 4], [0, 4]]
+    lines = [{"type": "line", "x": 9 * k, "y": 0, "points": corner} for k in range(3000)]
+    texts = [{"type": "text", "text": str(k), "x": 9 * k + 1, "y": 3} for k in range(3000)]
+    data = json.dumps({"type": "excalidraw", "elements": lines + texts}).encode()
+    with within(3.0):
+        strokes = ExcalidrawReader().read(data).strokes
+    assert [stroke.label for stroke in strokes] == [str(k) for k in range(3000)]

@@ -7,6 +7,7 @@ import pytest
 
 from sketchmatch.api import InvalidInputError
 from sketchmatch.model import SceneObject
+from sketchmatch.model.limits import SourceLimits, limited_to
 from sketchmatch_builtin.readers.scene_graph import SceneGraphReader
 
 UPRIGHT = {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0}
@@ -166,3 +167,13 @@ def test_a_fault_is_named_with_its_path_and_the_remedy(nodes, words):
     with pytest.raises(InvalidInputError) as caught:
         read(*nodes)
     assert words in str(caught.value)
+
+
+def test_an_edge_said_often_is_one_edge():
+    place = {"id": 2, "layer": 3, "attributes": {"position": [0, 0, 0], "distance": 1}}
+    room = {"id": 1, "layer": 4, "attributes": {"name": "hall"}}
+    edges = [{"source": 1, "target": 2}] * 100
+    document = {"layer_ids": [3, 4], "nodes": [room, place], "edges": edges}
+    with limited_to(SourceLimits(max_vertices=200)):
+        found = SceneGraphReader().read(json.dumps(document, separators=(",", ":")).encode())
+    assert [polygon.label for polygon in found.polygons] == ["hall"]

@@ -13,6 +13,7 @@ from sketchmatch.io import read_source
 from sketchmatch.io.svg import decode_svg
 from sketchmatch.model.limits import SourceLimits, limited_to
 from sketchmatch_builtin.segmenters.strokes import StrokeSegmenter
+from tests.pace import within
 
 CASES = Path(__file__).parents[3] / "shared" / "data" / "cases"
 needs_cases = pytest.mark.skipif(not CASES.is_dir(), reason=f"{CASES} is not here")
@@ -362,12 +363,18 @@ def test_a_shape_that_cannot_be_read_is_told_by_its_line():
         ),
         ("<style>" + "@media screen{" * 2000 + "}" * 2000 + "</style>", "is nested too deeply"),
         (f'<rect style="fill:{"(" * 5000}"/>', "is nested too deeply"),
-        ("<style>" + "/**/" * 500_001 + "</style>", "is longer than 2 million characters"),
+        ("<style>" + "/**/" * 250_001 + "</style>", "is longer than a million characters"),
         (
             "<style>g g g g g g rect{fill:none}</style>" + "<g>" * 99 + SMALL * 9 + "</g>" * 99,
             "too many rules",
         ),
         ("<style>" + "[a]{fill:red}" * 2000 + "</style>" + "<g/>" * 2000, "too many rules"),
+        (
+            f"<g style='{';'.join(f'--a{k}:1' for k in range(2000))}'>"
+            + "<g style='--b:1'/>" * 2000
+            + "</g>",
+            "too many custom properties",
+        ),
         (
             "<style>rect ~ rect{fill:none}</style>" + "<g/>" * 501,
             "selects elements by their siblings",
@@ -377,7 +384,7 @@ def test_a_shape_that_cannot_be_read_is_told_by_its_line():
             "selects elements by their siblings",
         ),
     ],
-    ids=range(8),
+    ids=range(9),
 )
 def test_a_style_sheet_meant_to_harm_is_refused(body, words):
     with pytest.raises(InvalidInputError, match=words) as caught:
@@ -579,3 +586,24 @@ def test_a_drawing_turned_and_stretched_by_css_is_read_so():
 def test_wrapped_labels_are_one_line():
     strokes = read_source(CASES / "41-label-newline/wrapped-title.svg").strokes
     assert [stroke.label for stroke in strokes] == ["writing desk", "shelf left side", "bed"]
+
+
+LONG = 100_000
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f"<style>a{{fill:red}}{'url(data:' * LONG}</style>",
+        f"<style media='{' ' * LONG}x'>rect{{fill:none}}</style>",
+        f"<style>@media {' ' * LONG}x{{rect{{fill:none}}}}</style>",
+        f"<g clip-path='url({' ' * LONG}x'/>",
+        f"<g transform-origin='{'1' * LONG}x'/>",
+        f"<g opacity='{'1' * LONG}x'/>",
+        f"<g stroke-width='{'1' * LONG}x'/>",
+    ],
+    ids=["data", "media", "at-media", "url", "origin", "share", "length"],
+)
+def test_a_long_value_is_looked_at_once(body):
+    with within(2.0):
+        assert boxes(body + DESK)[-1] == near([PLACE])[0]

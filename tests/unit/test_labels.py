@@ -11,6 +11,7 @@ from sketchmatch.io.geojson import decode_geojson
 from sketchmatch.io.stroke_json import decode_strokes
 from sketchmatch.model import LabelledPolygon, Scene, SceneObject, Stroke
 from sketchmatch.model.labels import cleaned_label
+from tests.pace import within
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
 CLEANED = {
@@ -73,3 +74,15 @@ def test_whoever_sets_a_label_it_is_cleaned():
     feature = {"type": "Polygon", "coordinates": [SQUARE]}
     feature = {"type": "Feature", "geometry": feature, "properties": {"name": raw}}
     assert decode_geojson(json.dumps(feature)).polygons[0].label == clean
+
+
+@pytest.mark.parametrize("opening", ["\x9d", "\x90", "\x1b]", "\x9b", "\x1b[", "\x1b "])
+def test_escape_sequences_that_never_end_are_looked_at_once(opening):
+    with within(2.0):
+        cleaned = cleaned_label(f"desk{opening * 100_000}")
+    assert cleaned.isprintable()
+    assert cleaned.startswith("desk")
+
+
+def test_an_escape_sequence_ends_where_another_begins():
+    assert cleaned_label("a\x9db\x9dc\x07d") == "abd"

@@ -17,10 +17,10 @@ from sketchmatch.io._svg_tree import invalid
 
 __all__ = ["NUMBER", "Frame", "css_transform", "fitted", "length", "view_box"]
 
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
-"""Pattern of a number, in whatever case."""
+NUMBER = r"[-+]?(?:\d++\.?+\d*+|\.\d++)(?:e[-+]?\d++)?+"
+"""Pattern of a number, in whatever case; it looks at a character once."""
 
-_LENGTH = re.compile(rf"\s*({NUMBER})(px|pt|pc|mm|cm|in|q|%|)\s*", re.IGNORECASE)
+_LENGTH = re.compile(rf"\s*+({NUMBER})(px|pt|pc|mm|cm|in|q|%|)\s*", re.IGNORECASE)
 _UNITS = {
     **{"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "in": 96.0},
     **{"mm": 96 / 25.4, "cm": 96 / 2.54, "q": 96 / 101.6},

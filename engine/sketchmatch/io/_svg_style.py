@@ -50,9 +50,10 @@ _RULES = {"nonzero": False, "evenodd": True}
 _LENGTHS = _GEOMETRY - {"d"}
 
 _PLAIN = re.compile(r"[^\"'\\/{}!(]*")
-_EMBEDDED = re.compile(r"url\(\s*[\"']?data:[^)]*\)", re.IGNORECASE)
-_URL = re.compile(r"""url\(\s*["']?([^"')]*)["']?\s*\)\s*(.*)""", re.IGNORECASE | re.DOTALL)
-_SCREEN = re.compile(r"\s*((only\s+)?(all|screen))?\s*", re.IGNORECASE)
+# Each looks at a character once: what is possessive never tries again with less.
+_EMBEDDED = re.compile(r"url\(\s*+[\"']?data:[^)]*+(?:\)|\Z)", re.IGNORECASE)
+_URL = re.compile(r"""url\(\s*+["']?([^"')]*+)["']?\s*+\)\s*+(.*)""", re.IGNORECASE | re.DOTALL)
+_SCREEN = re.compile(r"\s*+((only\s++)?(all|screen))?+\s*+", re.IGNORECASE)
 _SHARE = re.compile(rf"({NUMBER})(%?)", re.IGNORECASE)
 
 # A number without a unit, as attributes may have it.
@@ -62,7 +63,7 @@ _CUSTOM = "--"
 _LONGEST_VALUE, _MOST_REFERENCES = 1000, 16
 
 # A style sheet may be this long, and take this many tests of elements.
-_LONGEST, _MOST_TESTS = 2_000_000, 3_000_000
+_LONGEST, _MOST_TESTS = 1_000_000, 3_000_000
 # Selectors that look at an element's siblings are followed in drawings of this many elements.
 _FEW = 500
 _AROUND = re.compile(r"~(?!=)|:has\(|-of-type|:nth-")
@@ -130,6 +131,7 @@ class Styles:
         self._named = named
         self._matcher = cssselect2.Matcher()
         self._wrapped: dict[ElementTree.Element, cssselect2.ElementWrapper] = {}
+        self._passed_on = 0
         sheets = [
             "".join(element.itertext())
             for element in root.iter()
@@ -139,7 +141,7 @@ class Styles:
         ]
         text = _EMBEDDED.sub("url()", "\n".join(sheets))
         if len(text) > _LONGEST:
-            raise _costly("is longer than 2 million characters")
+            raise _costly("is longer than a million characters")
         try:
             nodes = tinycss2.parse_stylesheet(text, True, True)
             rules = [
@@ -256,6 +258,9 @@ class Styles:
         custom = inherited
         if named := {name: text for name, text, _ in said if name.startswith(_CUSTOM)}:
             custom = {**inherited, **named}
+            self._passed_on += len(custom)
+            if self._passed_on > _MOST_TESTS:
+                raise _costly("has too many custom properties for so large a drawing")
         values = ((name, _substituted(text, custom)) for name, text, _ in said if name in _KNOWN)
         return {name: text for name, text in values if _legal(name, text)}, custom
 

@@ -87,11 +87,11 @@ _MODES = ("trinary", "scale", "raw")
 _MANY = 0.01
 """As a share of all cells."""
 _MOST_LANDMARKS = 1000
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(\d++\.?+\d*+|\.\d++)([eE][+-]?\d++)?+", re.ASCII)
 _TRUE, _FALSE = ("true", "yes", "on", "y"), ("false", "no", "off", "n")
 _SAVED_PGM = re.compile(rb"P5\s+(?:#[^\n]*\n\s*)*\d+\s+\d+\s+255\s")
 _SAVED_GREYS = bytes((0, 205, 254, 255))
-_CREATOR = re.compile(rb"# CREATOR: [^\n]* (\d+\.\d+) m/pix")
+_CREATOR = re.compile(rb"^# CREATOR: [^\n]* (\d+\.\d+) m/pix", re.MULTILINE)
 _PLACES = ("pose", "position", "location", "centroid")
 _NAMES = ("name", "label")
 

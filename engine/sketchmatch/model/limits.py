@@ -139,8 +139,8 @@ def check_vertices(count: int, field: str, given: str = "") -> None:
         raise _beyond(field, given or f"has {count} vertices", shown, "max_vertices", "simplify it")
 
 
-def check_objects(count: int, field: str) -> None:
-    """Refuse a scene of too many objects.
+def check_objects(count: int, field: str, given: str = "") -> None:
+    """Refuse a scene of too many objects; ``given`` says how many, if not plainly.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def check_objects(count: int, field: str) -> None:
     if count > limit:
         shown = f"{_counted(limit)} objects"
         raise _beyond(
-            field, f"has {count} objects", shown, "max_objects", "leave out the small ones"
+            field, given or f"has {count} objects", shown, "max_objects", "leave out the small ones"
         )
 
 

@@ -61,8 +61,10 @@ def segment_side(
 
 
 def _with_notes(found: Segmentation, source: Source) -> Segmentation:
-    """Put what a file's reader noted before the segmenter's warnings."""
-    return replace(found, warnings=(*_notes(source), *found.warnings))
+    """Put what a file's reader noted before the warnings, unless the segmenter handed it on."""
+    warnings = tuple(map(cleaned_label, found.warnings))
+    notes = (note for note in _notes(source) if note not in warnings)
+    return replace(found, warnings=(*notes, *warnings))
 
 
 def _with_reasons(error: InvalidInputError, source: Source) -> InvalidInputError:

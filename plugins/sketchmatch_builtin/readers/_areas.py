@@ -10,9 +10,19 @@ import numpy as np
 import shapely
 
 from sketchmatch.api import InvalidInputError, Reason
-from sketchmatch.model import FloatArray, LabelledPolygon, PolygonSet
+from sketchmatch.model import FloatArray, IntArray, LabelledPolygon, PolygonSet
+from sketchmatch.model.limits import check_objects, check_vertices
 
-__all__ = ["Areas", "area_within", "box", "ellipse", "runs_area", "unfolded", "within_reach"]
+__all__ = [
+    "Areas",
+    "area_within",
+    "box",
+    "check_elements",
+    "ellipse",
+    "runs_area",
+    "unfolded",
+    "within_reach",
+]
 
 _CORNERS = 64
 _FAR = 1e15
@@ -20,6 +30,10 @@ _FAR = 1e15
 _STAIRS, _STAIRS_SHARE = 0.75, 0.02
 # Share of an area in other parts that nobody misses.
 _SPECK = 0.01
+# An outline may cross itself this often, and be looked at in so many pieces at once.
+_MOST_CROSSINGS, _PIECES = 10_000, 32
+# Vertices for which one element is allowed, and those that a run of pixels has.
+_VERTICES_OF_ELEMENT, _VERTICES_OF_RUN = 10, 4
 
 
 class Areas:
@@ -29,6 +43,7 @@ class Areas:
         self._found: list[tuple[shapely.Polygon, str]] = []
         self._left_out: Counter[str] = Counter()
         self._parts = 0
+        self._runs = 0
 
     def __len__(self) -> int:
         return len(self._found)
@@ -40,8 +55,25 @@ class Areas:
             self.leave_out("shapes without area")
             return
         largest = max(parts, key=lambda part: part.area)
+        found = len(self._found) + 1
+        check_objects(found, "", f"has {found} objects or more")
         self._parts += largest.area < (1.0 - _SPECK) * sum(part.area for part in parts)
         self._found.append((largest, label))
+
+    def add_runs(self, runs: IntArray, label: str, field: str, *, columns: bool) -> None:
+        """Take pixels as one object, given as runs along rows or columns: line, begin and end.
+
+        Raises
+        ------
+        InvalidInputError
+            If these, with all before, have too many.
+        """
+        merged = _merged(runs)
+        self._runs += len(merged)
+        check_vertices(
+            _VERTICES_OF_RUN * self._runs, field, f"and the masks before have {self._runs} runs"
+        )
+        self.add(runs_area(merged, columns=columns), label)
 
     def leave_out(self, what: str, count: int = 1) -> None:
         """Count what is no object, by what it is in the plural."""
@@ -85,7 +117,27 @@ def area_within(points: Any) -> Any:
     if len(ring) < 3:
         return shapely.Polygon()
     area = shapely.Polygon(ring)
-    return area if area.is_valid else shapely.make_valid(area)
+    if area.is_valid:
+        return area
+    _check_crossings(ring)
+    return shapely.make_valid(area)
+
+
+def _check_crossings(ring: FloatArray) -> None:
+    """Refuse a ring that crosses itself so often that its area would take minutes and gigabytes."""
+    sides = shapely.linestrings(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1))
+    tree, crossings = shapely.STRtree(sides), 0
+    for k in range(0, len(sides), _PIECES):
+        piece = sides[k : k + _PIECES]
+        # Each side meets itself and its neighbours.
+        crossings += tree.query(piece, predicate="intersects").shape[1] - 3 * len(piece)
+        if crossings > 2 * _MOST_CROSSINGS:
+            raise InvalidInputError(
+                Reason.INVALID_POLYGON,
+                "",
+                f"has an outline of {len(ring)} points that crosses itself more than "
+                f"{_MOST_CROSSINGS} times; draw it anew",
+            )
 
 
 def box(x0: float, y0: float, x1: float, y1: float, turn: float = 0.0) -> FloatArray:
@@ -100,14 +152,24 @@ def ellipse(x: float, y: float, rx: float, ry: float, turn: float = 0.0) -> Floa
     return _turned(np.column_stack([x + rx * np.cos(angles), y + ry * np.sin(angles)]), turn)
 
 
-def runs_area(runs: list[tuple[int, int, int]], *, columns: bool) -> Any:
-    """Return the area of pixels given as runs: the row, or column, and where it begins and ends."""
-    lines, begins, ends = np.array(runs, dtype=np.float64).reshape(-1, 3).T
-    within_reach(np.column_stack([lines, begins, lines, ends]))
-    if columns:
-        boxes = shapely.box(lines, begins, lines + 1.0, ends)
-    else:
-        boxes = shapely.box(begins, lines, ends, lines + 1.0)
+def check_elements(count: int, field: str, what: str) -> None:
+    """Refuse more elements than a file of the allowed vertices may have, before work is done."""
+    check_vertices(_VERTICES_OF_ELEMENT * count, field, f"has {count} {what}, each of ten vertices")
+
+
+def runs_area(runs: IntArray, *, columns: bool) -> Any:
+    """Return the area of pixels given as runs: the row, or column, and where it begins and ends.
+
+    Where a run has a fourth number, it is of all lines up to that one.
+    """
+    lines, begins, ends, *more = np.asarray(runs, dtype=np.float64).T
+    after = more[0] if more else lines + 1.0
+    within_reach(np.column_stack([lines, begins, after, ends]))
+    boxes = (
+        shapely.box(lines, begins, after, ends)
+        if columns
+        else shapely.box(begins, lines, ends, after)
+    )
     area = shapely.union_all(boxes)
     if area.is_empty:
         return area
@@ -115,22 +177,38 @@ def runs_area(runs: list[tuple[int, int, int]], *, columns: bool) -> Any:
     return shapely.simplify(area, min(_STAIRS, _STAIRS_SHARE * max(x1 - x0, y1 - y0)))
 
 
-def unfolded(counts: list[int], length: int) -> list[tuple[int, int, int]]:
+def unfolded(counts: list[int], length: int) -> IntArray:
     """Return the set runs of pixels that are counted along lines: line, begin and end of each.
 
     Examples
     --------
-    >>> unfolded([2, 3, 1], 3)  # not set, set, not set; three pixels a line
-    [(0, 2, 3), (1, 0, 2)]
+    >>> unfolded([2, 3, 1], 3).tolist()  # not set, set, not set; three pixels a line
+    [[0, 2, 3], [1, 0, 2]]
     """
-    runs = []
-    ends = np.cumsum(counts).tolist()
-    for start, end in zip(ends[::2], ends[1::2], strict=False):
-        line, first = divmod(start, length)
-        while line * length < end:
-            runs.append((line, first, min(end - line * length, length)))
-            line, first = line + 1, 0
-    return [run for run in runs if run[2] > run[1]]
+    bounds = np.cumsum(np.asarray(counts, dtype=np.int64))
+    pairs = bounds[: len(bounds) // 2 * 2].reshape(-1, 2)
+    starts, ends = pairs[pairs[:, 1] > pairs[:, 0]].T
+    first, last = starts // length, (ends - 1) // length
+    lines_of = last - first + 1
+    check_vertices(int(lines_of.sum()), "", f"has a mask of {lines_of.sum()} runs")
+    which = np.repeat(np.arange(len(starts)), lines_of)
+    before = np.cumsum(lines_of) - lines_of
+    lines = first[which] + np.arange(len(which)) - before[which]
+    begins = np.maximum(starts[which] - lines * length, 0)
+    until = np.minimum(ends[which] - lines * length, length)
+    return np.column_stack([lines, begins, until])
+
+
+def _merged(runs: IntArray) -> IntArray:
+    """Return runs with those made one that begin and end alike on lines next to each other."""
+    if len(runs) == 0:
+        return np.empty((0, 4), dtype=np.int64)
+    lines, begins, ends = runs[np.lexsort((runs[:, 0], runs[:, 2], runs[:, 1]))].T
+    new = np.ones(len(lines), dtype=np.bool_)
+    new[1:] = (np.diff(begins) != 0) | (np.diff(ends) != 0) | (np.diff(lines) != 1)
+    heads = np.flatnonzero(new)
+    tails = np.append(heads[1:], len(lines)) - 1
+    return np.column_stack([lines[heads], begins[heads], ends[heads], lines[tails] + 1])
 
 
 def _turned(points: FloatArray, turn: float) -> FloatArray:

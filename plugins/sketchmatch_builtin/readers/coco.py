@@ -16,10 +16,10 @@ from sketchmatch.api.documents import (
     sequence,
     shown,
 )
-from sketchmatch.model import PolygonSet
-from sketchmatch.model.limits import check_pixels, check_vertices
+from sketchmatch.model import IntArray, PolygonSet
+from sketchmatch.model.limits import check_pixels
 
-from ._areas import Areas, area_within, box, runs_area, unfolded
+from ._areas import Areas, area_within, box, check_elements, unfolded
 from ._pictures import chosen_picture
 
 __all__ = ["CocoReader"]
@@ -73,10 +73,20 @@ class CocoReader(Reader):
         wanted = chosen_picture(
             {key: pictures.get(key, "") for key in (*pictures, *by_picture)}, by_picture, part
         )
+        chosen = by_picture.get(wanted, [])
+        check_elements(sum(_parts(annotation) for _, annotation in chosen), "", "shapes")
         areas = Areas()
-        for k, annotation in by_picture.get(wanted, []):
-            area = _area(annotation, f"annotations[{k}]")
-            areas.add(area, names.get(plain_name(annotation.get("category_id")), ""))
+        for k, annotation in chosen:
+            name, field = (
+                names.get(plain_name(annotation.get("category_id")), ""),
+                f"annotations[{k}]",
+            )
+            mask = annotation.get("segmentation")
+            if isinstance(mask, dict):
+                at = f"{field}.segmentation"
+                areas.add_runs(_mask(mask, at), name, at, columns=True)
+            else:
+                areas.add(_area(annotation, field), name)
         return areas.polygon_set()
 
 
@@ -85,11 +95,14 @@ def _items(document: dict[str, Any], key: str) -> list[dict[str, Any]]:
     return [mapping(item, f"{key}[{k}]", _POLYGON, "an object") for k, item in enumerate(items)]
 
 
+def _parts(annotation: dict[str, Any]) -> int:
+    parts = annotation.get("segmentation")
+    return max(1, len(parts)) if isinstance(parts, list) else 1
+
+
 def _area(annotation: dict[str, Any], field: str) -> Any:
-    """Return the area of an annotation: of its segmentation, or else of its box."""
+    """Return the area of an annotation: of its polygons, or else of its box."""
     segmentation = annotation.get("segmentation")
-    if isinstance(segmentation, dict):
-        return _mask(segmentation, f"{field}.segmentation")
     if segmentation:
         parts = sequence(segmentation, f"{field}.segmentation", _POLYGON, "polygons")
         areas = [_ring(part, f"{field}.segmentation[{k}]") for k, part in enumerate(parts)]
@@ -111,8 +124,8 @@ def _ring(value: Any, field: str) -> Any:
     return area_within([number(v, f"{field}[{i}]", _POLYGON) for i, v in enumerate(flat)])
 
 
-def _mask(value: dict[str, Any], field: str) -> Any:
-    """Return the area of a mask as lengths of runs down the columns, from the left."""
+def _mask(value: dict[str, Any], field: str) -> IntArray:
+    """Return the runs of a mask, given as lengths of runs down the columns, from the left."""
     size = sequence(value.get("size"), f"{field}.size", _POLYGON, "[height, width]")
     sides = [int(number(v, f"{field}.size", _POLYGON)) for v in size]
     if len(sides) != 2 or min(sides) < 1:
@@ -128,8 +141,7 @@ def _mask(value: dict[str, Any], field: str) -> Any:
             f"{field}.counts",
             f"are of {sum(counts)} pixels, and the picture has {height * width}; save it again",
         )
-    check_vertices(4 * (len(counts) + width), field)
-    return runs_area(unfolded(counts, height), columns=True)
+    return unfolded(counts, height)
 
 
 def _counts(value: Any, field: str) -> list[int]:

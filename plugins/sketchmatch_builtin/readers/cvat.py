@@ -7,12 +7,14 @@ from collections.abc import Iterator
 from typing import NamedTuple
 from xml.etree import ElementTree
 
+import numpy as np
+
 from sketchmatch.api import InvalidInputError, Reader, Reason
 from sketchmatch.api.documents import load_xml, shown
-from sketchmatch.model import PolygonSet
-from sketchmatch.model.limits import check_vertices
+from sketchmatch.model import IntArray, PolygonSet
+from sketchmatch.model.limits import check_pixels
 
-from ._areas import Areas, area_within, box, ellipse, runs_area, unfolded
+from ._areas import Areas, area_within, box, check_elements, ellipse, unfolded, within_reach
 from ._pictures import chosen_picture
 
 __all__ = ["CvatReader"]
@@ -76,8 +78,10 @@ class CvatReader(Reader):
             names[key] = name
             if shape is not None:
                 shapes.setdefault(key, []).append(shape)
+        chosen = shapes.get(chosen_picture(names, shapes, part), [])
+        check_elements(len(chosen), "", "shapes")
         areas = Areas()
-        for shape in shapes.get(chosen_picture(names, shapes, part), []):
+        for shape in chosen:
             _add(areas, shape)
         return areas.polygon_set()
 
@@ -120,13 +124,13 @@ def _add(areas: Areas, shape: _Shape) -> None:
             turn = math.radians(_number(shape, "rotation", "0"))
             areas.add(area_within(ellipse(x, y, rx, ry, turn)), label)
         case "mask":
-            areas.add(_mask(shape), label)
+            areas.add_runs(_mask(shape), label, f"{field}.rle", columns=False)
         case _:
             areas.leave_out(_NO_AREA[element.tag])
 
 
-def _mask(shape: _Shape) -> object:
-    """Return the area of a mask: lengths of runs along the rows of its window, the first unset."""
+def _mask(shape: _Shape) -> IntArray:
+    """Return the runs of a mask: their lengths along the rows of its window, the first unset."""
     left, top, width, height = (
         int(_number(shape, key)) for key in ("left", "top", "width", "height")
     )
@@ -138,9 +142,9 @@ def _mask(shape: _Shape) -> object:
             field,
             f"is of {sum(counts)} pixels for {width} × {height}; export it from CVAT again",
         )
-    check_vertices(4 * (len(counts) + height), field)
-    runs = [(top + row, left + begin, left + end) for row, begin, end in unfolded(counts, width)]
-    return runs_area(runs, columns=False)
+    check_pixels(width, height, field)
+    within_reach([[left, top]])
+    return unfolded(counts, width) + np.array([top, left, left])
 
 
 def _number(shape: _Shape, key: str, otherwise: str = "") -> float:

@@ -28,6 +28,12 @@ _TOLERANCE = 1e-3
 _SPAN = 16
 # Lines of a file that a vertex takes at least.
 _LINES = 8
+# Closed shapes for each allowed object after which counting stops: a hatch is none of its own.
+_SHAPES_OF_OBJECT = 5
+# A hatch is compared with so many shapes, those nearest in area.
+_COMPARED = 20
+# How deep blocks lie in blocks, and the islands of a hatch in islands.
+_DEEPEST = 50
 # From this share of its convex hull on a block is what its closed shapes cover.
 _FILLED = 0.5
 # Two areas that share this much are one, drawn as an outline and as a hatch.
@@ -85,7 +91,11 @@ def _read(drawing: Any, part: str) -> PolygonSet:
         if _key(each.dxf.get("layer", "0")) in chosen and not each.dxf.get("invisible", 0)
     ]
     left_out: Counter[str] = Counter()
-    shapes = _without_doubles(list(_shapes(drawing, entities, left_out)))
+    most = _SHAPES_OF_OBJECT * source_limits().max_objects
+    found = list(islice(_shapes(drawing, entities, left_out), most + 1))
+    if len(found) > most:
+        raise _too_many(found, f"more than {most}")
+    shapes = _without_doubles(found)
     check_vertices(int(sum(shapely.get_num_coordinates(each.area) for each in shapes)), "")
     _check_count(shapes)
     factor, notes = _metres(drawing)
@@ -212,8 +222,8 @@ class _Sizes:
             )
 
     def _of(self, insert: Any, depth: int) -> int:
-        if depth > 50:
-            raise _invalid("has blocks in blocks, more than 50 deep; explode some")
+        if depth > _DEEPEST:
+            raise _invalid(f"has blocks in blocks, more than {_DEEPEST} deep; explode some")
         name = insert.dxf.get("name", "")
         if name not in self._known:
             block = self._blocks.get(name)
@@ -278,6 +288,10 @@ def _alternating(areas: list[Any]) -> Any:
     depths = []
     for area in areas:
         around = tree.query(area, predicate="within") if area.area > 0.0 else ()
+        if len(around) > _DEEPEST:
+            raise _invalid(
+                f"has a hatch with islands in islands, more than {_DEEPEST} deep; draw it anew"
+            )
         depths.append(sum(areas[j].area > area.area for j in around))
     covered: Any = shapely.Polygon()
     for depth in sorted(set(depths)):
@@ -345,8 +359,9 @@ def _without_doubles(shapes: list[_Shape]) -> list[_Shape]:
     for k, shape in enumerate(shapes):
         if shape.hatched:
             others = (shapes[j] for j in tree.query(shape.area).tolist() if j != k)
-            earlier = (o for o in others if not o.hatched or order[id(o)] < k)
-            if not any(_same(shape.area, other.area) for other in earlier):
+            earlier = [o for o in others if not o.hatched or order[id(o)] < k]
+            earlier.sort(key=lambda other: abs(other.area.area - shape.area.area))
+            if not any(_same(shape.area, other.area) for other in earlier[:_COMPARED]):
                 kept.append(shape)
     return sorted(kept, key=lambda shape: order[id(shape)])
 
@@ -362,18 +377,17 @@ def _same(one: Any, other: Any) -> bool:
 
 def _texts_in(shapes: list[_Shape], texts: Iterable[Any]) -> dict[int, str]:
     """Return the texts that lie in shapes, each in the smallest around it."""
-    tree = shapely.STRtree([shape.area for shape in shapes])
-    names: dict[int, list[str]] = {}
-    for each in texts:
-        insert = each.dxf.get("insert")
-        if insert is None:
-            continue
-        place = shapely.Point(insert.x, insert.y)
-        around = [int(k) for k in tree.query(place) if shapes[k].area.contains(place)]
-        if around:
-            k = min(around, key=lambda k: shapes[k].area.area)
-            names.setdefault(k, []).append(each.plain_text())
-    return {k: " ".join(said) for k, said in names.items()}
+    placed = [each for each in texts if each.dxf.get("insert") is not None]
+    places = np.array([(each.dxf.insert.x, each.dxf.insert.y) for each in placed]).reshape(-1, 2)
+    left = np.arange(len(placed))
+    names: dict[int, str] = {}
+    for k in sorted(range(len(shapes)), key=lambda k: float(shapes[k].area.area)):
+        shapely.prepare(shapes[k].area)
+        inside = shapely.contains_xy(shapes[k].area, places[left])
+        if inside.any():
+            names[k] = " ".join(placed[i].plain_text() for i in left[inside])
+            left = left[~inside]
+    return names
 
 
 def _layer_name(layer: str) -> str:
@@ -397,13 +411,17 @@ def _counted(shapes: list[_Shape]) -> str:
 def _check_count(shapes: list[_Shape]) -> None:
     limit = source_limits().max_objects
     if len(shapes) > limit:
-        raise InvalidInputError(
-            Reason.LIMIT_EXCEEDED,
-            "",
-            f"has {len(shapes)} closed shapes, more than the limit of {limit} objects; choose "
-            f"layers as in FILE#LAYER,… ({_counted(shapes)}), or raise limits.max_objects "
-            "(SKETCHMATCH_LIMITS__MAX_OBJECTS)",
-        )
+        raise _too_many(shapes, str(len(shapes)))
+
+
+def _too_many(shapes: list[_Shape], count: str) -> InvalidInputError:
+    return InvalidInputError(
+        Reason.LIMIT_EXCEEDED,
+        "",
+        f"has {count} closed shapes, and the limit is {source_limits().max_objects} objects; "
+        f"choose layers as in FILE#LAYER,… ({_counted(shapes)}), or raise limits.max_objects "
+        "(SKETCHMATCH_LIMITS__MAX_OBJECTS)",
+    )
 
 
 def _invalid(problem: str) -> InvalidInputError:

@@ -23,7 +23,7 @@ from sketchmatch.api.documents import (
 from sketchmatch.model import FloatArray, Stroke, StrokeSet
 from sketchmatch.model.limits import check_vertices
 
-from ._areas import box, ellipse, within_reach
+from ._areas import box, check_elements, ellipse, within_reach
 
 __all__ = ["ExcalidrawReader"]
 
@@ -100,6 +100,7 @@ class ExcalidrawReader(Reader):
                 _STROKE, "type", f"is {shown(kind)}; give a drawing of type excalidraw"
             )
         elements = list(_elements(document))
+        check_elements(len(elements), "elements", "elements")
         frames = {each.id: each.text("name") for each in elements if each.kind in _FRAMES}
         inside = _in_frame(elements, frames, part)
         shapes = [each for each in inside if each.kind in _DRAWN and _visible(each)]
@@ -249,29 +250,44 @@ def _names(
     texts: Sequence[_Element], shapes: Sequence[_Element], outlines: Sequence[FloatArray]
 ) -> dict[int, list[str]]:
     """Return the texts of each shape that has some, in their order."""
-    hulls = [shapely.MultiPoint(outline).convex_hull for outline in outlines]
+    hulls = np.array([shapely.MultiPoint(outline).convex_hull for outline in outlines])
+    places, tree = _Places(shapes), shapely.STRtree(hulls)
     names: dict[int, list[str]] = {}
     for each in texts:
-        k = _named(each, shapes, hulls)
+        k = places.named(each, tree)
         if k is not None and (said := each.text("originalText") or each.text("text")):
             names.setdefault(k, []).append(said)
     return names
 
 
-def _named(each: _Element, shapes: Sequence[_Element], hulls: Sequence[Any]) -> int | None:
-    """Return which shape a text is the name of: bound to it, grouped with it, or over it."""
-    container = each.data.get("containerId")
-    if container:
-        return next((k for k, shape in enumerate(shapes) if shape.id == container), None)
+class _Places:
+    """Which shape a text is the name of."""
+
+    def __init__(self, shapes: Sequence[_Element]) -> None:
+        self._by_id: dict[str, int] = {}
+        self._by_group: dict[str, list[int]] = {}
+        for k, shape in enumerate(shapes):
+            self._by_id.setdefault(shape.id, k)
+            for group in _groups(shape):
+                self._by_group.setdefault(group, []).append(k)
+
+    def named(self, text: _Element, hulls: shapely.STRtree) -> int | None:
+        """Return the shape that a text is bound to, grouped with alone, or lies over; or None."""
+        container = text.data.get("containerId")
+        if container:
+            return self._by_id.get(container) if isinstance(container, str) else None
+        for group in _groups(text):
+            members = self._by_group.get(group, [])
+            if len(members) == 1:
+                return members[0]
+        x = text.number("x") + text.number("width", 0.0) / 2
+        y = text.number("y") + text.number("height", 0.0) / 2
+        found = hulls.query(shapely.Point(x, y), predicate="within")
+        areas = {int(k): hulls.geometries[k].area for k in np.sort(found)}
+        return min((k for k in areas if areas[k] > 0.0), key=areas.__getitem__, default=None)
+
+
+def _groups(each: _Element) -> Sequence[str]:
+    """Return the groups that an element is in, the innermost first."""
     groups = each.data.get("groupIds")
-    for group in groups if isinstance(groups, list) else ():
-        members = [
-            k for k, shape in enumerate(shapes) if group in (shape.data.get("groupIds") or ())
-        ]
-        if len(members) == 1:
-            return members[0]
-    x = each.number("x") + each.number("width", 0.0) / 2
-    y = each.number("y") + each.number("height", 0.0) / 2
-    middle = shapely.Point(x, y)
-    over = [k for k, hull in enumerate(hulls) if hull.area > 0.0 and hull.contains(middle)]
-    return min(over, key=lambda k: hulls[k].area, default=None)
+    return [group for group in groups if isinstance(group, str)] if isinstance(groups, list) else ()

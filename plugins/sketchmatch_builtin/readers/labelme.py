@@ -20,10 +20,10 @@ from sketchmatch.api.documents import (
     sequence,
     shown,
 )
-from sketchmatch.model import FloatArray, PolygonSet
-from sketchmatch.model.limits import check_pixels, check_vertices
+from sketchmatch.model import FloatArray, IntArray, PolygonSet
+from sketchmatch.model.limits import check_pixels
 
-from ._areas import Areas, area_within, box, ellipse, runs_area
+from ._areas import Areas, area_within, box, check_elements, ellipse, within_reach
 
 __all__ = ["LabelmeReader"]
 
@@ -64,6 +64,7 @@ class LabelmeReader(Reader):
         no_parts(part)
         document = mapping(load_json(decode_text(data)), "", _POLYGON, "an object with shapes")
         shapes = sequence(document.get("shapes"), "shapes", _POLYGON, "a list of shapes")
+        check_elements(len(shapes), "shapes", "shapes")
         areas = Areas()
         for k, shape in enumerate(shapes):
             _add(areas, mapping(shape, f"shapes[{k}]", _POLYGON, "a shape"), f"shapes[{k}]")
@@ -83,7 +84,8 @@ def _add(areas: Areas, shape: dict[str, Any], field: str) -> None:
             x, y = points[0]
             areas.add(area_within(ellipse(x, y, radius, radius)), label)
         case "mask" if len(points) == 2:
-            areas.add(_mask(shape.get("mask"), points[0], f"{field}.mask"), label)
+            at = f"{field}.mask"
+            areas.add_runs(_mask(shape.get("mask"), points[0], at), label, at, columns=False)
         case "rectangle" | "circle" | "mask":
             raise InvalidInputError(
                 _POLYGON, f"{field}.points", f"is a list of {len(points)}; give two for a {kind}"
@@ -109,18 +111,14 @@ def _points(value: Any, field: str) -> FloatArray:
     return np.array(rows, dtype=np.float64).reshape(-1, 2)
 
 
-def _mask(value: Any, corner: FloatArray, field: str) -> Any:
-    """Return the area of a mask, a picture in base64 whose first pixel lies at a corner."""
-    import shapely
-
-    pixels = _pixels(value, field)
-    padded = np.pad(pixels, ((0, 0), (1, 1))).astype(np.int8)
-    rows, begins = np.nonzero(np.diff(padded, axis=1) == 1)
-    _, ends = np.nonzero(np.diff(padded, axis=1) == -1)
-    check_vertices(4 * len(rows), field)
-    runs = list(zip(rows.tolist(), begins.tolist(), ends.tolist(), strict=True))
-    area = runs_area(runs, columns=False)
-    return shapely.transform(area, lambda points: points + np.floor(corner))
+def _mask(value: Any, corner: FloatArray, field: str) -> IntArray:
+    """Return the runs of a mask, a picture in base64 whose first pixel lies at a corner."""
+    x, y = np.floor(within_reach(corner)[0]).astype(np.int64)
+    padded = np.pad(_pixels(value, field), ((0, 0), (1, 1))).astype(np.int8)
+    steps = np.diff(padded, axis=1)
+    rows, begins = np.nonzero(steps == 1)
+    _, ends = np.nonzero(steps == -1)
+    return np.column_stack([rows + y, begins + x, ends + x])
 
 
 def _pixels(value: Any, field: str) -> Any:

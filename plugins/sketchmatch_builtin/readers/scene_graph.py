@@ -24,7 +24,7 @@ from sketchmatch.api.documents import (
 from sketchmatch.model import FloatArray, PolygonSet
 from sketchmatch.model.limits import check_vertices
 
-from ._areas import Areas, area_within, ellipse, within_reach
+from ._areas import Areas, area_within, check_elements, ellipse, within_reach
 
 __all__ = ["SceneGraphReader"]
 
@@ -90,6 +90,7 @@ class SceneGraphReader(Reader):
         wanted = _wanted(nodes, part)
         classes = _classes(document)
         places = _places_of_rooms(document, nodes) if _ROOMS in wanted else {}
+        check_elements(sum(node.kind in wanted for node in nodes), "nodes", "objects")
         areas = Areas()
         for node in nodes:
             if node.kind in wanted:
@@ -226,7 +227,7 @@ def _places_of_rooms(document: dict[str, Any], nodes: list[_Node]) -> dict[Any, 
     """Return what the places of each room cover."""
     rooms = {node.id for node in nodes if node.kind == _ROOMS}
     places = {node.id: node for node in nodes if node.kind == _PLACES}
-    covered: dict[Any, list[Any]] = {}
+    within: dict[Any, dict[Any, None]] = {}
     edges = sequence(document.get("edges", []), "edges", _POLYGON, "a list of edges")
     for k, item in enumerate(edges):
         edge = mapping(item, f"edges[{k}]", _POLYGON, "an edge")
@@ -238,12 +239,11 @@ def _places_of_rooms(document: dict[str, Any], nodes: list[_Node]) -> dict[Any, 
                 and isinstance(place, int | str)
                 and place in places
             ):
-                covered.setdefault(room, []).append(_place(places[place]))
-    check_vertices(
-        sum(shapely.get_num_coordinates(area) for each in covered.values() for area in each),
-        "nodes",
-    )
-    return covered
+                within.setdefault(room, {})[place] = None
+    areas = {key: _place(places[key]) for key in {key for each in within.values() for key in each}}
+    sizes = {key: int(shapely.get_num_coordinates(area)) for key, area in areas.items()}
+    check_vertices(sum(sizes[key] for each in within.values() for key in each), "nodes")
+    return {room: [areas[key] for key in each] for room, each in within.items()}
 
 
 def _place(node: _Node) -> Any:
