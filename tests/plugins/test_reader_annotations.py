@@ -325,13 +325,13 @@ def test_all_masks_together_may_have_so_many_runs(reader):
         rle = ",".join(map(str, ones[:380]))
         one = f'<mask label="a" left="0" top="0" width="19" height="20" rle="{rle}"/>'
         data = f'<annotations><image id="0">{one * 9}</image></annotations>'.encode()
-    with limited_to(SourceLimits(max_vertices=10_000)):
+    with limited_to(SourceLimits(max_vertices=40_000)):
         assert len(reader().read(data).polygons) == 9
     with (
-        limited_to(SourceLimits(max_vertices=4000)),
+        limited_to(SourceLimits(max_vertices=10_000)),
         pytest.raises(
             InvalidInputError,
-            match=r"and the masks before have .* more than the limit of 4000 vertices",
+            match=r"and the masks before have .* more than the limit of 10000 vertices",
         ),
     ):
         reader().read(data)
@@ -371,3 +371,17 @@ def test_a_mask_of_cvat_has_as_many_pixels_as_a_picture_may():
     mask = '<mask label="a" left="0" top="0" width="1000000000" height="1" rle="0,1000000000"/>'
     with pytest.raises(InvalidInputError, match="more than the limit of 64 million pixels"):
         CvatReader().read(f'<annotations><image id="0">{mask}</image></annotations>'.encode())
+
+
+def test_all_masks_of_labelme_together_have_as_many_pixels_as_a_picture_may():
+    mask = shape("mask", [[0, 0], [9, 9]], mask=png(np.ones((10, 10))))
+    with limited_to(SourceLimits(max_pixels=300)):
+        assert len(labelme(mask, mask, mask).polygons) == 3
+        with pytest.raises(InvalidInputError, match="masks before have 400 pixels, more than the"):
+            labelme(mask, mask, mask, mask)
+
+
+def test_a_mask_that_is_noise_is_refused_at_once():
+    noise = np.random.default_rng(0).random((300, 300)) < 0.5
+    with pytest.raises(InvalidInputError, match="runs of pixels, and the limit is 10000; smooth"):
+        labelme(shape("mask", [[0, 0], [299, 299]], mask=png(noise)))

@@ -28,6 +28,8 @@ __all__ = [
 
 # Values that a vertex takes at most, with its share of everything around it.
 _VALUES = 8
+# An element of XML takes the memory of so many.
+_VALUES_OF_ELEMENT = 4
 _DEEPEST = 200
 _LONGEST_CAUSE = 100
 _LISTED = 6
@@ -215,7 +217,7 @@ def _counting() -> Callable[[Mapping[str, str], int], None]:
 
     def count(attributes: Mapping[str, str], _line: int) -> None:
         nonlocal values
-        values += 1 + sum(1 + text.count(",") for text in attributes.values())
+        values += _VALUES_OF_ELEMENT + sum(1 + text.count(",") for text in attributes.values())
         check_vertices(values // _VALUES, "", f"has {values} values")
 
     return count

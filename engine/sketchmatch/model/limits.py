@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import cache
 
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model.sources import Image, OccupancyGrid, PolygonSet, Source, StrokeSet
@@ -81,7 +82,12 @@ _in_force: ContextVar[SourceLimits | None] = ContextVar("source_limits", default
 
 def source_limits(otherwise: SourceLimits | None = None) -> SourceLimits:
     """Return the limits in force; where nobody put any in force ``otherwise``, or the defaults."""
-    return _in_force.get() or otherwise or SourceLimits()
+    return _in_force.get() or otherwise or _defaults()
+
+
+@cache
+def _defaults() -> SourceLimits:
+    return SourceLimits()
 
 
 @contextmanager

@@ -11,7 +11,7 @@ import shapely
 
 from sketchmatch.api import InvalidInputError, Reason
 from sketchmatch.model import FloatArray, IntArray, LabelledPolygon, PolygonSet
-from sketchmatch.model.limits import check_objects, check_vertices
+from sketchmatch.model.limits import check_objects, check_pixels, check_vertices, source_limits
 
 __all__ = [
     "Areas",
@@ -32,8 +32,8 @@ _STAIRS, _STAIRS_SHARE = 0.75, 0.02
 _SPECK = 0.01
 # An outline may cross itself this often, and be looked at in so many pieces at once.
 _MOST_CROSSINGS, _PIECES = 10_000, 32
-# Vertices for which one element is allowed, and those that a run of pixels has.
-_VERTICES_OF_ELEMENT, _VERTICES_OF_RUN = 10, 4
+# Vertices for which one element, or run of pixels, is allowed, and runs that one mask may have.
+_VERTICES_OF_ELEMENT, _MOST_RUNS = 10, 10_000
 
 
 class Areas:
@@ -43,7 +43,7 @@ class Areas:
         self._found: list[tuple[shapely.Polygon, str]] = []
         self._left_out: Counter[str] = Counter()
         self._parts = 0
-        self._runs = 0
+        self._runs = self._pixels = 0
 
     def __len__(self) -> int:
         return len(self._found)
@@ -69,11 +69,32 @@ class Areas:
             If these, with all before, have too many.
         """
         merged = _merged(runs)
+        if len(merged) > _MOST_RUNS:
+            raise InvalidInputError(
+                Reason.LIMIT_EXCEEDED,
+                field,
+                f"is a mask of {len(merged)} runs of pixels, and the limit is {_MOST_RUNS}; "
+                "smooth it, or save it as a polygon",
+            )
         self._runs += len(merged)
         check_vertices(
-            _VERTICES_OF_RUN * self._runs, field, f"and the masks before have {self._runs} runs"
+            _VERTICES_OF_ELEMENT * self._runs, field, f"and the masks before have {self._runs} runs"
         )
         self.add(runs_area(merged, columns=columns), label)
+
+    def check_pixels(self, width: int, height: int, field: str) -> None:
+        """Refuse a mask, before it is unpacked, that with all before has too many pixels."""
+        check_pixels(width, height, field)
+        self._pixels += width * height
+        limit = source_limits().max_pixels
+        if self._pixels > limit:
+            raise InvalidInputError(
+                Reason.LIMIT_EXCEEDED,
+                field,
+                f"and the masks before have {self._pixels} pixels, more than the limit of {limit}; "
+                "save them as polygons, or raise limits.max_pixels "
+                "(SKETCHMATCH_LIMITS__MAX_PIXELS)",
+            )
 
     def leave_out(self, what: str, count: int = 1) -> None:
         """Count what is no object, by what it is in the plural."""

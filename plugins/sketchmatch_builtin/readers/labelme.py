@@ -21,7 +21,6 @@ from sketchmatch.api.documents import (
     shown,
 )
 from sketchmatch.model import FloatArray, IntArray, PolygonSet
-from sketchmatch.model.limits import check_pixels
 
 from ._areas import Areas, area_within, box, check_elements, ellipse, within_reach
 
@@ -85,7 +84,7 @@ def _add(areas: Areas, shape: dict[str, Any], field: str) -> None:
             areas.add(area_within(ellipse(x, y, radius, radius)), label)
         case "mask" if len(points) == 2:
             at = f"{field}.mask"
-            areas.add_runs(_mask(shape.get("mask"), points[0], at), label, at, columns=False)
+            areas.add_runs(_mask(areas, shape.get("mask"), points[0], at), label, at, columns=False)
         case "rectangle" | "circle" | "mask":
             raise InvalidInputError(
                 _POLYGON, f"{field}.points", f"is a list of {len(points)}; give two for a {kind}"
@@ -111,17 +110,17 @@ def _points(value: Any, field: str) -> FloatArray:
     return np.array(rows, dtype=np.float64).reshape(-1, 2)
 
 
-def _mask(value: Any, corner: FloatArray, field: str) -> IntArray:
+def _mask(areas: Areas, value: Any, corner: FloatArray, field: str) -> IntArray:
     """Return the runs of a mask, a picture in base64 whose first pixel lies at a corner."""
     x, y = np.floor(within_reach(corner)[0]).astype(np.int64)
-    padded = np.pad(_pixels(value, field), ((0, 0), (1, 1))).astype(np.int8)
+    padded = np.pad(_pixels(areas, value, field), ((0, 0), (1, 1))).astype(np.int8)
     steps = np.diff(padded, axis=1)
     rows, begins = np.nonzero(steps == 1)
     _, ends = np.nonzero(steps == -1)
     return np.column_stack([rows + y, begins + x, ends + x])
 
 
-def _pixels(value: Any, field: str) -> Any:
+def _pixels(areas: Areas, value: Any, field: str) -> Any:
     from PIL import Image as Picture
 
     problem = "is no picture in base64; save the file with labelme again"
@@ -129,7 +128,7 @@ def _pixels(value: Any, field: str) -> Any:
         raise InvalidInputError(_POLYGON, field, f"is {shown(value)}; give a picture in base64")
     try:
         with Picture.open(BytesIO(base64.b64decode(value)), formats=["PNG"]) as picture:
-            check_pixels(*picture.size, field)
+            areas.check_pixels(*picture.size, field)
             return np.asarray(picture.convert("L")) > 0
     except InvalidInputError:
         raise
