@@ -63,12 +63,13 @@ def test_labelme_points_and_lines_are_left_out_with_a_note():
     found = labelme(
         shape("line", [[0, 0], [1, 1]]),
         shape("linestrip", [[0, 0], [1, 1]]),
+        shape("linestring", [[0, 0], [1, 1]]),
         shape("point", [[0, 0]]),
         shape("polygon", [[0, 0], [1, 1]]),
     )
     assert found.polygons == ()
     assert found.notes == (
-        "Left out because they enclose no area or are no objects: lines (2), points (1), "
+        "Left out because they enclose no area or are no objects: lines (3), points (1), "
         "shapes without area (1).",
     )
 

@@ -191,3 +191,12 @@ def test_thousands_of_texts_over_thousands_of_shapes_are_read_soon():
     with within(3.0):
         strokes = ExcalidrawReader().read(data).strokes
     assert [stroke.label for stroke in strokes] == [str(k) for k in range(3000)]
+
+
+def test_a_note_with_an_odd_name_is_told_once():
+    boxes = [element("rectangle", x=200 * k) for k in range(2)]
+    source = read(*boxes, element("\ud800"))
+    segmenter = resolve_segmenter(default_registry(), Choice(), source)
+    found = segment(source, segmenter, default_registry(), "sketch.stroke_set")
+    odd = "elements of type \N{REPLACEMENT CHARACTER} (1)."
+    assert found.warnings == (f"No objects, and left out: {odd}",)

@@ -32,6 +32,7 @@ _NO_AREA = {
     "points": "points",
     "line": "lines",
     "linestrip": "lines",
+    "linestring": "lines",
 }
 
 
