@@ -201,6 +201,7 @@ def test_a_fault_is_one_sentence_with_its_place(file, text, sentence):
         ("MAX_BYTES", "1", "is no setting; did you mean SKETCHMATCH_LIMITS__MAX_BYTES?"),
         ("LIMITS_MAX_BYTES", "1", "is no setting; did you mean SKETCHMATCH_LIMITS__MAX_BYTES?"),
         ("LIMITS__MAX_BYTES", "0", "is 0; it should be greater than or equal to 1"),
+        ("LIMITS__MAX_BYTES", "[" * 99_999, "is '[[[[[[[[[["),
         ("LIMITS__MAX_BYTES", "1" * 5000, "is '1111111111111111111111111111111111111111111111"),
         ("PROFILE", "best", "is 'best', which is no profile; choose one of: fast, learned, proof"),
         ("PIPELINE__SEARCHER", '{"nmae": 1}', ": nmae is no setting; did you mean SKETCHMATCH_PIP"),
@@ -213,11 +214,17 @@ def test_a_bad_variable_is_named(monkeypatch, variable, value, sentence):
     assert str(error).startswith(f"SKETCHMATCH_{variable}{joint}{sentence}")
 
 
+DEEP = "has tables or lists in each other, more than 50 deep"
+
+
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
         (lambda path: path.write_bytes(b"\xff"), "is not UTF-8 text; save it as UTF-8"),
         (lambda path: path.mkdir(), "is a directory; give a file in it"),
+        (lambda path: path.symlink_to("/dev/zero"), "has more than 1024 KiB; give a configuration"),
+        (lambda path: path.write_text(f"a = {'[' * 9999}"), f"{DEEP}; give a configuration"),
+        (lambda path: path.write_text(f"[{'a.' * 60}a]"), f"{DEEP}; give a configuration"),
     ],
 )
 def test_a_file_that_cannot_be_read_is_refused(tmp_path, make, sentence):
@@ -377,6 +384,8 @@ def test_check_finds_distributions_that_are_named_in_vain(file, monkeypatch, tex
         ("unix-abstract:sketchmatch", ""),
         ("localhost", "have a port, as in localhost:50051"),
         ("::1", "have brackets around an IPv6 address"),
+        (f"127.0.0.1:{'9' * 5000}", "end with a port from 0 to 65535"),
+        ("a\0b:80", "begin with a host"),
         ("fe80::1:50051", "have brackets around an IPv6 address"),
         ("[]:50051", "begin with a host"),
         ("a b:50051", "begin with a host"),

@@ -9,6 +9,7 @@ __all__ = ["address_fault"]
 _LOCAL = re.compile(r"unix(?:-abstract)?:(.*)", re.S)
 _URL = re.compile(r"[a-z][a-z0-9+.-]*://", re.I)
 _PORTS = 65_535
+_DIGITS = 5
 _LONGEST_PATH = 107
 
 
@@ -43,7 +44,8 @@ def _file_fault(path: str) -> str:
 def _network_fault(address: str) -> str:
     host, colon, port = address.rpartition(":")
     bracketed = host.startswith("[") and host.endswith("]")
-    numbered = port.isascii() and port.isdecimal() and int(port) <= _PORTS
+    numbered = port.isascii() and port.isdecimal() and len(port) <= _DIGITS
+    numbered = numbered and int(port) <= _PORTS
     faults = (
         (_URL.match(address), "be no URL but HOST:PORT, as in 127.0.0.1:50051"),
         (not colon, f"have a port, as in {address or '127.0.0.1'}:50051"),
@@ -52,7 +54,7 @@ def _network_fault(address: str) -> str:
             "have brackets around an IPv6 address, as in [::1]:50051",
         ),
         (
-            not host.strip("[]") or host.split() != [host],
+            not host.strip("[]") or host.split() != [host] or not host.isprintable(),
             "begin with a host, as in 127.0.0.1:50051, or 0.0.0.0:50051 for all addresses",
         ),
         (not numbered, f"end with a port from 0 to {_PORTS}, as in {host}:50051"),

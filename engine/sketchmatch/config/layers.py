@@ -41,6 +41,10 @@ _NO_SETTINGS = (_NAMING_FILE, "SKETCHMATCH_DEBUG")
 _SECTION = "__"
 _OWN_ALONE = PluginRules.of(allow=())
 _BUILTIN = Path(__file__).with_name("builtin.toml")
+# A file may be a pipe, as of a shell's <(…), but no endless device.
+_MOST_BYTES = 1024 * 1024
+_DEEPEST = 50
+_TOO_DEEP = f"has tables or lists in each other, more than {_DEEPEST} deep; give a configuration"
 
 
 class Origin(StrEnum):
@@ -84,7 +88,7 @@ def value_of(text: str) -> Any:
     """
     try:
         return json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return text
 
 
@@ -256,7 +260,16 @@ def _usual_places() -> tuple[Path, ...]:
 
 def _parsed(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        with path.open("rb") as file:
+            data = file.read(_MOST_BYTES + 1)
+        if len(data) > _MOST_BYTES:
+            problem = f"has more than {_MOST_BYTES // 1024} KiB; give a configuration"
+        elif _is_deep(values := tomllib.loads(data.decode("utf-8-sig"))):
+            problem = _TOO_DEEP
+        else:
+            return values
+    except RecursionError:
+        problem = _TOO_DEEP
     except tomllib.TOMLDecodeError as error:
         what, _, place = str(error).partition(" (at ")
         where = place.rstrip(")").replace("end of document", "its end")
@@ -268,6 +281,15 @@ def _parsed(path: Path) -> dict[str, Any]:
     except OSError as error:
         problem = f"cannot be read ({(error.strerror or str(error)).lower()}); check the path"
     raise InvalidInputError(Reason.INVALID_FILE, str(path), problem)
+
+
+def _is_deep(values: Any) -> bool:
+    """Whether tables and lists are in each other deeper than any setting is."""
+    level = [values]
+    for _ in range(_DEEPEST):
+        inner = (each.values() if isinstance(each, dict) else each for each in level)
+        level = [item for each in inner for item in each if isinstance(item, dict | list)]
+    return bool(level)
 
 
 def _path_of(variable: str) -> tuple[str, ...] | None:
