@@ -60,6 +60,7 @@ _WITHIN_MACHINE = ("unix:", "unix-abstract:", "vsock:")
 _HOST_AND_PORT = re.compile(
     r"(?:dns:(?://[^/]*/)?|ipv[46]:)?(?P<host>\[[^\]]*\]|[^:/\s]*)(?::(?P<port>\d+))?"
 )
+_DIGITS = 5
 _THIS_MACHINE = {"localhost", "localhost.localdomain", "ip6-localhost", "ip6-loopback"}
 
 
@@ -77,7 +78,7 @@ def check_address(address: str, encrypted: bool) -> None:
         If it is a URL, lacks a port where there is no default one, as there is for TLS, or names
         no file that can be a socket.
     """
-    if not isinstance(address, str) or not address.strip():
+    if not isinstance(address, str) or not address.strip() or not address.isprintable():
         raise _refused(address, "give host and port, as in 'localhost:50051'")
     file = _FILE.fullmatch(address)
     if file is not None and not 0 < len(os.fsencode(file[1])) <= _LONGEST_PATH:
@@ -92,7 +93,8 @@ def check_address(address: str, encrypted: bool) -> None:
         raise _refused(address, "give host and port, as in 'localhost:50051' or '[::1]:50051'")
     if parts["port"] is None and not encrypted:
         raise _refused(address, f"add the port, as in '{address}:50051'")
-    if parts["port"] is not None and not 0 < int(parts["port"]) < 1 << 16:
+    port = parts["port"] or "1"
+    if len(port) > _DIGITS or not 0 < int(port) < 1 << 16:
         raise _refused(address, "give a port from 1 to 65535")
 
 
