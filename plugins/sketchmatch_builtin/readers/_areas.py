@@ -146,7 +146,7 @@ def area_within(points: Any) -> Any:
 
 def _check_crossings(ring: FloatArray) -> None:
     """Refuse a ring that crosses itself so often that its area would take minutes and gigabytes."""
-    sides = shapely.linestrings(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1))
+    sides: Any = shapely.linestrings(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1))
     tree, crossings = shapely.STRtree(sides), 0
     for k in range(0, len(sides), _PIECES):
         piece = sides[k : k + _PIECES]

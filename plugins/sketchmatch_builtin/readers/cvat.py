@@ -144,7 +144,8 @@ def _mask(shape: _Shape) -> IntArray:
         )
     check_pixels(width, height, field)
     within_reach([[left, top]])
-    return unfolded(counts, width) + np.array([top, left, left])
+    placed: IntArray = unfolded(counts, width) + np.array([top, left, left])
+    return placed
 
 
 def _number(shape: _Shape, key: str, otherwise: str = "") -> float:
