@@ -149,7 +149,7 @@ def _notes(nodes: list[_Node], wanted: set[str], part: str) -> Iterator[str]:
         for other in sorted(set(_PARTS) - wanted):
             count = sum(node.kind == other for node in nodes)
             if count:
-                yield f"The graph has {count} {other} too; FILE#{other} reads them."
+                yield f"The graph holds {other} too ({count}); FILE#{other} reads them."
 
 
 def _classes(document: dict[str, Any]) -> Mapping[int, str]:
