@@ -19,6 +19,8 @@ from tests import processes
 from tests.processes import Terminal
 from tests.processes import sketchmatch as run
 
+pytestmark = pytest.mark.slow
+
 ROOM = (LIVING_ROOM_SKETCH, LIVING_ROOM_MAP)
 ENDLESS = (
     *("--searcher", "easm", "--time-budget", "60"),
@@ -31,7 +33,6 @@ import ctypes, os
 print("noise at import")
 from sketchmatch.api import Similarity, hookimpl
 
-pytestmark = pytest.mark.slow
 class Noisy(Similarity):
     '''Noise.'''
     name, summary = "noisy", "Prints."
