@@ -751,6 +751,7 @@ def large(request, tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_a_request_that_is_too_large_is_refused_over_grpc(small_server, large):
     with Client(small_server) as client:
         with pytest.raises(InvalidRequestError, match=r"send fewer|make it smaller") as raised:

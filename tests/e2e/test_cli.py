@@ -121,6 +121,7 @@ def test_a_pipe_gets_tab_separated_lines_and_nothing_else(where):
     assert ESCAPE not in done.stdout
 
 
+@pytest.mark.slow
 def test_a_terminal_shows_the_search_while_it_runs_and_then_a_table(where):
     terminal = Terminal("match", *ROOM, *where, *LONG, "--time-budget", "5")
     terminal.wait_for("searching")
@@ -152,6 +153,7 @@ def test_a_label_that_looks_like_markup_is_shown_as_it_is(command, tmp_path):
         assert label in terminal.shown
 
 
+@pytest.mark.slow
 def test_a_pipe_stays_clean_while_the_terminal_shows_the_search():
     terminal = Terminal("match", *ROOM, *LONG, "--time-budget", "4", "--json", stdout=False)
     terminal.wait_for("searching")
@@ -273,6 +275,7 @@ def test_fewer_and_more_objects_in_the_sketch(command_line, where, uneven):
     assert list(fewer.unmatched_map_objects) == list(more.unmatched_sketch_objects) == [3]
 
 
+@pytest.mark.slow
 def test_the_table_says_how_many_are_without_a_partner(uneven):
     four, three = uneven
     terminal = Terminal("match", four, three)
@@ -360,6 +363,7 @@ def test_plugins_list_takes_one_kind(command_line, where):
     assert len(algorithms) == 6
 
 
+@pytest.mark.slow
 def test_plugins_list_shows_parameters_on_a_terminal():
     terminal = Terminal("plugins", "list")
     assert terminal.end()[0] == 0
@@ -383,6 +387,7 @@ def test_plugins_show_is_what_the_catalogue_says_of_one(command_line, where):
     ]
 
 
+@pytest.mark.slow
 def test_plugins_show_is_readable_on_a_terminal():
     terminal = Terminal("plugins", "show", "exact")
     assert terminal.end()[0] == 0
@@ -463,6 +468,7 @@ def test_strokes_are_drawn_and_warned_about_alike_whoever_segments_them(tmp_path
         assert "left out" in answers[0][1]
 
 
+@pytest.mark.slow
 def test_plugins_list_says_what_became_of_each_plugin(strangers):
     algorithms, _, plugins, readers = tables(run("plugins", "list", env=strangers))
     assert ["dxf", ".dxf"] in [line[:2] for line in readers]
@@ -474,6 +480,7 @@ def test_plugins_list_says_what_became_of_each_plugin(strangers):
     assert "no licence" in states["broken-plugins"][2]
 
 
+@pytest.mark.slow
 def test_the_configuration_shows_in_the_lists(strangers, tmp_path):
     file = tmp_path / "sketchmatch.toml"
     file.write_text(
@@ -489,6 +496,7 @@ def test_the_configuration_shows_in_the_lists(strangers, tmp_path):
     assert "parameter\tpopulation\tinteger | null\t77\t" in shown
 
 
+@pytest.mark.slow
 def test_a_name_in_two_kinds_needs_the_kind(strangers):
     done = run("plugins", "show", "exact", env=strangers)
     assert_one_line(done, ExitCode.INVALID_INPUT, "'exact'", "searcher and a similarity", "--kind")
@@ -496,6 +504,7 @@ def test_a_name_in_two_kinds_needs_the_kind(strangers):
     assert "A [b]name[/b] of another kind." in done.stdout
 
 
+@pytest.mark.slow
 def test_plugins_reference_writes_the_page_of_any_distribution(strangers):
     page = run("plugins", "reference", "--distribution", "acme-plugins", env=strangers).stdout
     assert page.startswith("# Algorithms of acme-plugins\n")
@@ -506,6 +515,7 @@ def test_plugins_reference_writes_the_page_of_any_distribution(strangers):
 # serve ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_serve_takes_its_limits_from_options():
     limits = ("--max-request-mib", "2", "--max-matches", "3", "--max-time-budget", "1.5")
     with processes.server(*limits) as running, Client(running.address) as client:
@@ -523,6 +533,7 @@ def test_serve_refuses_limits_that_let_nothing_pass(command_line, option, value)
     assert_one_line(command_line("serve", option, value), 2, option)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("address", ["nowhere.invalid:1", "256.0.0.1:1"])
 def test_serve_refuses_an_address_that_is_none(address):
     assert_one_line(run("serve", "--address", address), 2, "cannot be listened on")
@@ -582,6 +593,7 @@ def test_a_server_that_is_not_there_is_exit_code_3(command_line, arguments):
     assert_one_line(done, ExitCode.SERVER_UNAVAILABLE, "127.0.0.1:9", "start it, or check")
 
 
+@pytest.mark.slow
 def test_a_busy_server_is_exit_code_3_as_well(command_line):
     with processes.server("--max-matches", "1") as running:
         other = Terminal("match", *ROOM, *LONG, "--server", running.address)

@@ -198,6 +198,7 @@ def client_of(*arguments):
         yield client
 
 
+@pytest.mark.slow
 def test_a_server_takes_its_file_and_options_over_it(mine):
     sketch = sources.polygons(SQUARES)
     with client_of("--config", str(mine), "--max-matches", "3") as client:
@@ -221,6 +222,7 @@ def test_a_server_takes_its_file_and_options_over_it(mine):
         assert all(item.source for item in offered.algorithms if item.name == "easm")
 
 
+@pytest.mark.slow
 def test_a_server_reads_its_file_again_on_sighup_and_keeps_to_options(mine):
     sketch = sources.polygons(SQUARES)
     options = ("--config", str(mine), "--max-matches", "3")

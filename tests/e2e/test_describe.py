@@ -57,6 +57,7 @@ def document(done):
 # describe ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_pipe_gets_a_line_for_each_pair_counted_from_0(boxes):
     head, *rows = lines(run("describe", boxes))
     assert head == ["a", "b", "phrase", "degree", "a_label", "b_label"]
@@ -74,6 +75,7 @@ def test_labels_come_with_the_pairs(command_line):
     assert rows[0][4:] == ["sideboard", "round table"]
 
 
+@pytest.mark.slow
 def test_a_terminal_gets_a_table_counted_from_1():
     terminal = Terminal("describe", LIVING_ROOM_SKETCH)
     assert terminal.end()[0] == 0
@@ -139,6 +141,7 @@ def test_out_saves_an_archive_or_a_table_of_the_same_numbers(command_line, boxes
     assert (np.array([row[4:] for row in table], dtype=float) == rows).all()
 
 
+@pytest.mark.slow
 def test_plot_draws_the_scene_and_its_histograms(command_line, tmp_path):
     for source in ROOM:
         done = command_line("describe", source, "--plot", tmp_path / "x.png")
@@ -152,6 +155,7 @@ def test_plot_draws_the_scene_and_its_histograms(command_line, tmp_path):
             assert len(picture.getcolors(10**6)) > 50
 
 
+@pytest.mark.slow
 def test_a_plot_of_all_relations_says_nothing(boxes, tmp_path):
     assert len(lines(run("describe", boxes, "--plot", tmp_path / "x.png"))) == 4
 
@@ -159,6 +163,7 @@ def test_a_plot_of_all_relations_says_nothing(boxes, tmp_path):
 # relate -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_relate_lists_the_most_similar_first():
     head, *rows = lines(run("relate", *ROOM))
     assert head[:7] == ["a", "b", "c", "d", "similarity", "rotation_degrees", "dilation"]
@@ -168,6 +173,7 @@ def test_relate_lists_the_most_similar_first():
     assert rows[0][7]
 
 
+@pytest.mark.slow
 def test_relate_shows_a_table_on_a_terminal():
     terminal = Terminal("relate", *ROOM, "--limit", "3")
     assert terminal.end()[0] == 0
@@ -273,6 +279,7 @@ def test_a_target_that_cannot_be_written_is_exit_code_2(command_line, boxes, opt
     assert len(done.stderr.splitlines()) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["describe", "relate"])
 def test_ctrl_c_ends_a_long_one_soon(tmp_path, command):
     spots = [(5 * (k % 18), 5 * (k // 18)) for k in range(320)]

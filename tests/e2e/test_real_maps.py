@@ -55,6 +55,7 @@ def runs(request):
     return results
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", ["whole", "cropped"])
 def test_the_search_ends_at_least_as_high_as_the_truth(runs, setting):
     reached = [r[setting]["confidence"] >= r[setting]["truth"] - 1e-9 for r in runs]

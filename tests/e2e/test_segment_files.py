@@ -122,6 +122,7 @@ def test_a_bad_value_in_the_environment_is_one_sentence(command_line, monkeypatc
     )
 
 
+@pytest.mark.slow
 def test_serve_takes_its_limits_on_sources_from_options(command_line, tmp_path):
     with processes.server("--max-pixels", "1000", "--max-objects", "2") as running:
         done = command_line("segment", LIVING_ROOM_MAP, "--server", running.address)

@@ -44,7 +44,9 @@ def where(request):
 
 def test_the_command_line_leaves_objects_out(command_line, files, place, where):
     options = ("--profile", "learned", "--allow-unmatched", "--json", *where)
-    result = json.loads(command_line("match", *files, *options).stdout)
+    done = command_line("match", *files, *options)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
     found = {
         line.get("sketchObject", 0): line.get("mapObject", 0) for line in result["objectMatches"]
     }
@@ -87,7 +89,9 @@ def test_a_profile_may_allow_it(command_line, files, place, tmp_path):
     mine = tmp_path / "mine.toml"
     mine.write_text(f"[profiles.mine]\nweights = {[*LEARNED]}\nallow_unmatched = true\n")
     options = ("--config", mine, "--profile", "mine", "--json")
-    result = json.loads(command_line("match", *files, *options).stdout)
+    done = command_line("match", *files, *options)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
     assert len(result["objectMatches"]) == len(place[2])
     result = json.loads(command_line("match", *files, *options, "--no-allow-unmatched").stdout)
     assert len(result["objectMatches"]) == 8

@@ -40,6 +40,7 @@ def test_broken_files_are_read_or_refused_in_one_sentence(kind, tmp_path):
         check(kind, mutated(rng, originals, kind), tmp_path, segmenting=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", FOUND_EARLIER, ids=lambda path: path.name)
 def test_what_was_found_stays_mended(path, tmp_path):
     check(path.suffix[1:], path.read_bytes(), tmp_path)
@@ -127,6 +128,7 @@ def read_or_refused(decode, text, kind):
         assert "\n" not in sentence
 
 
+@pytest.mark.slow
 @given(GEOJSON)
 @settings(max_examples=200)
 def test_geojson_of_any_structure_is_read_or_refused(document):

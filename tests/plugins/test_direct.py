@@ -248,6 +248,7 @@ def share_of_optima(cases):
     return found
 
 
+@pytest.mark.slow
 def test_it_finds_the_best_of_random_relations():
     rng = np.random.default_rng(0)
     sizes = [(n, n + more) for n in range(2, 7) for more in range(3)]
@@ -485,6 +486,7 @@ def test_every_step_at_a_hundred_objects_is_cut_into_slices(a_hundred_objects):
     assert_sound([seen[0]], a_hundred_objects)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("yields", [1, 3, 30])
 def test_it_ends_as_soon_as_it_is_closed(yields, a_hundred_objects):
     work = start(a_hundred_objects)

@@ -268,6 +268,7 @@ def sketches():
     return [table_of_a_sketch(seed) for seed in range(40)]
 
 
+@pytest.mark.slow
 def test_it_finds_the_best_object_map_of_small_scenes(sketches):
     found = 0
     for seed, table in enumerate(sketches):

@@ -262,6 +262,7 @@ def larger():
     return table, seen[-1].confidence
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [1, 2, 5, 20, 80])
 def test_stopped_early_it_has_a_map_and_a_true_bound(larger, steps, monkeypatch):
     small_slices(monkeypatch, 20_000)
@@ -281,6 +282,7 @@ def test_a_node_limit_ends_the_search_with_a_gap(larger):
     assert seen[-1].upper_bound > seen[-1].confidence
 
 
+@pytest.mark.slow
 def test_without_memory_for_a_cell_it_does_not_claim_a_proof(larger, monkeypatch):
     table, best = larger
     whole = _residual.empty_tree

@@ -353,6 +353,7 @@ def test_where_rotation_is_all_costs_and_losses_of_a_whole_map_are_its_loss(seed
             assert loss == pytest.approx(1.0 - value, abs=1e-12)
 
 
+@pytest.mark.slow
 @given(st.integers(1, 6), st.integers(0, 4), st.integers(0, 2**32))
 @settings(max_examples=150)
 def test_the_assignment_is_the_cheapest_and_its_reduced_costs_are_a_proof(rows, more, seed):

@@ -254,6 +254,7 @@ def assert_as_defined(name, first, second, tolerance=1e-9):
     assert_same(found, expected, first, second, exponent, tolerance)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXACT)
 @given(shapes=pairs_apart())
 @examples(20)
@@ -275,6 +276,7 @@ def test_it_agrees_with_its_definition_between_objects_in_touch(name, shapes):
     assert_as_defined(name, *shapes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in EXACT if name in FINITE_IN_OVERLAP])
 @given(shapes=pairs_in_overlap())
 @examples(20)
@@ -406,6 +408,7 @@ def test_hybrid_of_unit_squares_in_touch(near):
     assert found == pytest.approx([expected, 0, 0, 0], rel=1e-9)
 
 
+@pytest.mark.slow
 @given(st.one_of(pairs_apart(), pairs_in_touch(), pairs_in_overlap()), st.floats(0.05, 2.0))
 @examples(40)
 def test_hybrid_agrees_with_its_definition_at_any_reach(shapes, near):

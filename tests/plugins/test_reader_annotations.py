@@ -350,6 +350,7 @@ def test_masks_lie_where_their_runs_say():
     assert first[1] <= pixels.sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("points", [3000, 30_000])
 def test_an_outline_that_is_all_crossings_is_refused_at_once(points):
     scribble = np.random.default_rng(0).random((points, 2)).tolist()

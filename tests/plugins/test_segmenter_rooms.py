@@ -67,6 +67,7 @@ def test_a_floors_rooms_are_found_in_reading_order():
     assert found.warnings == ()
 
 
+@pytest.mark.slow
 def test_rooms_do_not_overlap_and_keep_off_walls():
     polygons = [item.polygon for item in segmented(floor()).scene.objects]
     tree = shapely.STRtree(polygons)
@@ -240,6 +241,7 @@ def test_padding_and_scaling_the_map_does_that_to_the_rooms(seed):
         assert large.area == pytest.approx(4.0 * small.area)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1))
 def test_any_grid_gives_valid_rooms_apart_or_one_sentence(seed):
     rng = np.random.default_rng(seed)

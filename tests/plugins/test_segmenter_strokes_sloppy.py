@@ -73,6 +73,7 @@ def test_sloppy_objects_are_recovered(sloppiness, recovered, marks, invented):
     assert made_up <= invented * total
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     st.integers(0, 10_000),

@@ -221,6 +221,7 @@ def test_plugins_that_misbehave_harm_no_other_request(host, client, plugins):
     assert set(blamed) == set(plugins)
 
 
+@pytest.mark.slow
 def test_a_search_that_ignores_its_time_budget_is_stopped(host):
     del host
     patient = Setup(Engine(discover()), isolation=Isolation(patience=60.0))
@@ -233,6 +234,7 @@ def test_a_search_that_ignores_its_time_budget_is_stopped(host):
         connected.match(scene(4), scene(4), searcher="sleepingsearcher", time_budget=0.5)
 
 
+@pytest.mark.slow
 def test_no_process_outlives_its_server(host):
     del host
     with (

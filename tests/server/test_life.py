@@ -75,6 +75,7 @@ def test_it_serves_while_the_other_kernels_warm_up_and_stops_then_too():
     assert host.said[-1] == "stopped"
 
 
+@pytest.mark.slow
 def test_the_other_kernels_wait_until_no_request_is_under_way(monkeypatch):
     monkeypatch.setattr(serve, "_QUIET", 0.7)
     TellsWhenWarm.warm.clear()
@@ -134,6 +135,7 @@ def test_the_server_tells_its_version_and_limits():
     assert info.limits.max_time_budget.ToTimedelta().total_seconds() == 2.5
 
 
+@pytest.mark.slow
 def test_sigterm_ends_an_idle_server_at_once_with_exit_code_0():
     with server() as running, within(2.0):
         running.process.send_signal(signal.SIGTERM)
@@ -152,6 +154,7 @@ def test_sigterm_lets_a_running_match_end_within_the_grace():
             assert running.end() == 0
 
 
+@pytest.mark.slow
 def test_sigterm_ends_matches_that_outlast_the_grace():
     with server("--grace", "0.5") as running, Client(running.address) as client:
         events = client.events(scene(20), scene(20, 1), **ENDLESS)

@@ -73,6 +73,7 @@ def test_new_requests_get_the_new_configuration_and_a_running_search_its_own(run
     assert last.result.statistics.search_elapsed.ToTimedelta().total_seconds() > 4.0
 
 
+@pytest.mark.slow
 def test_a_configuration_that_is_wrong_changes_nothing_and_the_server_says_why(running):
     client, reload = running
     for text, words in [

@@ -40,6 +40,7 @@ def assert_prompt(latencies):
     assert max(latencies) < LENIENT * slower
 
 
+@pytest.mark.slow
 def test_closing_the_stream_stops_the_search_within_100_ms(recorded):
     def latency(client):
         events = client.events(scene(30), scene(30, 1), **OPTIONS)
@@ -54,6 +55,7 @@ def test_closing_the_stream_stops_the_search_within_100_ms(recorded):
         assert_prompt([latency(client) for _ in range(10)])
 
 
+@pytest.mark.slow
 def test_cancelling_an_asyncio_task_stops_the_search_within_100_ms(recorded):
     async def latency(client):
         task = asyncio.create_task(client.match(scene(30), scene(30, 1), **OPTIONS))
@@ -72,6 +74,7 @@ def test_cancelling_an_asyncio_task_stops_the_search_within_100_ms(recorded):
     assert_prompt(in_loop(latencies()).result(60))
 
 
+@pytest.mark.slow
 def test_a_deadline_stops_the_search_within_100_ms(recorded):
     def latency(client):
         began = time.monotonic()

@@ -187,6 +187,7 @@ def test_the_blocking_and_the_asyncio_client_get_the_same_answer(address):
     assert timeless(in_loop(asked()).result(30).result) == timeless(blocking.result)
 
 
+@pytest.mark.slow
 def test_another_seed_searches_differently(address):
     with Client(address) as client:
         answers = [client.match(scene(12), scene(12, 1), seed=seed).result for seed in (1, 2)]
@@ -280,6 +281,7 @@ def test_each_matched_object_comes_with_its_relation_in_the_sketch(address, sket
         assert not any(line.HasField("relation") for line in part.object_matches)
 
 
+@pytest.mark.slow
 def test_a_long_search_reports_progress_often_and_at_most_20_times_a_second(address):
     with Client(address) as client:
         started = time.monotonic()
@@ -305,6 +307,7 @@ def test_progress_of_a_search_never_falls_and_carries_the_best_map_so_far(addres
         assert len({line.map_object for line in item.object_matches}) == 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label", ["", "x" * 10_000], ids=["small events", "large events"])
 def test_a_slow_reader_gets_the_latest_progress_and_misses_no_other_event(address, label):
     seconds, each, labels = 2.5, 0.25, [label] * 8

@@ -104,6 +104,7 @@ def test_a_result_says_that_its_time_was_over():
     assert result.seconds >= 0.3
 
 
+@pytest.mark.slow
 def test_a_loop_that_swallows_everything_is_left_behind():
     try:
         result = the_check(Swallowing).result()
@@ -114,6 +115,7 @@ def test_a_loop_that_swallows_everything_is_left_behind():
         all_end()
 
 
+@pytest.mark.slow
 def test_what_waits_where_no_exception_reaches_it_is_left_behind():
     Reading.pipe, writing = os.pipe()
     try:
@@ -124,6 +126,7 @@ def test_what_waits_where_no_exception_reaches_it_is_left_behind():
         all_end()
 
 
+@pytest.mark.slow
 def test_threads_that_wait_for_each_other_are_seen():
     try:
         result = the_check(Waiting, "threads-agree", 1.0).result()

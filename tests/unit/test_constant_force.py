@@ -54,6 +54,7 @@ def test_it_agrees_with_the_definition_in_180_directions(shapes):
     assert_same(force_histogram(*shapes), by_definition(*shapes, 180), *shapes)
 
 
+@pytest.mark.slow
 @given(cornered_rings(), cornered_rings(), st.tuples(st.integers(-4, 4), st.integers(-4, 4)))
 @examples(200)
 def test_it_agrees_where_edges_lie_on_each_other_and_along_the_direction(first, second, offset):

@@ -61,6 +61,7 @@ def strokes(path):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", [LIVING_ROOM_MAP, LIVING_ROOM_SKETCH, LIVING_ROOM_TRUTH])
 def test_made_again_the_texts_are_the_same(fresh, path):
     assert (fresh / path.name).read_bytes() == path.read_bytes()

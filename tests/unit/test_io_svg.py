@@ -162,6 +162,7 @@ def uses(depth):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("document", "reason", "words"),
     [

@@ -148,6 +148,7 @@ print(walk(1))
 }
 
 
+@pytest.mark.slow
 @compiled_only
 def test_a_full_disk_keeps_nothing_from_running_and_is_told_of_once(tmp_path):
     write(tmp_path, FULL_DISK)
@@ -230,6 +231,7 @@ print(*names)
     assert done.stdout.split() == []
 
 
+@pytest.mark.slow
 @compiled_only
 def test_the_first_match_compiles_nothing_that_the_warm_up_did_not():
     code = """

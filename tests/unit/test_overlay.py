@@ -97,6 +97,7 @@ def test_partners_have_one_colour_at_their_places():
         assert np.abs(residuals).max() < 3.0
 
 
+@pytest.mark.slow
 def test_objects_without_partner_are_grey():
     scene = room()
     image = draw_overlay(scene, scene, [OverlayMatch(k, k, 0.5) for k in (0, 1, 3)])
@@ -201,6 +202,7 @@ def test_small_objects_are_drawn_over_large_ones():
     assert (np.abs(image - both) <= 4).all(axis=2).sum() > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [400, 1600, 3000])
 def test_width_is_as_asked_and_shape_does_not_depend_on_it(width):
     image = draw_overlay(room(), room(), pairs(range(5)), width=width)
@@ -280,6 +282,7 @@ def test_a_route_is_a_light_arrow_and_all_of_it_is_seen():
         assert draw_scene(room(), route=np.array(short), width=400).width == 400
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     offset=st.sampled_from([0.0, -3.0, 5e5, 5e6]),

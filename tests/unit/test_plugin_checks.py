@@ -721,6 +721,7 @@ def violations(algorithm):
     return said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "seen", "algorithm"), BROKEN)
 def test_what_breaks_one_contract_fails_that_check_alone(name, seen, algorithm):
     said = violations(algorithm)

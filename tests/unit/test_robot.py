@@ -257,6 +257,7 @@ def test_the_grid_lies_on_multiples_of_its_resolution():
     assert (border == -1).all()
 
 
+@pytest.mark.slow
 def test_one_seed_one_map():
     first, again = (survey(FURNISHED, np.random.default_rng(7)) for _ in range(2))
     np.testing.assert_array_equal(first.grid.cells, again.grid.cells)
