@@ -29,9 +29,15 @@ def test_an_interrupt_that_python_ignores_is_found_later():
             interrupts.check()
         except KeyboardInterrupt:
             print("was interrupted")
+        interrupts.listen()
+        print(interrupts.check(), "for the next command")
         """
     )
-    assert done.stdout.split("\n")[:2] == ["went on", "was interrupted"]
+    assert done.stdout.splitlines() == [
+        "went on",
+        "was interrupted",
+        "() for the next command",
+    ]
 
 
 def test_who_ignores_interrupts_goes_on_ignoring_them():

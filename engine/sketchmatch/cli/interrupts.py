@@ -14,7 +14,8 @@ _came: list[int] = []
 
 
 def listen() -> None:
-    """Remember each Ctrl-C, beside what Python makes of it."""
+    """Remember each Ctrl-C from now on, beside what Python makes of it."""
+    _came.clear()
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _remember)
 
