@@ -99,7 +99,8 @@ def test_the_plugin_imports_of_the_engine_only_what_a_plugin_may(path):
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         names = [item.name for item in getattr(node, "names", [])]
         if isinstance(node, ast.ImportFrom):
-            names = [node.module]
+            whole = node.module == "sketchmatch"
+            names = [f"sketchmatch.{name}" for name in names] if whole else [node.module]
         for name in names if isinstance(node, ast.Import | ast.ImportFrom) else ():
             package, _, rest = name.partition(".")
             assert package != "sketchmatch" or rest.split(".")[0] in allowed, name

@@ -110,7 +110,9 @@ def test_at_60_columns_tables_are_lists_in_which_nothing_is_cut(arguments, whole
     shown = terminal.shown.replace("\r\n", "\n")
     answer = shown[shown.index(whole[0]) :]
     assert all(part in answer for part in whole), shown
-    assert not set("─━┃│…") & set(answer.replace(" … ", ""))
+    assert not set("─━┃│") & set(answer)
+    # Summaries have ellipses of their own, with blanks about them or before a comma.
+    assert not re.search(r"\w…", answer)
     assert all(len(line.rstrip()) <= 60 for line in answer.splitlines())
 
 
@@ -153,7 +155,8 @@ def test_a_reader_who_has_had_enough_does_not_cost_the_files(command, tmp_path):
         timeout=200,
     )
     os.close(written)
-    assert (done.returncode, done.stderr) == (ExitCode.OK, "")
+    notes = [line for line in done.stderr.splitlines() if ": draws the 16 of 28" not in line]
+    assert (done.returncode, notes) == (ExitCode.OK, [])
     with PIL.Image.open(picture) as image:
         assert image.width >= 1000
 

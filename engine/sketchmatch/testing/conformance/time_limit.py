@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import faulthandler
+import math
 import os
 import signal
 import sys
@@ -143,8 +144,9 @@ def _end(before: set[_Worker]) -> bool:
 def _ended_when_held_up(seconds: float) -> Iterator[None]:
     """End the process, and show where every thread is, if the block takes longer."""
     if faulthandler.is_enabled() and sys.platform == "linux":
-        with _aborting_pipe() as pipe:
-            faulthandler.dump_traceback_later(seconds, file=pipe)
+        whole = math.ceil(seconds)
+        with _aborting_pipe(whole) as pipe:
+            faulthandler.dump_traceback_later(whole, file=pipe)
             try:
                 yield
             finally:
@@ -159,16 +161,21 @@ def _ended_when_held_up(seconds: float) -> Iterator[None]:
 
 
 @contextmanager
-def _aborting_pipe() -> Iterator[int]:
-    """Yield a file that aborts the process once something is written into it.
+def _aborting_pipe(seconds: int) -> Iterator[int]:
+    """Yield a file that aborts the process once faulthandler writes its first line into it.
 
     Whoever enabled faulthandler, as pytest does, shows the stacks then. What faulthandler writes
-    to standard error by itself is lost where that is captured.
+    to standard error by itself is lost where that is captured. There is room for the first line
+    alone: a second signal would end the process before the stacks are shown.
     """
     import fcntl
 
+    first_line = f"Timeout ({seconds // 3600}:{seconds // 60 % 60:02}:{seconds % 60:02})!\n"
     reading, writing = os.pipe()
     try:
+        size = fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
+        os.set_blocking(writing, False)
+        os.write(writing, bytes(size - len(first_line)))
         fcntl.fcntl(reading, fcntl.F_SETOWN, os.getpid())
         fcntl.fcntl(reading, fcntl.F_SETSIG, signal.SIGABRT)
         fcntl.fcntl(reading, fcntl.F_SETFL, os.O_ASYNC | os.O_NONBLOCK)
