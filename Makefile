@@ -13,7 +13,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 KERNEL_TESTS := engine/sketchmatch/kernels engine/sketchmatch/api/kernels.py \
   $(patsubst %,tests/unit/test_%.py,alignment confidence correspond constant_force force_histogram \
   hybrid_force raster incremental evidence alternatives relations) tests/plugins/test_similarities.py
-KERNEL_SHARE := 95
+KERNEL_SHARE := 99
 says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 
 .PHONY: demo test test-slow test-all test-units test-interpreted mutation lint proto bench \
@@ -23,17 +23,17 @@ demo: $(VENV)/runtime
 	@$(BIN)/sketchmatch demo
 
 test: $(VENV)/dev
-	$(call says,lint and all tests but the slow ones,4 minutes)
+	$(call says,lint and all tests but the slow ones,5 minutes)
 	@$(MAKE) --no-print-directory lint
 	$(PYTEST) -m "not slow"
 
 test-slow: $(VENV)/dev
-	$(call says,the slow tests,6 minutes)
+	$(call says,the slow tests,10 minutes)
 	$(PYTEST) -m slow
 
 # With examples that no run had before; the others draw the same ones each time.
 test-all: $(VENV)/dev
-	$(call says,lint and all tests,10 minutes)
+	$(call says,lint and all tests,15 minutes)
 	@$(MAKE) --no-print-directory lint
 	$(PYTEST) --hypothesis-profile new
 
