@@ -5,11 +5,12 @@ All but labels is ASCII, which every terminal and pipe can take.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 
-__all__ = ["Table", "likelihood", "listed", "name", "shortened"]
+__all__ = ["Table", "Tabular", "likelihood", "listed", "name", "shortened"]
 
 _ROWS = 20
 _NAMES = 5
@@ -119,3 +120,26 @@ class Table:
     def _rest(self) -> list[str]:
         left_out = len(self.rows) - _ROWS
         return [f"... and {left_out} more"] if left_out > 0 else []
+
+
+class Tabular(ABC):
+    """What shows itself in a line, and printed or in a notebook as a small table."""
+
+    @abstractmethod
+    def _headline(self) -> str:
+        """Return what there is to say of it in a line."""
+
+    @abstractmethod
+    def _table(self) -> Table:
+        """Return what is in it; objects count from 0."""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self._headline()}>"
+
+    def __str__(self) -> str:
+        """Return the table for a terminal."""
+        return str(self._table())
+
+    def _repr_html_(self) -> str:
+        """Return the same for a notebook."""
+        return self._table().html()

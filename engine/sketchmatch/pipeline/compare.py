@@ -22,7 +22,7 @@ from sketchmatch.model import (
     pair_count,
     pair_index,
 )
-from sketchmatch.model.text import Table, name
+from sketchmatch.model.text import Table, Tabular, name
 from sketchmatch.pipeline.describe import check_histograms
 from sketchmatch.pipeline.evidence import compare_objects, rotation_weights, weigh_objects
 from sketchmatch.pipeline.guard import blamed
@@ -41,8 +41,8 @@ _MAX_COMPARISONS = 30_000_000
 _Value = TypeVar("_Value")
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Tabular):
     """How the relations within a sketch compare with those on a map.
 
     The scene with fewer objects, or else the sketch, is the template of the table, the other one
@@ -71,17 +71,6 @@ class Comparison:
     def swapped(self) -> bool:
         """Whether the template is the map: it has fewer objects than the sketch."""
         return _swapped(self.sketch, self.map)
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self._headline()}>"
-
-    def __str__(self) -> str:
-        """Return the most similar relations, for a terminal."""
-        return str(self._table())
-
-    def _repr_html_(self) -> str:
-        """Return the same for a notebook."""
-        return self._table().html()
 
     def most_similar(
         self, sketch_pairs: Pairs = (), map_pairs: Pairs = (), limit: int | None = None

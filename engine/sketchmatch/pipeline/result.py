@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from sketchmatch.api import Outcome
 from sketchmatch.model import Confidence, FloatArray, Scene
-from sketchmatch.model.text import Table, likelihood, name
+from sketchmatch.model.text import Table, Tabular, likelihood, name
 
 __all__ = [
     "AlternativeMap",
@@ -125,8 +125,8 @@ class Statistics:
     seconds: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class MatchResult:
+@dataclass(frozen=True, repr=False)
+class MatchResult(Tabular):
     """The result of a match.
 
     Attributes
@@ -213,17 +213,6 @@ class MatchResult:
         """Mapped objects without a partner."""
         matched = set(self.object_map.values())
         return tuple(k for k in range(len(self.map)) if k not in matched)
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self._headline()}>"
-
-    def __str__(self) -> str:
-        """Return which object is which, for a terminal; objects count from 0."""
-        return str(self._table())
-
-    def _repr_html_(self) -> str:
-        """Return the same for a notebook."""
-        return self._table().html()
 
     def _headline(self) -> str:
         matched = f"{len(self.matches)} of {len(self.sketch)} sketched objects matched"
