@@ -14,6 +14,7 @@ returning classes::
 from sketchmatch.api._algorithm import API_VERSION, Algorithm, Params
 from sketchmatch.api._hooks import hookimpl
 from sketchmatch.api.histogram import Histogram, HistogramParams
+from sketchmatch.api.judge import Candidate, Judge, JudgedMap, Judgement, JudgeProblem
 from sketchmatch.api.reader import Reader
 from sketchmatch.api.searcher import MatchProblem, Outcome, Searcher, SearchProgress
 from sketchmatch.api.segmenter import Segmentation, Segmenter
@@ -24,9 +25,14 @@ __all__ = [
     "API_VERSION",
     "Algorithm",
     "Alignment",
+    "Candidate",
     "Histogram",
     "HistogramParams",
     "InvalidInputError",
+    "Judge",
+    "JudgeProblem",
+    "JudgedMap",
+    "Judgement",
     "MatchProblem",
     "Outcome",
     "Params",

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from sketchmatch.api._algorithm import Algorithm
-from sketchmatch.model import Fmap, RelationTable, Weights
+from sketchmatch.model import BoolArray, Fmap, IntArray, RelationTable, Scene, Weights
 
 __all__ = ["MatchProblem", "Outcome", "SearchProgress", "Searcher"]
 
@@ -47,12 +47,30 @@ class MatchProblem:
         How many object maps beside the best the caller wants to see.
     time_budget
         Seconds left for the search, or None for no limit; the host stops the search by then.
+    scenes
+        Returns the template and the argument themselves, for a searcher that looks beyond their
+        relations; None where there are none.
+    swapped
+        Whether the template is the map, and the argument the sketch.
+    partial
+        Whether template objects may stay without partner.
+    allowed
+        Shape (N, N'): which pairings the caller does not rule out; None where none is ruled out.
+        A searcher may leave it alone: ζ of maps with others is below that of all without.
+    names
+        int64, shape (N, N'): 1 where both objects have a label and these mean the same, −1 where
+        they do not, 0 where one has none; None where a side has no labels at all.
     """
 
     table: RelationTable
     weights: Weights = (1.0, 1.0, 1.0)
     alternatives: int = 0
     time_budget: float | None = None
+    scenes: Callable[[], tuple[Scene, Scene]] | None = None
+    swapped: bool = False
+    partial: bool = False
+    allowed: BoolArray | None = None
+    names: IntArray | None = None
 
 
 @dataclass(frozen=True)
@@ -76,6 +94,10 @@ class SearchProgress:
         to other object maps. Only those of the last progress count.
     note
         One sentence on what the searcher did, where there is something to say.
+    maps
+        Object maps for the judge beside these, in any order, from a searcher that is ``partial``:
+        each int64, shape (N,), with −1 for a template object that has no partner. Only those of
+        the last progress count.
     """
 
     fmap: Fmap
@@ -85,6 +107,7 @@ class SearchProgress:
     upper_bound: float | None = None
     alternatives: tuple[Fmap, ...] = ()
     note: str = ""
+    maps: tuple[IntArray, ...] = ()
 
 
 class Searcher(Algorithm, ABC):
@@ -104,6 +127,15 @@ class Searcher(Algorithm, ABC):
         the parameters, the host refuses requests that weigh shapes and sizes of objects.
         """
         return True
+
+    @property
+    def partial(self) -> bool:
+        """Whether it finds maps that leave objects out by itself, where a problem lets it.
+
+        It tells them in ``SearchProgress.maps``, and is asked once, for all of the template; any
+        other searcher is asked again for parts of it.
+        """
+        return False
 
     @abstractmethod
     def search(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pluggy
 
-from sketchmatch.api import Histogram, Reader, Searcher, Segmenter, Similarity
+from sketchmatch.api import Histogram, Judge, Reader, Searcher, Segmenter, Similarity
 
 _hookspec = pluggy.HookspecMarker("sketchmatch")
 
@@ -27,6 +27,11 @@ def sketchmatch_register_similarities() -> list[type[Similarity]]:  # type: igno
 @_hookspec
 def sketchmatch_register_searchers() -> list[type[Searcher]]:  # type: ignore[empty-body]
     """Return searchers."""
+
+
+@_hookspec
+def sketchmatch_register_judges() -> list[type[Judge]]:  # type: ignore[empty-body]
+    """Return judges."""
 
 
 @_hookspec

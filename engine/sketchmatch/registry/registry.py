@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, get_args
 
-from sketchmatch.api import Algorithm, Histogram, Searcher, Segmenter, Similarity
+from sketchmatch.api import Algorithm, Histogram, Judge, Searcher, Segmenter, Similarity
 from sketchmatch.errors import InvalidInputError, PluginError, Reason, quoted
 from sketchmatch.model import Source
 from sketchmatch.registry.distributions import OWN_DISTRIBUTION, PluginState, PluginStatus
@@ -19,12 +19,13 @@ __all__ = ["Conflict", "Kind", "Registered", "Registry"]
 
 
 class Kind(StrEnum):
-    """The four kinds of algorithm."""
+    """The five kinds of algorithm."""
 
     SEGMENTER = "segmenter"
     HISTOGRAM = "histogram"
     SIMILARITY = "similarity"
     SEARCHER = "searcher"
+    JUDGE = "judge"
 
     @property
     def interface(self) -> type[Algorithm]:
@@ -47,12 +48,14 @@ _INTERFACES: dict[Kind, type[Algorithm]] = {
     Kind.HISTOGRAM: Histogram,
     Kind.SIMILARITY: Similarity,
     Kind.SEARCHER: Searcher,
+    Kind.JUDGE: Judge,
 }
 _PLURALS = {
     Kind.SEGMENTER: "segmenters",
     Kind.HISTOGRAM: "histograms",
     Kind.SIMILARITY: "similarities",
     Kind.SEARCHER: "searchers",
+    Kind.JUDGE: "judges",
 }
 
 
