@@ -65,6 +65,9 @@ class JudgeProblem:
         How many maps beside the best the caller wants to see.
     allowed
         Shape (N, N'): which pairings the caller does not rule out; None where none is ruled out.
+    pinned
+        int64, shape (N,): the argument object that a template object is known to be, −1 where
+        nothing is known; None where of none. In ``allowed`` all that contradicts is ruled out.
     names
         int64, shape (N, N'): 1 where both objects have a label and these mean the same, −1 where
         they do not, 0 where one has none; None where a side has no labels at all.
@@ -87,6 +90,7 @@ class JudgeProblem:
     price: float = math.inf
     alternatives: int = 0
     allowed: BoolArray | None = None
+    pinned: IntArray | None = None
     names: IntArray | None = None
     exchanges: FloatArray | None = None
     omissions: FloatArray | None = None

@@ -57,6 +57,9 @@ class MatchProblem:
     allowed
         Shape (N, N'): which pairings the caller does not rule out; None where none is ruled out.
         A searcher may leave it alone: ζ of maps with others is below that of all without.
+    pinned
+        int64, shape (N,): the argument object that a template object is known to be, −1 where
+        nothing is known; None where of none. In ``allowed`` all that contradicts is ruled out.
     names
         int64, shape (N, N'): 1 where both objects have a label and these mean the same, −1 where
         they do not, 0 where one has none; None where a side has no labels at all.
@@ -70,6 +73,7 @@ class MatchProblem:
     swapped: bool = False
     partial: bool = False
     allowed: BoolArray | None = None
+    pinned: IntArray | None = None
     names: IntArray | None = None
 
 

@@ -39,6 +39,8 @@ class _AlgorithmKindEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._
     """Says how alike two relations are: `Pipeline.similarity`."""
     ALGORITHM_KIND_SEARCHER: _AlgorithmKind.ValueType  # 4
     """Looks for the best map: `Pipeline.searcher`."""
+    ALGORITHM_KIND_JUDGE: _AlgorithmKind.ValueType  # 5
+    """Says which of the maps found is the answer, and how likely it is: `Pipeline.judge`."""
 
 class AlgorithmKind(_AlgorithmKind, metaclass=_AlgorithmKindEnumTypeWrapper):
     """What an algorithm does in a match."""
@@ -53,6 +55,8 @@ ALGORITHM_KIND_SIMILARITY: AlgorithmKind.ValueType  # 3
 """Says how alike two relations are: `Pipeline.similarity`."""
 ALGORITHM_KIND_SEARCHER: AlgorithmKind.ValueType  # 4
 """Looks for the best map: `Pipeline.searcher`."""
+ALGORITHM_KIND_JUDGE: AlgorithmKind.ValueType  # 5
+"""Says which of the maps found is the answer, and how likely it is: `Pipeline.judge`."""
 global___AlgorithmKind = AlgorithmKind
 
 class _SourceKind:

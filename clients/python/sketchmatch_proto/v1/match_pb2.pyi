@@ -336,6 +336,9 @@ class MatchResult(google.protobuf.message.Message):
     ALTERNATIVES_FIELD_NUMBER: builtins.int
     SEARCH_NOTE_FIELD_NUMBER: builtins.int
     PROBABILITY_FIELD_NUMBER: builtins.int
+    PLACE_PROBABILITY_FIELD_NUMBER: builtins.int
+    AMBIGUITY_FIELD_NUMBER: builtins.int
+    UNMATCHED_SKETCH_PROBABILITIES_FIELD_NUMBER: builtins.int
     match_id: builtins.str
     """Name of the match, as in `MatchAccepted`."""
     seed: builtins.int
@@ -363,6 +366,11 @@ class MatchResult(google.protobuf.message.Message):
     sketches. Absent where nothing was learned: for weights other than 1, 1, 1 and those of the
     profile `learned`, for histograms of other than constant forces, for other similarities than
     `cross-correlation`, for searchers that map pairs, and for too many objects.
+    """
+    place_probability: builtins.float
+    """How likely the sketch shows the place of the map at all, within [0, 1]: below one half it is
+    probably another place, and the object map means little. `probability` and those of the lines
+    are of both, that it is this place and that they are right. Absent where nothing was learned.
     """
     @property
     def object_matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectMatch]:
@@ -401,6 +409,18 @@ class MatchResult(google.protobuf.message.Message):
         the best, the sketch does not tell the two apart.
         """
 
+    @property
+    def ambiguity(self) -> global___Ambiguity:
+        """Where several maps are about equally likely, which, and what to ask. Absent where one is
+        clearly the best, or nothing is known of probabilities.
+        """
+
+    @property
+    def unmatched_sketch_probabilities(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.float]:
+        """How likely each of `unmatched_sketch_objects` has no partner, in their order; empty where
+        nothing is known of probabilities.
+        """
+
     def __init__(
         self,
         *,
@@ -420,15 +440,52 @@ class MatchResult(google.protobuf.message.Message):
         alternatives: collections.abc.Iterable[global___AlternativeMap] | None = ...,
         search_note: builtins.str = ...,
         probability: builtins.float | None = ...,
+        place_probability: builtins.float | None = ...,
+        ambiguity: global___Ambiguity | None = ...,
+        unmatched_sketch_probabilities: collections.abc.Iterable[builtins.float] | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_probability", b"_probability", "_upper_bound", b"_upper_bound", "fmap_confidence", b"fmap_confidence", "probability", b"probability", "statistics", b"statistics", "upper_bound", b"upper_bound"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_probability", b"_probability", "_upper_bound", b"_upper_bound", "alternatives", b"alternatives", "fmap_confidence", b"fmap_confidence", "fmap_entries", b"fmap_entries", "match_id", b"match_id", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence", "outcome", b"outcome", "probability", b"probability", "rotation_radians", b"rotation_radians", "scale", b"scale", "search_note", b"search_note", "seed", b"seed", "statistics", b"statistics", "unmatched_map_objects", b"unmatched_map_objects", "unmatched_sketch_objects", b"unmatched_sketch_objects", "upper_bound", b"upper_bound"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_place_probability", b"_place_probability", "_probability", b"_probability", "_upper_bound", b"_upper_bound", "ambiguity", b"ambiguity", "fmap_confidence", b"fmap_confidence", "place_probability", b"place_probability", "probability", b"probability", "statistics", b"statistics", "upper_bound", b"upper_bound"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_place_probability", b"_place_probability", "_probability", b"_probability", "_upper_bound", b"_upper_bound", "alternatives", b"alternatives", "ambiguity", b"ambiguity", "fmap_confidence", b"fmap_confidence", "fmap_entries", b"fmap_entries", "match_id", b"match_id", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence", "outcome", b"outcome", "place_probability", b"place_probability", "probability", b"probability", "rotation_radians", b"rotation_radians", "scale", b"scale", "search_note", b"search_note", "seed", b"seed", "statistics", b"statistics", "unmatched_map_objects", b"unmatched_map_objects", "unmatched_sketch_objects", b"unmatched_sketch_objects", "unmatched_sketch_probabilities", b"unmatched_sketch_probabilities", "upper_bound", b"upper_bound"]) -> None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_place_probability", b"_place_probability"]) -> typing.Literal["place_probability"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_probability", b"_probability"]) -> typing.Literal["probability"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_upper_bound", b"_upper_bound"]) -> typing.Literal["upper_bound"] | None: ...
 
 global___MatchResult = MatchResult
+
+@typing.final
+class Ambiguity(google.protobuf.message.Message):
+    """Several object maps that the sketch does not tell apart, as in a symmetric room."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    MAPS_FIELD_NUMBER: builtins.int
+    ALTERNATIVES_FIELD_NUMBER: builtins.int
+    DECIDING_SKETCH_OBJECTS_FIELD_NUMBER: builtins.int
+    maps: builtins.int
+    """How many maps share the probability, the best among them; 2 or more."""
+    @property
+    def alternatives(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.int]:
+        """Which of `MatchResult.alternatives` are among them, by index from 0."""
+
+    @property
+    def deciding_sketch_objects(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.int]:
+        """The sketched objects that differ between them, the one first of which it would help most to
+        know what it is: ask for it, and send the answer as a `Pin`.
+        """
+
+    def __init__(
+        self,
+        *,
+        maps: builtins.int = ...,
+        alternatives: collections.abc.Iterable[builtins.int] | None = ...,
+        deciding_sketch_objects: collections.abc.Iterable[builtins.int] | None = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["alternatives", b"alternatives", "deciding_sketch_objects", b"deciding_sketch_objects", "maps", b"maps"]) -> None: ...
+
+global___Ambiguity = Ambiguity
 
 @typing.final
 class AlternativeMap(google.protobuf.message.Message):
@@ -439,8 +496,11 @@ class AlternativeMap(google.protobuf.message.Message):
     OBJECT_MATCHES_FIELD_NUMBER: builtins.int
     FMAP_CONFIDENCE_FIELD_NUMBER: builtins.int
     OMAP_CONFIDENCE_FIELD_NUMBER: builtins.int
+    PROBABILITY_FIELD_NUMBER: builtins.int
     omap_confidence: builtins.float
     """Ω, the mean confidence of the object map."""
+    probability: builtins.float
+    """How likely it is the right one, as `MatchResult.probability`. Absent where that is."""
     @property
     def object_matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectMatch]:
         """The object map, in the order of the sketch; without margins and relations."""
@@ -455,9 +515,11 @@ class AlternativeMap(google.protobuf.message.Message):
         object_matches: collections.abc.Iterable[global___ObjectMatch] | None = ...,
         fmap_confidence: global___FmapConfidence | None = ...,
         omap_confidence: builtins.float = ...,
+        probability: builtins.float | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["fmap_confidence", b"fmap_confidence"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["fmap_confidence", b"fmap_confidence", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_probability", b"_probability", "fmap_confidence", b"fmap_confidence", "probability", b"probability"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_probability", b"_probability", "fmap_confidence", b"fmap_confidence", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence", "probability", b"probability"]) -> None: ...
+    def WhichOneof(self, oneof_group: typing.Literal["_probability", b"_probability"]) -> typing.Literal["probability"] | None: ...
 
 global___AlternativeMap = AlternativeMap
 

@@ -18,7 +18,7 @@ from sketchmatch_proto.v1 import pipeline_pb2 as sketchmatch_dot_v1_dot_pipeline
 from sketchmatch_proto.v1 import source_pb2 as sketchmatch_dot_v1_dot_source__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"sketchmatch/v1/match_service.proto\x12\x0esketchmatch.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1asketchmatch/v1/match.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1bsketchmatch/v1/source.proto\"\x97\x03\n\x0cMatchRequest\x12&\n\x06sketch\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12#\n\x03map\x18\x02 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12*\n\x08pipeline\x18\x03 \x01(\x0b\x32\x18.sketchmatch.v1.Pipeline\x12\x11\n\x04seed\x18\x04 \x01(\x04H\x00\x88\x01\x01\x12.\n\x0btime_budget\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x32\n\x07weights\x18\x06 \x01(\x0b\x32!.sketchmatch.v1.ConfidenceWeights\x12\x19\n\x0c\x61lternatives\x18\x07 \x01(\rH\x01\x88\x01\x01\x12\x1c\n\x0f\x61llow_unmatched\x18\x08 \x01(\x08H\x02\x88\x01\x01\x12\x1c\n\x0funmatched_price\x18\t \x01(\x01H\x03\x88\x01\x01\x42\x07\n\x05_seedB\x0f\n\r_alternativesB\x12\n\x10_allow_unmatchedB\x12\n\x10_unmatched_price\"\xdc\x01\n\rMatchResponse\x12\x31\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x0b\x32\x1d.sketchmatch.v1.MatchAcceptedH\x00\x12-\n\x06scenes\x18\x02 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchScenesH\x00\x12\x31\n\x08progress\x18\x03 \x01(\x0b\x32\x1d.sketchmatch.v1.MatchProgressH\x00\x12-\n\x06result\x18\x04 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchResultH\x00\x42\x07\n\x05\x65vent2V\n\x0cMatchService\x12\x46\n\x05Match\x12\x1c.sketchmatch.v1.MatchRequest\x1a\x1d.sketchmatch.v1.MatchResponse0\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"sketchmatch/v1/match_service.proto\x12\x0esketchmatch.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1asketchmatch/v1/match.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1bsketchmatch/v1/source.proto\"\xe6\x03\n\x0cMatchRequest\x12&\n\x06sketch\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12#\n\x03map\x18\x02 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12*\n\x08pipeline\x18\x03 \x01(\x0b\x32\x18.sketchmatch.v1.Pipeline\x12\x11\n\x04seed\x18\x04 \x01(\x04H\x00\x88\x01\x01\x12.\n\x0btime_budget\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x32\n\x07weights\x18\x06 \x01(\x0b\x32!.sketchmatch.v1.ConfidenceWeights\x12\x19\n\x0c\x61lternatives\x18\x07 \x01(\rH\x01\x88\x01\x01\x12\x1c\n\x0f\x61llow_unmatched\x18\x08 \x01(\x08H\x02\x88\x01\x01\x12\x1c\n\x0funmatched_price\x18\t \x01(\x01H\x03\x88\x01\x01\x12!\n\x04pins\x18\n \x03(\x0b\x32\x13.sketchmatch.v1.Pin\x12*\n\x08synonyms\x18\x0b \x03(\x0b\x32\x18.sketchmatch.v1.SynonymsB\x07\n\x05_seedB\x0f\n\r_alternativesB\x12\n\x10_allow_unmatchedB\x12\n\x10_unmatched_price\"\x84\x01\n\x03Pin\x12\x36\n\rsketch_object\x18\x01 \x01(\x0b\x32\x1f.sketchmatch.v1.ObjectReference\x12\x33\n\nmap_object\x18\x02 \x01(\x0b\x32\x1f.sketchmatch.v1.ObjectReference\x12\x10\n\x08\x65xcluded\x18\x03 \x01(\x08\";\n\x0fObjectReference\x12\x0f\n\x05index\x18\x01 \x01(\rH\x00\x12\x0f\n\x05label\x18\x02 \x01(\tH\x00\x42\x06\n\x04kind\"\x1a\n\x08Synonyms\x12\x0e\n\x06labels\x18\x01 \x03(\t\"\xdc\x01\n\rMatchResponse\x12\x31\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x0b\x32\x1d.sketchmatch.v1.MatchAcceptedH\x00\x12-\n\x06scenes\x18\x02 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchScenesH\x00\x12\x31\n\x08progress\x18\x03 \x01(\x0b\x32\x1d.sketchmatch.v1.MatchProgressH\x00\x12-\n\x06result\x18\x04 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchResultH\x00\x42\x07\n\x05\x65vent2V\n\x0cMatchService\x12\x46\n\x05Match\x12\x1c.sketchmatch.v1.MatchRequest\x1a\x1d.sketchmatch.v1.MatchResponse0\x01\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -26,9 +26,15 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'sketchmatch_proto.v1.match_
 if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
   _globals['_MATCHREQUEST']._serialized_start=175
-  _globals['_MATCHREQUEST']._serialized_end=582
-  _globals['_MATCHRESPONSE']._serialized_start=585
-  _globals['_MATCHRESPONSE']._serialized_end=805
-  _globals['_MATCHSERVICE']._serialized_start=807
-  _globals['_MATCHSERVICE']._serialized_end=893
+  _globals['_MATCHREQUEST']._serialized_end=661
+  _globals['_PIN']._serialized_start=664
+  _globals['_PIN']._serialized_end=796
+  _globals['_OBJECTREFERENCE']._serialized_start=798
+  _globals['_OBJECTREFERENCE']._serialized_end=857
+  _globals['_SYNONYMS']._serialized_start=859
+  _globals['_SYNONYMS']._serialized_end=885
+  _globals['_MATCHRESPONSE']._serialized_start=888
+  _globals['_MATCHRESPONSE']._serialized_end=1108
+  _globals['_MATCHSERVICE']._serialized_start=1110
+  _globals['_MATCHSERVICE']._serialized_end=1196
 # @@protoc_insertion_point(module_scope)

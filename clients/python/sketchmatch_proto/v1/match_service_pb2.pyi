@@ -4,8 +4,10 @@ isort:skip_file
 """
 
 import builtins
+import collections.abc
 import google.protobuf.descriptor
 import google.protobuf.duration_pb2
+import google.protobuf.internal.containers
 import google.protobuf.message
 import sketchmatch_proto.v1.match_pb2
 import sketchmatch_proto.v1.pipeline_pb2
@@ -29,6 +31,8 @@ class MatchRequest(google.protobuf.message.Message):
     ALTERNATIVES_FIELD_NUMBER: builtins.int
     ALLOW_UNMATCHED_FIELD_NUMBER: builtins.int
     UNMATCHED_PRICE_FIELD_NUMBER: builtins.int
+    PINS_FIELD_NUMBER: builtins.int
+    SYNONYMS_FIELD_NUMBER: builtins.int
     seed: builtins.int
     """Seed of everything random: the same request with the same seed gives the same result. Absent: 0."""
     alternatives: builtins.int
@@ -68,6 +72,18 @@ class MatchRequest(google.protobuf.message.Message):
     def weights(self) -> sketchmatch_proto.v1.match_pb2.ConfidenceWeights:
         """What the parts of ζ count for. Absent: as the profile says, or else the first three the same."""
 
+    @property
+    def pins(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Pin]:
+        """What the caller knows of single objects. A contradiction is INVALID_ARGUMENT with INVALID_FIELD.
+        Only searchers that map objects can obey.
+        """
+
+    @property
+    def synonyms(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Synonyms]:
+        """Labels that mean the same, beside those that are equal but for case and plural. Labels are
+        evidence where both scenes have some, and never force a line.
+        """
+
     def __init__(
         self,
         *,
@@ -80,9 +96,11 @@ class MatchRequest(google.protobuf.message.Message):
         alternatives: builtins.int | None = ...,
         allow_unmatched: builtins.bool | None = ...,
         unmatched_price: builtins.float | None = ...,
+        pins: collections.abc.Iterable[global___Pin] | None = ...,
+        synonyms: collections.abc.Iterable[global___Synonyms] | None = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["_allow_unmatched", b"_allow_unmatched", "_alternatives", b"_alternatives", "_seed", b"_seed", "_unmatched_price", b"_unmatched_price", "allow_unmatched", b"allow_unmatched", "alternatives", b"alternatives", "map", b"map", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_allow_unmatched", b"_allow_unmatched", "_alternatives", b"_alternatives", "_seed", b"_seed", "_unmatched_price", b"_unmatched_price", "allow_unmatched", b"allow_unmatched", "alternatives", b"alternatives", "map", b"map", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["_allow_unmatched", b"_allow_unmatched", "_alternatives", b"_alternatives", "_seed", b"_seed", "_unmatched_price", b"_unmatched_price", "allow_unmatched", b"allow_unmatched", "alternatives", b"alternatives", "map", b"map", "pins", b"pins", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "synonyms", b"synonyms", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_allow_unmatched", b"_allow_unmatched"]) -> typing.Literal["allow_unmatched"] | None: ...
     @typing.overload
@@ -93,6 +111,81 @@ class MatchRequest(google.protobuf.message.Message):
     def WhichOneof(self, oneof_group: typing.Literal["_unmatched_price", b"_unmatched_price"]) -> typing.Literal["unmatched_price"] | None: ...
 
 global___MatchRequest = MatchRequest
+
+@typing.final
+class Pin(google.protobuf.message.Message):
+    """What the caller knows of a sketched object."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    SKETCH_OBJECT_FIELD_NUMBER: builtins.int
+    MAP_OBJECT_FIELD_NUMBER: builtins.int
+    EXCLUDED_FIELD_NUMBER: builtins.int
+    excluded: builtins.bool
+    """Whether it is known that it is NOT this one: any other may be its partner, or none."""
+    @property
+    def sketch_object(self) -> global___ObjectReference:
+        """The sketched object. Required."""
+
+    @property
+    def map_object(self) -> global___ObjectReference:
+        """The mapped object that it is. Absent: it is on no map, and finds no partner."""
+
+    def __init__(
+        self,
+        *,
+        sketch_object: global___ObjectReference | None = ...,
+        map_object: global___ObjectReference | None = ...,
+        excluded: builtins.bool = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["map_object", b"map_object", "sketch_object", b"sketch_object"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["excluded", b"excluded", "map_object", b"map_object", "sketch_object", b"sketch_object"]) -> None: ...
+
+global___Pin = Pin
+
+@typing.final
+class ObjectReference(google.protobuf.message.Message):
+    """Names an object of a scene."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    INDEX_FIELD_NUMBER: builtins.int
+    LABEL_FIELD_NUMBER: builtins.int
+    index: builtins.int
+    """Its index, from 0, as in `MatchScenes` or a `SegmentResponse` of the same source."""
+    label: builtins.str
+    """Its label, which no other object of the scene has."""
+    def __init__(
+        self,
+        *,
+        index: builtins.int = ...,
+        label: builtins.str = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["index", b"index", "kind", b"kind", "label", b"label"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["index", b"index", "kind", b"kind", "label", b"label"]) -> None: ...
+    def WhichOneof(self, oneof_group: typing.Literal["kind", b"kind"]) -> typing.Literal["index", "label"] | None: ...
+
+global___ObjectReference = ObjectReference
+
+@typing.final
+class Synonyms(google.protobuf.message.Message):
+    """Words for the same thing."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    LABELS_FIELD_NUMBER: builtins.int
+    @property
+    def labels(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.str]:
+        """Two or more labels, such as "couch" and "sofa"."""
+
+    def __init__(
+        self,
+        *,
+        labels: collections.abc.Iterable[builtins.str] | None = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["labels", b"labels"]) -> None: ...
+
+global___Synonyms = Synonyms
 
 @typing.final
 class MatchResponse(google.protobuf.message.Message):

@@ -15,7 +15,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import struct_pb2 as google_dot_protobuf_dot_struct__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1dsketchmatch/v1/pipeline.proto\x12\x0esketchmatch.v1\x1a\x1cgoogle/protobuf/struct.proto\"\xb9\x02\n\x08Pipeline\x12<\n\x10sketch_segmenter\x18\x01 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x39\n\rmap_segmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x35\n\thistogram\x18\x03 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x36\n\nsimilarity\x18\x04 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x34\n\x08searcher\x18\x05 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x0f\n\x07profile\x18\x06 \x01(\t\"O\n\x12\x41lgorithmSelection\x12\x0c\n\x04name\x18\x01 \x01(\t\x12+\n\nparameters\x18\x02 \x01(\x0b\x32\x17.google.protobuf.Structb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1dsketchmatch/v1/pipeline.proto\x12\x0esketchmatch.v1\x1a\x1cgoogle/protobuf/struct.proto\"\xec\x02\n\x08Pipeline\x12<\n\x10sketch_segmenter\x18\x01 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x39\n\rmap_segmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x35\n\thistogram\x18\x03 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x36\n\nsimilarity\x18\x04 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x34\n\x08searcher\x18\x05 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x0f\n\x07profile\x18\x06 \x01(\t\x12\x31\n\x05judge\x18\x07 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\"O\n\x12\x41lgorithmSelection\x12\x0c\n\x04name\x18\x01 \x01(\t\x12+\n\nparameters\x18\x02 \x01(\x0b\x32\x17.google.protobuf.Structb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -23,7 +23,7 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'sketchmatch_proto.v1.pipeli
 if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
   _globals['_PIPELINE']._serialized_start=80
-  _globals['_PIPELINE']._serialized_end=393
-  _globals['_ALGORITHMSELECTION']._serialized_start=395
-  _globals['_ALGORITHMSELECTION']._serialized_end=474
+  _globals['_PIPELINE']._serialized_end=444
+  _globals['_ALGORITHMSELECTION']._serialized_start=446
+  _globals['_ALGORITHMSELECTION']._serialized_end=525
 # @@protoc_insertion_point(module_scope)

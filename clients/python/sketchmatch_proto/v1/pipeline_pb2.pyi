@@ -29,6 +29,7 @@ class Pipeline(google.protobuf.message.Message):
     SIMILARITY_FIELD_NUMBER: builtins.int
     SEARCHER_FIELD_NUMBER: builtins.int
     PROFILE_FIELD_NUMBER: builtins.int
+    JUDGE_FIELD_NUMBER: builtins.int
     profile: builtins.str
     """Name of the profile, a pipeline of the server's configuration such as "fast" or "proof", that
     decides what is left out here. Empty: the server's default one, if it has one.
@@ -54,6 +55,10 @@ class Pipeline(google.protobuf.message.Message):
     def searcher(self) -> global___AlgorithmSelection:
         """Looks for the best map of the relations in the sketch to those in the map."""
 
+    @property
+    def judge(self) -> global___AlgorithmSelection:
+        """Says which of the maps found is the answer, and how likely each of them is right."""
+
     def __init__(
         self,
         *,
@@ -63,9 +68,10 @@ class Pipeline(google.protobuf.message.Message):
         similarity: global___AlgorithmSelection | None = ...,
         searcher: global___AlgorithmSelection | None = ...,
         profile: builtins.str = ...,
+        judge: global___AlgorithmSelection | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["histogram", b"histogram", "map_segmenter", b"map_segmenter", "searcher", b"searcher", "similarity", b"similarity", "sketch_segmenter", b"sketch_segmenter"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["histogram", b"histogram", "map_segmenter", b"map_segmenter", "profile", b"profile", "searcher", b"searcher", "similarity", b"similarity", "sketch_segmenter", b"sketch_segmenter"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["histogram", b"histogram", "judge", b"judge", "map_segmenter", b"map_segmenter", "searcher", b"searcher", "similarity", b"similarity", "sketch_segmenter", b"sketch_segmenter"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["histogram", b"histogram", "judge", b"judge", "map_segmenter", b"map_segmenter", "profile", b"profile", "searcher", b"searcher", "similarity", b"similarity", "sketch_segmenter", b"sketch_segmenter"]) -> None: ...
 
 global___Pipeline = Pipeline
 
