@@ -375,6 +375,7 @@ def test_no_candidate_breaks_what_is_known():
     pinned = np.array([-1, best[2], -1, -1])
     verdict, problem = told(scenes, pinned=pinned)
     assert all(each.partners[1] == best[2] for each in problem.candidates)
+    assert np.isneginf(problem.omissions).tolist() == [False, True, False, False]
     with pytest.raises(AnswerUnavailableError, match="keeps to what is known of the objects"):
         told(scenes, allowed=np.zeros((4, 5), dtype=bool))
 

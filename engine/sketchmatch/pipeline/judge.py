@@ -219,6 +219,8 @@ def problem_of(
     if exchanges is not None and goal.allowed is not None:
         exchanges = np.where(_exchangeable(first, goal.allowed), exchanges, -np.inf)
     omissions = omission_confidences(first.fmap, first.part.table, goal.weights.searched)
+    if omissions is not None and goal.pinned is not None:
+        omissions = np.where(goal.pinned[first.part.kept] >= 0, -np.inf, omissions)
     return JudgeProblem(
         template,
         argument,
