@@ -24,7 +24,7 @@ from sketchmatch.pipeline.correspond import fmap_confidence, induced_map, map_co
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.events import Finished
 from sketchmatch.pipeline.guard import check_map
-from sketchmatch.pipeline.judge import considered, judged, problem_of
+from sketchmatch.pipeline.judge import considered, problem_of
 from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.search import Goal
@@ -342,7 +342,7 @@ def test_the_weights_have_a_say_in_the_price(monkeypatch):
 # What the caller knows ---------------------------------------------------------------------------
 
 
-def told(scenes, judge=None, **known):
+def told(scenes, **known):
     """Return what a judge makes of an exact search, and what it was given."""
     engine = Engine(REGISTRY)
     pipeline = engine.resolve({"searcher": Choice("exact")})
@@ -350,7 +350,7 @@ def told(scenes, judge=None, **known):
     work = engine.compare(scenes, pipeline.histogram, pipeline.similarity)
     comparison = finish(work)
     found = finish(engine.search(comparison, pipeline.searcher, goal))
-    verdict = finish(judged(comparison, found, goal, judge or Told(), REGISTRY))
+    verdict = finish(engine.judge(comparison, found, goal, Told()))
     first, others = finish(considered(comparison, found, goal))
     return verdict, problem_of(comparison, first, others, goal)
 
