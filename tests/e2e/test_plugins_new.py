@@ -88,7 +88,7 @@ def test_what_it_writes_passes_mypy_strict_where_parameters_are_given(command_li
         text=True,
         check=False,
     )
-    assert done.stdout == "Success: no issues found in 13 source files\n", done.stdout
+    assert done.stdout == "Success: no issues found in 16 source files\n", done.stdout
 
 
 def test_it_writes_into_a_folder_that_is_still_to_be_made(command_line, tmp_path):
