@@ -179,6 +179,10 @@ def test_a_profile_of_ones_own_changes_the_built_in_one(file):
             "{file}: algorithms.searcher.easm.colour is no parameter of easm; it has: consistency",
         ),
         (
+            "[algorithms.judge.confidence]\nodds = 3",
+            "{file}: algorithms.judge.confidence.odds is no parameter of confidence; it has: none",
+        ),
+        (
             "[pipeline.map_segmenter.parameters]\nmin_size = 1",
             "{file}: pipeline.map_segmenter.parameters.min_size is set for no segmenter; give its",
         ),
@@ -415,8 +419,14 @@ def test_the_built_in_profiles_are_sound_and_as_the_thesis_has_it():
     path, faults = check()
     assert (path, faults) == (None, [])
     profiles = {profile.name: profile for profile in builtin().defaults.profiles}
-    assert list(profiles) == ["fast", "learned", "proof", "thesis-easm", "thesis-fsnn"]
+    assert list(profiles) == [
+        *("fast", "learned", "proof"),
+        *("thesis", "thesis-easm", "thesis-fsnn"),
+    ]
     assert all(profile.summary for profile in profiles.values())
+    for name in ("proof", "thesis", "thesis-easm", "thesis-fsnn"):
+        assert profiles[name].stages["judge"].name == "confidence"
+        assert profiles[name].allow_unmatched is False
     easm = profiles["thesis-easm"].stages["searcher"].parameters
     assert (easm["crossover_rate"], easm["exchange_rate"]) == (0.7, 0.5)
     assert (easm["mutation_rate"], easm["patience"]) == (0.3, 400)
@@ -428,6 +438,21 @@ def test_the_built_in_profiles_are_sound_and_as_the_thesis_has_it():
         "velocity_limit": 0.2,
         "patience": 30,
     }
+
+
+def test_a_profile_says_whether_objects_may_stay_unmatched_or_leaves_it_open(file):
+    path = file(
+        "[profiles.open.judge]\nname = 'confidence'\n[profiles.strict]\nallow_unmatched = false\n"
+        "[profiles.loose]\nallow_unmatched = true\n[pipeline.judge]\nname = 'confidence'\n"
+    )
+    configuration = load(path)
+    profiles = {each.name: each.allow_unmatched for each in configuration.defaults.profiles}
+    assert [profiles[name] for name in ("open", "strict", "loose")] == [None, False, True]
+    found = {entry.path: entry for entry in entries(configuration, default_registry())}
+    assert found["pipeline", "judge", "name"].origin is Origin.FILE
+    assert found["profiles", "strict", "allow_unmatched"].value is False
+    assert found["profiles", "loose", "allow_unmatched"].value is True
+    assert ("profiles", "open", "allow_unmatched") not in found
 
 
 def test_python_takes_profiles_and_files_but_reads_none_that_lies_around(file, monkeypatch):
@@ -469,7 +494,7 @@ def test_the_file_to_begin_with_is_sound_and_changes_nothing(file, uncommented):
     found, expected = load(path), builtin()
     assert found.limits == expected.limits
     assert found.settings.server == expected.settings.server
-    for kind in (Kind.HISTOGRAM, Kind.SIMILARITY, Kind.SEARCHER):
+    for kind in (Kind.HISTOGRAM, Kind.SIMILARITY, Kind.SEARCHER, Kind.JUDGE):
         for item in default_registry().of_kind(kind):
             one, other = (
                 getattr(resolve(default_registry(), {kind: Choice(item.name)}, defaults=d), kind)

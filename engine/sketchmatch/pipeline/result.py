@@ -116,8 +116,8 @@ class Statistics:
     iterations, evaluations
         Of the searcher: its iterations, and the FMAPs that it evaluated.
     seconds
-        Time of each stage, ``segment``, ``describe``, ``relate``, ``search``, and ``total``, all
-        without the compilation of kernels.
+        Time of each stage, ``segment``, ``describe``, ``relate``, ``search`` with the judgement,
+        and ``total``, all without the compilation of kernels.
     """
 
     iterations: int
@@ -148,7 +148,9 @@ class MatchResult(Tabular):
     upper_bound
         A ζ that no legal FMAP exceeds, or None where the searcher proves nothing. Where objects
         may stay unmatched, it and an outcome OPTIMAL speak of maps of the objects of the smaller
-        scene that are matched; that no other objects should be is not proved.
+        scene that are matched; that no other objects should be is not proved. An outcome is
+        OPTIMAL only where the judge answers the map with the highest ζ, and there is no bound
+        where it answers a map of other objects than the search proved one for.
     seed
         With it, the same request gives the same result.
     match_id

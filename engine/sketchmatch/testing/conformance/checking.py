@@ -10,6 +10,7 @@ from sketchmatch.registry import Kind
 from sketchmatch.testing.conformance import (
     every_kind,
     histograms,
+    judges,
     searchers,
     segmenters,
     similarities,
@@ -38,6 +39,7 @@ _CONTRACTS: dict[Kind, Callable[[type[Any]], Sequence[Contract]]] = {
     Kind.HISTOGRAM: lambda _: histograms.CONTRACTS,
     Kind.SIMILARITY: lambda _: similarities.CONTRACTS,
     Kind.SEARCHER: lambda _: searchers.CONTRACTS,
+    Kind.JUDGE: lambda _: judges.CONTRACTS,
 }
 
 
@@ -54,7 +56,7 @@ def check_plugin(
     Parameters
     ----------
     algorithm
-        A class that derives from one of the four interfaces in :mod:`sketchmatch.api`.
+        A class that derives from one of the five interfaces in :mod:`sketchmatch.api`.
     expected_failures
         Names of checks that it fails, and why that is accepted.
     time_limit

@@ -24,7 +24,7 @@ _NOBODY = "no_such_parameter"
 
 
 def kind_of_class(algorithm: type[Any]) -> Kind:
-    """Return which of the four kinds a class is of.
+    """Return which of the five kinds a class is of.
 
     Raises
     ------
@@ -35,8 +35,8 @@ def kind_of_class(algorithm: type[Any]) -> Kind:
         if inspect.isclass(algorithm) and issubclass(algorithm, kind.interface):
             return kind
     raise TypeError(
-        f"{algorithm!r} derives from none of Segmenter, Histogram, Similarity and Searcher of "
-        "sketchmatch.api"
+        f"{algorithm!r} derives from none of Segmenter, Histogram, Similarity, Searcher and Judge "
+        "of sketchmatch.api"
     )
 
 
