@@ -11,13 +11,13 @@ import numpy as np
 import shapely
 
 from sketchmatch.model import FloatArray, Scene
-from sketchmatch.testing import spacing
 from tests.experiments.generators import outlines
 from tests.experiments.people import Shapes
 
 __all__ = ["drawn", "furnished", "thing"]
 
 _STRETCH = 0.25
+# Of the width of a thing's place on the floor, which is 1.
 _DISPLACEMENT = 0.22
 _SIZE = 0.45
 _SIZES = 0.35
@@ -67,18 +67,21 @@ def thing(rng: np.random.Generator) -> FloatArray:
 
 
 def drawn(
-    things: Sequence[FloatArray], room: Scene, shapes: Shapes, rng: np.random.Generator
+    things: Sequence[FloatArray],
+    room: Scene,  # noqa: ARG001
+    shapes: Shapes,
+    rng: np.random.Generator,
 ) -> list[FloatArray]:
-    """Return things of a room as they are drawn, turned anyhow.
+    """Return things as they are drawn, turned anyhow.
 
     Where drawn things meet, all are drawn again, and after many tries a little better.
     """
     simple = [outlines.simplified(ring, shapes) for ring in things]
     centres = np.array([ring.mean(axis=0) for ring in simple])
-    unit, care = spacing(room), 1.0
+    care = 1.0
     while True:
         for _ in range(_TRIES):
-            places = centres + rng.normal(0.0, care * _DISPLACEMENT * unit, centres.shape)
+            places = centres + rng.normal(0.0, care * _DISPLACEMENT, centres.shape)
             stretches = 1.0 + care * rng.uniform(-_STRETCH, _STRETCH, centres.shape)
             rings = [
                 (ring - centre) * stretch + place
