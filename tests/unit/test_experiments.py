@@ -427,8 +427,8 @@ def test_the_report_has_the_numbers_of_the_records(results):
 def test_the_report_says_what_segmentation_cost_and_who_can_leave_objects_out(results):
     text = (results.folder / "report.md").read_text(encoding="utf-8")
     assert "In 0 of our 2 sketches segmentation lost" in text
-    drawn = chosen(results.results["missing and extra"], place="B", method="unmatched")
-    row = cells(text, "One object missing and one that is not there", "B", "unmatched")
+    drawn = chosen(results.results["missing and extra"], place="B", method="default")
+    row = cells(text, "One object missing and one that is not there", "B", "default")
     assert row[2:4] == ["1", share(sum(record.perfect for record in drawn), 1)]
 
 
@@ -461,7 +461,7 @@ def test_the_report_begins_with_the_numbers_of_the_readme(results):
     row = cells(text, "Against the thesis", "one object missing: wholly right, %")
     sweeps = [results.results[f"one missing, {map_}"] for map_ in ("map", "grid")]
     shares = []
-    for method in ("auto", "learned"):
+    for method in ("auto", "default"):
         own = [record for sweep in sweeps for record in chosen(sweep, method=method)]
         shares.append(share(sum(each.perfect for each in own), len(own)))
     assert row[1:] == ["88.5 [84.2, 91.8]", *shares]
