@@ -23,8 +23,8 @@ __all__ = ["ARMS", "Arm", "ArmWork", "Judged", "arm_works", "judged"]
 
 _CONSIDERED = 100
 _METHODS = ("auto", "default")
-_LARGE = 20
-_SLOW = {"auto": 4}
+_SMALL = 8
+_SLOW = {"auto": 10}
 
 
 @dataclass(frozen=True)
@@ -140,8 +140,8 @@ def arm_works(
     Parameters
     ----------
     methods
-        Those of these two that are named get sketches: ``auto`` gets a quarter of those of large
-        maps, which it searches long, and ``default`` all.
+        Of these ``default`` gets all sketches, and ``auto`` a tenth of those whose map has more
+        objects than the sketch, which it searches long.
     count
         Sketches of each arm.
     only
@@ -213,5 +213,4 @@ def _said(result: MatchResult) -> list[tuple[int, float]]:
 
 def _most(method: str, arm: Arm, count: int) -> int:
     """Return how many sketches of an arm a method gets."""
-    slow = arm.objects > _LARGE or (arm.wrong_place and arm.objects >= _LARGE)
-    return max(1, count // _SLOW.get(method, 1)) if slow else count
+    return count if arm.objects <= _SMALL else max(1, count // _SLOW.get(method, 1))
