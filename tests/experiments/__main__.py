@@ -8,9 +8,10 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.experiments.arms import ARMS, arm_works
+from tests.experiments.arms import ARMS
 from tests.experiments.cases import Record
 from tests.experiments.document import save
+from tests.experiments.judging import arm_works
 from tests.experiments.methods import METHODS
 from tests.experiments.protocol import PARTS, SKETCHES, experiments, times
 from tests.experiments.records import Results
