@@ -7,10 +7,12 @@ The thesis's figures, and so its scenes and sketches, are not available. What st
 - ``people``: a model of how people draw, calibrated once by ``calibrate``;
 - ``study``: the sketches, which go through the real segmenter as pen strokes;
 - ``cases``: what is matched with what, and what came of it;
+- ``generators``: two other ways to draw, with which is measured and from which nothing is learned;
+- ``arms``: parts of maps, things forgotten and invented, other places, and what came of them;
+  ``judging`` matches them, ``arm_tables`` counts;
 - ``runs``: many cases in two processes;
 - ``thesis``: the numbers that the thesis printed;
 - ``records``, ``tables``, ``plots``, ``claims``, ``examples``: what is read out of it all, and
   ``report``, a ``document`` of these;
-- ``learn``: weights, price and probabilities of the engine, from ``drawings`` that no table is made
-  of.
+- ``learn``: price and probabilities of the engine, from ``drawings`` that no table is made of.
 """

@@ -8,15 +8,17 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from tests.experiments.arms import ARMS
 from tests.experiments.cases import Record
 from tests.experiments.document import save
+from tests.experiments.judging import arm_works
 from tests.experiments.methods import METHODS
 from tests.experiments.protocol import PARTS, SKETCHES, experiments, times
 from tests.experiments.records import Results
 from tests.experiments.report import report
 from tests.experiments.runs import PROCESSES, run_all
 
-METHODS_COMPARED = ("fsnn-pso", "easm", "auto", "learned")
+METHODS_COMPARED = ("fsnn-pso", "easm", "auto", "default")
 
 _TIMES = "times"
 
@@ -25,15 +27,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the experiments and write the report."""
     options = _options(arguments)
     started = time.perf_counter()
-    results = Results(_records(options), options.methods, options.sketches)
+    parts = options.only or (*PARTS, *ARMS, _TIMES)
+    records, arms = _records(options, parts), [part for part in parts if part in ARMS]
+    judged = run_all(
+        arm_works(options.methods, options.sketches, arms), processes=options.processes
+    )
+    results = Results(records, options.methods, options.sketches, judged)
     save(options.out, report(results))
     seconds = time.perf_counter() - started
     print(f"{options.out / 'report.html'} and {options.out / 'report.md'}: {seconds:.0f} s")
 
 
-def _records(options: argparse.Namespace) -> dict[str, list[Record]]:
-    parts = options.only or (*PARTS, _TIMES)
-    wanted = [part for part in parts if part != _TIMES]
+def _records(options: argparse.Namespace, parts: Sequence[str]) -> dict[str, list[Record]]:
+    wanted = [part for part in parts if part in PARTS]
     records: dict[str, list[Record]] = {}
     if wanted:
         works = experiments(options.methods, options.sketches, wanted)
@@ -47,8 +53,8 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m tests.experiments", description=(__doc__ or "").partition(": ")[0]
     )
-    known = (*PARTS, _TIMES)
-    parser.add_argument("--sketches", type=int, default=SKETCHES, help="of each scene")
+    known = (*PARTS, *ARMS, _TIMES)
+    parser.add_argument("--sketches", type=int, default=SKETCHES, help="of each scene and arm")
     parser.add_argument("--only", type=_listed, default=(), help=f"some of {','.join(known)}")
     parser.add_argument(
         "--methods",

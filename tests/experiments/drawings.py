@@ -14,7 +14,7 @@ from tests.experiments.study import Style, sketch
 
 __all__ = ["SEEDS", "SHARE_WITH_EXTRAS", "Drawing", "drawing"]
 
-SEEDS = {"weights": 4, "odds": 10, "check": 20}
+SEEDS = {"odds": 10, "check": 20}
 """Of what each part of the learning looks at; the study's sketches have seed 0."""
 
 SHARE_WITH_EXTRAS = 2 / 26

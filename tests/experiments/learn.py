@@ -1,12 +1,11 @@
 """What the engine knows of right and wrong maps, learned from sketches that no table is made of.
 
-Run it with ``python -m tests.experiments.learn``; it takes about half an hour and writes
+Run it with ``python -m tests.experiments.learn``; it takes some minutes and writes
 ``learned.json`` beside this file, from which the numbers of
 :mod:`sketchmatch_builtin.judges.calibration` are copied and the report tells how they were chosen:
 
-- ``weights`` of ζ, and by cross-validation whether objects are compared and how much distance
-  counts;
-- ``odds``: price, and what makes probabilities of ζ;
+- ``odds``: price, and what makes probabilities of the thesis's ζ, which the judge ``confidence``
+  has;
 - and how well these probabilities hold on yet other sketches.
 """
 
@@ -22,47 +21,33 @@ from typing import TypeVar
 
 from tests.experiments.odds import considered_by, errors, learned_odds
 from tests.experiments.runs import each_of
-from tests.experiments.weights import FOLDS, learned_weights, parts_of
 
 __all__ = ["LEARNED", "SKETCHES", "THESIS"]
 
 LEARNED = Path(__file__).with_name("learned.json")
 """What came of it."""
 
-SKETCHES = {"weights": 1800, "odds": 600, "check": 600}
+SKETCHES = {"odds": 600, "check": 600}
 
-THESIS = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
-"""The weights of the thesis, for which price and probabilities are learned as well."""
+THESIS = (1.0, 1.0, 1.0)
+"""The weights of the thesis."""
 
-# With which maps are looked for that leave objects out, before prices are learned; near these.
-_FIRST_PRICES = {"thesis": 0.35, "learned": 0.1}
+# With which maps are looked for that leave objects out, before it is learned; near it.
+_FIRST_PRICE = 0.35
 
 _Case = TypeVar("_Case")
 
 
 def main() -> None:
     """Learn, print and write."""
-    held, weights = learned_weights(_all_of(parts_of, "weights"))
-    for each in held:
-        print(f"{each.compared}, distance^{each.distance:g}, penalty {each.penalty:g}: ", end="")
-        print(f"loss {each.loss:.4f} ± {each.error:.4f}, right {each.right:.1%}")
-    print("weights:", weights)
-    odds = {}
-    for name, each in (("thesis", THESIS), ("learned", weights)):
-        known, others = (
-            _all_of(partial(considered_by, each, _FIRST_PRICES[name], part), part)
-            for part in ("odds", "check")
-        )
-        calibration = learned_odds(known)
-        odds[name] = asdict(calibration) | {"errors": errors(others, calibration)}
-        print(name, odds[name])
-    found = {
-        "sketches": SKETCHES,
-        "folds": FOLDS,
-        "held": [asdict(each) for each in held],
-        "weights": weights,
-        "odds": odds,
-    }
+    known, others = (
+        _all_of(partial(considered_by, THESIS, _FIRST_PRICE, part), part)
+        for part in ("odds", "check")
+    )
+    calibration = learned_odds(known)
+    odds = asdict(calibration) | {"errors": errors(others, calibration)}
+    print(odds)
+    found = {"sketches": SKETCHES, "odds": odds}
     text = json.dumps(found, indent=1, ensure_ascii=False)
     LEARNED.write_text(text + "\n", encoding="utf-8")
 

@@ -22,31 +22,37 @@ class Method:
     name
         What tables call it.
     searcher
-        The searcher's name.
+        The searcher's name; None for the profile's, or the default.
     options
         Further arguments of :func:`sketchmatch.match`.
     """
 
     name: str
-    searcher: str
+    searcher: str | None
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
-_LEARNED = {"profile": "learned"}
+_THESIS = {"profile": "thesis"}
+
+
+def _by_the_thesis(name: str, searcher: str, **parameters: str) -> Method:
+    """Return a method that looks for the highest ζ of a map of all objects, as the thesis does."""
+    options = {"params": {"searcher": parameters}} if parameters else {}
+    return Method(name, searcher, {**_THESIS, **options})
+
 
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
         method.name: method
         for method in (
-            Method("fsnn-pso", "fsnn-pso"),
-            Method("fsnn-folded", "fsnn-pso", {"params": {"searcher": {"rotation": "folded"}}}),
-            Method("easm", "easm"),
-            Method("easm-pairwise", "easm", {"params": {"searcher": {"consistency": "pairwise"}}}),
-            Method("auto", "auto"),
-            Method("exact", "exact"),
-            Method("direct", "direct"),
-            Method("learned", "auto", _LEARNED),
-            Method("unmatched", "auto", {**_LEARNED, "allow_unmatched": True}),
+            _by_the_thesis("fsnn-pso", "fsnn-pso"),
+            _by_the_thesis("fsnn-folded", "fsnn-pso", rotation="folded"),
+            _by_the_thesis("easm", "easm"),
+            _by_the_thesis("easm-pairwise", "easm", consistency="pairwise"),
+            _by_the_thesis("auto", "auto"),
+            _by_the_thesis("exact", "exact"),
+            _by_the_thesis("direct", "direct"),
+            Method("default", None),
         )
     }
 )
@@ -61,4 +67,5 @@ def warm_up(methods: Iterable[str]) -> None:
     warmup.warm_up(default_registry())
     searchers = {item.name: item.algorithm for item in default_registry().of_kind(Kind.SEARCHER)}
     for method in methods:
-        searchers[METHODS[method].searcher].warm_up()
+        if (searcher := METHODS[method].searcher) is not None:
+            searchers[searcher].warm_up()

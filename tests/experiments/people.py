@@ -35,7 +35,7 @@ import shapely
 from sketchmatch.model import FloatArray, Scene, SceneObject, StrokeSet
 from sketchmatch.testing import draw_strokes, simulate_sketch
 
-__all__ = ["EXTRA", "Person", "Shapes", "draw", "with_extras"]
+__all__ = ["EXTRA", "Person", "Shapes", "draw", "remembered", "with_extras"]
 
 EXTRA = "extra"
 """What labels of objects begin with that are drawn and not there."""
@@ -121,12 +121,17 @@ def draw(
     """
     drawn = [*range(len(room))] if objects is None else objects
     chosen = Scene(tuple(room.objects[k] for k in drawn))
+    return draw_strokes(remembered(chosen, person, rng), rng, gap=_GAP, drift=_DRIFT)
+
+
+def remembered(room: Scene, person: Person, rng: np.random.Generator) -> Scene:
+    """Return a room as a person remembers it, in random order: what is drawn, before the pen."""
     strength = person.strength
     while True:
         for _ in range(_TRIES):
-            sketch = _remembered(chosen, person, strength, rng)
+            sketch = _remembered(room, person, strength, rng)
             if _apart(sketch):
-                return draw_strokes(sketch, rng, gap=_GAP, drift=_DRIFT)
+                return sketch
         strength *= _BETTER
 
 

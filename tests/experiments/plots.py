@@ -40,7 +40,7 @@ _COLOURS = {
     "fsnn-pso": "#1b9e77",
     "exact": "#7b3294",
     "direct": "#c2a000",
-    "learned": "#e7298a",
+    "default": "#e7298a",
 }
 _OTHER = "#888888"
 _WIDTHS = {"easm": 4.5}  # to be seen beneath auto, which mostly agrees

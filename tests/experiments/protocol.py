@@ -58,8 +58,8 @@ _NINE = len(LETTERS)
 _GOLDEN_ANGLE = 137.5
 _PAPERS = range(0, 360, 30)
 _LARGE = {10: 4, 12: 3, 16: 2, 20: 2, 30: 1}
-_SMALL = ("fsnn-pso", "easm", "auto", "learned", "exact")
-_LARGE_BY = ("easm", "auto", "learned", "direct")
+_SMALL = ("fsnn-pso", "easm", "auto", "default", "exact")
+_LARGE_BY = ("easm", "auto", "default", "direct")
 _FEWEST = 3
 _FSNN, _FOLDED, _EASM = "fsnn-pso", "fsnn-folded", "easm"
 
@@ -241,7 +241,7 @@ def _both_ways(methods: tuple[str, ...], count: int) -> dict[str, list[Work]]:
         Work(place, number, Style(missing=1, extra=1), methods=tuple(dict.fromkeys(those)))
         for place in PLACES
         for number in range(max(1, count // 2))
-        for those in [(*_affordable(methods, number, fsnn=0), "unmatched")]
+        for those in [(*_affordable(methods, number, fsnn=0), "default")]
     ]
     return {"missing and extra": works}
 

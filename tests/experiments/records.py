@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from statistics import mean
 from typing import TypeVar
 
 import numpy as np
 
+from tests.experiments.arms import Judged
 from tests.experiments.cases import Record
 from tests.experiments.intervals import wilson
 from tests.experiments.thesis import Row
@@ -42,11 +43,14 @@ class Results:
         The methods compared, in the order of the tables.
     sketches
         How many there were of each scene.
+    judged
+        Those of the arms, by title.
     """
 
     experiments: dict[str, list[Record]]
     methods: tuple[str, ...]
     sketches: int
+    judged: Mapping[str, list[Judged]] = field(default_factory=dict)
 
     def __contains__(self, title: str) -> bool:
         return title in self.experiments

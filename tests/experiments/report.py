@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from statistics import mean, median
 
-from tests.experiments import plots, tables, thesis
+from tests.experiments import arm_tables, plots, tables, thesis
 from tests.experiments.calibrate import calibrated
 from tests.experiments.cases import Record
 from tests.experiments.claims import claims
@@ -45,10 +45,9 @@ _WHAT_IS_WHOSE = (
     "through the real segmenter. No person drew any of them, so no number here says how well "
     "anything does with people; it says how methods compare on the same sketches.",
     "fsnn-pso and easm are our programs of the thesis's text; its own are not available. auto, "
-    "exact and direct are ours and maximise the same ζ. learned is auto with the profile learned: "
-    "another ζ, which compares objects in shape and size too and lets rotations of distant pairs "
-    "count for more. Its weights, and what makes a "
-    "probability of a score, were learned from other sketches by the same model of how people "
+    "exact and direct are ours and maximise the same ζ. default is what a match is that chooses "
+    "nothing: it may leave objects without partner and judges maps by more than ζ. What makes "
+    "probabilities was learned from other sketches by the same model of how people "
     "draw, of these two rooms and of others (tests/experiments/learn.py).",
 )
 
@@ -74,9 +73,10 @@ def report(results: Results) -> list[Block]:
 
 
 def _introduction(results: Results) -> Iterator[Block]:
-    cases = sum(len(records) for records in results.experiments.values())
+    done = (*results.experiments.values(), *results.judged.values())
+    cases = sum(len(records) for records in done)
     yield Paragraph(
-        f"{results.sketches} sketches of each scene, {cases:,} matches, methods "
+        f"{results.sketches} sketches of each scene and arm, {cases:,} matches, methods "
         f"{', '.join(results.methods)}. The same seeds give the same numbers again, times apart. "
         "Written by `make experiments`."
     )
@@ -221,6 +221,27 @@ def _sweeps(results: Results) -> Iterator[Block]:
         yield tables.both_ways(results)
 
 
+def _parts(results: Results) -> Iterator[Block]:
+    judged = [each for records in results.judged.values() for each in records]
+    if not judged:
+        return
+    yield Heading("Parts of maps, and other places")
+    yield Paragraph(
+        "People draw a few things of a map of many, forget some and draw one that is not there; "
+        "and the map may be of another place. These sketches are by two generators that differ in "
+        "kind from each other and from the people above, and from which nothing was learned: "
+        "plain strews things over a floor, displaces each by 0.22 of the spacing along x and y "
+        "and stretches it by up to 25 %; memory draws furnished rooms along a corridor as people "
+        "remember them, who straighten, know three sizes, keep order better than distance, and "
+        "move what belongs together as one."
+    )
+    if any(not each.arm.wrong_place for each in judged):
+        yield arm_tables.parts(judged)
+    if any(each.arm.wrong_place for each in judged):
+        yield arm_tables.places(judged)
+    yield arm_tables.together(judged)
+
+
 def _stronger(results: Results) -> Table:
     records = results[f"strength {STRONGER:g}"]
     return _whole_and_missing(
@@ -332,38 +353,12 @@ def _calibration(_results: Results) -> Iterator[Block]:
 
 def _learning(_results: Results) -> Iterator[Block]:
     found = json.loads(LEARNED.read_text(encoding="utf-8"))
-    yield Heading("How the profile learned was learned")
+    yield Heading("How the probabilities of ζ were learned")
+    errors = found["odds"]["errors"]
     yield Paragraph(
-        f"From {found['sketches']['weights']} sketches without one object, of these rooms and "
-        "random ones, with people who draw better and worse, outlines, boxes and ellipses; none of "
-        "them is used above. A conditional logit finds the weights that make right maps likeliest. "
-        f"{found['folds']}-fold cross-validation decides whether objects are compared and how much "
-        "the distance of two objects counts for in ζR: the lowest loss wins; then how much large "
-        "coefficients are penalised: as much as costs no more than one standard error of that loss."
-    )
-    chosen = found["held"][-1]
-    yield Table(
-        "Cross-validation",
-        ("compared", "exponent of distance", "penalty", "held-out loss", "± error", "right, %"),
-        tuple(
-            (
-                line["compared"],
-                f"{line['distance']:g}",
-                f"{line['penalty']:g}" + (" (chosen)" if line is chosen else ""),
-                f"{line['loss']:.4f}",
-                f"{line['error']:.4f}",
-                f"{100 * line['right']:.1f}",
-            )
-            for line in found["held"]
-        ),
-        note="Of the sketches left out. loss: mean of −ln of the probability given "
-        "to the right map.",
-    )
-    weights = ", ".join(f"{weight:g}" for weight in found["weights"])
-    errors = found["odds"]["learned"]["errors"]
-    yield Paragraph(
-        f"So the weights of ζσ, ζR, ζL, ζS and ζM and the exponent are {weights}. What makes "
-        f"probabilities of scores was learned from {found['sketches']['odds']} more sketches. On "
+        "What makes probabilities of the thesis's ζ, which the judge confidence gives, was learned "
+        f"from {found['sketches']['odds']} sketches of these rooms and random ones, with people "
+        "who draw better and worse, outlines, boxes and ellipses; none of them is used above. On "
         f"{found['sketches']['check']} others the expected calibration error is "
         f"{errors['maps']:g} for maps and {errors['objects']:g} for single objects."
     )
@@ -416,6 +411,7 @@ _SECTIONS = (
     _missing,
     _times,
     _sweeps,
+    _parts,
     _probabilities,
     _examples,
     _learning,

@@ -11,7 +11,7 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -21,7 +21,7 @@ from tests.experiments.cases import NOTHING, Record, Removal, cases, evaluate
 from tests.experiments.methods import warm_up
 from tests.experiments.study import Style
 
-__all__ = ["PROCESSES", "Work", "each_of", "run", "run_all"]
+__all__ = ["PROCESSES", "Task", "Work", "each_of", "run", "run_all"]
 
 PROCESSES = 2
 
@@ -29,6 +29,18 @@ _CHUNK = 2
 _TELL_EVERY = 30.0
 _Item = TypeVar("_Item")
 _Done = TypeVar("_Done")
+_Made_co = TypeVar("_Made_co", covariant=True)
+
+
+class Task(Protocol[_Made_co]):
+    """Something to be done that knows how."""
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Names in :data:`tests.experiments.methods.METHODS`."""
+
+    def done(self) -> list[_Made_co]:
+        """Do it."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +74,8 @@ def run(works: Sequence[Work], title: str, *, processes: int = PROCESSES) -> lis
 
 
 def run_all(
-    experiments: Mapping[str, Sequence[Work]], *, processes: int = PROCESSES
-) -> dict[str, list[Record]]:
+    experiments: Mapping[str, Sequence[Task[_Done]]], *, processes: int = PROCESSES
+) -> dict[str, list[_Done]]:
     """Do the work of several experiments, showing progress on the error stream.
 
     Parameters
@@ -83,10 +95,10 @@ def run_all(
     }
     counts = {title: len(works) for title, works in experiments.items()}
     with _workers(processes, methods) as do, _progress(counts) as advanced:
-        records: dict[str, list[Record]] = {}
+        records: dict[str, list[_Done]] = {}
         for title, works in experiments.items():
             records[title] = []
-            for each in do(Work.done, works):
+            for each in do(_done, works):
                 records[title] += each
                 advanced(title)
     return records
@@ -100,6 +112,10 @@ def each_of(
         for done in all_of(do, items):
             yield done
             advanced(title)
+
+
+def _done(task: Task[_Done]) -> list[_Done]:
+    return task.done()
 
 
 @contextmanager

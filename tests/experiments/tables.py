@@ -293,8 +293,8 @@ def both_ways(results: Results) -> Table:
         ("scene", "method", "sketches", "wholly right, %", "objects, %"),
         tuple(rows),
         left=2,
-        note="Only unmatched, which is learned with allow_unmatched, may leave an object of either "
-        f"side without partner: no other can be wholly right. {_INTERVAL}",
+        note="Only default may leave an object of either side without partner: no other can be "
+        f"wholly right. {_INTERVAL}",
     )
 
 

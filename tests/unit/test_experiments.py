@@ -26,6 +26,7 @@ from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from tests.experiments import __main__ as program
 from tests.experiments import cases as case_module
 from tests.experiments import document, protocol, study, thesis
+from tests.experiments.arms import ARMS
 from tests.experiments.calibrate import calibrated
 from tests.experiments.cases import NOTHING, CaseName, Record, Removal, answer, cases, evaluate
 from tests.experiments.claims import CONFIRMED, IN_PART, REFUTED, claims
@@ -376,7 +377,7 @@ def results(tmp_path_factory):
     """The whole of it on one sketch a scene, and the folder with its report."""
     kept = {}
     brief = {
-        name: Method(name, name, {"params": {"searcher": {limit: 2}}})
+        name: Method(name, name, {"profile": "thesis", "params": {"searcher": {limit: 2}}})
         for name, limit in (("easm", "patience"), ("fsnn-pso", "iterations"))
     }
     folder = tmp_path_factory.mktemp("experiments")
@@ -385,6 +386,8 @@ def results(tmp_path_factory):
         patch.setattr(protocol, "_LARGE", {10: 1})
         patch.setattr(protocol, "_PAPERS", (0, 30))
         patch.setattr(protocol, "STRENGTHS", (0.95,))
+        for part, arms in ARMS.items():
+            patch.setitem(ARMS, part, arms[:1])
         patch.setattr(
             program, "report", lambda found: kept.setdefault("r", found) and report(found)
         )
@@ -424,11 +427,22 @@ def test_the_report_has_the_numbers_of_the_records(results):
     assert row[1:4] == ["37", "4607", "124.5"]
 
 
+def test_the_report_has_the_arms(results):
+    text = (results.folder / "report.md").read_text(encoding="utf-8")
+    judged = results.results.judged
+    assert [*judged] == [f"{part}, {kind}" for part in ARMS for kind in ("plain", "memory")]
+    (record,) = (each for each in judged["parts, memory"] if each.method == "default")
+    row = cells(text, "Sketches of parts of a map", "", "memory", "default")
+    assert row[3:5] == ["1", share(int(record.perfect), 1)]
+    row = cells(text, "Sketches of other places", "8 of another 8", "plain", "auto")
+    assert row[3] == "1"
+
+
 def test_the_report_says_what_segmentation_cost_and_who_can_leave_objects_out(results):
     text = (results.folder / "report.md").read_text(encoding="utf-8")
     assert "In 0 of our 2 sketches segmentation lost" in text
-    drawn = chosen(results.results["missing and extra"], place="B", method="unmatched")
-    row = cells(text, "One object missing and one that is not there", "B", "unmatched")
+    drawn = chosen(results.results["missing and extra"], place="B", method="default")
+    row = cells(text, "One object missing and one that is not there", "B", "default")
     assert row[2:4] == ["1", share(sum(record.perfect for record in drawn), 1)]
 
 
@@ -461,7 +475,7 @@ def test_the_report_begins_with_the_numbers_of_the_readme(results):
     row = cells(text, "Against the thesis", "one object missing: wholly right, %")
     sweeps = [results.results[f"one missing, {map_}"] for map_ in ("map", "grid")]
     shares = []
-    for method in ("auto", "learned"):
+    for method in ("auto", "default"):
         own = [record for sweep in sweeps for record in chosen(sweep, method=method)]
         shares.append(share(sum(each.perfect for each in own), len(own)))
     assert row[1:] == ["88.5 [84.2, 91.8]", *shares]
@@ -474,6 +488,14 @@ def test_html_is_escaped(tmp_path):
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     for escaped in ("a &lt; b", "x &amp; y", "&lt;b&gt;", "1 &gt; 0", "&lt;p&gt;"):
         assert escaped in text
+
+
+def test_an_arm_alone_makes_a_report(tmp_path, monkeypatch):
+    monkeypatch.setitem(ARMS, "places", ARMS["places"][:1])
+    program.main(["--sketches=1", "--processes=1", "--only=places", f"--out={tmp_path}"])
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert cells(text, "Sketches of other places", "", "plain", "default")[3] == "1"
+    assert "Sketches of parts of a map" not in text
 
 
 def test_a_part_alone_makes_a_report(tmp_path, capsys):

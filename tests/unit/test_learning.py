@@ -2,19 +2,15 @@
 
 import dataclasses
 import json
-import math
 
 import numpy as np
 import pytest
 
-from sketchmatch.config import builtin
 from sketchmatch.model import ConfidenceWeights
-from sketchmatch_builtin.judges.calibration import LEARNED, calibrated
-from tests.experiments import calibrate, drawings, learn, odds, thesis, weights
+from sketchmatch_builtin.judges.calibration import calibrated
+from tests.experiments import calibrate, drawings, learn, odds, thesis
 from tests.experiments.protocol import STRONGER
 from tests.experiments.study import STRENGTH
-from tests.oracle import maps
-from tests.searching import relations_of
 
 pytestmark = pytest.mark.slow
 
@@ -25,64 +21,13 @@ def found():
 
 
 def test_the_engine_has_the_numbers_that_were_learned(found):
-    assert tuple(found["weights"]) == tuple(LEARNED)
-    for name, known in (("thesis", ConfidenceWeights(*learn.THESIS)), ("learned", LEARNED)):
-        calibration = dataclasses.asdict(calibrated(known))
-        assert {key: found["odds"][name][key] for key in calibration} == calibration
-    assert tuple(builtin().defaults.named("learned").weights) == tuple(LEARNED)
-
-
-def test_the_weights_are_those_that_cross_validation_chose(found):
-    *others, chosen = found["held"]
-    free = [line for line in others if not line["penalty"]] or [chosen]
-    best = min(free, key=lambda line: line["loss"])
-    same = ("compared", "distance")
-    assert [chosen[key] for key in same] == [best[key] for key in same]
-    assert chosen["loss"] <= best["loss"] + best["error"]
-    for line in others:
-        if [line[key] for key in same] == [best[key] for key in same]:
-            dearer = line["loss"] > best["loss"] + best["error"]
-            assert dearer or line["penalty"] <= chosen["penalty"]
-    assert chosen["distance"] == LEARNED.distance
+    calibration = dataclasses.asdict(calibrated(ConfidenceWeights(*learn.THESIS)))
+    assert {key: found["odds"][key] for key in calibration} == calibration
 
 
 def test_the_study_learns_from_no_sketch_that_a_table_is_made_of():
     seeds = [*drawings.SEEDS.values(), calibrate.SEED]
     assert len({0, *seeds}) == 1 + len(seeds)
-
-
-def test_parts_are_those_of_the_definition():
-    (parts,) = weights.parts_of(0)
-    drawn = drawings.drawing("weights", 0, 8, missing=1, extra=0)
-    table = relations_of(drawn.scene, drawn.map)
-    right = maps.induced(drawn.truth.tolist())
-    _, sigma, turned, level = maps.confidence(table, right)
-    assert parts.alike[parts.right, :2] == pytest.approx([sigma, level], abs=1e-9)
-    assert parts.at(0.0, 3)[parts.right] == pytest.approx([sigma, turned, level], abs=1e-9)
-    centroids = [item.centroid for item in drawn.scene.objects]
-    counts = [math.dist(centroids[a], centroids[b]) for a, b in maps.pairs(len(centroids))]
-    turns = [maps.look_up(table, i, pair)[1] for i, pair in enumerate(right)]
-    total = sum(c * complex(math.cos(r), math.sin(r)) for c, r in zip(counts, turns, strict=True))
-    assert parts.at(1.0, 5)[parts.right, 1] == pytest.approx(abs(total) / sum(counts), abs=1e-9)
-
-
-def made_up(coefficients, cases, rng):
-    """Return the parts of maps of which the right one is drawn by a logit."""
-    for _ in range(cases):
-        alike, turned = rng.uniform(0.7, 1.0, (6, 4)), rng.uniform(0.7, 1.0, (6, 5))
-        parts = weights.Parts(alike, turned, 0)
-        chances = np.exp(parts.at(1.0, 5) @ np.array(coefficients))
-        yield weights.Parts(alike, turned, int(rng.choice(6, p=chances / chances.sum())))
-
-
-def test_a_fit_finds_the_weights_that_there_are():
-    cases = list(made_up((20.0, 40.0, 10.0, 30.0, 0.0), 3000, np.random.default_rng(0)))
-    held, found = weights.learned_weights(cases)
-    assert held[-1].distance == found[-1] == 1.0
-    assert held[-1].compared == "relations, shapes and sizes"
-    assert found[0] == 1.0
-    assert found[1:4] == pytest.approx((2.0, 0.5, 1.5), rel=0.15)
-    assert found[4] <= 0.1
 
 
 def considered(values, left_out, truth, objects, extra):

@@ -7,12 +7,22 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BoolArray", "FloatArray", "IntArray", "frozen", "frozen_floats", "sealed"]
+__all__ = [
+    "BoolArray",
+    "ComplexArray",
+    "FloatArray",
+    "IntArray",
+    "frozen",
+    "frozen_floats",
+    "sealed",
+]
 
 _DType = TypeVar("_DType", bound=np.generic)
 
 BoolArray = NDArray[np.bool_]
 """An array of truth values."""
+ComplexArray = NDArray[np.complex128]
+"""An array of complex128: points and vectors of the plane, x + iy."""
 FloatArray = NDArray[np.float64]
 """An array of float64."""
 IntArray = NDArray[np.int64]

@@ -136,7 +136,7 @@ def judged(
     """
     whole, weights = Part.whole(comparison.table, comparison.own), goal.weights.searched
     first, others = yield from considered(comparison, found, goal)
-    problem = problem_of(comparison, first, others, goal, usual)
+    problem = problem_of(comparison, first, others, goal, usual, bool(found.best.best.maps))
     with inspecting(judge, registry, problem), blaming(judge, registry):
         judgement = judge.judge(problem)
         check_maps(judgement, problem)
@@ -212,6 +212,7 @@ def problem_of(
     others: Iterable[Rival],
     goal: Goal,
     usual: bool = True,
+    explored: bool = False,
 ) -> JudgeProblem:
     """Return what the judge is given of the maps that :func:`considered` returns."""
     template, argument = comparison.scenes
@@ -238,6 +239,7 @@ def problem_of(
         goal.names,
         None if exchanges is None else sealed(exchanges),
         None if omissions is None else sealed(omissions),
+        explored,
         usual,
     )
 

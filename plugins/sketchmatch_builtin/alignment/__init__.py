@@ -1,0 +1,27 @@
+"""Laying a sketch upon a map: poses, and the object maps that follow; for searcher and judge."""
+
+from sketchmatch_builtin.alignment._candidates import (
+    Laid,
+    completed,
+    drive,
+    laid_maps,
+    template_maps,
+)
+from sketchmatch_builtin.alignment._measures import PARTS, Part, measured, relations_of
+from sketchmatch_builtin.alignment._sides import Sides, sides_of
+from sketchmatch_builtin.alignment._things import Things
+
+__all__ = [
+    "PARTS",
+    "Laid",
+    "Part",
+    "Sides",
+    "Things",
+    "completed",
+    "drive",
+    "laid_maps",
+    "measured",
+    "relations_of",
+    "sides_of",
+    "template_maps",
+]

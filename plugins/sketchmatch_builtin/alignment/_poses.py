@@ -1,0 +1,543 @@
+"""Poses of a sketch on a map, compiled: guessed from two pairings, weighed, and refined.
+
+A pose is w = u·z + t in complex numbers. Under it sketched object i is mapped object j with
+
+    ℓ_ij = −2 ln[(1 + d²/3)(1 + e²/3)(1 + h²/3)],
+
+the logarithm of a product of Student's t with 3 degrees of freedom [1]_ but for a constant: d, e
+and h are the distance of the places, the difference of the logarithms of the areas, and that of
+the shapes, each over its tolerance. A pose is worth Σ_i max(max_j ℓ_ij, −λ).
+
+References
+----------
+.. [1] K. Lange, R. Little, J. Taylor, "Robust statistical modeling using the t distribution",
+   Journal of the American Statistical Association 84, 1989.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from sketchmatch.api.kernels import kernel
+from sketchmatch.model import BoolArray, FloatArray, IntArray
+from sketchmatch_builtin.alignment._things import Things
+from sketchmatch_builtin.searchers._assignment import FORBIDDEN, reduce_by_assignment
+
+__all__ = [
+    "TOLERANCES",
+    "Grid",
+    "Guesses",
+    "Tolerances",
+    "empty_guesses",
+    "first_growth",
+    "fitted_pose",
+    "grid_of",
+    "grown",
+    "guess_poses",
+    "pairing_worths",
+    "refine_pose",
+    "square",
+    "vary",
+]
+
+_ROUNDS = 6
+_MOST_CELLS = 64
+
+_REACH = 3.0
+"""Tolerances that sizes and shapes of two pairings may differ by to make a pose."""
+
+_SMALLEST = 2.0
+"""How much, in ln of the area, a sketch may show all things larger or smaller between places."""
+
+_TRUST = 0.9
+"""Of that, how much two pairings are believed."""
+
+_SPREAD = 0.6
+"""Its standard deviation among sketches."""
+
+
+class Tolerances(NamedTuple):
+    """How far sketches leave the truth.
+
+    Attributes
+    ----------
+    place
+        Of places, in units of the sketch's spacing under the pose.
+    size
+        Of ln of the areas.
+    shape
+        Of shapes.
+    omission
+        λ, what leaving a sketched object without partner costs.
+    """
+
+    place: float
+    size: float
+    shape: float
+    omission: float
+
+
+TOLERANCES = Tolerances(place=0.35, size=0.35, shape=0.35, omission=5.0)
+"""Wide enough for anybody's sketch; judging is not theirs."""
+
+
+class Grid(NamedTuple):
+    """Objects by the cells of a grid in which they lie.
+
+    Attributes
+    ----------
+    corner
+        x + iy of the first cell's corner.
+    cell
+        Width of a cell.
+    columns, rows
+        How many cells there are.
+    starts
+        int64, shape (columns·rows + 1,): cell c, counted row by row, holds the objects
+        ``starts[c]`` to ``starts[c + 1]`` − 1 of:
+    things
+        The objects, sorted by cell.
+    order
+        int64, shape (m,): which each of these is.
+    """
+
+    corner: complex
+    cell: float
+    columns: int
+    rows: int
+    starts: IntArray
+    things: Things
+    order: IntArray
+
+
+class Guesses(NamedTuple):
+    """Good poses met.
+
+    Attributes
+    ----------
+    scores
+        Shape (room,).
+    pairings
+        int64, shape (room, 4): i, j, k and l of a pose that lays i on j and k on l.
+    state
+        int64, shape (3,): how many there are, how many were weighed, and how many pairs of a
+        sketched pair and a mapped object are done.
+    floor
+        Shape (1,): what a pose must be worth to be kept.
+    """
+
+    scores: FloatArray
+    pairings: IntArray
+    state: IntArray
+    floor: FloatArray
+
+
+def grid_of(things: Things) -> Grid:
+    """Return objects by cells, about one in each."""
+    x, y = things.places.real, things.places.imag
+    width, height = float(np.ptp(x)), float(np.ptp(y))
+    cell = max(math.sqrt(width * height / len(x)), max(width, height) / _MOST_CELLS, things.spacing)
+    columns, rows = int(width / cell) + 1, int(height / cell) + 1
+    number = ((y - y.min()) / cell).astype(np.int64) * columns
+    number += ((x - x.min()) / cell).astype(np.int64)
+    order = np.argsort(number, kind="stable")
+    starts = np.searchsorted(number[order], np.arange(columns * rows + 1))
+    sorted_ = Things(
+        things.places[order], things.sizes[order], things.shapes[order], things.spacing
+    )
+    return Grid(complex(x.min(), y.min()), cell, columns, rows, starts, sorted_, order)
+
+
+def empty_guesses(room: int, floor: float) -> Guesses:
+    """Return room for an even number of guesses that are worth more than a floor."""
+    return Guesses(
+        np.empty(room),
+        np.empty((room, 4), dtype=np.int64),
+        np.zeros(3, dtype=np.int64),
+        np.full(1, floor),
+    )
+
+
+@kernel
+def guess_poses(
+    pairs: IntArray,
+    drawn: Things,
+    mapped: Things,
+    grid: Grid,
+    logs: FloatArray,
+    allowed: FloatArray,
+    tolerances: Tolerances,
+    most: int,
+    guesses: Guesses,
+) -> None:
+    """Go on weighing the poses that lay each sketched pair on every ordered pair of mapped objects.
+
+    Parameters
+    ----------
+    pairs
+        Shape (p, 2), sketched pairs.
+    drawn, mapped, grid
+        The objects, and the mapped ones by cells.
+    logs
+        Shape (m, m): ln of the distances between mapped objects; on the diagonal anything.
+    allowed
+        Shape (n, m): 0 where a pairing is ruled out.
+    tolerances
+        How far sketches leave the truth.
+    most
+        How many to weigh before a pause, or a few more.
+    guesses
+        Where good poses are kept, and how far this has come.
+    """
+    m = mapped.places.size
+    free = np.empty((drawn.places.size, m), dtype=np.bool_)
+    for x in range(m):
+        free[:, x] = allowed[:, grid.order[x]] > 0.0
+    wide, limit = _REACH * tolerances.size, (_REACH * tolerances.shape) ** 2
+    until = guesses.state[1] + most
+    while guesses.state[2] < pairs.shape[0] * m and guesses.state[1] < until:
+        i, k = pairs[guesses.state[2] // m, 0], pairs[guesses.state[2] // m, 1]
+        j = guesses.state[2] % m
+        guesses.state[2] += 1
+        apart = drawn.places[k] - drawn.places[i]
+        if abs(apart) == 0.0 or allowed[i, j] == 0.0:
+            continue
+        log_apart = np.log(abs(apart))
+        for l in range(m):  # noqa: E741
+            if l == j or allowed[k, l] == 0.0:
+                continue
+            growth = 2.0 * (logs[j, l] - log_apart)
+            one = mapped.sizes[j] - drawn.sizes[i] - growth
+            other = mapped.sizes[l] - drawn.sizes[k] - growth
+            if abs(one - other) > wide or abs(one + other) > 2.0 * _SMALLEST:
+                continue
+            u = (mapped.places[l] - mapped.places[j]) / apart
+            if u == 0.0:
+                continue
+            twist = u * u / square(u)
+            if (
+                square(drawn.shapes[i] * twist - mapped.shapes[j]) > limit
+                or square(drawn.shapes[k] * twist - mapped.shapes[l]) > limit
+            ):
+                continue
+            guesses.state[1] += 1
+            growth += 0.5 * _TRUST * (one + other)
+            t = mapped.places[j] - u * drawn.places[i]
+            score = _worth(u, t, twist, growth, drawn, grid, free, tolerances, guesses.floor[0])
+            if score > guesses.floor[0]:
+                _keep(guesses, score, i, j, k, l)
+
+
+@kernel
+def first_growth(
+    u: complex,
+    i: int,
+    j: int,
+    k: int,
+    l: int,
+    drawn: Things,
+    mapped: Things,  # noqa: E741
+) -> float:
+    """Return by how much ln of the areas grows under a pose that lays i on j and k on l."""
+    growth = 2.0 * np.log(abs(u))
+    one = mapped.sizes[j] - drawn.sizes[i] - growth
+    other = mapped.sizes[l] - drawn.sizes[k] - growth
+    return growth + 0.5 * _TRUST * (one + other)
+
+
+@kernel
+def square(z: complex) -> float:
+    """Return |z|², of which numba knows no quick form."""
+    return z.real * z.real + z.imag * z.imag
+
+
+@kernel
+def _worth(
+    u: complex,
+    t: complex,
+    twist: complex,
+    growth: float,
+    drawn: Things,
+    grid: Grid,
+    free: BoolArray,
+    tolerances: Tolerances,
+    floor: float,
+) -> float:
+    """Return what a pose is worth, or the floor where it is not above that."""
+    unit = 1.0 / (3.0 * square(u) * (tolerances.place * drawn.spacing) ** 2)
+    by_size, by_shape = 1.0 / (3.0 * tolerances.size**2), 1.0 / (3.0 * tolerances.shape**2)
+    worst = np.exp(0.5 * tolerances.omission)
+    far, things = (worst - 1.0) / unit, grid.things
+    reach = np.sqrt(far) / grid.cell
+    most, product = np.exp(-0.5 * floor), 1.0
+    for i in range(drawn.places.size):
+        place, size = u * drawn.places[i] + t, drawn.sizes[i] + growth
+        shape = drawn.shapes[i] * twist
+        best = worst
+        column = (place.real - grid.corner.real) / grid.cell
+        row = (place.imag - grid.corner.imag) / grid.cell
+        left, right = max(0.0, column - reach), min(grid.columns - 1.0, column + reach)
+        low, high = max(0.0, row - reach), min(grid.rows - 1.0, row + reach)
+        if left <= right and low <= high:
+            for y in range(int(low), int(high) + 1):
+                first = grid.starts[y * grid.columns + int(left)]
+                last = grid.starts[y * grid.columns + int(right) + 1]
+                for x in range(first, last):
+                    away = square(things.places[x] - place)
+                    if away < far:
+                        unlike = 1.0 + unit * away
+                        unlike *= 1.0 + by_size * (things.sizes[x] - size) ** 2
+                        if unlike < best and free[i, x]:
+                            unlike *= 1.0 + by_shape * square(shape - things.shapes[x])
+                            best = min(best, unlike)
+        product *= best
+        if product >= most:
+            return floor
+    return -2.0 * np.log(product)
+
+
+@kernel
+def _keep(guesses: Guesses, score: float, i: int, j: int, k: int, l: int) -> None:  # noqa: E741
+    """Keep a guess; where there is no room left, the better half alone stays."""
+    room = guesses.scores.size
+    count = guesses.state[0]
+    guesses.scores[count] = score
+    guesses.pairings[count, 0], guesses.pairings[count, 1] = i, j
+    guesses.pairings[count, 2], guesses.pairings[count, 3] = k, l
+    count += 1
+    if count == room:
+        floor = np.sort(guesses.scores)[room // 2]
+        count = 0
+        for x in range(room):
+            if guesses.scores[x] > floor:
+                guesses.scores[count] = guesses.scores[x]
+                guesses.pairings[count] = guesses.pairings[x]
+                count += 1
+        guesses.floor[0] = floor
+    guesses.state[0] = count
+
+
+@kernel
+def refine_pose(
+    u: complex,
+    t: complex,
+    growth: float,
+    drawn: Things,
+    mapped: Things,
+    bonus: FloatArray,
+    tolerances: Tolerances,
+    partners: IntArray,
+) -> tuple[complex, complex, float, float]:
+    """Assign under a pose, fit the pose to what was assigned, and so on until nothing changes.
+
+    Parameters
+    ----------
+    u, t
+        The pose.
+    drawn, mapped, tolerances
+        As for :func:`guess_poses`.
+    bonus
+        Shape (n, m): what speaks for each pairing beside place, size and shape; −inf rules it out.
+    partners
+        Shape (n,), written: the mapped object of each sketched one, −1 for none.
+
+    Returns
+    -------
+    complex, complex, float
+        The pose, and the sum of ℓ and −λ under it.
+    """
+    n, m = drawn.places.size, mapped.places.size
+    costs, candidates = np.empty((n, m + 1)), np.empty((n, m + 1), dtype=np.int64)
+    sizes, holders = np.empty(n, dtype=np.int64), np.empty(m + n, dtype=np.int64)
+    former = np.empty(n, dtype=np.int64)
+    total = 0.0
+    for x in range(_ROUNDS):
+        weigh_pairings(u, t, growth, drawn, mapped, bonus, tolerances, costs, candidates, sizes)
+        total = -reduce_by_assignment(costs, candidates, sizes, holders)
+        partners[:] = -1
+        for j in range(m):
+            if holders[j] >= 0:
+                partners[holders[j]] = j
+        if x > 0 and (partners == former).all():
+            break
+        former[:] = partners
+        v, s = fitted_pose(u, t, drawn, mapped, tolerances, partners)
+        if v == 0.0:
+            break
+        u, t = v, s
+        growth = grown(drawn, mapped, partners, 2.0 * np.log(abs(u)), tolerances)
+    return u, t, growth, total
+
+
+@kernel
+def grown(
+    drawn: Things, mapped: Things, partners: IntArray, growth: float, tolerances: Tolerances
+) -> float:
+    """Return by how much ln of the areas grows: what the pose says, and things say otherwise."""
+    offset = 0.0
+    for _ in range(3):
+        total, weight = 0.0, (tolerances.size / _SPREAD) ** 2
+        for i in range(partners.size):
+            if partners[i] >= 0:
+                e = mapped.sizes[partners[i]] - drawn.sizes[i] - growth
+                share = 1.0 / (1.0 + ((e - offset) / tolerances.size) ** 2 / 3.0)
+                total += share * e
+                weight += share
+        offset = total / weight
+    return growth + offset
+
+
+@kernel
+def weigh_pairings(
+    u: complex,
+    t: complex,
+    growth: float,
+    drawn: Things,
+    mapped: Things,
+    bonus: FloatArray,
+    tolerances: Tolerances,
+    costs: FloatArray,
+    candidates: IntArray,
+    sizes: IntArray,
+) -> None:
+    """Write −ℓ of the pairings that are better than leaving out, which comes last in each row."""
+    n, m = drawn.places.size, mapped.places.size
+    unit = 1.0 / (3.0 * (tolerances.place * abs(u) * drawn.spacing) ** 2)
+    by_size, by_shape = 1.0 / (3.0 * tolerances.size**2), 1.0 / (3.0 * tolerances.shape**2)
+    twist, worst = u * u / abs(u * u), np.exp(0.5 * tolerances.omission)
+    for i in range(n):
+        place, size, shape = u * drawn.places[i] + t, drawn.sizes[i] + growth, drawn.shapes[i]
+        shape = shape * twist
+        count = 0
+        for j in range(m):
+            away, other = mapped.places[j] - place, shape - mapped.shapes[j]
+            unlike = 1.0 + unit * (away.real * away.real + away.imag * away.imag)
+            unlike *= 1.0 + by_size * (mapped.sizes[j] - size) ** 2
+            unlike *= 1.0 + by_shape * (other.real * other.real + other.imag * other.imag)
+            if bonus[i, j] == 0.0 and unlike >= worst:
+                continue
+            cost = 2.0 * np.log(unlike) - bonus[i, j]
+            if cost < tolerances.omission:
+                costs[i, count], candidates[i, count] = cost, j
+                count += 1
+        costs[i, count], candidates[i, count] = min(tolerances.omission, FORBIDDEN / 2), m + i
+        sizes[i] = count + 1
+
+
+@kernel
+def fitted_pose(
+    u: complex,
+    t: complex,
+    drawn: Things,
+    mapped: Things,
+    tolerances: Tolerances,
+    partners: IntArray,
+) -> tuple[complex, complex]:
+    """Return the pose that fits pairings best, each weighed by how well it fits; 0 if none."""
+    unit = 1.0 / (3.0 * (tolerances.place * abs(u) * drawn.spacing) ** 2)
+    weight, before, after = 0.0, 0.0j, 0.0j
+    count = 0
+    for i in range(partners.size):
+        if partners[i] >= 0:
+            away = mapped.places[partners[i]] - u * drawn.places[i] - t
+            share = 1.0 / (1.0 + unit * (away.real * away.real + away.imag * away.imag))
+            weight += share
+            before += share * drawn.places[i]
+            after += share * mapped.places[partners[i]]
+            count += 1
+    if count < 2:
+        return 0.0j, 0.0j
+    before, after = before / weight, after / weight
+    product, spread = 0.0j, 0.0
+    for i in range(partners.size):
+        if partners[i] >= 0:
+            away = mapped.places[partners[i]] - u * drawn.places[i] - t
+            share = 1.0 / (1.0 + unit * (away.real * away.real + away.imag * away.imag))
+            z, w = drawn.places[i] - before, mapped.places[partners[i]] - after
+            product += share * w * z.conjugate()
+            spread += share * square(z)
+    if spread <= 0.0 or product == 0.0:
+        return 0.0j, 0.0j
+    v = product / spread
+    return v, after - v * before
+
+
+@kernel
+def pairing_worths(
+    u: complex,
+    t: complex,
+    growth: float,
+    drawn: Things,
+    mapped: Things,
+    bonus: FloatArray,
+    tolerances: Tolerances,
+) -> FloatArray:
+    """Return ℓ of every pairing under a pose, shape (n, m)."""
+    n, m = drawn.places.size, mapped.places.size
+    unit = 1.0 / (3.0 * (tolerances.place * abs(u) * drawn.spacing) ** 2)
+    by_size, by_shape = 1.0 / (3.0 * tolerances.size**2), 1.0 / (3.0 * tolerances.shape**2)
+    twist = u * u / abs(u * u)
+    worths = np.empty((n, m))
+    for i in range(n):
+        place, size, shape = u * drawn.places[i] + t, drawn.sizes[i] + growth, drawn.shapes[i]
+        shape = shape * twist
+        for j in range(m):
+            away, other = mapped.places[j] - place, shape - mapped.shapes[j]
+            unlike = 1.0 + unit * (away.real * away.real + away.imag * away.imag)
+            unlike *= 1.0 + by_size * (mapped.sizes[j] - size) ** 2
+            unlike *= 1.0 + by_shape * (other.real * other.real + other.imag * other.imag)
+            worths[i, j] = bonus[i, j] - 2.0 * np.log(unlike)
+    return worths
+
+
+@kernel
+def vary(
+    worths: FloatArray,
+    omission: float,
+    partners: IntArray,
+    loss: float,
+    maps: IntArray,
+    losses: FloatArray,
+) -> int:
+    """Write the maps that one change makes of a map at a loss of at most so much.
+
+    A change gives an object another partner, or none; whoever has that partner takes the first
+    one's in exchange, or what else is free, or none.
+    """
+    n, m = worths.shape
+    holders = np.full(m, -1)
+    for i in range(n):
+        if partners[i] >= 0:
+            holders[partners[i]] = i
+    count = 0
+    for i in range(n):
+        now = worths[i, partners[i]] if partners[i] >= 0 else -omission
+        for j in range(-1, m):
+            if j == partners[i] or count >= losses.size:
+                continue
+            after = worths[i, j] if j >= 0 else -omission
+            change = after - now
+            k = holders[j] if j >= 0 else -1
+            if k < 0:
+                if change >= -loss:
+                    maps[count], losses[count] = partners, -change
+                    maps[count, i] = j
+                    count += 1
+                continue
+            change -= worths[k, j]
+            for l in range(-1, m):  # noqa: E741
+                if count >= losses.size or l == j:
+                    break
+                if l >= 0 and holders[l] >= 0 and l != partners[i]:
+                    continue
+                if l >= 0 and l == partners[i] and i > k:
+                    continue
+                whole = change + (worths[k, l] if l >= 0 else -omission)
+                if whole >= -loss:
+                    maps[count], losses[count] = partners, -whole
+                    maps[count, i], maps[count, k] = j, l
+                    count += 1
+    return count

@@ -1,0 +1,111 @@
+"""The maps of a sketch in numbers, and those of its decoys: what is judged, and learned from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from sketchmatch.model import FloatArray, IntArray, RelationTable, Scene
+from sketchmatch_builtin.alignment import (
+    Sides,
+    Things,
+    drive,
+    laid_maps,
+    measured,
+    relations_of,
+)
+from sketchmatch_builtin.judges._evidence import numbers
+
+__all__ = ["Described", "described"]
+
+_POSES, _MAPS = 60, 300
+_DECOY_POSES, _DECOY_MAPS = 40, 60
+_SEED = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Described:
+    """The maps of a sketch in numbers.
+
+    Attributes
+    ----------
+    maps
+        int64, shape (c, n), at least one: the mapped object of each sketched one, −1 for none.
+    numbers
+        Shape (c, len(NUMBERS)).
+    decoys
+        The numbers of the maps of each decoy, maybe of none.
+    drawn, mapped
+        How many objects there are.
+    """
+
+    maps: IntArray
+    numbers: FloatArray
+    decoys: tuple[FloatArray, ...]
+    drawn: int
+    mapped: int
+
+
+def described(
+    scenes: tuple[Scene, Scene],
+    sides: Sides,
+    table: RelationTable,
+    names: IntArray | None = None,
+    met: Iterable[IntArray] = (),
+    partial: bool = True,
+    explore: bool = True,
+) -> Described:
+    """Describe maps of a sketch, and of its decoys.
+
+    Parameters
+    ----------
+    scenes, sides
+        The sketch and the map.
+    table, names
+        Of template and argument, as in :class:`sketchmatch.api.JudgeProblem`.
+    met
+        Maps that are known, of the sketch.
+    partial
+        Whether objects of both sides may be without partner.
+    explore
+        Whether to look for more maps by laying the sketch upon the map.
+    """
+    found = [*met]
+    if explore:
+        found += [each.partners for each in drive(laid_maps(sides, _POSES, _MAPS, partial))]
+    unique = {each.tobytes(): each for each in found}
+    maps = np.stack([*unique.values()])
+    relations = relations_of(scenes, table, names, sides.swapped)
+    drawn, mapped = len(sides.drawn.places), len(sides.mapped.places)
+    parts = measured(maps, sides.drawn, sides.mapped, relations)
+    decoys = tuple(_decoy_numbers(each, sides.mapped) for each in _decoys(sides.drawn))
+    return Described(maps, numbers(parts, drawn, mapped), decoys, drawn, mapped)
+
+
+def _decoys(drawn: Things) -> Iterator[Things]:
+    """Yield what the sketch is not, and might be as likely where it shows another place."""
+    rng = np.random.default_rng(_SEED)
+    mirrored = drawn._replace(places=np.conj(drawn.places), shapes=np.conj(drawn.shapes))
+    yield mirrored
+    for each in (drawn, mirrored, drawn):
+        order = _derangement(rng, len(each.sizes))
+        yield each._replace(sizes=each.sizes[order], shapes=each.shapes[order])
+
+
+def _derangement(rng: np.random.Generator, count: int) -> IntArray:
+    """Return a random order in which nothing is where it was."""
+    while True:
+        order = rng.permutation(count)
+        if (order != np.arange(count)).all():
+            return order
+
+
+def _decoy_numbers(decoy: Things, mapped: Things) -> FloatArray:
+    """Return the numbers of the best maps of a decoy; of none, where it fits nowhere."""
+    drawn, there_are = len(decoy.places), len(mapped.places)
+    sides = Sides(decoy, mapped, np.zeros((drawn, there_are)), swapped=False)
+    laid = drive(laid_maps(sides, _DECOY_POSES, _DECOY_MAPS, partial=True))
+    maps = np.array([each.partners for each in laid], dtype=np.int64).reshape(-1, drawn)
+    return numbers(measured(maps, decoy, mapped), drawn, there_are)

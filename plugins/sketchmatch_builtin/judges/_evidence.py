@@ -1,0 +1,202 @@
+"""What the judge ``posterior`` goes by: numbers of a map, of a sketch, and of a place.
+
+A map of a sketch is described by the parts that :mod:`sketchmatch_builtin.alignment` measures,
+sums over its lines, and a place by how far the best of its maps exceeds what chance achieves.
+What each number counts for is learned; this says what they are.
+
+How much a deviation says depends on how well somebody draws, so each number counts the more or
+less by how far the best map leaves places, sizes and shapes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sketchmatch.model import FloatArray, IntArray
+from sketchmatch_builtin.alignment import PARTS, Part
+from sketchmatch_builtin.judges.calibration import Posterior
+
+__all__ = [
+    "FIRST",
+    "NUMBERS",
+    "Weighed",
+    "detailed",
+    "lost_numbers",
+    "numbers",
+    "place_numbers",
+    "skill",
+    "weighed",
+]
+
+_MORE = ("matched_among_many", "matched_share")
+
+NUMBERS = (*PARTS, *_MORE)
+"""What a map is described by."""
+
+_RELATIONS = (Part.SIMILARITY, Part.ROTATION, Part.DILATION, Part.SELF, Part.SELF_TIGHT)
+
+FIRST = np.array(
+    [k for k, name in enumerate(NUMBERS) if k not in _RELATIONS and name not in ("alike", "unlike")]
+)
+"""Which of them the places, sizes and shapes of objects alone tell."""
+
+_BY_SKILL = np.array(
+    [
+        k
+        for k, name in enumerate(NUMBERS)
+        if name not in ("offset", "bend", "alike", "unlike", "matched_among_many")
+    ]
+)
+
+_NONE = -30.0
+
+
+def numbers(parts: FloatArray, drawn: int, mapped: int) -> FloatArray:
+    """Return what maps are described by.
+
+    Parameters
+    ----------
+    parts
+        Shape (c, parts), as measured.
+    drawn, mapped
+        How many objects there are.
+
+    Returns
+    -------
+    ndarray
+        Shape (c, len(NUMBERS)).
+    """
+    matched = parts[:, Part.MATCHED]
+    return np.column_stack([parts, matched * math.log(mapped), matched * matched / drawn])
+
+
+def skill(best: FloatArray) -> FloatArray:
+    """Return how well somebody draws, by the best map, shape (3,); less is better."""
+    matched = max(best[Part.MATCHED], 1.0)
+    return np.array(
+        [
+            best[Part.SCATTER] / matched + 1.6,
+            best[Part.SCATTER_SIZE] / matched + 1.2,
+            best[Part.SCATTER_SHAPE] / matched + 1.8,
+        ]
+    )
+
+
+def detailed(described: FloatArray, drawing: FloatArray) -> FloatArray:
+    """Return the numbers of maps, and most of them times each of the numbers of a skill."""
+    by_skill = described[:, _BY_SKILL]
+    return np.hstack([described, *(by_skill * each for each in drawing)])
+
+
+def place_numbers(
+    described: FloatArray,
+    maps: IntArray,
+    decoys: Sequence[FloatArray],
+    weights: FloatArray,
+    drawn: int,
+    mapped: int,
+) -> FloatArray:
+    """Return what says whether a sketch shows a place at all.
+
+    Decoys are what the sketch is not: mirrored, or with things in each other's places. The best
+    that they achieve on the map is what chance achieves there.
+
+    Parameters
+    ----------
+    described, maps
+        Shapes (c, len(NUMBERS)) and (c, n): of at least one map.
+    decoys
+        The same numbers of the maps of each decoy.
+    weights
+        Shape (len(FIRST),): what places, sizes and shapes count for.
+    drawn, mapped
+        How many objects there are.
+    """
+    worths = described[:, FIRST] @ weights
+    best = int(worths.argmax())
+    top = float(worths[best])
+    chance = [float((each[:, FIRST] @ weights).max(initial=_NONE)) for each in decoys]
+    shared = ((maps == maps[best]) & (maps[best] >= 0)).sum(axis=1)
+    other = shared <= max(1, np.count_nonzero(maps[best] >= 0) // 4)
+    rival = float(worths[other].max(initial=float(worths.min()) - 4.0))
+    most, mean, lead = top - max(chance), top - float(np.mean(chance)), top - rival
+    many, row = math.log(mapped), described[best]
+    matched = max(row[Part.MATCHED], 1.0)
+    drawing = np.array([*skill(row), matched / drawn])
+    return np.array(
+        [
+            1.0,
+            drawn,
+            many,
+            drawn * many,
+            1.0 / drawn,
+            top,
+            top / drawn,
+            most,
+            mean,
+            _above(most),
+            lead,
+            _above(lead),
+            min(most, lead),
+            *drawing,
+            *(most * drawing),
+            *(drawn * drawing),
+            *(many * drawing),
+        ]
+    )
+
+
+def _above(difference: float) -> float:
+    """Return a smooth positive part."""
+    return float(np.logaddexp(0.0, np.clip(difference, -20.0, 20.0)))
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """What the numbers of maps come to.
+
+    Attributes
+    ----------
+    shares
+        Shape (c,): how likely each is right if one of them is.
+    lost
+        How likely none of them is, in this place.
+    elsewhere
+        How likely the sketch does not show this place.
+    """
+
+    shares: FloatArray
+    lost: float
+    elsewhere: float
+
+
+def weighed(
+    maps: IntArray,
+    described: FloatArray,
+    decoys: Sequence[FloatArray],
+    drawn: int,
+    mapped: int,
+    learned: Posterior,
+) -> Weighed:
+    """Return what the numbers of maps come to; arguments as of :func:`place_numbers`."""
+    first = np.array(learned.first)
+    best = described[(described[:, FIRST] @ first).argmax()]
+    scores = detailed(described, skill(best)) @ np.array(learned.weights)
+    shares = np.exp(scores - scores.max())
+    shares /= shares.sum()
+    here = place_numbers(described, maps, decoys, first, drawn, mapped) @ np.array(learned.place)
+    lost = lost_numbers(shares, drawn, mapped) @ np.array(learned.lost)
+    return Weighed(shares, _logistic(lost), _logistic(-here))
+
+
+def lost_numbers(shares: FloatArray, drawn: int, mapped: int) -> FloatArray:
+    """Return what says whether the right map is among those that are known."""
+    return np.array([1.0, drawn, math.log(mapped), math.log(shares.max()), drawn / mapped])
+
+
+def _logistic(odds: float) -> float:
+    return float(1.0 / (1.0 + math.exp(-min(max(odds, -50.0), 50.0))))
