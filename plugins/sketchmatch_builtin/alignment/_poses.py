@@ -239,7 +239,7 @@ def first_growth(
     k: int,
     l: int,
     drawn: Things,
-    mapped: Things,  # noqa: E741
+    mapped: Things,
 ) -> float:
     """Return by how much ln of the areas grows under a pose that lays i on j and k on l."""
     growth = 2.0 * np.log(abs(u))

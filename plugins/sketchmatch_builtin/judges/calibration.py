@@ -70,3 +70,31 @@ def default_price(weights: ConfidenceWeights) -> float:
 def _shares(weights: ConfidenceWeights) -> tuple[float, ...]:
     *parts, distance = weights
     return (*(weight / weights.total for weight in parts), distance)
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What the judge ``posterior`` goes by.
+
+    Attributes
+    ----------
+    first
+        What places, sizes and shapes count for: ``FIRST`` of the numbers of a map.
+    weights
+        What all numbers count for, by themselves and times each number of a skill.
+    place
+        What the numbers of a place count for.
+    lost
+        What the numbers count for that say whether the right map is known.
+    luck
+        As in :class:`Calibration`.
+    """
+
+    first: tuple[float, ...]
+    weights: tuple[float, ...]
+    place: tuple[float, ...]
+    lost: tuple[float, ...]
+    luck: float
+
+
+POSTERIOR = Posterior((), (), (), (), 0.0)

@@ -80,7 +80,9 @@ class Posterior(Judge):
             partial=problem.price < math.inf,
             explore=not problem.explored,
         )
-        found = weighed(known.maps, known.numbers, known.decoys, known.drawn, known.mapped, POSTERIOR)
+        found = weighed(
+            known.maps, known.numbers, known.decoys, known.drawn, known.mapped, POSTERIOR
+        )
         order = np.argsort(-found.shares, kind="stable")
         maps = [sides.template_partners(each) for each in known.maps[order]]
         told = problem.alternatives + 1

@@ -1,0 +1,226 @@
+"""What the judge ``posterior`` goes by, learned from sketches of several kinds.
+
+Three fits, each a logit with a small penalty: which of the maps that are known is right, by a
+conditional logit; whether it is among them; and whether the sketch shows the place at all. Labels
+are evidence on their own, so what they count for is learned from labels put on the same sketches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from sketchmatch.model import BoolArray, FloatArray, IntArray
+from sketchmatch.pipeline.engine import Engine
+from sketchmatch.pipeline.slices import finish
+from sketchmatch.registry import default_registry
+from sketchmatch_builtin.alignment import Part, sides_of
+from sketchmatch_builtin.histograms.constant import ConstantForce
+from sketchmatch_builtin.judges._described import Described, described
+from sketchmatch_builtin.judges._evidence import (
+    FIRST,
+    detailed,
+    lost_numbers,
+    place_numbers,
+    skill,
+)
+from sketchmatch_builtin.judges.calibration import Posterior
+from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+from tests.experiments.training import training_drawing
+
+__all__ = ["Known", "known_of", "learned_posterior"]
+
+_ENGINE = Engine(default_registry())
+
+_PENALTY = 1e-4
+_OTHER_PLACES = 2.5
+"""What a sketch of another place counts for: taking it for this one is the worse mistake."""
+
+_LABELLED, _RIGHTLY, _WORDS = 0.7, 0.9, 0.5
+"""How many objects have a label, how many of these the right one, and how many words there are for
+an object of the map, where labels are learned."""
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """A sketch to learn from.
+
+    Attributes
+    ----------
+    described
+        Its maps in numbers; without the right one where that was not found.
+    right
+        Index of the right map; −1 where it is none of them.
+    elsewhere
+        Whether the sketch is of another place.
+    truth
+        Map index or −1 by sketched object.
+    """
+
+    described: Described
+    right: int
+    elsewhere: bool
+    truth: IntArray
+
+
+def known_of(number: int) -> list[Known]:
+    """Return a sketch in numbers."""
+    drawn = training_drawing(number)
+    scenes = drawn.scene, drawn.map
+    compared = finish(_ENGINE.compare(scenes, ConstantForce(), CrossCorrelation()))
+    swapped = compared.swapped
+    sides = sides_of(scenes[::-1] if swapped else scenes, swapped, None, None, None)
+    try:
+        found = described(scenes, sides, compared.table)
+    except ValueError:  # nothing fits at all
+        return []
+    right = np.flatnonzero((found.maps == drawn.truth).all(axis=1))
+    elsewhere = bool((drawn.truth < 0).all())
+    return [Known(found, int(right[0]) if len(right) else -1, elsewhere, drawn.truth)]
+
+
+def learned_posterior(cases: Sequence[Known]) -> Posterior:
+    """Return what makes the truth likeliest."""
+    here = [each for each in cases if not each.elsewhere]
+    found = [each for each in here if each.right >= 0]
+    rights = np.array([each.right for each in found])
+    first = _conditional([each.described.numbers[:, FIRST] for each in found], rights)
+    weights = _conditional([_detailed(each, first) for each in found], rights)
+    words = _labels(found, first, weights)
+    weights[[Part.ALIKE, Part.UNLIKE]] = words
+    shares = [_shares(_detailed(each, first) @ weights) for each in here]
+    lost = _logit(
+        np.array(
+            [
+                lost_numbers(share, each.described.drawn, each.described.mapped)
+                for share, each in zip(shares, here, strict=True)
+            ]
+        ),
+        np.array([each.right < 0 for each in here], dtype=float),
+        np.ones(len(here)),
+    )
+    place = _logit(
+        np.array([_place(each, first) for each in cases]),
+        np.array([not each.elsewhere for each in cases], dtype=float),
+        np.array([_OTHER_PLACES if _counts(each) else 1.0 for each in cases]),
+    )
+    luck = [
+        float((each.described.maps[share.argmax()] == each.truth).mean())
+        for share, each in zip(shares, here, strict=True)
+        if each.right < 0
+    ]
+    return Posterior(
+        _rounded(first),
+        _rounded(weights),
+        _rounded(place),
+        _rounded(lost),
+        round(float(np.mean(luck)), 2),
+    )
+
+
+def _counts(case: Known) -> bool:
+    """Whether a sketch of another place shows enough to be told from one of this place."""
+    return case.elsewhere and case.described.drawn > 4
+
+
+def _detailed(case: Known, first: FloatArray) -> FloatArray:
+    rows = case.described.numbers
+    return detailed(rows, skill(rows[(rows[:, FIRST] @ first).argmax()]))
+
+
+def _place(case: Known, first: FloatArray) -> FloatArray:
+    each = case.described
+    return place_numbers(each.numbers, each.maps, each.decoys, first, each.drawn, each.mapped)
+
+
+def _labels(cases: Sequence[Known], first: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return what labels count for that mean the same, and that do not."""
+    rng = np.random.default_rng(0)
+    rows, offsets = [], []
+    for each in cases:
+        names = _named(each, rng)
+        lines = np.arange(len(each.truth))
+        told = np.where(each.described.maps >= 0, names[lines, each.described.maps], 0)
+        rows.append(np.column_stack([(told > 0).sum(axis=1), (told < 0).sum(axis=1)]).astype(float))
+        offsets.append(_detailed(each, first) @ weights)
+    return _conditional(rows, np.array([each.right for each in cases]), offsets)
+
+
+def _named(case: Known, rng: np.random.Generator) -> IntArray:
+    """Return which labels mean the same, as in ``JudgeProblem.names``, of a sketch and a map."""
+    words = max(2, round(_WORDS * case.described.mapped))
+    mapped = rng.integers(words, size=case.described.mapped)
+    drawn = np.where(case.truth >= 0, mapped[case.truth], rng.integers(words, size=len(case.truth)))
+    mistaken = rng.random(len(drawn)) > _RIGHTLY
+    drawn = np.where(mistaken, rng.integers(words, size=len(drawn)), drawn)
+    names = np.where(drawn[:, None] == mapped, 1, -1)
+    names[rng.random(len(drawn)) > _LABELLED] = 0
+    names[:, rng.random(len(mapped)) > _LABELLED] = 0
+    return names
+
+
+def _conditional(
+    rows: Sequence[FloatArray], rights: IntArray, offsets: Sequence[FloatArray] | None = None
+) -> FloatArray:
+    """Return the weights under which the right rows are likeliest."""
+    x, none, beside = _padded(rows, offsets)
+    unit = np.abs(x[~none]).mean(axis=0) + 1e-9
+    x, cases = x / unit, np.arange(len(rights))
+
+    def loss(weights: FloatArray) -> tuple[float, FloatArray]:
+        scores = np.where(none, -np.inf, x @ weights + beside)
+        scores -= scores.max(axis=1, keepdims=True)
+        shares = np.exp(scores)
+        shares /= shares.sum(axis=1, keepdims=True)
+        value = -np.log(np.maximum(shares[cases, rights], 1e-300)).mean()
+        shares[cases, rights] -= 1.0
+        slope = np.einsum("cm,cmp->p", shares, x) / len(cases)
+        return float(value + _PENALTY * weights @ weights), slope + 2.0 * _PENALTY * weights
+
+    found = minimize(loss, np.zeros(x.shape[2]), jac=True, method="L-BFGS-B", options=_PATIENT)
+    fitted: FloatArray = found.x / unit
+    return fitted
+
+
+_PATIENT = {"maxiter": 1000}
+
+
+def _padded(
+    rows: Sequence[FloatArray], offsets: Sequence[FloatArray] | None
+) -> tuple[FloatArray, BoolArray, FloatArray]:
+    most = max(map(len, rows))
+    x = np.zeros((len(rows), most, rows[0].shape[1]))
+    none, beside = np.ones(x.shape[:2], dtype=bool), np.zeros(x.shape[:2])
+    for k, each in enumerate(rows):
+        x[k, : len(each)], none[k, : len(each)] = each, False
+        if offsets is not None:
+            beside[k, : len(each)] = offsets[k]
+    return x, none, beside
+
+
+def _logit(x: FloatArray, truth: FloatArray, counts: FloatArray) -> FloatArray:
+    """Return the weights under which the truth is likeliest."""
+    unit = np.abs(x).mean(axis=0) + 1e-9
+    x, counts = x / unit, counts / counts.mean()
+
+    def loss(weights: FloatArray) -> tuple[float, FloatArray]:
+        odds = x @ weights
+        value = (counts * (np.logaddexp(0.0, odds) - truth * odds)).mean()
+        slope = x.T @ (counts * (1.0 / (1.0 + np.exp(-odds)) - truth)) / len(truth)
+        return float(value + _PENALTY * weights @ weights), slope + 2.0 * _PENALTY * weights
+
+    found = minimize(loss, np.zeros(x.shape[1]), jac=True, method="L-BFGS-B", options=_PATIENT)
+    fitted: FloatArray = found.x / unit
+    return fitted
+
+
+def _shares(scores: FloatArray) -> FloatArray:
+    shares: FloatArray = np.exp(scores - scores.max())
+    return shares / shares.sum()
+
+
+def _rounded(values: FloatArray) -> tuple[float, ...]:
+    return tuple(float(f"{each:.4g}") for each in values)
