@@ -414,6 +414,37 @@ def test_a_map_has_three_lines_all_different(partners, words):
         check_map(np.array(partners), problem)
 
 
+@pytest.mark.parametrize(
+    ("probability", "lines", "elsewhere", "words"),
+    [
+        (0.5, None, 0.5, ""),
+        (0.5, 0.5, 0.5, ""),
+        (0.0, 1.0, 1.0, ""),
+        (1.5, None, None, "probability of a map is 1.5, not a number within 0 … 1"),
+        ("half", None, None, "probability of a map is 'half', not a number"),
+        (math.nan, None, None, "probability of a map is nan, not a number"),
+        (None, None, -0.5, "elsewhere is -0.5, not a number within 0 … 1"),
+        (None, 1.5, None, "it returned 1.5, which is more than 1"),
+        (0.6, 0.5, None, "right with probability 0.6, and one of its lines with 0.5"),
+        (0.6, None, 0.5, "right with probability 0.6, and the place another one with 0.5"),
+    ],
+)
+def test_probabilities_that_contradict_each_other_are_put_down_to_the_judge(
+    probability, lines, elsewhere, words
+):
+    maps_ = (JudgedMap([3, 0, 4, 1], probability), JudgedMap([0, 1, 2, 3]))
+    table = None
+    if lines is not None:
+        table = np.eye(4, 6)
+        table[2, 4] = table[0, 3] = table[1, 0] = table[3, 1] = lines
+    Told.says = lambda _: Judgement(maps_, table, elsewhere)
+    if not words:
+        assert matched(*drawn(4, 5)).probability == probability
+        return
+    with pytest.raises(PluginError, match=f"judge told of acme 1.0 failed .*{words}"):
+        matched(*drawn(4, 5))
+
+
 # ζ of a map of some objects ----------------------------------------------------------------------
 
 
