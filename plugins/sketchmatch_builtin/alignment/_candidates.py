@@ -12,9 +12,9 @@ from sketchmatch_builtin.alignment._poses import (
     TOLERANCES,
     Guesses,
     empty_guesses,
-    first_growth,
     grid_of,
     guess_poses,
+    guessed_pose,
     pairing_worths,
     refine_pose,
     vary,
@@ -99,7 +99,7 @@ def laid_maps(
     if not partial:
         laid = [_filled(each, sides) for each in laid]
     fewest = min(_FEWEST, most) if partial else most
-    varied = _varied(laid, sides)
+    varied = _varied(laid, sides, maps)
     return [each for each in varied if np.count_nonzero(each.partners >= 0) >= fewest][:maps]
 
 
@@ -155,11 +155,9 @@ def _guessed(sides: Sides) -> Generator[int, None, Guesses]:
     guesses = empty_guesses(_ROOM, -_FLOOR * _ROUGH * len(drawn.places))
     grid = grid_of(mapped)
     pairs = _pairs(drawn)
-    apart = np.abs(mapped.places[:, None] - mapped.places)
-    logs = np.log(np.maximum(apart, np.finfo(float).tiny))
     allowed = np.isfinite(sides.bonus).astype(np.float64)
     while guesses.state[2] < len(pairs) * len(mapped.places):
-        guess_poses(pairs, drawn, mapped, grid, logs, allowed, rough, _STEP, guesses)
+        guess_poses(pairs, drawn, mapped, grid, allowed, rough, _STEP, guesses)
         yield int(guesses.state[1])
     return guesses
 
@@ -172,11 +170,8 @@ def _refined(guesses: Guesses, sides: Sides, poses: int) -> list[Laid]:
     count = int(guesses.state[0])
     ranked = np.argsort(-guesses.scores[:count], kind="stable")
     for g in ranked[: 5 * poses]:
-        i, j, k, l = guesses.pairings[g]  # noqa: E741
-        u = (mapped.places[l] - mapped.places[j]) / (drawn.places[k] - drawn.places[i])
-        t = mapped.places[j] - u * drawn.places[i]
-        growth = first_growth(u, i, j, k, l, drawn, mapped)
-        *pose, score = refine_pose(u, t, growth, drawn, mapped, sides.bonus, TOLERANCES, partners)
+        pose = guessed_pose(guesses.pairings[g], drawn, mapped)
+        *pose, score = refine_pose(*pose, drawn, mapped, sides.bonus, TOLERANCES, partners)
         key = partners.tobytes()
         if key not in found or found[key].score < score:
             found[key] = Laid(partners.copy(), (pose[0], pose[1], pose[2]), score)
@@ -194,7 +189,7 @@ def _filled(laid: Laid, sides: Sides) -> Laid:
     return Laid(partners, laid.pose, score - TOLERANCES.omission * (len(partners) - len(matched)))
 
 
-def _varied(laid: list[Laid], sides: Sides) -> list[Laid]:
+def _varied(laid: list[Laid], sides: Sides, most: int) -> list[Laid]:
     """Return these maps and what single changes make of the best of them."""
     found = {each.partners.tobytes(): each for each in laid}
     maps = np.empty((_CHANGES, len(sides.drawn.places)), dtype=np.int64)
@@ -205,10 +200,10 @@ def _varied(laid: list[Laid], sides: Sides) -> list[Laid]:
             break
         worths = pairing_worths(*each.pose, sides.drawn, sides.mapped, sides.bonus, TOLERANCES)
         count = vary(worths, TOLERANCES.omission, each.partners, left, maps, losses)
-        for changed, loss in zip(maps[:count], losses[:count], strict=True):
-            key = changed.tobytes()
-            if key not in found or found[key].score < each.score - loss:
-                found[key] = Laid(changed.copy(), each.pose, float(each.score - loss))
+        for x in np.argsort(losses[:count], kind="stable")[:most]:
+            key, score = maps[x].tobytes(), float(each.score - losses[x])
+            if key not in found or found[key].score < score:
+                found[key] = Laid(maps[x].copy(), each.pose, score)
     return sorted(found.values(), key=lambda each: -each.score)
 
 

@@ -32,11 +32,11 @@ __all__ = [
     "Guesses",
     "Tolerances",
     "empty_guesses",
-    "first_growth",
     "fitted_pose",
     "grid_of",
     "grown",
     "guess_poses",
+    "guessed_pose",
     "pairing_worths",
     "refine_pose",
     "square",
@@ -45,6 +45,9 @@ __all__ = [
 
 _ROUNDS = 6
 _MOST_CELLS = 64
+_FULL = 1e3
+_LOOKS = 50
+"""Pairings to look at for each pose that may be weighed between two pauses."""
 
 _REACH = 3.0
 """Tolerances that sizes and shapes of two pairings may differ by to make a pose."""
@@ -167,7 +170,6 @@ def guess_poses(
     drawn: Things,
     mapped: Things,
     grid: Grid,
-    logs: FloatArray,
     allowed: FloatArray,
     tolerances: Tolerances,
     most: int,
@@ -181,8 +183,6 @@ def guess_poses(
         Shape (p, 2), sketched pairs.
     drawn, mapped, grid
         The objects, and the mapped ones by cells.
-    logs
-        Shape (m, m): ln of the distances between mapped objects; on the diagonal anything.
     allowed
         Shape (n, m): 0 where a pairing is ruled out.
     tolerances
@@ -197,55 +197,52 @@ def guess_poses(
     for x in range(m):
         free[:, x] = allowed[:, grid.order[x]] > 0.0
     wide, limit = _REACH * tolerances.size, (_REACH * tolerances.shape) ** 2
-    until = guesses.state[1] + most
-    while guesses.state[2] < pairs.shape[0] * m and guesses.state[1] < until:
+    until, end = guesses.state[1] + most, guesses.state[2] + max(1, _LOOKS * most // m)
+    while guesses.state[2] < min(pairs.shape[0] * m, end) and guesses.state[1] < until:
         i, k = pairs[guesses.state[2] // m, 0], pairs[guesses.state[2] // m, 1]
         j = guesses.state[2] % m
         guesses.state[2] += 1
         apart = drawn.places[k] - drawn.places[i]
-        if abs(apart) == 0.0 or allowed[i, j] == 0.0:
+        if square(apart) == 0.0 or allowed[i, j] == 0.0:
             continue
-        log_apart = np.log(abs(apart))
-        for l in range(m):  # noqa: E741
-            if l == j or allowed[k, l] == 0.0:
+        larger = mapped.sizes[j] - drawn.sizes[i]
+        for g in range(m):
+            if g == j or allowed[k, g] == 0.0:
                 continue
-            growth = 2.0 * (logs[j, l] - log_apart)
-            one = mapped.sizes[j] - drawn.sizes[i] - growth
-            other = mapped.sizes[l] - drawn.sizes[k] - growth
-            if abs(one - other) > wide or abs(one + other) > 2.0 * _SMALLEST:
+            if abs(mapped.sizes[g] - drawn.sizes[k] - larger) > wide:
                 continue
-            u = (mapped.places[l] - mapped.places[j]) / apart
-            if u == 0.0:
+            u = (mapped.places[g] - mapped.places[j]) / apart
+            if square(u) == 0.0:
+                continue
+            growth = np.log(square(u))
+            mean = 0.5 * (larger + mapped.sizes[g] - drawn.sizes[k]) - growth
+            if abs(mean) > _SMALLEST:
                 continue
             twist = u * u / square(u)
             if (
                 square(drawn.shapes[i] * twist - mapped.shapes[j]) > limit
-                or square(drawn.shapes[k] * twist - mapped.shapes[l]) > limit
+                or square(drawn.shapes[k] * twist - mapped.shapes[g]) > limit
             ):
                 continue
             guesses.state[1] += 1
-            growth += 0.5 * _TRUST * (one + other)
+            growth += _TRUST * mean
             t = mapped.places[j] - u * drawn.places[i]
             score = _worth(u, t, twist, growth, drawn, grid, free, tolerances, guesses.floor[0])
             if score > guesses.floor[0]:
-                _keep(guesses, score, i, j, k, l)
+                _keep(guesses, score, i, j, k, g)
 
 
 @kernel
-def first_growth(
-    u: complex,
-    i: int,
-    j: int,
-    k: int,
-    l: int,
-    drawn: Things,
-    mapped: Things,
-) -> float:
-    """Return by how much ln of the areas grows under a pose that lays i on j and k on l."""
-    growth = 2.0 * np.log(abs(u))
-    one = mapped.sizes[j] - drawn.sizes[i] - growth
-    other = mapped.sizes[l] - drawn.sizes[k] - growth
-    return growth + 0.5 * _TRUST * (one + other)
+def guessed_pose(
+    pairing: IntArray, drawn: Things, mapped: Things
+) -> tuple[complex, complex, float]:
+    """Return the pose that lays i on j and k on g, and by how much ln of the areas grows."""
+    i, j, k, g = pairing[0], pairing[1], pairing[2], pairing[3]
+    u = (mapped.places[g] - mapped.places[j]) / (drawn.places[k] - drawn.places[i])
+    growth = np.log(square(u))
+    larger = mapped.sizes[j] - drawn.sizes[i] + mapped.sizes[g] - drawn.sizes[k]
+    growth += _TRUST * (0.5 * larger - growth)
+    return u, mapped.places[j] - u * drawn.places[i], growth
 
 
 @kernel
@@ -272,7 +269,7 @@ def _worth(
     worst = np.exp(0.5 * tolerances.omission)
     far, things = (worst - 1.0) / unit, grid.things
     reach = np.sqrt(far) / grid.cell
-    most, product = np.exp(-0.5 * floor), 1.0
+    most, total, product = -0.5 * floor, 0.0, 1.0
     for i in range(drawn.places.size):
         place, size = u * drawn.places[i] + t, drawn.sizes[i] + growth
         shape = drawn.shapes[i] * twist
@@ -294,29 +291,27 @@ def _worth(
                             unlike *= 1.0 + by_shape * square(shape - things.shapes[x])
                             best = min(best, unlike)
         product *= best
-        if product >= most:
-            return floor
-    return -2.0 * np.log(product)
+        if product > _FULL or i == drawn.places.size - 1:
+            total, product = total + np.log(product), 1.0
+            if total >= most:
+                return floor
+    return -2.0 * total
 
 
 @kernel
-def _keep(guesses: Guesses, score: float, i: int, j: int, k: int, l: int) -> None:  # noqa: E741
+def _keep(guesses: Guesses, score: float, i: int, j: int, k: int, g: int) -> None:
     """Keep a guess; where there is no room left, the better half alone stays."""
-    room = guesses.scores.size
     count = guesses.state[0]
     guesses.scores[count] = score
     guesses.pairings[count, 0], guesses.pairings[count, 1] = i, j
-    guesses.pairings[count, 2], guesses.pairings[count, 3] = k, l
+    guesses.pairings[count, 2], guesses.pairings[count, 3] = k, g
     count += 1
-    if count == room:
-        floor = np.sort(guesses.scores)[room // 2]
-        count = 0
-        for x in range(room):
-            if guesses.scores[x] > floor:
-                guesses.scores[count] = guesses.scores[x]
-                guesses.pairings[count] = guesses.pairings[x]
-                count += 1
-        guesses.floor[0] = floor
+    if count == guesses.scores.size:
+        count //= 2
+        best = np.argsort(-guesses.scores, kind="mergesort")[:count]
+        guesses.scores[:count] = guesses.scores[best]
+        guesses.pairings[:count] = guesses.pairings[best]
+        guesses.floor[0] = guesses.scores[count - 1]
     guesses.state[0] = count
 
 
@@ -528,16 +523,16 @@ def vary(
                     count += 1
                 continue
             change -= worths[k, j]
-            for l in range(-1, m):  # noqa: E741
-                if count >= losses.size or l == j:
+            for g in range(-1, m):
+                if count >= losses.size or g == j:
                     break
-                if l >= 0 and holders[l] >= 0 and l != partners[i]:
+                if g >= 0 and holders[g] >= 0 and g != partners[i]:
                     continue
-                if l >= 0 and l == partners[i] and i > k:
+                if g >= 0 and g == partners[i] and i > k:
                     continue
-                whole = change + (worths[k, l] if l >= 0 else -omission)
+                whole = change + (worths[k, g] if g >= 0 else -omission)
                 if whole >= -loss:
                     maps[count], losses[count] = partners, -whole
-                    maps[count, i], maps[count, k] = j, l
+                    maps[count, i], maps[count, k] = j, g
                     count += 1
     return count
