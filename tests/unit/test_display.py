@@ -207,7 +207,7 @@ def test_in_a_pipe_doubts_go_to_standard_error_and_the_columns_stay(monkeypatch,
     sure.result.unmatched_sketch_objects.append(3)
     display.show_match(sure, metres=False, verbose=False)
     told = capsys.readouterr()
-    assert told.err == "sketchmatch: probably not this place (0.4 % that it is)\n"
+    assert told.err == "sketchmatch: Probably not this place (0.4 % that it is)\n"
     assert told.out == plain_.out
 
 

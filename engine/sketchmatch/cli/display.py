@@ -301,7 +301,7 @@ def doubt(match: Match) -> str:
     """
     result = match.result
     if result.HasField("place_probability") and result.place_probability < 0.5:
-        return f"probably not this place ({likely(result.place_probability)} that it is)"
+        return f"Probably not this place ({likely(result.place_probability)} that it is)"
     if not result.ambiguity.deciding_sketch_objects:
         return ""
     first = result.ambiguity.deciding_sketch_objects[0]
@@ -380,7 +380,7 @@ def _answer(match: Match, metres: bool) -> RenderableType:
     lines += filter(None, [detail, _effort(result), result.search_note])
     doubted = doubt(match)
     return Group(
-        *([plain(doubted[0].upper() + doubted[1:], "bold red")] if doubted else []),
+        *([plain(doubted, "bold red")] if doubted else []),
         Rows(_headline(match), columns, rows),
         "",
         *map(plain, lines),
