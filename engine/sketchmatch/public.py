@@ -51,6 +51,7 @@ def match(
     histogram: str | None = None,
     similarity: str | None = None,
     searcher: str | None = None,
+    judge: str | None = None,
     params: Mapping[str, Mapping[str, Any]] | None = None,
     seed: int = 0,
     time_budget: float | None = None,
@@ -75,11 +76,11 @@ def match(
         Names of the algorithms that find the objects, e.g. ``map_segmenter="rooms"``; a scene needs
         none. Left out, the profile decides, or else the configuration, or else the form of the
         source.
-    histogram, similarity, searcher
+    histogram, similarity, searcher, judge
         Names of the algorithms. Left out, the profile decides, or else the configuration, or else
-        they are ``"constant"``, ``"cross-correlation"`` and ``"auto"``.
+        they are ``"constant"``, ``"cross-correlation"``, ``"auto"`` and ``"confidence"``.
     params
-        Parameters by stage, the five above, e.g. ``{"searcher": {"population": 400}}``; without a
+        Parameters by stage, the six above, e.g. ``{"searcher": {"population": 400}}``; without a
         name they are those of the algorithm that is used anyway.
     seed
         The same arguments with the same seed give the same result.
@@ -92,10 +93,11 @@ def match(
         1, 1, 1.
     allow_unmatched
         Whether an object may stay without partner on both sides, where that is likelier. Left out,
-        as the profile says, or else not: the smaller scene is matched completely.
+        as the profile says, or else as searcher and judge do by themselves; the built-in ones
+        match the smaller scene completely.
     unmatched_price
         What a map loses that leaves all objects of the smaller scene out, in units of ζ, and in
-        proportion where it leaves out some. Left out, one that was learned for the weights.
+        proportion where it leaves out some. Left out, the judge's own.
     alternatives
         How many of the next best object maps the result shall hold; None for 3, or as many as
         there are.
@@ -133,6 +135,7 @@ def match(
         "histogram": histogram,
         "similarity": similarity,
         "searcher": searcher,
+        "judge": judge,
     }
     with engine.limited():
         request = MatchRequest(

@@ -5,7 +5,7 @@ Each hook imports its kind alone: listing one kind does not load the others.
 
 from __future__ import annotations
 
-from sketchmatch.api import Histogram, Reader, Searcher, Segmenter, Similarity, hookimpl
+from sketchmatch.api import Histogram, Judge, Reader, Searcher, Segmenter, Similarity, hookimpl
 
 
 @hookimpl
@@ -63,6 +63,14 @@ def sketchmatch_register_searchers() -> list[type[Searcher]]:
     from sketchmatch_builtin.searchers.nn_pso import NnPso
 
     return [Auto, Nn, NnPso, FsnnPso, Easm, Direct, Exact]
+
+
+@hookimpl
+def sketchmatch_register_judges() -> list[type[Judge]]:
+    """Offer the built-in judges."""
+    from sketchmatch_builtin.judges.confidence import HighestConfidence
+
+    return [HighestConfidence]
 
 
 @hookimpl

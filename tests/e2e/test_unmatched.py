@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sketchmatch import Scene
-from sketchmatch.pipeline.calibration import LEARNED
 from sketchmatch.testing import random_scene, simulate_sketch
+from sketchmatch_builtin.judges.calibration import LEARNED
 from sketchmatch_client import Client, InvalidRequestError, sources
 
 

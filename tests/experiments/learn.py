@@ -2,7 +2,7 @@
 
 Run it with ``python -m tests.experiments.learn``; it takes about half an hour and writes
 ``learned.json`` beside this file, from which the numbers of
-:mod:`sketchmatch.pipeline.calibration` are copied and the report tells how they were chosen:
+:mod:`sketchmatch_builtin.judges.calibration` are copied and the report tells how they were chosen:
 
 - ``weights`` of ζ, and by cross-validation whether objects are compared and how much distance
   counts;

@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
+from sketchmatch.api import JudgeProblem
 from sketchmatch.model import ConfidenceWeights, FloatArray, IntArray
-from sketchmatch.pipeline import answer
-from sketchmatch.pipeline.answer import considered
-from sketchmatch.pipeline.calibration import Calibration
 from sketchmatch.pipeline.engine import Engine
+from sketchmatch.pipeline.judge import considered, problem_of
 from sketchmatch.pipeline.request import alternatives_wanted
 from sketchmatch.pipeline.search import Goal
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import default_registry
+from sketchmatch_builtin.judges._odds import met
+from sketchmatch_builtin.judges.calibration import Calibration
 from tests.experiments.drawings import SHARE_WITH_EXTRAS, Drawing, drawing
 from tests.experiments.logits import log_shares, significant
 from tests.experiments.reliability import reliability
@@ -114,19 +115,20 @@ def _considered(drawing: Drawing, weights: Any, price: float | None) -> Consider
     comparison = finish(work)
     price = math.inf if price is None else price
     goal = Goal(weights, price, alternatives_wanted(None, *scenes))
-    maps = considered(finish(_ENGINE.search(comparison, pipeline.searcher, goal)), goal)
-    return _of(maps, drawing, comparison.swapped)
+    found = finish(_ENGINE.search(comparison, pipeline.searcher, goal))
+    first, others = finish(considered(comparison, found, goal))
+    return _of(problem_of(comparison, first, others, goal), drawing)
 
 
-def _of(considering: answer.Considered, drawing: Drawing, swapped: bool) -> Considered:
+def _of(problem: JudgeProblem, drawing: Drawing) -> Considered:
     """Return maps as numbers, beside the right one."""
-    found, exchanges, omissions = considering.best, considering.exchanges, considering.omissions()
+    first, exchanges, omissions = problem.candidates[0], problem.exchanges, problem.omissions
     assert exchanges is not None
-    truth = _turned(drawing.truth, len(drawing.map)) if swapped else drawing.truth
-    kept, partners = found.part.kept, found.mapped.partners
-    best = np.full(len(truth), -1)
-    best[kept] = partners
-    maps = {tuple(best.tolist()): found.best.confidence}
+    truth = _turned(drawing.truth, len(drawing.map)) if problem.swapped else drawing.truth
+    best = first.partners
+    kept = np.flatnonzero(best >= 0)
+    partners = best[kept]
+    maps = {tuple(best.tolist()): first.confidence.total}
     for g, h in zip(*np.nonzero(np.isfinite(exchanges)), strict=True):
         changed = best.copy()
         changed[best == h] = partners[g]
@@ -136,10 +138,8 @@ def _of(considering: answer.Considered, drawing: Drawing, swapped: bool) -> Cons
         changed = best.copy()
         changed[kept[g]] = -1
         maps.setdefault(tuple(changed.tolist()), confidence)
-    for rival in considering.rivals:
-        changed = np.full(len(truth), -1)
-        changed[rival.kept] = rival.mapped.partners
-        maps.setdefault(tuple(changed.tolist()), rival.confidence.total)
+    for other in met(problem):
+        maps.setdefault(tuple(other.partners.tolist()), other.confidence.total)
     every = np.array(list(maps))
     right = np.flatnonzero((every == truth).all(axis=1))
     return Considered(

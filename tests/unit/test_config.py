@@ -415,8 +415,14 @@ def test_the_built_in_profiles_are_sound_and_as_the_thesis_has_it():
     path, faults = check()
     assert (path, faults) == (None, [])
     profiles = {profile.name: profile for profile in builtin().defaults.profiles}
-    assert list(profiles) == ["fast", "learned", "proof", "thesis-easm", "thesis-fsnn"]
+    assert list(profiles) == [
+        *("fast", "learned", "proof"),
+        *("thesis", "thesis-easm", "thesis-fsnn"),
+    ]
     assert all(profile.summary for profile in profiles.values())
+    for name in ("proof", "thesis", "thesis-easm", "thesis-fsnn"):
+        assert profiles[name].stages["judge"].name == "confidence"
+        assert profiles[name].allow_unmatched is False
     easm = profiles["thesis-easm"].stages["searcher"].parameters
     assert (easm["crossover_rate"], easm["exchange_rate"]) == (0.7, 0.5)
     assert (easm["mutation_rate"], easm["patience"]) == (0.3, 400)

@@ -9,7 +9,7 @@ import pytest
 
 from sketchmatch.config import builtin
 from sketchmatch.model import ConfidenceWeights
-from sketchmatch.pipeline.calibration import LEARNED, calibrated
+from sketchmatch_builtin.judges.calibration import LEARNED, calibrated
 from tests.experiments import calibrate, drawings, learn, odds, thesis, weights
 from tests.experiments.protocol import STRONGER
 from tests.experiments.study import STRENGTH

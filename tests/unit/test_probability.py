@@ -9,21 +9,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sketchmatch import Scene, match
-from sketchmatch.api import MatchProblem, Outcome
+from sketchmatch.api import Candidate, JudgeProblem, MatchProblem
 from sketchmatch.config import builtin
 from sketchmatch.model import ConfidenceWeights, Fmap
 from sketchmatch.pipeline.alternatives import exchange_confidences
-from sketchmatch.pipeline.calibration import LEARNED, Calibration, calibrated, default_price
 from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
-from sketchmatch.pipeline.probability import likelihood
 from sketchmatch.pipeline.slices import finish
-from sketchmatch.pipeline.unmatched import Part, PartSearch, Rival, omission_confidences, part_of
+from sketchmatch.pipeline.unmatched import Part, omission_confidences, part_of
 from sketchmatch.testing import random_scene, simulate_sketch
+from sketchmatch_builtin.judges._odds import likelihood
+from sketchmatch_builtin.judges.calibration import LEARNED, Calibration, calibrated, default_price
 from sketchmatch_builtin.searchers.exact import Exact
 from tests.strategies import random_table
 
 WEIGHTS = (1.0, 1.0, 1.0)
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
+SCENE = Scene.from_polygons([SQUARE, SQUARE + 2])
 
 
 def zeta(kept, partners, table):
@@ -70,28 +71,38 @@ def test_a_probability_is_a_share_of_all_odds(seed, few, more, left_out, doubt, 
     kept = sorted(rng.permutation(few)[left_out:].tolist())
     part = finish(part_of(Part.whole(table), kept))
     *_, last = Exact().search(MatchProblem(part.table, WEIGHTS), rng)
-    found = PartSearch(part, last, Outcome.OPTIMAL)
-    best = dict(zip(kept, found.mapped.partners.tolist(), strict=True))
+    found = object_map(occm(last.fmap, part.table))
+    best = dict(zip(kept, found.partners.tolist(), strict=True))
     others = [random_map(rng, few, few + more) for _ in range(4)]
     others = [other for k, other in enumerate(others) if other not in (best, *others[:k])]
-    computed = likelihood(
-        found,
-        exchange_confidences(found.mapped, part.table, WEIGHTS),
-        omission_confidences(last.fmap, part.table, WEIGHTS),
-        [rival(other, table) for other in others],
-        calibration,
+    first, *rivals = (candidate(each, table) for each in (best, *others))
+    problem = JudgeProblem(
+        SCENE,
+        SCENE,
+        table,
+        ConfidenceWeights(),
+        (first, *rivals),
+        exchanges=exchange_confidences(found, part.table, WEIGHTS),
+        omissions=omission_confidences(last.fmap, part.table, WEIGHTS),
     )
+    computed = likelihood(problem, rivals, calibration)
     maps = considered(best, few + more, others)
     steep = calibration.sharpness * few**calibration.growth
     top = worth(best, table, calibration)
     odds = [math.exp(steep * (worth(each, table, calibration) - top)) for each in maps]
     nothing = math.exp(steep * (doubt - top) + reserve)
     total = sum(odds) + nothing
-    assert computed.of_map == pytest.approx(1.0 / total, abs=1e-9)
-    for k, g in enumerate(kept):
-        agreeing = sum(o for o, each in zip(odds, maps, strict=True) if each.get(g) == best[g])
+    for judged, mapping in zip(computed.maps, (best, *others), strict=True):
+        share = math.exp(steep * (worth(mapping, table, calibration) - top)) / total
+        assert judged.probability == pytest.approx(share, abs=1e-9)
+    for g in range(few):
+        agreeing = sum(o for o, each in zip(odds, maps, strict=True) if each.get(g) == best.get(g))
         expected = (agreeing + luck * nothing) / total
-        assert computed.of_objects[k] == pytest.approx(expected, abs=1e-9)
+        assert computed.lines[g, best.get(g, -1)] == pytest.approx(expected, abs=1e-9)
+        for h in {None, *range(few + more)} - {best.get(g)}:
+            agreeing = sum(o for o, each in zip(odds, maps, strict=True) if each.get(g) == h)
+            line = computed.lines[g, -1 if h is None else h]
+            assert line == pytest.approx(agreeing / total, abs=1e-9)
 
 
 def random_map(rng, few, many):
@@ -99,14 +110,11 @@ def random_map(rng, few, many):
     return dict(zip(kept, rng.permutation(many).tolist(), strict=False))
 
 
-def rival(mapping, table):
+def candidate(mapping, table):
     kept = sorted(mapping)
-    part = finish(part_of(Part.whole(table), kept))
-    partners = np.array([mapping[g] for g in kept])
-    fmap = Fmap.from_object_map(partners, table.argument_objects)
-    mapped = object_map(occm(fmap, part.table))
-    assert mapped.partners.tolist() == partners.tolist()
-    return Rival(np.array(kept), table.template_objects, mapped, zeta(kept, partners, table))
+    partners = np.full(table.template_objects, -1)
+    partners[kept] = [mapping[g] for g in kept]
+    return Candidate(partners, zeta(kept, partners[kept], table))
 
 
 def test_good_sketches_are_likelier_right_than_bad_ones():

@@ -45,13 +45,14 @@ def test_every_kind_of_source_has_its_segmenter(name):
         "histogram": "constant",
         "similarity": "cross-correlation",
         "searcher": "auto",
+        "judge": "confidence",
     }
     assert list(pipeline.stages()) == list(STAGES)
 
 
 def test_scenes_need_no_segmenter():
     pipeline = resolve(default_registry(), {})
-    assert list(pipeline.stages()) == ["histogram", "similarity", "searcher"]
+    assert list(pipeline.stages()) == ["histogram", "similarity", "searcher", "judge"]
 
 
 def test_parameters_reach_their_stage_alone():

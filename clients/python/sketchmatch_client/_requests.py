@@ -38,11 +38,11 @@ class MatchOptions(TypedDict, total=False):
 
     Attributes
     ----------
-    sketch_segmenter, map_segmenter, histogram, similarity, searcher
+    sketch_segmenter, map_segmenter, histogram, similarity, searcher, judge
         Names of algorithms; :meth:`Client.algorithms` lists them.
     params
         Parameters by stage, e.g. ``{"searcher": {"population": 200}}``. The stages are the
-        names of the five options above.
+        names of the six options above.
     seed
         Seed of everything random, from 0 to 2**64 − 1. Left out: 0.
     time_budget
@@ -53,10 +53,10 @@ class MatchOptions(TypedDict, total=False):
         that are d apart counts for d^β. Left out: as the profile says, or else 1, 1, 1, 0, 0, 0.
     allow_unmatched
         Whether an object may stay without partner on both sides where that is likelier. Left out:
-        as the profile says, or else not.
+        as the profile says, or else as searcher and judge do by themselves.
     unmatched_price
         What a match loses that leaves all objects of the smaller scene out, in units of ζ, and in
-        proportion where it leaves out some. Left out: one that fits the weights.
+        proportion where it leaves out some. Left out: the judge's own.
     alternatives
         How many of the next best object maps the result shall hold. Left out: 3, or as many as
         there are.
@@ -70,6 +70,7 @@ class MatchOptions(TypedDict, total=False):
     histogram: str | None
     similarity: str | None
     searcher: str | None
+    judge: str | None
     params: Mapping[str, Mapping[str, Any]] | None
     seed: int | None
     time_budget: float | timedelta | None

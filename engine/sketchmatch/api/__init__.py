@@ -1,7 +1,7 @@
 """All that a plugin may import from the engine, beside ``sketchmatch.model``.
 
 A distribution offers its algorithms, and readers of files, through one entry point in the group
-``sketchmatch``, naming a module with any of five hooks, each marked with :data:`hookimpl` and
+``sketchmatch``, naming a module with any of six hooks, each marked with :data:`hookimpl` and
 returning classes::
 
     from sketchmatch.api import hookimpl

@@ -38,7 +38,7 @@ class Params(BaseModel):
 
 
 class Algorithm:
-    """Base of the four kinds of plugin.
+    """Base of the five kinds of plugin.
 
     Parameters
     ----------

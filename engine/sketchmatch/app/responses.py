@@ -324,7 +324,7 @@ def _profile(profile: Profile, is_default: bool) -> catalog_service_pb2.Profile:
         pipeline=pipeline_pb2.Pipeline(**stages),
         is_default=is_default,
         weights=None if profile.weights is None else _weights(profile.weights),
-        allow_unmatched=profile.allow_unmatched,
+        allow_unmatched=bool(profile.allow_unmatched),
     )
 
 

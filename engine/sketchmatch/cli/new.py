@@ -35,7 +35,7 @@ def new(
     kind: Annotated[
         str,
         typer.Option(
-            "--kind", metavar="KIND", help="segmenter, histogram, similarity or searcher."
+            "--kind", metavar="KIND", help="segmenter, histogram, similarity, searcher or judge."
         ),
     ],
     into: Annotated[

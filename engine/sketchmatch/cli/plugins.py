@@ -25,7 +25,7 @@ app.command("new")(new.new)
 _Kind = Annotated[
     str,
     typer.Option(
-        "--kind", metavar="KIND", help="Only segmenter, histogram, similarity or searcher."
+        "--kind", metavar="KIND", help="Only segmenter, histogram, similarity, searcher or judge."
     ),
 ]
 

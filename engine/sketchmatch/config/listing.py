@@ -145,8 +145,8 @@ def _profiles(configuration: Configuration) -> _Found:
         yield (*path, "summary"), profile.summary, ""
         if profile.weights is not None:
             yield (*path, "weights"), list(profile.weights), ""
-        if profile.allow_unmatched:
-            yield (*path, "allow_unmatched"), True, ""
+        if profile.allow_unmatched is not None:
+            yield (*path, "allow_unmatched"), profile.allow_unmatched, ""
         for stage, choice in profile.stages.items():
             if choice.name:
                 yield (*path, stage, "name"), choice.name, ""

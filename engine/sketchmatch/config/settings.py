@@ -80,9 +80,10 @@ class _Profile(_Stages):
         description="Weights of ζσ, ζR and ζL in ζ, perhaps of the objects' shapes and sizes, and "
         "perhaps the exponent of distance in ζR; 1, 1, 1, when left out.",
     )
-    allow_unmatched: bool = Field(
-        False,
-        description="Leave objects without partner on both sides where that is likelier.",
+    allow_unmatched: bool | None = Field(
+        None,
+        description="Leave objects without partner on both sides where that is likelier; as "
+        "searcher and judge do, when left out.",
     )
 
 
@@ -93,6 +94,7 @@ class _Algorithms(_Section):
     histogram: _Named = {}
     similarity: _Named = {}
     searcher: _Named = {}
+    judge: _Named = {}
 
 
 class _Plugins(_Section):

@@ -26,8 +26,9 @@ from sketchmatch.pipeline.correspond import (
     object_map,
     occm,
 )
+from sketchmatch.pipeline.unmatched import Rival
 
-__all__ = ["Alternative", "best_others", "exchange_confidences", "partner_margins"]
+__all__ = ["Alternative", "exchange_confidences", "other_maps", "partner_margins"]
 
 # One exchange costs about a nanosecond for each entry of the FMAP and each step of its sorting;
 # beyond this many entries in all, ζ of every exchange would take longer than a tenth of a second.
@@ -71,7 +72,7 @@ def exchange_confidences(
     )
 
 
-def best_others(
+def other_maps(
     mapped: ObjectMap,
     candidates: Iterable[Fmap],
     exchanges: FloatArray | None,
@@ -80,7 +81,7 @@ def best_others(
     count: int,
     own: SelfRelations | None = None,
 ) -> tuple[Alternative, ...]:
-    """Return the best other object maps among those that are known.
+    """Return the other object maps that are known: those met, and the best exchanges.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def best_others(
     table, weights
         What was searched.
     count
-        How many are wanted.
+        How many exchanges count.
     own
         How the objects compare, for ζS and ζM of each.
 
@@ -118,14 +119,13 @@ def best_others(
         if key not in found or found[key].confidence.total < other.confidence.total:
             found[key] = other
     found.pop(tuple(mapped.partners.tolist()), None)
-    ranked = sorted(found.values(), key=lambda other: -other.confidence.total)
-    return tuple(ranked[:count])
+    return tuple(sorted(found.values(), key=lambda other: -other.confidence.total))
 
 
 def partner_margins(
     mapped: ObjectMap,
     confidence: float,
-    others: Iterable[Alternative],
+    others: Iterable[Alternative | Rival],
     exchanges: FloatArray | None,
 ) -> FloatArray | None:
     """Return by how much ζ falls when an object must take another partner.

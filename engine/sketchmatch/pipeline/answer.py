@@ -1,92 +1,30 @@
-"""From what a search came to, to the answer: read from sketch to map, and how sure it is."""
+"""From what the judge says, to the answer: read from sketch to map, and how sure it is."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from types import MappingProxyType
 
-from sketchmatch.api import Segmentation
-from sketchmatch.model import Confidence, FloatArray, Weights
+import numpy as np
+
+from sketchmatch.api import Outcome, Segmentation
 from sketchmatch.pipeline import reading
-from sketchmatch.pipeline.alternatives import best_others, exchange_confidences, partner_margins
-from sketchmatch.pipeline.calibration import Calibration
+from sketchmatch.pipeline.alternatives import partner_margins
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison
-from sketchmatch.pipeline.correspond import fmap_confidence, global_dilation, global_rotation
-from sketchmatch.pipeline.probability import UNKNOWN, likelihood
+from sketchmatch.pipeline.correspond import global_dilation, global_rotation
+from sketchmatch.pipeline.judge import Judged
 from sketchmatch.pipeline.result import AlternativeMap, MatchResult, Statistics
 from sketchmatch.pipeline.search import Goal, Search
-from sketchmatch.pipeline.unmatched import PartSearch, Rival, omission_confidences
 from sketchmatch.pipeline.words import nearest_relations
 
-__all__ = ["Considered", "answer", "considered"]
-
-
-@dataclass(frozen=True, eq=False)
-class Considered:
-    """The maps that an answer is chosen from.
-
-    Attributes
-    ----------
-    best
-        The best one, of the objects of its part.
-    exchanges
-        Shape (k, N'): ζ after each exchange in it, as
-        :func:`sketchmatch.pipeline.alternatives.exchange_confidences` returns it, or None.
-    rivals
-        The others that were met, what is worth most first.
-    confidence
-        ζ of the best, and its parts.
-    margins
-        Shape (k,): by how much ζ falls with the best other partner of each object, or None.
-    weights
-        Of ζ.
-    """
-
-    best: PartSearch
-    exchanges: FloatArray | None
-    rivals: tuple[Rival, ...]
-    confidence: Confidence
-    margins: FloatArray | None
-    weights: Weights
-
-    def omissions(self) -> FloatArray | None:
-        """Return ζ without each of its objects, shape (k,), or None."""
-        return omission_confidences(self.best.best.fmap, self.best.part.table, self.weights)
-
-
-def considered(found: Search, goal: Goal) -> Considered:
-    """Return the maps that an answer to a search is chosen from."""
-    best = found.best
-    part, mapped, weights = best.part, best.mapped, goal.weights.searched
-    table = part.table
-    exchanges = exchange_confidences(mapped, table, weights)
-    others = best_others(
-        mapped,
-        best.best.alternatives,
-        exchanges,
-        table,
-        weights,
-        goal.alternatives,
-        part.own,
-    )
-    confidence = fmap_confidence(best.best.fmap, table, weights, part.own)
-    met = [Rival(part.kept, part.objects, other.mapped, other.confidence) for other in others]
-    return Considered(
-        best,
-        exchanges,
-        tuple(sorted((*found.rivals, *met), key=lambda rival: -rival.value(goal.price))),
-        confidence,
-        partner_margins(mapped, confidence.total, others, exchanges),
-        weights,
-    )
+__all__ = ["answer"]
 
 
 def answer(
     comparison: Comparison,
     found: Search,
+    judged: Judged,
     goal: Goal,
-    calibration: Calibration | None,
     segmentations: tuple[Segmentation, Segmentation],
     match_id: str,
     clock: Clock,
@@ -95,10 +33,8 @@ def answer(
 
     Parameters
     ----------
-    comparison, found, goal
-        What was searched, what came of it, and what was sought.
-    calibration
-        What was learned of such matches; None where nothing was.
+    comparison, found, judged, goal
+        What was searched, what came of it, what the judge made of that, and what was sought.
     segmentations
         Of sketch and map.
     match_id
@@ -106,27 +42,25 @@ def answer(
     clock
         Of the match.
     """
-    maps = considered(found, goal)
-    swapped, part, mapped = comparison.swapped, maps.best.part, maps.best.mapped
-    last, table, kept = maps.best.best, part.table, part.kept
-    likely = UNKNOWN
-    if calibration is not None and maps.exchanges is not None:
-        likely = likelihood(maps.best, maps.exchanges, maps.omissions(), maps.rivals, calibration)
+    swapped, best, judgement = comparison.swapped, judged.answer, judged.judgement
+    mapped, table, kept, fmap = best.mapped, best.part.table, best.part.kept, best.fmap
+    alike = (other for other in judged.others if np.array_equal(other.kept, kept))
+    margins = partner_margins(mapped, best.confidence.total, alike, best.exchanges)
+    lines = judgement.lines
+    likely = None if lines is None else lines[kept, mapped.partners]
     matched = mapped.partners if swapped else kept
     relations = nearest_relations(comparison.sketch, comparison.sketch_descriptor, matched.tolist())
-    rotation, dilation = global_rotation(last.fmap, table), global_dilation(last.fmap, table)
-    bound = last.upper_bound
-    if bound is not None:
-        bound = max(bound, maps.confidence.total)  # ζ was taken anew, and may differ by rounding
+    rotation, dilation = global_rotation(fmap, table), global_dilation(fmap, table)
+    outcome, bound = _proved(found, judged)
     sketch, map_ = segmentations
     return MatchResult(
-        matches=reading.matches(mapped, swapped, kept, maps.margins, likely.of_objects, relations),
+        matches=reading.matches(mapped, swapped, kept, margins, likely, relations),
         omap_confidence=mapped.confidence,
-        confidence=maps.confidence,
-        fmap=reading.correspondences(last.fmap, table, swapped, kept),
+        confidence=best.confidence,
+        fmap=reading.correspondences(fmap, table, swapped, kept),
         rotation=reading.half_turned(-rotation if swapped else rotation),
         scale=1.0 / dilation if swapped else dilation,
-        outcome=maps.best.outcome,
+        outcome=outcome,
         upper_bound=bound,
         seed=goal.seed,
         match_id=match_id,
@@ -147,9 +81,23 @@ def answer(
                 rival.confidence,
                 rival.mapped.confidence,
             )
-            for rival in maps.rivals[: goal.alternatives]
+            for rival in judged.others[: goal.alternatives]
         ),
-        search_note=last.note,
+        search_note=found.best.best.note,
         sketch_route=sketch.route,
-        probability=likely.of_map,
+        probability=judgement.maps[0].probability,
     )
+
+
+def _proved(found: Search, judged: Judged) -> tuple[Outcome, float | None]:
+    """Return why the search ended and its upper bound, as far as they are true of the answer."""
+    searched, best = found.best, judged.answer
+    outcome, bound = searched.outcome, searched.best.upper_bound
+    same_objects = np.array_equal(best.part.kept, searched.part.kept)
+    if outcome is Outcome.OPTIMAL and not (
+        same_objects and np.array_equal(best.mapped.partners, searched.mapped.partners)
+    ):
+        outcome = Outcome.CONVERGED  # proved of another map, which the judge did not take
+    if bound is None or not same_objects:
+        return outcome, None
+    return outcome, max(bound, best.confidence.total)  # ζ was taken anew, and may be rounded

@@ -72,6 +72,11 @@ class Comparison(Tabular):
         """Whether the template is the map: it has fewer objects than the sketch."""
         return _swapped(self.sketch, self.map)
 
+    @property
+    def scenes(self) -> tuple[Scene, Scene]:
+        """The template and the argument."""
+        return (self.map, self.sketch) if self.swapped else (self.sketch, self.map)
+
     def most_similar(
         self, sketch_pairs: Pairs = (), map_pairs: Pairs = (), limit: int | None = None
     ) -> tuple[Correspondence, ...]:

@@ -12,11 +12,13 @@ from sketchmatch.model import (
     Confidence,
     FloatArray,
     Fmap,
+    IntArray,
     ObjectMap,
     Occm,
     RelationTable,
     Weights,
     object_pairs,
+    pair_index,
 )
 
 __all__ = [
@@ -24,6 +26,8 @@ __all__ = [
     "fmap_confidence",
     "global_dilation",
     "global_rotation",
+    "induced_map",
+    "map_confidence",
     "object_map",
     "occm",
     "own_confidence",
@@ -111,6 +115,83 @@ def occm(fmap: Fmap, table: RelationTable) -> Occm:
     np.add.at(crossed, (a, d), sigma)
     np.add.at(crossed, (b, c), sigma)
     return Occm(implied + crossed, implied)
+
+
+def map_confidence(
+    partners: IntArray,
+    table: RelationTable,
+    weights: Weights = (1.0, 1.0, 1.0),
+    own: SelfRelations | None = None,
+) -> Confidence:
+    """Return ζ of the histogram map that an object map induces, and its parts.
+
+    Parameters
+    ----------
+    partners
+        Shape (N,), all different, −1 for an object without partner; at least two have one.
+    table, weights, own
+        As in :func:`fmap_confidence`.
+    """
+    kept = np.flatnonzero(partners >= 0)
+    fmap = Fmap.from_object_map(partners[kept], table.argument_objects)
+    if len(kept) == table.template_objects:
+        return fmap_confidence(fmap, table, weights, own)
+    rows, entries = _rows_of(kept, table), fmap.entries
+    columns, dual = entries % table.argument_pairs, entries >= table.argument_pairs
+    turned = np.where(dual, -1.0, 1.0) / table.rotation_weights[rows].mean()
+    evidence = table.entry_evidence[rows, columns if table.evidence is None else entries]
+    first, scratch = np.zeros(len(rows), dtype=np.int64), np.empty(len(rows))
+    total, similarity, rotation, dilation = kernels.fmap_confidence(
+        first,  # each row is of its entry alone
+        scratch,
+        evidence[:, None],
+        (turned * table.cosine[rows, columns])[:, None],
+        (turned * table.sine[rows, columns])[:, None],
+        table.normalized_dilation[rows, columns][:, None],
+        np.array(weights, dtype=np.float64),
+    )
+    if table.evidence is not None:
+        similarity = table.similarity[rows, columns].mean()
+    shape = size = None
+    if own is not None:
+        pairs = object_pairs(table.template_objects)[rows], object_pairs(table.argument_objects)
+        turns, growth = table.rotation[rows], table.dilation[rows]
+        shape, size = map(float, mean_parts(entries, pairs, turns, growth, own))
+    return Confidence(
+        float(total), float(similarity), float(rotation), float(dilation), shape, size
+    )
+
+
+def induced_map(partners: IntArray, table: RelationTable) -> ObjectMap:
+    """Return an object map with what the histogram map that it induces says for each line.
+
+    Parameters
+    ----------
+    partners
+        As in :func:`map_confidence`.
+    table
+        The relations.
+
+    Returns
+    -------
+    ObjectMap
+        Of the objects that have a partner alone.
+    """
+    kept = np.flatnonzero(partners >= 0)
+    fmap, rows = Fmap.from_object_map(partners[kept], table.argument_objects), _rows_of(kept, table)
+    sigma = table.similarity[rows, fmap.entries % table.argument_pairs]
+    confidences = np.zeros(len(kept))
+    a, b = object_pairs(len(kept)).T
+    np.add.at(confidences, a, sigma)
+    np.add.at(confidences, b, sigma)
+    confidences /= len(kept) - 1
+    return ObjectMap(partners[kept], confidences, float(confidences.mean()))
+
+
+def _rows_of(kept: IntArray, table: RelationTable) -> IntArray:
+    """Return the rows of the pairs of some template objects."""
+    a, b = kept[object_pairs(len(kept))].T
+    return np.asarray(pair_index(a, b, table.template_objects))
 
 
 def object_map(matrix: Occm) -> ObjectMap:

@@ -11,15 +11,27 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sketchmatch.api import Algorithm, MatchProblem, SearchProgress
+from sketchmatch.api import Algorithm, JudgeProblem, MatchProblem, SearchProgress
 from sketchmatch.errors import PluginError, SketchmatchError, quoted
-from sketchmatch.model import FloatArray, Fmap, RelationTable, Scene, Source
+from sketchmatch.model import FloatArray, Fmap, IntArray, RelationTable, Scene, Source
 from sketchmatch.registry import Registry
 
-__all__ = ["blamed", "blaming", "checked_array", "checked_progress", "inspecting"]
+__all__ = [
+    "FEWEST",
+    "blamed",
+    "blaming",
+    "breaks_pins",
+    "check_map",
+    "checked_array",
+    "checked_progress",
+    "inspecting",
+]
 
 _Told = TypeVar("_Told")
 _Value = TypeVar("_Value")
+FEWEST = 3
+"""Template objects that find a partner in any case, where there are as many."""
+
 _LONGEST = 200
 _ROUNDING = 1e-9
 _DOUBT = 1e-6
@@ -99,6 +111,9 @@ def checked_progress(
         _check_legal(progress.fmap, problem.table)
     for fmap in progress.alternatives:
         _check_legal(fmap, problem.table)
+    if former is None or progress.maps is not former.maps:
+        for partners in progress.maps:
+            check_map(partners, problem)
     _check_confidence(progress, problem, former)
     bound = progress.upper_bound
     if bound is not None and not progress.confidence - _DOUBT <= bound < math.inf:
@@ -110,6 +125,40 @@ def checked_progress(
     if not isinstance(progress.note, str):
         raise TypeError(f"its note is a {type(progress.note).__name__}, not a string")
     return progress
+
+
+def check_map(partners: Any, problem: MatchProblem | JudgeProblem) -> None:
+    """Refuse what is no object map that a problem allows.
+
+    Raises
+    ------
+    TypeError, ValueError
+        With a sentence that tells what a plugin did.
+    """
+    table = problem.table
+    template, argument = table.template_objects, table.argument_objects
+    if not (isinstance(partners, np.ndarray) and np.issubdtype(partners.dtype, np.integer)):
+        raise TypeError(f"its object map is {quoted(partners)}, not an array of whole numbers")
+    if partners.shape != (template,):
+        raise ValueError(f"its object map has shape {partners.shape}, not ({template},)")
+    if partners.min() < -1 or partners.max() >= argument:
+        raise ValueError(f"its object map has a partner outside −1 … {argument - 1}")
+    kept = np.flatnonzero(partners >= 0)
+    if len(np.unique(partners[kept])) < len(kept):
+        raise ValueError("its object map takes an object of the argument twice")
+    partial = problem.price < math.inf if isinstance(problem, JudgeProblem) else problem.partial
+    fewest = min(FEWEST, template) if partial else template
+    if len(kept) < fewest:
+        raise ValueError(f"its object map matches {len(kept)} objects, and at least {fewest} must")
+    if problem.allowed is not None and not problem.allowed[kept, partners[kept]].all():
+        raise ValueError("its object map holds a pairing that is ruled out")
+    if problem.pinned is not None and breaks_pins(partners, problem.pinned):
+        raise ValueError("its object map leaves out a pairing that is known")
+
+
+def breaks_pins(partners: IntArray, pinned: IntArray) -> bool:
+    """Whether a map of the whole template gives an object another partner than the known one."""
+    return bool(((pinned >= 0) & (partners != pinned)).any())
 
 
 def _check_legal(fmap: Any, table: RelationTable) -> None:
@@ -142,7 +191,7 @@ def _check_confidence(
 
 @contextmanager
 def inspecting(
-    algorithm: Algorithm, registry: Registry, value: RelationTable | Scene | Source
+    algorithm: Algorithm, registry: Registry, value: RelationTable | Scene | Source | JudgeProblem
 ) -> Iterator[None]:
     """Blame an algorithm if its input, read-only as it is, changes within the block."""
     before = dict(_checksums(value))

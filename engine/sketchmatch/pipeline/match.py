@@ -13,7 +13,6 @@ from sketchmatch.model import ConfidenceWeights, Scene
 from sketchmatch.model.limits import SourceLimits, limited_to, source_limits
 from sketchmatch.pipeline import reading
 from sketchmatch.pipeline.answer import answer
-from sketchmatch.pipeline.calibration import Calibration, calibrated
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison, check_scenes, compare
 from sketchmatch.pipeline.describe import described
@@ -25,11 +24,13 @@ from sketchmatch.pipeline.events import (
     Progress,
     Segmented,
 )
+from sketchmatch.pipeline.judge import judged
 from sketchmatch.pipeline.relate import check_exponent
 from sketchmatch.pipeline.request import (
     MatchRequest,
     alternatives_wanted,
     check_objects_weighed,
+    finds_partial,
     price_in_force,
 )
 from sketchmatch.pipeline.search import Goal, Search, search
@@ -93,13 +94,13 @@ class _Plan:
         The algorithms.
     goal
         What is sought, but for how many alternatives: that depends on the scenes.
-    calibration
-        What was learned of such matches; None where nothing was.
+    usual
+        As in :class:`~sketchmatch.api.JudgeProblem`.
     """
 
     pipeline: Pipeline
     goal: Goal
-    calibration: Calibration | None
+    usual: bool
 
 
 def _planned(request: MatchRequest, registry: Registry, defaults: Defaults) -> _Plan:
@@ -117,19 +118,18 @@ def _planned(request: MatchRequest, registry: Registry, defaults: Defaults) -> _
     profile = defaults.named(request.profile)
     weights = ConfidenceWeights(*(request.weights or profile.weights or ()))
     check_objects_weighed(weights, pipeline.searcher)
-    price = price_in_force(request, profile, weights, pipeline.searcher)
-    goal = Goal(weights, price, seed=request.seed)
-    return _Plan(pipeline, goal, _calibration(pipeline, weights, registry))
+    price = price_in_force(request, profile, weights, pipeline, registry)
+    goal = Goal(weights, price, seed=request.seed, at_once=finds_partial(pipeline, registry))
+    return _Plan(pipeline, goal, _is_usual(pipeline, registry))
 
 
-def _calibration(
-    pipeline: Pipeline, weights: ConfidenceWeights, registry: Registry
-) -> Calibration | None:
-    """Return what was learned of matches like this one, if anything was."""
-    usual = pipeline.similarity.name == registry.default(Kind.SIMILARITY)
-    if not usual or pipeline.histogram.exponent or not pipeline.searcher.object_consistent:
-        return None
-    return calibrated(weights)
+def _is_usual(pipeline: Pipeline, registry: Registry) -> bool:
+    """Whether relations and maps are of the kind that judges learn from."""
+    return (
+        pipeline.similarity.name == registry.default(Kind.SIMILARITY)
+        and not pipeline.histogram.exponent
+        and pipeline.searcher.object_consistent
+    )
 
 
 def _events(
@@ -163,9 +163,9 @@ def _events(
     with clock.timing("search"):
         work = search(comparison, pipeline.searcher, goal, registry, clock)
         found = yield from _watched_search(work, comparison.swapped, clock)
-    yield Finished(
-        answer(comparison, found, goal, plan.calibration, (sketch, map_), match_id, clock)
-    )
+        judging = judged(comparison, found, goal, pipeline.judge, registry, plan.usual)
+        verdict = yield from retold(judging, lambda _: _told(found, comparison.swapped, clock))
+    yield Finished(answer(comparison, found, verdict, goal, (sketch, map_), match_id, clock))
 
 
 def _compared(
@@ -207,19 +207,20 @@ def _watched_search(
     work: Generator[Search, None, Search], swapped: bool, clock: Clock
 ) -> Generator[MatchEvent, None, Search]:
     """Go on with a search to its end, passing on what it has come to."""
+    return retold(work, lambda so_far: _told(so_far, swapped, clock))
 
-    def tell(so_far: Search) -> Iterator[Progress]:
-        if not clock.is_time_to_tell():
-            return
-        best = so_far.best
-        yield Progress(
-            Phase.SEARCH,
-            clock.elapsed(),
-            iteration=so_far.iterations,
-            evaluations=so_far.evaluations,
-            confidence=best.best.confidence,
-            upper_bound=best.best.upper_bound,
-            matches=reading.matches(best.mapped, swapped, best.part.kept),
-        )
 
-    return retold(work, tell)
+def _told(so_far: Search, swapped: bool, clock: Clock) -> Iterator[Progress]:
+    """Tell what a search has come to, if it is time to."""
+    if not clock.is_time_to_tell():
+        return
+    best = so_far.best
+    yield Progress(
+        Phase.SEARCH,
+        clock.elapsed(),
+        iteration=so_far.iterations,
+        evaluations=so_far.evaluations,
+        confidence=best.best.confidence,
+        upper_bound=best.best.upper_bound,
+        matches=reading.matches(best.mapped, swapped, best.part.kept),
+    )

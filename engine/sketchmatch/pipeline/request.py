@@ -8,14 +8,21 @@ from numbers import Integral, Real
 from types import MappingProxyType
 from typing import Any
 
-from sketchmatch.api import Searcher
+from sketchmatch.api import Judge, Searcher
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model import ConfidenceWeights, RequestWeights, Scene, Source
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
-from sketchmatch.pipeline.calibration import default_price
-from sketchmatch.pipeline.selection import Profile, Selection
+from sketchmatch.pipeline.guard import blaming
+from sketchmatch.pipeline.selection import Pipeline, Profile, Selection
+from sketchmatch.registry import Registry
 
-__all__ = ["MatchRequest", "alternatives_wanted", "check_objects_weighed", "price_in_force"]
+__all__ = [
+    "MatchRequest",
+    "alternatives_wanted",
+    "check_objects_weighed",
+    "finds_partial",
+    "price_in_force",
+]
 
 _MAX_SEED = 2**64 - 1
 _MAX_PRICE = 1e3
@@ -47,10 +54,11 @@ class MatchRequest:
         Name of the profile to take the rest from; empty for the default one.
     allow_unmatched
         Whether an object may stay without partner on both sides where that is likelier; None for
-        what the profile says, or else not: the smaller scene is matched completely.
+        what the profile says, or else for whether searcher or judge find such maps by themselves.
+        Where it may not, the smaller scene is matched completely.
     unmatched_price
         What a map loses for leaving all objects of the smaller scene out, and for some of them
-        their share of it, in units of ζ; None for the one that fits the weights.
+        their share of it, in units of ζ; None for the judge's own.
 
     Raises
     ------
@@ -106,12 +114,29 @@ def check_objects_weighed(weights: ConfidenceWeights, searcher: Searcher) -> Non
         )
 
 
+def finds_partial(pipeline: Pipeline, registry: Registry) -> bool:
+    """Whether searcher or judge find maps that leave objects out by themselves."""
+    for algorithm in (pipeline.searcher, pipeline.judge):
+        with blaming(algorithm, registry):
+            if algorithm.partial:
+                return True
+    return False
+
+
 def price_in_force(
-    request: MatchRequest, profile: Profile, weights: ConfidenceWeights, searcher: Searcher
+    request: MatchRequest,
+    profile: Profile,
+    weights: ConfidenceWeights,
+    pipeline: Pipeline,
+    registry: Registry,
 ) -> float:
     """Return the price of leaving objects out; infinite where that is not allowed."""
-    allowed, price = request.allow_unmatched, request.unmatched_price
-    if not (profile.allow_unmatched if allowed is None else allowed):
+    searcher, price, allowed = pipeline.searcher, request.unmatched_price, request.allow_unmatched
+    if allowed is None:
+        allowed = profile.allow_unmatched
+    if allowed is None:
+        allowed = searcher.object_consistent and finds_partial(pipeline, registry)
+    if not allowed:
         if price is not None:
             raise _refused(
                 "unmatched_price",
@@ -125,7 +150,18 @@ def price_in_force(
             "maps pairs that need not lead to one; choose another, such as 'auto', or switch it "
             "off",
         )
-    return default_price(weights) if price is None else price
+    return _price_of(pipeline.judge, weights, registry) if price is None else price
+
+
+def _price_of(judge: Judge, weights: ConfidenceWeights, registry: Registry) -> float:
+    """Return the price that a judge has for leaving objects out."""
+    with blaming(judge, registry):
+        price = judge.price(weights)
+        if not (isinstance(price, Real) and 0.0 < float(price) <= _MAX_PRICE):
+            raise ValueError(
+                f"its price is {quoted(price)}, not a number above 0, at most {_MAX_PRICE:g}"
+            )
+    return float(price)
 
 
 def alternatives_wanted(requested: int | None, sketch: Scene, map_: Scene) -> int:

@@ -193,7 +193,9 @@ class MatchResult(Tabular):
     upper_bound
         A ζ that no legal FMAP exceeds, or None where the searcher proves nothing. Where objects
         may stay unmatched, it and an outcome OPTIMAL speak of maps of the objects of the smaller
-        scene that are matched; that no other objects should be is not proved.
+        scene that are matched; that no other objects should be is not proved. An outcome is
+        OPTIMAL only where the judge answers the map with the highest ζ, and there is no bound
+        where it answers a map of other objects than the search proved one for.
     seed
         With it, the same request gives the same result.
     match_id

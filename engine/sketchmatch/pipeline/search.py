@@ -7,11 +7,12 @@ import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 
 from sketchmatch.api import MatchProblem, Outcome, Searcher, SearchProgress
-from sketchmatch.model import ConfidenceWeights
+from sketchmatch.model import BoolArray, ConfidenceWeights, IntArray, Scene
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison
 from sketchmatch.pipeline.guard import blaming, checked_progress, inspecting
@@ -36,12 +37,22 @@ class Goal:
         How many maps beside the best are wanted.
     seed
         Of everything random.
+    at_once
+        Whether the searcher or the judge finds out by itself which objects to leave out, so that
+        no parts of the template are searched.
+    allowed, pinned, names
+        What the caller knows of objects, and their labels, as in
+        :class:`~sketchmatch.api.MatchProblem`.
     """
 
     weights: ConfidenceWeights
     price: float = math.inf
     alternatives: int = 0
     seed: int = 0
+    at_once: bool = False
+    allowed: BoolArray | None = None
+    pinned: IntArray | None = None
+    names: IntArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,12 +97,13 @@ def search(
     """
     whole = Part.whole(comparison.table, comparison.own)
     weights = goal.weights.searched
-    plan = trials(whole.objects, weights, goal.price)
+    plan = trials(whole.objects, weights, math.inf if goal.at_once else goal.price)
     trial, so_far, rivals = next(plan), None, list[Rival]()
     while True:
         part = yield from retold(part_of(whole, trial.kept), _still(so_far))
         share = trial.share * clock.left()
-        found, total = yield from _searched(part, searcher, goal, registry, share, so_far)
+        problem = _problem(comparison, part, goal, share)
+        found, total = yield from _searched(part, problem, searcher, goal, registry, so_far)
         if so_far is not None:
             worse = so_far.best if total.best is found else found
             rivals.append(worse.rival(weights))
@@ -111,10 +123,10 @@ def _still(so_far: Search | None) -> Callable[[float], Iterable[Search]]:
 
 def _searched(
     part: Part,
+    problem: MatchProblem,
     searcher: Searcher,
     goal: Goal,
     registry: Registry,
-    seconds: float,
     so_far: Search | None,
 ) -> Generator[Search, None, tuple[PartSearch, Search]]:
     """Run the searcher on a part until it ends, or its time does.
@@ -124,7 +136,7 @@ def _searched(
     PartSearch, Search
         What came of the part, and of it and of what was searched before.
     """
-    problem = _problem(part, goal, seconds)
+    seconds = math.inf if problem.time_budget is None else problem.time_budget
     until = time.monotonic() + seconds
     found: PartSearch | None = None
     with _searching(searcher, problem, goal.seed, registry) as work:
@@ -145,7 +157,7 @@ def _searched(
             yield total
 
 
-def _problem(part: Part, goal: Goal, seconds: float) -> MatchProblem:
+def _problem(comparison: Comparison, part: Part, goal: Goal, seconds: float) -> MatchProblem:
     table = part.table
     there_are = math.perm(table.argument_objects, table.template_objects) - 1
     return MatchProblem(
@@ -153,7 +165,21 @@ def _problem(part: Part, goal: Goal, seconds: float) -> MatchProblem:
         goal.weights.searched,
         min(goal.alternatives, there_are),
         seconds if seconds < math.inf else None,
+        scenes=cache(partial(_scenes, comparison, part)),
+        swapped=comparison.swapped,
+        partial=goal.at_once and goal.price < math.inf,
+        allowed=part.known(goal.allowed),
+        pinned=part.known(goal.pinned),
+        names=part.known(goal.names),
     )
+
+
+def _scenes(comparison: Comparison, part: Part) -> tuple[Scene, Scene]:
+    """Return the template's objects of a part, and the argument."""
+    template, argument = comparison.scenes
+    if part.left_out:
+        template = Scene(tuple(template.objects[k] for k in part.kept.tolist()))
+    return template, argument
 
 
 def _total(so_far: Search | None, found: PartSearch, price: float) -> Search:

@@ -14,7 +14,7 @@ from typing import Any, cast
 
 from pydantic import ValidationError
 
-from sketchmatch.api import Algorithm, Histogram, Searcher, Segmenter, Similarity
+from sketchmatch.api import Algorithm, Histogram, Judge, Searcher, Segmenter, Similarity
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model import (
     Image,
@@ -93,14 +93,15 @@ class Profile:
     weights
         Of the parts of ζ, as in a request; None for 1, 1, 1.
     allow_unmatched
-        Whether objects may stay without partner on both sides.
+        Whether objects may stay without partner on both sides; None leaves it to searcher and
+        judge.
     """
 
     name: str
     summary: str = ""
     stages: Selection = field(default_factory=dict)
     weights: RequestWeights | None = None
-    allow_unmatched: bool = False
+    allow_unmatched: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -160,6 +161,7 @@ class Pipeline:
     histogram: Histogram
     similarity: Similarity
     searcher: Searcher
+    judge: Judge
     profile: str = ""
 
     def segmenter(self, side: str) -> Segmenter | None:
@@ -248,6 +250,7 @@ def resolve(
         histogram=cast(Histogram, pick(Kind.HISTOGRAM)),
         similarity=cast(Similarity, pick(Kind.SIMILARITY)),
         searcher=cast(Searcher, pick(Kind.SEARCHER)),
+        judge=cast(Judge, pick(Kind.JUDGE)),
         profile=levels.profile,
     )
 
@@ -359,7 +362,8 @@ def default_names(registry: Registry, defaults: Defaults) -> Mapping[Kind, tuple
         ),
         **{
             kind: (levels.folded(kind, Choice()).name,)
-            for kind in (Kind.HISTOGRAM, Kind.SIMILARITY, Kind.SEARCHER)
+            for kind in Kind
+            if kind is not Kind.SEGMENTER
         },
     }
 

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sketchmatch.api import Outcome, SearchProgress
 from sketchmatch.kernels import exchange
@@ -32,10 +34,10 @@ from sketchmatch.pipeline.correspond import (
     object_map,
     occm,
 )
+from sketchmatch.pipeline.guard import FEWEST
 from sketchmatch.pipeline.slices import in_slices
 
 __all__ = [
-    "FEWEST",
     "Part",
     "PartSearch",
     "Rival",
@@ -46,8 +48,7 @@ __all__ = [
     "trials",
 ]
 
-FEWEST = 3
-"""Template objects that find a partner in any case."""
+_Item = TypeVar("_Item", bound=np.generic)
 
 _FEW = 10
 """Template objects up to which each is left out in turn."""
@@ -92,6 +93,10 @@ class Part:
     def left_out(self) -> int:
         """u, the number of objects that are left out."""
         return self.objects - len(self.kept)
+
+    def known(self, values: NDArray[_Item] | None) -> NDArray[_Item] | None:
+        """Return the rows of its objects, of what has one for each object of the template."""
+        return values if values is None or not self.left_out else values[self.kept]
 
 
 @dataclass(frozen=True)
@@ -146,7 +151,7 @@ class PartSearch:
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """An object map that is not the best, and maybe of other objects.
+    """An object map that may be the answer, of all objects or of some.
 
     Attributes
     ----------
@@ -163,6 +168,13 @@ class Rival:
     mapped: ObjectMap
     confidence: Confidence
 
+    @cached_property
+    def partners(self) -> IntArray:
+        """The map of the whole template, shape (N,): −1 for an object that is left out."""
+        partners = np.full(self.objects, -1)
+        partners[self.kept] = self.mapped.partners
+        return sealed(partners)
+
     def value(self, price: float) -> float:
         """Return what the map is worth."""
         left_out = self.objects - len(self.kept)
@@ -177,7 +189,7 @@ def net_confidence(confidence: float, left_out: int, objects: int, price: float)
     >>> net_confidence(0.9, left_out=1, objects=8, price=0.4)
     0.85
     """
-    return confidence - price * left_out / objects
+    return confidence - price * left_out / objects if left_out else confidence
 
 
 def trials(objects: int, weights: Weights, price: float) -> Generator[Trial, PartSearch, None]:

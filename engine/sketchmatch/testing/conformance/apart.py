@@ -42,7 +42,7 @@ _DYING = 2.0
 _ENDLESS = 2
 """Checks of one algorithm that may never end; the others are skipped then."""
 
-_LOADS = ("loads", "Load, and offer algorithms that derive from the four interfaces.")
+_LOADS = ("loads", "Load, and offer algorithms that derive from the five interfaces.")
 _spawning = multiprocessing.get_context("spawn")
 
 

@@ -54,7 +54,7 @@ def check_plugin(
     Parameters
     ----------
     algorithm
-        A class that derives from one of the four interfaces in :mod:`sketchmatch.api`.
+        A class that derives from one of the five interfaces in :mod:`sketchmatch.api`.
     expected_failures
         Names of checks that it fails, and why that is accepted.
     time_limit

@@ -24,7 +24,7 @@ _NOBODY = "no_such_parameter"
 
 
 def kind_of_class(algorithm: type[Any]) -> Kind:
-    """Return which of the four kinds a class is of.
+    """Return which of the five kinds a class is of.
 
     Raises
     ------

@@ -1,0 +1,1 @@
+"""Built-in judges, one algorithm a file, and what was learned of right and wrong maps."""

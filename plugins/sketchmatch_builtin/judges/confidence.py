@@ -1,0 +1,43 @@
+"""The thesis's judgement: the map with the highest ζ is the answer."""
+
+from __future__ import annotations
+
+from sketchmatch.api import Judge, JudgedMap, Judgement, JudgeProblem
+from sketchmatch.model import ConfidenceWeights
+from sketchmatch_builtin.judges._odds import likelihood, met
+from sketchmatch_builtin.judges.calibration import calibrated, default_price
+
+__all__ = ["HighestConfidence"]
+
+
+class HighestConfidence(Judge):
+    """The map with the highest ζ, less the price of what it leaves out, is the answer.
+
+    How likely it is right follows from ζ of the maps that come close to it, by odds that were
+    learned from simulated sketches: for the weights of the thesis, the default measure of
+    similarity on histograms of constant forces, and maps of objects. For others nothing is said,
+    nor where there are too many objects. It knows nothing of other places: all its probabilities
+    are of maps of this one.
+
+    References
+    ----------
+    "Scene Matching Between a Quantitative Map and a Qualitative Hand Drawn Sketch", thesis,
+    section 3.6.1.
+    """
+
+    name = "confidence"
+    summary = "The map with the highest confidence ζ wins, as in the thesis."
+    default = True
+
+    def price(self, weights: ConfidenceWeights) -> float:
+        """Return the price of leaving objects out that fits the weights."""
+        return default_price(weights)
+
+    def judge(self, problem: JudgeProblem) -> Judgement:
+        """Put the candidates in the order of what they are worth."""
+        others = met(problem)
+        calibration = calibrated(problem.weights) if problem.usual else None
+        if calibration is not None and problem.exchanges is not None:
+            return likelihood(problem, others, calibration)
+        ranked = (problem.candidates[0], *others)
+        return Judgement(tuple(JudgedMap(each.partners) for each in ranked))
