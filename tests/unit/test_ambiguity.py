@@ -216,8 +216,8 @@ def test_a_judgement_says_the_same_whichever_scene_was_the_template(case, swappe
         for i in range(sketched)
     ]
     assert read.of_objects.tolist() == pytest.approx(expected, abs=1e-12)
-    unmatched = tuple(i for i in range(sketched) if best[i] < 0)
-    assert read.unmatched(unmatched) == pytest.approx([expected[i] for i in unmatched], abs=1e-12)
+    unmatched = [expected[i] for i in range(sketched) if best[i] < 0]
+    assert read.of_unmatched == pytest.approx(unmatched, abs=1e-12)
 
 
 @given(judged(), st.booleans())
@@ -234,7 +234,7 @@ def test_what_a_judge_does_not_know_is_not_said():
     read = said(Judgement((JudgedMap([0, 1]), JudgedMap([1, 0]))), 2, 2, False, 1)
     assert (read.of_map, read.of_place, read.of_objects, read.ambiguity) == (None,) * 4
     assert read.of_alternatives == (None,)
-    assert read.unmatched((0, 1)) == ()
+    assert read.of_unmatched == ()
 
 
 def test_where_it_is_probably_another_place_there_is_nothing_to_ask():

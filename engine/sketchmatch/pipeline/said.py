@@ -27,6 +27,8 @@ class Said:
     of_objects
         Shape (N,), what the answer says of each sketched object: its partner, or that it has none;
         or None.
+    of_unmatched
+        The same, of those that have none.
     of_alternatives
         Of each of the next maps.
     ambiguity
@@ -36,12 +38,9 @@ class Said:
     of_map: float | None
     of_place: float | None
     of_objects: FloatArray | None
+    of_unmatched: tuple[float, ...]
     of_alternatives: tuple[float | None, ...]
     ambiguity: Ambiguity | None
-
-    def unmatched(self, objects: tuple[int, ...]) -> tuple[float, ...]:
-        """Return how likely sketched objects that the answer leaves out have no partner."""
-        return () if self.of_objects is None else tuple(self.of_objects[list(objects)].tolist())
 
 
 def said(
@@ -68,15 +67,18 @@ def said(
     >>> found = said(Judgement(maps, [[0.5, 0.4, 0.1]], elsewhere=0.1), 2, 1, True, 1)
     >>> found.of_place, found.of_objects.tolist(), found.of_alternatives
     (0.9, [0.5, 0.6], (0.4,))
+    >>> found.of_unmatched
+    (0.6,)
     >>> found.ambiguity
     Ambiguity(maps=2, alternatives=(0,), deciding_sketch_objects=(0, 1))
     """
     judged = judgement.maps
     maps = _from_sketch(judged, sketch_objects, swapped)
-    of_objects = None
+    of_objects, of_unmatched = None, ()
     if judgement.lines is not None:
         # An object without partner has −1, which picks the last column: that it has none.
         of_objects = _lines_from_sketch(judgement.lines, swapped)[np.arange(len(maps[0])), maps[0]]
+        of_unmatched = tuple(of_objects[maps[0] < 0].tolist())
     place = None if judgement.elsewhere is None else 1.0 - judgement.elsewhere
     known = [each.probability or 0.0 for each in judged]
     here = place is None or place >= 0.5
@@ -84,6 +86,7 @@ def said(
         judged[0].probability,
         place,
         of_objects,
+        of_unmatched,
         tuple(each.probability for each in judged[1 : shown + 1]),
         ambiguity(maps, known, map_objects, shown) if here else None,
     )
