@@ -8,10 +8,12 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from sketchmatch import Scene, match
 from sketchmatch.api import JudgedMap, Judgement
 from sketchmatch.pipeline.ambiguity import ambiguity, information_gains
 from sketchmatch.pipeline.result import Ambiguity
 from sketchmatch.pipeline.said import said
+from sketchmatch.testing import random_scene
 from tests.oracle.ambiguity import contradict, expected_reduction, sharing
 
 
@@ -242,3 +244,41 @@ def test_where_it_is_probably_another_place_there_is_nothing_to_ask():
     assert said(Judgement(maps, elsewhere=0.6), 2, 2, False, 1).ambiguity is None
     assert said(Judgement(maps, elsewhere=0.4), 2, 2, False, 1).ambiguity.maps == 2
     assert said(Judgement(maps), 2, 2, False, 1).ambiguity.maps == 2
+
+
+# Through the engine -----------------------------------------------------------------------------
+
+
+def pillars(columns, rows):
+    return Scene.from_polygons(
+        [
+            [[4 * x, 4 * y], [4 * x + 1, 4 * y], [4 * x + 1, 4 * y + 1], [4 * x, 4 * y + 1]]
+            for y in range(rows)
+            for x in range(columns)
+        ]
+    )
+
+
+def test_nine_pillars_fit_in_four_ways_and_the_result_says_so():
+    result = match(pillars(3, 3), pillars(3, 3))
+    assert result.ambiguity == Ambiguity(4, (0, 1, 2), (0, 1, 2, 3, 5, 6, 7, 8))
+    likely = [result.probability, *(each.probability for each in result.alternatives)]
+    assert likely == pytest.approx([0.25] * 4, abs=0.02)
+    assert result.unmatched_sketch_probabilities == ()
+    assert [line.probability > 0.9 for line in result.matches] == [k == CENTRE for k in range(9)]
+
+
+def test_a_room_in_which_every_thing_differs_is_not_ambiguous():
+    scene = random_scene(np.random.default_rng(3), 6)
+    result = match(scene, scene)
+    assert result.ambiguity is None
+    assert result.probability > 0.9
+
+
+def test_what_a_sketch_shows_beyond_the_map_has_no_partner_with_a_probability():
+    scene = random_scene(np.random.default_rng(5), 7)
+    fewer = Scene(scene.objects[:3] + scene.objects[4:])
+    result = match(scene, fewer)
+    assert result.unmatched_sketch_objects == (3,)
+    (alone,) = result.unmatched_sketch_probabilities
+    assert 0.5 < result.probability <= alone <= 1.0
