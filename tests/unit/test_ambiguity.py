@@ -268,6 +268,14 @@ def test_nine_pillars_fit_in_four_ways_and_the_result_says_so():
     assert [line.probability > 0.9 for line in result.matches] == [k == CENTRE for k in range(9)]
 
 
+@pytest.mark.parametrize("shown", [0, 1])
+def test_how_many_alternatives_are_asked_for_does_not_make_the_answer_likelier(shown):
+    result = match(pillars(3, 3), pillars(3, 3), alternatives=shown)
+    assert len(result.alternatives) == shown
+    assert result.probability == pytest.approx(0.25, abs=0.02)
+    assert result.ambiguity == Ambiguity(4, tuple(range(shown)), (0, 1, 2, 3, 5, 6, 7, 8))
+
+
 def test_a_room_in_which_every_thing_differs_is_not_ambiguous():
     scene = random_scene(np.random.default_rng(3), 6)
     result = match(scene, scene)

@@ -53,7 +53,7 @@ def answer(
     outcome, bound = _proved(found, judged)
     sketch, map_ = segmentations
     sides = len(sketch.scene), len(map_.scene)
-    says = said(judged.judgement, *sides, swapped, goal.alternatives)
+    says = said(judged.judgement, *sides, swapped, goal.shown)
     likely = None if says.of_objects is None else says.of_objects[matched]
     return MatchResult(
         matches=reading.matches(mapped, swapped, kept, margins, likely, relations),
