@@ -8,6 +8,7 @@ from pydantic import Field
 
 from sketchmatch.api import (
     Histogram,
+    Judge,
     Outcome,
     Params,
     Reader,
@@ -164,6 +165,21 @@ class Guessing(Searcher):
         raise NotImplementedError
 
 
+class Weighing(Judge):
+    """Weighed, and found wanting."""
+
+    name = "weighing"
+    summary = "Weighs."
+
+    class Params(Params):
+        """Of the scales."""
+
+        strictness: float = 0.5
+
+    def judge(self, problem):
+        raise NotImplementedError
+
+
 TRACING = Tracing(Tracing.Params(closing=0.125, mode="neat"))
 
 # Requests, by the names of the golden ones.
@@ -218,6 +234,7 @@ NOTHING_CHOSEN = {
     "histogram": Choice(),
     "similarity": Choice(),
     "searcher": Choice(),
+    "judge": Choice(),
 }
 MATCHES = {
     "MatchRequest": MatchRequest(
@@ -229,6 +246,7 @@ MATCHES = {
             "histogram": Choice("compass", {"directions": 36}),
             "similarity": Choice("alikeness", {"shares": [0.5, "rest", False]}),
             "searcher": Choice("guessing", {"limits": {"rounds": 9, "quiet": True}}),
+            "judge": Choice("weighing", {"scales": ["gold", 2.5]}),
         },
         seed=2**53 + 1,
         time_budget=3.25,
@@ -298,6 +316,7 @@ ACCEPTED = Accepted(
         histogram=Compass(Compass.Params(directions=36)),
         similarity=Alikeness(),
         searcher=Guessing(Guessing.Params(rounds=9)),
+        judge=Weighing(Weighing.Params(strictness=0.75)),
         profile="careful",
     ),
     weights=WEIGHTS,
@@ -408,6 +427,7 @@ REGISTRY = Registry(
         Registered(Kind.SEARCHER, Guessing, "acme-tiles", "2.1"),
         Registered(Kind.SEGMENTER, Tracing, "acme-pens", "1.3"),
         Registered(Kind.SEGMENTER, Tiling, "acme-tiles", "2.1"),
+        Registered(Kind.JUDGE, Weighing, "acme-pens", "1.3"),
         Registered(Kind.SIMILARITY, Alikeness, "acme-tiles", "2.1"),
         Registered(Kind.HISTOGRAM, Compass, "acme-pens", "1.3"),
     ],
@@ -423,10 +443,11 @@ REGISTRY = Registry(
     [RegisteredReader(Sheets, "acme-sheets", "7.5")],
 )
 DEFAULTS = Defaults(
-    pipeline={"sketch_segmenter": Choice("tracing")},
+    pipeline={"sketch_segmenter": Choice("tracing"), "judge": Choice("weighing")},
     parameters={
         Kind.SEGMENTER: {"tracing": {"closing": 0.375}},
         Kind.SEARCHER: {"guessing": {"rounds": 7}},
+        Kind.JUDGE: {"weighing": {"strictness": 0.625}},
     },
     profiles=(
         Profile(
@@ -440,6 +461,7 @@ DEFAULTS = Defaults(
             {
                 "sketch_segmenter": Choice("tracing", {"closing": 0.125, "mode": "neat"}),
                 "searcher": Choice("guessing", {"rounds": 9}),
+                "judge": Choice("weighing"),
             },
             WEIGHTS,
             allow_unmatched=True,
