@@ -9,10 +9,14 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sketchmatch import Scene, match
-from sketchmatch.api import JudgedMap, Judgement
+from sketchmatch.api import Judge, JudgedMap, Judgement, Params
 from sketchmatch.pipeline.ambiguity import ambiguity, information_gains
+from sketchmatch.pipeline.match import run_match
+from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import Ambiguity
 from sketchmatch.pipeline.said import said
+from sketchmatch.pipeline.selection import Choice
+from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from sketchmatch.testing import random_scene
 from tests.oracle.ambiguity import contradict, expected_reduction, sharing
 
@@ -290,3 +294,63 @@ def test_what_a_sketch_shows_beyond_the_map_has_no_partner_with_a_probability():
     assert result.unmatched_sketch_objects == (3,)
     (alone,) = result.unmatched_sketch_probabilities
     assert 0.5 < result.probability <= alone <= 1.0
+
+
+class Wary(Judge):
+    """Says the same of any four objects: how likely each map is, and that it is another place."""
+
+    name = "wary"
+    summary = "Is never sure."
+
+    class Params(Params):
+        elsewhere: float = 0.1
+
+    def judge(self, problem):
+        maps = ([0, 1, -1, 3], [1, 0, -1, 3], [0, 2, 1, 3], [1, 2, 0, 3])
+        here = 1.0 - self.params.elsewhere
+        shares = [here * share for share in (0.4, 0.3, 0.21, 0.09)]
+        return judgement_of(maps, shares, 4, problem.swapped)
+
+
+def wary(sketch, map_, elsewhere, shown=2):
+    given = Registered(Kind.JUDGE, Wary, "acme", "1.0")
+    registry = Registry([*default_registry().algorithms, given])
+    selection = {"judge": Choice("wary", {"elsewhere": elsewhere})}
+    request = MatchRequest(
+        sketch, map_, selection, seed=1, allow_unmatched=True, alternatives=shown
+    )
+    *_, last = run_match(request, registry)
+    return last.result
+
+
+@pytest.mark.parametrize("shown", [1, 3])
+def test_a_result_has_all_that_the_judge_says(shown):
+    scene = random_scene(np.random.default_rng(8), 4)
+    result = wary(scene, scene, 0.1, shown)
+    assert result.object_map == {0: 0, 1: 1, 3: 3}
+    assert result.probability == pytest.approx(0.36)
+    assert result.place_probability == pytest.approx(0.9)
+    assert [line.probability for line in result.matches] == pytest.approx([0.549, 0.36, 0.9])
+    assert result.unmatched_sketch_objects == (2,)
+    assert result.unmatched_sketch_probabilities == pytest.approx([0.73])
+    assert [each.object_map for each in result.alternatives] == [
+        *({0: 1, 1: 0, 3: 3}, {0: 0, 1: 2, 2: 1, 3: 3}, {0: 1, 1: 2, 2: 0, 3: 3}),
+    ][:shown]
+    assert [each.probability for each in result.alternatives] == pytest.approx(
+        [0.27, 0.189, 0.081][:shown]
+    )
+    # The last is not half as likely as the first.
+    assert result.ambiguity.maps == 3
+    assert result.ambiguity.alternatives == (0, 1)[:shown]
+    # Three answers for the second object; for the first .61 against .3, for the third .7 and .21.
+    assert result.ambiguity.deciding_sketch_objects == (1, 0, 2)
+
+
+def test_on_another_place_the_answer_stands_but_nothing_is_asked():
+    scene = random_scene(np.random.default_rng(8), 4)
+    result = wary(scene, scene, 0.75)
+    assert result.object_map == {0: 0, 1: 1, 3: 3}
+    assert result.place_probability == pytest.approx(0.25)
+    assert result.probability == pytest.approx(0.1)
+    assert result.ambiguity is None
+    assert repr(result).startswith("<MatchResult: probably not this place (0.250 that it is): 3 of")
