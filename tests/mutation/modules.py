@@ -35,7 +35,8 @@ _GROUPS = {
     "pipeline": (
         "engine/sketchmatch/pipeline",
         {
-            "answer": f"unit/test_alternatives unit/test_probability {_MATCHED}",
+            "ambiguity": "unit/test_ambiguity",
+            "answer": f"unit/test_ambiguity unit/test_probability {_MATCHED}",
             "calibration": "unit/test_probability unit/test_learning",
             "clock": _MATCHED,
             "compare": "unit/test_compare unit/test_relate unit/test_evidence",
@@ -47,6 +48,7 @@ _GROUPS = {
             "reading": _MATCHED,
             "request": f"unit/test_selection {_MATCHED}",
             "result": _MATCHED,
+            "said": "unit/test_ambiguity",
             "search": f"unit/test_unmatched {_MATCHED}",
             "segment": _MATCHED,
             "warmup": "unit/test_startup unit/test_match",
