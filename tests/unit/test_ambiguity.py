@@ -44,8 +44,10 @@ def test_one_map_alone_is_not_ambiguous():
     assert found([STRAIGHT], [0.3]) is None
 
 
-def test_maps_of_which_nothing_is_known_are_not_ambiguous():
+def test_maps_that_cannot_be_right_are_not_ambiguous():
     assert found([STRAIGHT, EXCHANGED], [0.0, 0.0]) is None
+    impossible = [1, 2, 0]
+    assert found([STRAIGHT, EXCHANGED, impossible], [0.5, 0.4, 0.0]).maps == 2
 
 
 @pytest.mark.parametrize(
@@ -61,7 +63,8 @@ def test_maps_of_different_objects_that_fit_together_say_the_same():
 
 
 def test_two_objects_that_may_both_be_one_mapped_object_are_ambiguous():
-    assert found([[0, 1, -1], [0, -1, 1]], [0.4, 0.4], 2) == Ambiguity(2, (0,), (1, 2))
+    for maps in ([[0, 1, -1], [0, -1, 1]], [[1, 0, -1], [1, -1, 0]]):
+        assert found(maps, [0.4, 0.4], 2) == Ambiguity(2, (0,), (1, 2))
 
 
 def test_what_says_the_same_as_a_likelier_one_is_not_counted():
