@@ -246,6 +246,12 @@ def test_what_a_judge_does_not_know_is_not_said():
     assert read.of_unmatched == ()
 
 
+def test_no_probability_is_below_0_for_a_sum_that_is_above_1():
+    maps = (JudgedMap([0, 1], 0.5),)
+    read = said(Judgement(maps, [[0.6, 0.0, 0.4, 0.0], [0.1, 0.9, 0.7, 0.0]]), 3, 2, True, 0)
+    assert read.of_unmatched == (0.0,)
+
+
 def test_where_it_is_probably_another_place_there_is_nothing_to_ask():
     maps = (JudgedMap([0, 1], 0.2), JudgedMap([1, 0], 0.2))
     assert said(Judgement(maps, elsewhere=0.6), 2, 2, False, 1).ambiguity is None

@@ -29,7 +29,15 @@ from sketchmatch.pipeline.search import Goal, Search
 from sketchmatch.pipeline.unmatched import Part, Rival, omission_confidences, part_of
 from sketchmatch.registry import Registry
 
-__all__ = ["Considered", "Judged", "considered", "judged", "problem_of"]
+__all__ = [
+    "Considered",
+    "Judged",
+    "check_maps",
+    "check_probabilities",
+    "considered",
+    "judged",
+    "problem_of",
+]
 
 # Probabilities that should be the same may come from different sums.
 _ROUNDING = 1e-9
@@ -130,7 +138,9 @@ def judged(
     first, others = yield from considered(comparison, found, goal)
     problem = problem_of(comparison, first, others, goal, usual)
     with inspecting(judge, registry, problem), blaming(judge, registry):
-        judgement = _checked(judge.judge(problem), problem)
+        judgement = judge.judge(problem)
+        check_maps(judgement, problem)
+        check_probabilities(judgement, problem)
     known = {each.partners.tobytes(): each for each in (first.rival, *others)}
     ranked = [
         known.get(each.partners.tobytes()) or _rival(each.partners, whole, weights)
@@ -209,6 +219,8 @@ def problem_of(
     if exchanges is not None and goal.allowed is not None:
         exchanges = np.where(_exchangeable(first, goal.allowed), exchanges, -np.inf)
     omissions = omission_confidences(first.fmap, first.part.table, goal.weights.searched)
+    if omissions is not None and goal.pinned is not None:
+        omissions = np.where(goal.pinned[first.part.kept] >= 0, -np.inf, omissions)
     return JudgeProblem(
         template,
         argument,
@@ -228,6 +240,59 @@ def problem_of(
         None if omissions is None else sealed(omissions),
         usual,
     )
+
+
+def check_maps(judgement: Any, problem: JudgeProblem) -> None:
+    """Refuse what is no judgement of one object map or more, all different and possible.
+
+    Raises
+    ------
+    TypeError, ValueError
+        With a sentence that tells what a judge did.
+    """
+    if not isinstance(judgement, Judgement):
+        raise TypeError(f"it returned a {type(judgement).__name__}, not a Judgement")
+    maps = judgement.maps
+    if not (isinstance(maps, tuple) and all(isinstance(each, JudgedMap) for each in maps)):
+        raise TypeError("its maps are no tuple of JudgedMap")
+    if not maps:
+        raise ValueError("it returned no map")
+    for each in maps:
+        check_map(each.partners, problem)
+    if len({each.partners.tobytes() for each in maps}) < len(maps):
+        raise ValueError("it returned a map twice")
+
+
+def check_probabilities(judgement: Judgement, problem: JudgeProblem) -> None:
+    """Refuse probabilities that are none, or contradict each other.
+
+    Raises
+    ------
+    TypeError, ValueError
+        With a sentence that tells what a judge did.
+    """
+    lines, elsewhere = judgement.lines, judgement.elsewhere
+    table = problem.table
+    if lines is not None:
+        checked_array(lines, (table.template_objects, table.argument_objects + 1), most=1.0)
+    if elsewhere is not None:
+        _check_probability("elsewhere", elsewhere)
+    for each in judgement.maps:
+        if each.probability is None:
+            continue
+        _check_probability("probability of a map", each.probability)
+        if elsewhere is not None and each.probability > 1.0 - elsewhere + _ROUNDING:
+            raise ValueError(
+                f"its map is right with probability {each.probability:g}, and the place another "
+                f"one with {elsewhere:g}"
+            )
+        if lines is not None:
+            least = lines[np.arange(len(lines)), each.partners].min()  # −1 is the last, of none
+            if each.probability > least + _ROUNDING:
+                raise ValueError(
+                    f"its map is right with probability {each.probability:g}, and one of its "
+                    f"lines with {least:g}"
+                )
 
 
 def _considered(rival: Rival, whole: Part, weights: Weights) -> Generator[float, None, Considered]:
@@ -262,48 +327,6 @@ def _exchangeable(first: Considered, allowed: BoolArray) -> BoolArray:
     # Where h is held, its holder takes what g had.
     possible[:, partners] &= allowed[np.ix_(kept, partners)].T
     return possible
-
-
-def _checked(judgement: Any, problem: JudgeProblem) -> Judgement:
-    """Return what a judge returned, if it keeps to the contract of judges."""
-    if not isinstance(judgement, Judgement):
-        raise TypeError(f"it returned a {type(judgement).__name__}, not a Judgement")
-    maps = judgement.maps
-    if not (isinstance(maps, tuple) and all(isinstance(each, JudgedMap) for each in maps)):
-        raise TypeError("its maps are no tuple of JudgedMap")
-    if not maps:
-        raise ValueError("it returned no map")
-    for each in maps:
-        check_map(each.partners, problem)
-    if len({each.partners.tobytes() for each in maps}) < len(maps):
-        raise ValueError("it returned a map twice")
-    _check_probabilities(judgement, problem)
-    return judgement
-
-
-def _check_probabilities(judgement: Judgement, problem: JudgeProblem) -> None:
-    lines, elsewhere = judgement.lines, judgement.elsewhere
-    table = problem.table
-    if lines is not None:
-        checked_array(lines, (table.template_objects, table.argument_objects + 1), most=1.0)
-    if elsewhere is not None:
-        _check_probability("elsewhere", elsewhere)
-    for each in judgement.maps:
-        if each.probability is None:
-            continue
-        _check_probability("probability of a map", each.probability)
-        if elsewhere is not None and each.probability > 1.0 - elsewhere + _ROUNDING:
-            raise ValueError(
-                f"its map is right with probability {each.probability:g}, and the place another "
-                f"one with {elsewhere:g}"
-            )
-        if lines is not None:
-            least = lines[np.arange(len(lines)), each.partners].min()  # −1 is the last, of none
-            if each.probability > least + _ROUNDING:
-                raise ValueError(
-                    f"its map is right with probability {each.probability:g}, and one of its "
-                    f"lines with {least:g}"
-                )
 
 
 def _check_probability(name: str, given: Any) -> None:

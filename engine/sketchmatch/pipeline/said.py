@@ -108,5 +108,5 @@ def _lines_from_sketch(lines: FloatArray, swapped: bool) -> FloatArray:
     if not swapped:
         return lines
     partners = lines[:, :-1].T
-    none = np.clip(1.0 - partners.sum(axis=1), 0.0, 1.0)
+    none = np.maximum(1.0 - partners.sum(axis=1), 0.0)  # a sum may be rounded up
     return np.column_stack([partners, none])
