@@ -62,7 +62,7 @@ class JudgeProblem:
     price
         Of leaving all template objects out, in units of ζ; infinite where none may be left out.
     alternatives
-        How many maps beside the best the caller wants to see.
+        How many maps beside the best are wanted, be it to see them or to know what competes.
     allowed
         Shape (N, N'): which pairings the caller does not rule out; None where none is ruled out.
     pinned
