@@ -1,5 +1,7 @@
 """What answers print."""
 
+from copy import deepcopy
+
 import pytest
 
 from sketchmatch_client import Match, MatchCollector, Progress, summary
@@ -19,7 +21,7 @@ def finished(*events) -> Match:
 
 @pytest.fixture
 def match() -> Match:
-    return finished(*STREAM)
+    return finished(*map(deepcopy, STREAM))
 
 
 def test_a_match_shows_itself_in_a_line(match):
@@ -28,8 +30,22 @@ def test_a_match_shows_itself_in_a_line(match):
         f"<Match: 2 of 3 sketched objects matched, "
         f"FMAP confidence {result.fmap_confidence.total:.3f}, "
         f"OMAP confidence {result.omap_confidence:.3f}, "
-        f"probability {result.probability:.3f}, ITERATION_LIMIT>"
+        f"probability {result.probability:.3f}, this place {result.place_probability:.3f}, "
+        "2 maps about as likely, ask what 0 bed is, ITERATION_LIMIT>"
     )
+
+
+def test_a_match_says_where_it_is_probably_another_place(match):
+    match.result.place_probability = 0.499
+    match.result.ClearField("ambiguity")
+    line = repr(match)
+    assert line.startswith(
+        "<Match: probably not this place (0.499 that it is): 2 of 3 sketched objects matched, "
+    )
+    assert "this place 0" not in line
+    match.result.place_probability = 0.5
+    assert repr(match).startswith("<Match: 2 of 3 sketched objects matched, ")
+    assert "probability 0.365, this place 0.500, ITERATION_LIMIT" in repr(match)
 
 
 def test_a_match_prints_a_small_table(match):
@@ -43,6 +59,15 @@ def test_a_match_prints_a_small_table(match):
         *(f"{first.confidence:.3f}", f"{first.probability:.3f}", f"{first.margin:.3f}"),
     ]
     assert rows[1].split()[:4] == ["2", second.sketch_label, "0", second.map_label]
+    assert rows[2].split() == ["0", "bed", "no", "partner", "0.575"]
+    match.result.ClearField("unmatched_sketch_probabilities")
+    assert str(match).splitlines()[-1].split() == ["0", "bed", "no", "partner"]
+
+
+def test_a_result_without_its_scenes_names_objects_by_number(match):
+    headline, _, *rows = summary(match.result).splitlines()
+    assert "ask what 0 is, " in headline
+    assert rows[2].split() == ["0", "no", "partner", "0.575"]
 
 
 def test_a_match_is_the_same_table_in_a_notebook(match):
@@ -53,7 +78,9 @@ def test_a_match_is_the_same_table_in_a_notebook(match):
 def test_a_match_has_none_where_there_is_no_value():
     bare = finished(MatchResponse(result=match_pb2.MatchResult()))
     assert (bare.probability, bare.upper_bound) == (None, None)
+    assert (bare.place_probability, bare.ambiguity) == (None, None)
     assert "probability" not in repr(bare)
+    assert "place" not in repr(bare)
 
 
 def test_a_match_has_the_numbers_of_its_result(match):
@@ -61,6 +88,9 @@ def test_a_match_has_the_numbers_of_its_result(match):
     assert match.fmap_confidence == result.fmap_confidence.total > 0
     assert match.omap_confidence == result.omap_confidence > 0
     assert match.probability == result.probability > 0
+    assert match.place_probability == result.place_probability > match.probability
+    assert match.ambiguity == result.ambiguity
+    assert match.ambiguity.maps == 2
     assert match.upper_bound == result.upper_bound > 0
     assert match.outcome == "ITERATION_LIMIT"
 
@@ -118,7 +148,7 @@ def test_a_stream_can_be_printed_event_by_event():
         f"accepted as {STREAM[0].accepted.match_id}, seed {2**53 + 1}",
         "3 sketched objects, 4 mapped ones",
         "SEARCH, 1.25 s, 62%, confidence 0.710, 1300 evaluations, at most 0.930",
-        str(finished(*STREAM)).splitlines()[0],
+        summary(STREAM[-1].result).splitlines()[0],
     ]
     assert summary(MatchResponse()) == ""
 

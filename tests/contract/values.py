@@ -33,6 +33,7 @@ from sketchmatch.pipeline.events import Accepted, Finished, Phase, Progress, Seg
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import (
     AlternativeMap,
+    Ambiguity,
     Correspondence,
     MatchResult,
     ObjectMatch,
@@ -391,15 +392,20 @@ RESULT = MatchResult(
                 total=0.79, similarity=0.72, rotation=0.85, dilation=0.62, shape=0.56, size=0.47
             ),
             omap_confidence=0.52,
+            probability=0.285,
         ),
         AlternativeMap(
             matches=(ObjectMatch(sketch_object=1, map_object=0, confidence=0.44),),
             confidence=Confidence(total=0.61, similarity=0.58, rotation=0.67, dilation=0.55),
             omap_confidence=0.43,
+            probability=0.115,
         ),
     ),
     search_note="every map of two objects was tried",
-    probability=0.865,
+    probability=0.365,
+    place_probability=0.905,
+    ambiguity=Ambiguity(maps=2, alternatives=(0,), deciding_sketch_objects=(0, 1, 2)),
+    unmatched_sketch_probabilities=(0.575,),
 )
 EVENTS = {
     "MatchResponse.accepted": ACCEPTED,

@@ -35,7 +35,8 @@ _GROUPS = {
     "pipeline": (
         "engine/sketchmatch/pipeline",
         {
-            "answer": f"unit/test_judge unit/test_alternatives {_MATCHED}",
+            "ambiguity": "unit/test_ambiguity",
+            "answer": f"unit/test_ambiguity unit/test_judge {_MATCHED}",
             "clock": _MATCHED,
             "compare": "unit/test_compare unit/test_relate unit/test_evidence",
             "correspond": "unit/test_correspond unit/test_confidence unit/test_judge",
@@ -47,6 +48,7 @@ _GROUPS = {
             "reading": _MATCHED,
             "request": f"unit/test_selection unit/test_judge {_MATCHED}",
             "result": _MATCHED,
+            "said": "unit/test_ambiguity",
             "search": f"unit/test_unmatched unit/test_judge {_MATCHED}",
             "segment": _MATCHED,
             "warmup": "unit/test_startup unit/test_match",

@@ -124,7 +124,91 @@ def test_no_probability_is_rounded_to_certainty(probability):
 def test_a_result_without_probability_shows_none(monkeypatch):
     lines = shown(answer(), monkeypatch)
     assert not any("likely" in line or "Probability" in line for line in lines)
+    assert not any("place" in line or "maps" in line for line in lines)
     assert any("confidence" in line for line in lines)
+
+
+def test_probabilities_of_map_and_place_have_a_line_of_their_own(monkeypatch):
+    lines = shown(answer(probability=0.4, place_probability=0.9996), monkeypatch)
+    assert "Probability 40 %  This place > 99.9 %" in lines
+    assert any(line.startswith("Rotation 0°  Scale 0.0105") for line in lines)
+
+
+def test_where_it_is_probably_another_place_that_is_said_first(monkeypatch):
+    apart = answer(place_probability=0.49, ambiguity=ambiguity(2, 1))
+    assert shown(apart, monkeypatch)[:2] == [
+        "Probably not this place (49 % that it is)",
+        "3 of 3 sketched objects matched",
+    ]
+    here = answer(place_probability=0.5)
+    assert shown(here, monkeypatch)[0] == "3 of 3 sketched objects matched"
+
+
+def ambiguity(maps, *deciding, alternatives=()):
+    return match_pb2.Ambiguity(
+        maps=maps, alternatives=alternatives, deciding_sketch_objects=deciding
+    )
+
+
+def test_of_maps_that_are_as_likely_it_is_said_what_to_tell(monkeypatch):
+    def asked(k, *labels):
+        match = answer(place_probability=0.9, ambiguity=ambiguity(4, k, 0))
+        match.scenes.sketch.CopyFrom(scene(*labels))
+        return shown(match, monkeypatch)[0]
+
+    begin = "4 maps fit about equally well; say which mapped object is"
+    assert asked(1, "desk", "shelf", "") == f"{begin} shelf (--pin shelf=…)"
+    assert asked(2, "desk", "shelf", "") == f"{begin} No. 3 (--pin 3=…)"
+    assert asked(1, "bed", "tea table", "") == f"{begin} tea table (--pin 2=…)"
+    assert asked(1, "bed", "chair", "chair") == f"{begin} chair (2) (--pin 2=…)"
+    assert asked(1, "bed", "7", "") == f"{begin} 7 (--pin 2=…)"
+
+
+def test_alternatives_that_share_the_probability_are_as_good_and_say_how_likely_they_are(
+    monkeypatch,
+):
+    others = [
+        alternative(0.95, line(0, 2), line(1, 1), line(2, 0), probability=0.02),
+        alternative(0.7, line(0, 0), line(1, 2), line(2, 1), probability=0.37),
+    ]
+    shared = ambiguity(2, 1, 2, alternatives=[1])
+    match = answer(alternatives=others, probability=0.4, ambiguity=shared)
+    assert shown(match, monkeypatch)[-2:] == [
+        "Next best, 2 %, ζ 0.950: on the map desk is No. 3, No. 3 is No. 1",
+        "Just as good, 37 %, ζ 0.700: on the map shelf is No. 3, No. 3 is bed",
+    ]
+
+
+def test_sketched_objects_without_partner_are_listed_with_how_likely_that_is(monkeypatch):
+    alone = answer(object_matches=[line(1, 1)], unmatched_sketch_objects=[0, 2])
+    assert [row.split() for row in shown(alone, monkeypatch)[3:6]] == [
+        ["2", "shelf", "2", "bed", "0.900", "0.100"],
+        ["1", "desk", "no", "partner"],
+        ["3", "no", "partner"],
+    ]
+    alone.result.unmatched_sketch_probabilities.extend([0.75, 0.9999])
+    assert [row.split() for row in shown(alone, monkeypatch)[4:6]] == [
+        ["1", "desk", "no", "partner", "75", "%"],
+        ["3", "no", "partner", ">", "99.9", "%"],
+    ]
+
+
+def test_in_a_pipe_doubts_go_to_standard_error_and_the_columns_stay(monkeypatch, capsys):
+    monkeypatch.setattr(output, "for_people", lambda: False)
+    sure = answer(probability=0.9, place_probability=0.9)
+    display.show_match(sure, metres=False, verbose=False)
+    plain_ = capsys.readouterr()
+    assert plain_.err == ""
+    assert plain_.out.splitlines()[:2] == [
+        "sketch_object\tmap_object\tconfidence\tsketch_label\tmap_label",
+        "0\t0\t0.9000\t\t",
+    ]
+    sure.result.place_probability = 0.004
+    sure.result.unmatched_sketch_objects.append(3)
+    display.show_match(sure, metres=False, verbose=False)
+    told = capsys.readouterr()
+    assert told.err == "sketchmatch: Probably not this place (0.4 % that it is)\n"
+    assert told.out == plain_.out
 
 
 @pytest.mark.parametrize(
@@ -142,9 +226,9 @@ def test_a_scale_has_its_unit():
     assert dict(display.facts(result, metres=False))["Scale"] == "0.0105 map units per sketch unit"
 
 
-def alternative(total, *lines):
+def alternative(total, *lines, **fields):
     return match_pb2.AlternativeMap(
-        object_matches=lines, fmap_confidence=match_pb2.FmapConfidence(total=total)
+        object_matches=lines, fmap_confidence=match_pb2.FmapConfidence(total=total), **fields
     )
 
 

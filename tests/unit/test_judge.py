@@ -126,11 +126,11 @@ def map_of(result):
 
 def test_a_judge_sees_the_scenes_the_relations_and_the_maps_met_the_best_first():
     sketch, map_ = drawn(4, 6, displacement=0.3)
-    result = matched(sketch, map_, alternatives=2, weights=(2, 1, 1))
+    result = matched(sketch, map_, alternatives=4, weights=(2, 1, 1))
     (problem,) = Told.problems
     assert (problem.template, problem.argument, problem.swapped) == (sketch, map_, False)
     assert problem.weights == ConfidenceWeights(2, 1, 1)
-    assert (problem.price, problem.alternatives, problem.usual) == (math.inf, 2, True)
+    assert (problem.price, problem.alternatives, problem.usual) == (math.inf, 4, True)
     values = [each.confidence.total for each in problem.candidates]
     assert values == sorted(values, reverse=True)
     assert len({each.partners.tobytes() for each in problem.candidates}) == len(values) >= 3

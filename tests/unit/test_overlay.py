@@ -171,6 +171,49 @@ def test_confidences_are_written_as_the_table_beside_writes_them(drawn):
     assert shares == ["0.995", "0.800"]
 
 
+def test_what_is_said_of_a_pair_stands_beside_its_bar(drawn):
+    said = [OverlayMatch(0, 0, 0.9954, "> 99 %"), OverlayMatch(1, 1, 0.8)]
+    draw_overlay(row([0, 1]), row([0, 1]), said)
+    shares = [text for text, _ in drawn.texts if text.startswith("0.") or text.endswith("%")]
+    assert shares == ["> 99 %", "0.800"]
+
+
+def test_an_alert_stands_between_header_and_panels_and_a_footnote_below_all(drawn):
+    plain = draw_overlay(row([0, 1]), row([0, 1]), pairs([0, 1]), facts=[("Scale", "2.5")])
+    panel = next(p for text, p in drawn.texts if text == "Sketch")
+    drawn.texts.clear()
+    told = draw_overlay(
+        *(row([0, 1]), row([0, 1]), pairs([0, 1])),
+        facts=[("Scale", "2.5")],
+        alert="another\nplace",
+        footnote="what it means",
+    )
+    heights = {text: point.y for text, point in drawn.texts}
+    moved = heights["Sketch"] - panel.y
+    assert heights["2.5"] < heights["another place"] < heights["Sketch"]
+    assert moved > 40
+    assert heights["what it means"] > max(y for text, y in heights.items() if "means" not in text)
+    assert heights["what it means"] < told.height
+    assert told.height > plain.height + moved
+    (x,) = {point.x for text, point in drawn.texts if text == "another place"}
+    colour = pixels(told)[round(heights["another place"]), round(x) - 8]
+    assert saturation(colour) > 40
+    assert saturation(pixels(plain)[round(heights["another place"]), round(x) - 8]) < 20
+
+
+def test_the_last_facts_give_way_to_the_headline(drawn):
+    facts = [(f"fact {k}", "a value that is long") for k in range(6)]
+    draw_overlay(row([0, 1]), row([0, 1]), pairs([0, 1]), facts=facts)
+    texts = [text for text, _ in drawn.texts]
+    assert "2 of 2 objects matched" in texts
+    assert {"fact 0", "fact 1", "fact 2"} <= set(texts)
+    assert "fact 5" not in texts
+    drawn.texts.clear()
+    draw_overlay(row([0, 1]), row([0, 1]), pairs([0, 1]), title="long " * 99, facts=facts[:3])
+    texts = [text for text, _ in drawn.texts]
+    assert {"fact 0", "fact 1", "fact 2"} <= set(texts), "a third of the page is enough"
+
+
 def test_numbers_of_a_scene_by_itself_are_those_beside_its_partners(drawn):
     scene = row([1, 3, 0, 2])
     draw_scene(Scene.from_polygons([item.rings for item in scene.objects], ["a", "", "c", ""]))

@@ -24,7 +24,7 @@ from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH, LIVING_ROO
 from sketchmatch.model import Stroke, StrokeSet
 from sketchmatch.model.text import likelihood
 from sketchmatch.pipeline.events import Phase, Progress
-from sketchmatch.pipeline.result import ObjectMatch
+from sketchmatch.pipeline.result import Ambiguity, ObjectMatch
 from sketchmatch.pipeline.selection import STAGES
 from sketchmatch.pipeline.warmup import warm_up_others
 from sketchmatch.registry import default_registry
@@ -264,6 +264,7 @@ def test_what_is_no_scene_is_refused_with_its_side(given):
 
 
 def test_a_result_shows_itself_in_a_line_and_prints_a_table(living_room):
+    living_room = replace(living_room, place_probability=None, ambiguity=None)
     line = repr(living_room)
     assert line == (
         f"<MatchResult: 8 of 8 sketched objects matched, "
@@ -297,6 +298,8 @@ def test_a_result_shows_no_probability_where_none_is_known(living_room):
     unknown = replace(
         living_room,
         probability=None,
+        place_probability=None,
+        ambiguity=None,
         matches=tuple(replace(m, probability=None, margin=None) for m in living_room.matches),
     )
     assert "probability" not in repr(unknown)
@@ -304,13 +307,47 @@ def test_a_result_shows_no_probability_where_none_is_known(living_room):
     assert first.endswith(f"{unknown.matches[0].confidence:.3f}")
 
 
+def test_a_result_says_whether_it_is_the_place(living_room):
+    living_room = replace(living_room, ambiguity=None)
+    other = replace(living_room, place_probability=0.499)
+    counted = "8 of 8 sketched objects matched, FMAP"
+    assert repr(other).startswith(
+        f"<MatchResult: probably not this place (0.499 that it is): {counted}"
+    )
+    assert "this place 0" not in repr(other)
+    here = replace(living_room, place_probability=0.5)
+    assert repr(here).startswith(f"<MatchResult: {counted}")
+    assert repr(here).endswith(", this place 0.500, OPTIMAL>")
+
+
+def test_a_result_says_what_to_ask_where_maps_are_as_likely(living_room):
+    shared = replace(living_room, ambiguity=Ambiguity(4, (0, 2), (1, 0)))
+    label = living_room.sketch.labels[1]
+    assert repr(shared).endswith(f", 4 maps about as likely, ask what 1 {label} is, OPTIMAL>")
+
+
+def test_a_result_lists_the_sketched_objects_without_partner_after_the_others(living_room):
+    kept = [line for line in living_room.matches if line.sketch_object not in (2, 5)]
+    part = replace(living_room, matches=tuple(kept))
+    names = [f"{k} {living_room.sketch.labels[k]}".split() for k in (2, 5)]
+    assert [row.split() for row in str(part).splitlines()[-2:]] == [
+        [*name, "no", "partner"] for name in names
+    ]
+    told = replace(part, unmatched_sketch_probabilities=(0.25, 0.99999))
+    assert [row.split() for row in str(told).splitlines()[-2:]] == [
+        [*names[0], "no", "partner", "0.250"],
+        [*names[1], "no", "partner", ">0.999"],
+    ]
+
+
 def test_other_maps_show_themselves_in_a_line(living_room):
-    other = living_room.alternatives[0]
+    other = replace(living_room.alternatives[0], probability=None)
     assert repr(other) == (
         f"<AlternativeMap: FMAP confidence {other.confidence.total:.3f}, "
         f"OMAP confidence {other.omap_confidence:.3f}, "
         f"{other.object_map}>"
     )
+    assert ", probability 0.250, {" in repr(replace(other, probability=0.25))
 
 
 def test_a_comparison_shows_itself_in_a_line_and_prints_the_most_similar():

@@ -11,6 +11,7 @@ from google.protobuf.duration_pb2 import Duration
 from sketchmatch_client._summary import enum_name, match_headline, match_table, progress_line
 from sketchmatch_client.errors import ServerFailedError
 from sketchmatch_proto.v1.match_pb2 import (
+    Ambiguity,
     MatchAccepted,
     MatchProgress,
     MatchResult,
@@ -138,8 +139,19 @@ class Match:
 
     @property
     def probability(self) -> float | None:
-        """How likely the object map is right as a whole; None where nothing was learned."""
+        """How likely the object map is right as a whole, on this place; None where unknown."""
         return self.result.probability if self.result.HasField("probability") else None
+
+    @property
+    def place_probability(self) -> float | None:
+        """How likely the sketch shows the map's place at all; None where unknown."""
+        known = self.result.HasField("place_probability")
+        return self.result.place_probability if known else None
+
+    @property
+    def ambiguity(self) -> Ambiguity | None:
+        """Which maps are about as likely, and what to ask; None where one is clearly the best."""
+        return self.result.ambiguity if self.result.HasField("ambiguity") else None
 
     @property
     def upper_bound(self) -> float | None:
@@ -152,11 +164,11 @@ class Match:
         return enum_name(Outcome, "OUTCOME_", self.result.outcome)
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {match_headline(self.result)}>"
+        return f"<{type(self).__name__}: {match_headline(self.result, self.scenes.sketch)}>"
 
     def __str__(self) -> str:
         """Return which object is which, for a terminal; objects count from 0."""
-        return match_table(self.result)
+        return match_table(self.result, self.scenes.sketch)
 
     def _repr_html_(self) -> str:
         """Return the same for a notebook."""

@@ -6,6 +6,7 @@ All but what they say themselves is ASCII, which every terminal and pipe can tak
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 from google.protobuf.message import Message
@@ -13,12 +14,14 @@ from google.protobuf.message import Message
 from sketchmatch_proto.v1.catalog_service_pb2 import AlgorithmKind, ListAlgorithmsResponse
 from sketchmatch_proto.v1.match_pb2 import MatchProgress, MatchResult, Outcome, Phase
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+from sketchmatch_proto.v1.scene_pb2 import Scene
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 
 __all__ = ["enum_name", "match_headline", "match_table", "progress_line", "summary"]
 
 _ROWS = 20
 _LONGEST = 60
+_UNKNOWN = Scene()
 
 
 def summary(answer: Message) -> str:
@@ -55,8 +58,8 @@ def summary(answer: Message) -> str:
     return str(answer)
 
 
-def match_headline(result: MatchResult) -> str:
-    """Return what came out of a match as a whole."""
+def match_headline(result: MatchResult, sketch: Scene = _UNKNOWN) -> str:
+    """Return what came out of a match as a whole; the sketch has the labels of its objects."""
     matched = len(result.object_matches)
     facts = [
         f"{matched} of {matched + len(result.unmatched_sketch_objects)} sketched objects matched",
@@ -66,10 +69,19 @@ def match_headline(result: MatchResult) -> str:
     ]
     if result.HasField("probability"):
         facts.insert(-1, f"probability {_likelihood(result.probability)}")
+    if result.HasField("place_probability"):
+        likely = _likelihood(result.place_probability)
+        if result.place_probability < 0.5:
+            facts[0] = f"probably not this place ({likely} that it is): {facts[0]}"
+        else:
+            facts.insert(-1, f"this place {likely}")
+    if result.ambiguity.deciding_sketch_objects:
+        asked = _object(result.ambiguity.deciding_sketch_objects[0], sketch)
+        facts.insert(-1, f"{result.ambiguity.maps} maps about as likely, ask what {asked} is")
     return ", ".join(facts)
 
 
-def match_table(result: MatchResult) -> str:
+def match_table(result: MatchResult, sketch: Scene = _UNKNOWN) -> str:
     """Return which sketched object is which mapped object, counted from 0."""
     heads = ("in the sketch", "on the map", "confidence", "probability", "margin")
     rows = [
@@ -82,7 +94,11 @@ def match_table(result: MatchResult) -> str:
         )
         for line in result.object_matches
     ]
-    return _table(match_headline(result), heads, rows, names=2)
+    unmatched = zip_longest(
+        result.unmatched_sketch_objects, map(_likelihood, result.unmatched_sketch_probabilities)
+    )
+    rows += [(_object(k, sketch), "no partner", "", likely or "", "") for k, likely in unmatched]
+    return _table(match_headline(result, sketch), heads, rows, names=2)
 
 
 def progress_line(progress: MatchProgress) -> str:
@@ -172,6 +188,10 @@ def _table(
     ]
     rest = [f"... and {len(rows) - most} more"] if len(rows) > most else []
     return "\n".join([title, *lines, *rest])
+
+
+def _object(index: int, scene: Scene) -> str:
+    return _name(index, scene.objects[index].label if index < len(scene.objects) else "")
 
 
 def _name(index: int, label: str) -> str:

@@ -62,7 +62,7 @@ class JudgeProblem:
     price
         Of leaving all template objects out, in units of ζ; infinite where none may be left out.
     alternatives
-        How many maps beside the best the caller wants to see.
+        How many maps beside the best are wanted, be it to see them or to know what competes.
     allowed
         Shape (N, N'): which pairings the caller does not rule out; None where none is ruled out.
     pinned
@@ -127,10 +127,12 @@ class Judgement:
     Attributes
     ----------
     maps
-        All different, the answer first and then the next best ones.
+        All different, the answer first and then the next best ones; all that are about as likely,
+        however few the caller wants to see.
     lines
         Shape (N, N' + 1): how likely each template object's partner is each argument object, and,
-        last, none of them. None where unknown. No map is likelier than one of its lines.
+        last, none of them, as where the sketch shows another place. None where unknown. No map is
+        likelier than one of its lines.
     elsewhere
         How likely the sketch does not show this place at all; None where unknown.
     """

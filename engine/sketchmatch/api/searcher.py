@@ -44,7 +44,7 @@ class MatchProblem:
         Weights of the three parts of ζ: of ζσ, or the mean of the evidence in its place where the
         table holds any, ζR and ζL.
     alternatives
-        How many object maps beside the best the caller wants to see.
+        How many object maps beside the best are wanted.
     time_budget
         Seconds left for the search, or None for no limit; the host stops the search by then.
     scenes

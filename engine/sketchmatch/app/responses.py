@@ -23,7 +23,13 @@ from sketchmatch.model import (
 )
 from sketchmatch.pipeline.events import Accepted, Finished, MatchEvent, Progress, Segmented
 from sketchmatch.pipeline.request import MatchRequest
-from sketchmatch.pipeline.result import Correspondence, MatchResult, ObjectMatch, ObjectRelation
+from sketchmatch.pipeline.result import (
+    Ambiguity,
+    Correspondence,
+    MatchResult,
+    ObjectMatch,
+    ObjectRelation,
+)
 from sketchmatch.pipeline.selection import (
     UNCONFIGURED,
     Choice,
@@ -144,11 +150,15 @@ def result(value: MatchResult) -> match_pb2.MatchResult:
                 ),
                 fmap_confidence=_fmap_confidence(other.confidence),
                 omap_confidence=other.omap_confidence,
+                probability=other.probability,
             )
             for other in value.alternatives
         ],
         search_note=value.search_note,
         probability=value.probability,
+        place_probability=value.place_probability,
+        ambiguity=_ambiguity(value.ambiguity),
+        unmatched_sketch_probabilities=value.unmatched_sketch_probabilities,
     )
 
 
@@ -272,6 +282,16 @@ def _relation(relation: ObjectRelation | None) -> match_pb2.ObjectRelation | Non
         reference_object=relation.reference_object,
         phrase=relation.phrase,
         degree=relation.degree,
+    )
+
+
+def _ambiguity(value: Ambiguity | None) -> match_pb2.Ambiguity | None:
+    if value is None:
+        return None
+    return match_pb2.Ambiguity(
+        maps=value.maps,
+        alternatives=value.alternatives,
+        deciding_sketch_objects=value.deciding_sketch_objects,
     )
 
 

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import Console, Group, RenderableType
@@ -28,11 +29,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "chosen",
+    "doubt",
     "facts",
     "follow",
     "likely",
     "named",
     "numbered",
+    "say_doubt",
     "say_match_notes",
     "say_notes",
     "show_match",
@@ -169,6 +172,7 @@ def show_match(match: Match, metres: bool, verbose: bool) -> None:
     if output.for_people():
         output.show(_answer(match, metres))
         return
+    say_doubt(match)
     output.write_line("sketch_object", "map_object", "confidence", "sketch_label", "map_label")
     for line in match.result.object_matches:
         confidence = f"{line.confidence:.4f}"
@@ -210,6 +214,12 @@ def say_match_notes(match: Match, verbose: bool) -> None:
     """Tell what segmentation left out or decided on both sides."""
     say_notes("sketch", match.scenes.sketch_warnings, verbose)
     say_notes("map", match.scenes.map_warnings, verbose)
+
+
+def say_doubt(match: Match) -> None:
+    """Tell what is to be known before an answer is used, where people do not see it."""
+    if said := doubt(match):
+        say(said)
 
 
 def say_notes(side: str, notes: Sequence[str], verbose: bool) -> None:
@@ -283,14 +293,38 @@ def likely(probability: float) -> str:
     return f"{percent:.0f} %" if 1.0 <= percent < 99.0 else f"{percent:.1f} %"
 
 
+def doubt(match: Match) -> str:
+    """Return what is to be known before an answer is used; empty where nothing is.
+
+    That it is probably another place, or, where it is this one, that several maps are about as
+    likely, and what would decide between them.
+    """
+    result = match.result
+    if result.HasField("place_probability") and result.place_probability < 0.5:
+        return f"Probably not this place ({likely(result.place_probability)} that it is)"
+    if not result.ambiguity.deciding_sketch_objects:
+        return ""
+    first = result.ambiguity.deciding_sketch_objects[0]
+    labels = [item.label for item in match.scenes.sketch.objects]
+    return (
+        f"{result.ambiguity.maps} maps fit about equally well; say which mapped object is "
+        f"{named(first, labels)} (--pin {_pinned(first, labels)}=…)"
+    )
+
+
 def facts(result: match_pb2.MatchResult, metres: bool) -> list[tuple[str, str]]:
     """Return the figures that sum a result up, by name; ``metres``, whether the map is in them."""
     degrees = round(math.degrees(result.rotation_radians))
     sense = (
         "" if degrees in (0, 180, -180) else " clockwise" if degrees < 0 else " counter-clockwise"
     )
+    known = [
+        (name, likely(getattr(result, field)))
+        for name, field in (("Probability", "probability"), ("This place", "place_probability"))
+        if result.HasField(field)  # type: ignore[arg-type]
+    ]
     return [
-        *([("Probability", likely(result.probability))] if result.HasField("probability") else []),
+        *known,
         ("Rotation", f"{abs(degrees)}°{sense}"),
         ("Scale", f"{result.scale:.3g} {'m' if metres else 'map units'} per sketch unit"),
         ("FMAP confidence", f"{result.fmap_confidence.total:.3f}"),
@@ -323,6 +357,16 @@ def _answer(match: Match, metres: bool) -> RenderableType:
         ]
         for line in result.object_matches
     ]
+    unmatched = zip_longest(
+        result.unmatched_sketch_objects, map(likely, result.unmatched_sketch_probabilities)
+    )
+    rows += [
+        [
+            *(numbered(k, sketched), Text("no partner"), plain(probability or "")),
+            *(Text(""), Text(""), Text("")),
+        ]
+        for k, probability in unmatched
+    ]
     parts = result.fmap_confidence
     detail = (
         f"ζ {parts.total:.3f} of relations {parts.similarity:.3f}, "
@@ -331,9 +375,12 @@ def _answer(match: Match, metres: bool) -> RenderableType:
     if parts.HasField("shape"):
         detail += f", shapes {parts.shape:.3f}, sizes {parts.size:.3f}"
     said = [f"{name} {value}" for name, value in facts(result, metres)]
-    lines = ["  ".join(said[:-2]), "  ".join(said[-2:]), detail, _effort(result)]
-    lines += filter(None, [result.search_note])
+    figures = (said[:-4], said[-4:-2], said[-2:])
+    lines = ["  ".join(some) for some in figures if some]
+    lines += filter(None, [detail, _effort(result), result.search_note])
+    doubted = doubt(match)
     return Group(
+        *([plain(doubted, "bold red")] if doubted else []),
         Rows(_headline(match), columns, rows),
         "",
         *map(plain, lines),
@@ -390,9 +437,8 @@ def _alternatives(
 ) -> list[Text]:
     """Say what else it could be: only the objects that another map maps otherwise."""
     best = _partners(result.object_matches)
-    total = result.fmap_confidence.total
     lines = []
-    for other in result.alternatives:
+    for k, other in enumerate(result.alternatives):
         others = _partners(other.object_matches)
         changes = [
             f"{named(k, sketched)} is {named(others[k], mapped)}"
@@ -401,11 +447,28 @@ def _alternatives(
             for k in sorted({*best, *others})
             if best.get(k) != others.get(k)
         ]
-        found = other.fmap_confidence.total
-        how = "Just as good" if total - found < _AMBIGUOUS else "Next best"
-        said = f"{how}, ζ {found:.3f}: on the map {', '.join(changes)}"
-        lines.append(plain(said, "" if how == "Just as good" else "dim"))
+        as_good = _is_as_good(result, k)
+        how = ["Just as good" if as_good else "Next best"]
+        how += [likely(other.probability)] if other.HasField("probability") else []
+        how += [f"ζ {other.fmap_confidence.total:.3f}"]
+        said = f"{', '.join(how)}: on the map {', '.join(changes)}"
+        lines.append(plain(said, "" if as_good else "dim"))
     return lines
+
+
+def _is_as_good(result: match_pb2.MatchResult, k: int) -> bool:
+    """Whether an alternative may as well be the answer, by probability or, without, by ζ."""
+    if result.HasField("probability"):
+        return k in result.ambiguity.alternatives
+    lost = result.fmap_confidence.total - result.alternatives[k].fmap_confidence.total
+    return lost < _AMBIGUOUS
+
+
+def _pinned(index: int, labels: Sequence[str]) -> str:
+    """Return what an option names an object by: a label that is one word, or its number."""
+    label = labels[index]
+    named_so = label.isidentifier() and labels.count(label) == 1
+    return label if named_so else str(index + 1)
 
 
 def _partners(lines: Iterable[match_pb2.ObjectMatch]) -> dict[int, int]:

@@ -120,6 +120,7 @@ def match(
         pictures.draw_match(answer, map_, overlay, metres)
     if json:
         display.say_match_notes(answer, verbose)
+        display.say_doubt(answer)
         output.write_message(answer.result)
     else:
         display.show_match(answer, metres, verbose)

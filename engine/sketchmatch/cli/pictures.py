@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sketchmatch.cli.display import facts
+from sketchmatch.cli.display import doubt, facts, likely
 from sketchmatch.cli.options import say
 from sketchmatch.io.files import read_map_files
 from sketchmatch.io.ros_bag import bag_and_topic, is_bag, read_bag
@@ -25,7 +25,7 @@ from sketchmatch.pictures.overlay import (
     save_overlay,
 )
 from sketchmatch_client import Match
-from sketchmatch_proto.v1 import scene_pb2
+from sketchmatch_proto.v1 import match_pb2, scene_pb2
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 from sketchmatch_proto.v1.source_pb2 import Point
 
@@ -40,7 +40,11 @@ check_path = check_picture_path
 def draw_match(match: Match, map_path: Path, target: Path, metres: bool) -> None:
     """Draw both scenes of a match, a robot's map under its objects, and save the picture."""
     pairs = [
-        OverlayMatch(line.sketch_object, line.map_object, line.confidence)
+        OverlayMatch(
+            line.sketch_object, line.map_object, line.probability, likely(line.probability)
+        )
+        if line.HasField("probability")
+        else OverlayMatch(line.sketch_object, line.map_object, line.confidence)
         for line in match.result.object_matches
     ]
     picture = draw_overlay(
@@ -48,6 +52,8 @@ def draw_match(match: Match, map_path: Path, target: Path, metres: bool) -> None
         scene_of(match.scenes.map),
         pairs,
         facts=facts(match.result, metres),
+        alert=doubt(match),
+        footnote=_meaning(match.result),
         underlay=_grid(map_path),
         route=_way(match.scenes.sketch_route),
     )
@@ -104,6 +110,16 @@ def scene_of(message: scene_pb2.Scene) -> Scene:
             for item in message.objects
         )
     )
+
+
+def _meaning(result: match_pb2.MatchResult) -> str:
+    """Return what the probabilities of a result mean, those that it has."""
+    if not result.HasField("probability"):
+        return ""
+    said = "Bars: how likely each pair is right.  Probability: how likely all of it is right."
+    if result.HasField("place_probability"):
+        said += "  This place: how likely the sketch shows this place at all."
+    return said
 
 
 def _way(points: Sequence[Point]) -> FloatArray | None:

@@ -42,6 +42,8 @@ MARGIN, GUTTER, HEADER, ROW = 36.0, 24.0, 108.0, 38.0
 _PAIR = 40.0
 PAGE: Colour = (246, 247, 249)
 SOFT: Colour = (98, 112, 134)
+_ALERT: Colour = (255, 241, 205)
+_ALERT_EDGE: Colour = (222, 164, 32)
 
 
 @dataclass(frozen=True)
@@ -56,24 +58,29 @@ class Entry:
         What these are drawn in.
     name
         What it is called.
-    confidence
+    share
         How sure the pair is, 0 … 1, or None.
+    said
+        The same in words; the number where empty.
     """
 
     numbers: tuple[int, ...]
     colour: Colour
     name: str
-    confidence: float | None = None
+    share: float | None = None
+    said: str = ""
 
 
 @dataclass(frozen=True)
 class Page:
-    """Header, panels of one size, legend; from top to bottom."""
+    """Header, alert, panels of one size, legend, footnote; from top to bottom."""
 
     across: float
     panels: Sequence[Panel]
     entries: Sequence[Entry]
     note: str
+    alert: str = ""
+    footnote: str = ""
 
     def drawn(
         self, title: str, caption: str, facts: Sequence[tuple[str, str]], width: int
@@ -81,12 +88,18 @@ class Page:
         """Return the finished picture."""
         boxes = self._boxes()
         legend = self._legend_box(boxes[0][3])
-        canvas = Canvas((self.across, legend[3] + MARGIN), width, PAGE)
+        foot = ROW if self.footnote else 0.0
+        canvas = Canvas((self.across, legend[3] + foot + MARGIN), width, PAGE)
         draw_header(canvas, self.across, title, caption, facts)
+        if self.alert:
+            self._draw_alert(canvas)
         for panel, box in zip(self.panels, boxes, strict=True):
             draw_panel(canvas, panel, box)
         if legend[3] > legend[1]:
             self._draw_legend(canvas, legend)
+        if self.footnote:
+            said = canvas.truncated(printable(self.footnote), 16.0, self.across - 2.0 * MARGIN)
+            canvas.text((MARGIN, legend[3] + 0.8 * ROW), said, 16.0, SOFT)
         return canvas.finished()
 
     def _boxes(self) -> list[Box]:
@@ -95,7 +108,16 @@ class Page:
         width = (self.across - 2.0 * MARGIN - (count - 1) * GUTTER) / count
         height = panel_height(self.panels, width)
         lefts = [MARGIN + k * (width + GUTTER) for k in range(count)]
-        return [(x, HEADER, x + width, HEADER + height) for x in lefts]
+        top = HEADER + (ROW + GUTTER if self.alert else 0.0)
+        return [(x, top, x + width, top + height) for x in lefts]
+
+    def _draw_alert(self, canvas: Canvas) -> None:
+        """Write in a box across the page what is to be known before the answer is used."""
+        box = (MARGIN, HEADER - 4.0, self.across - MARGIN, HEADER + ROW + 4.0)
+        canvas.rounded(box, 12.0, _ALERT, _ALERT_EDGE, 2.0)
+        said = canvas.truncated(printable(self.alert), 22.0, box[2] - box[0] - 40.0)
+        middle = (box[1] + box[3]) / 2.0
+        canvas.text((MARGIN + 20.0, middle), said, 22.0, INK, weight=0.012)
 
     def _legend_box(self, top: float) -> Box:
         rows = math.ceil(len(self.entries) / self._columns()) + (1 if self.note else 0)
@@ -139,16 +161,25 @@ def panel_height(panels: Sequence[Panel], width: float) -> float:
 def draw_header(
     canvas: Canvas, across: float, title: str, caption: str, facts: Sequence[tuple[str, str]]
 ) -> None:
-    """Write the headline, the line below it, and the facts on the right."""
+    """Write the headline, the line below it, and on the right the facts.
+
+    The last facts give way to the headline, up to a third of the page.
+    """
+    title, caption = printable(title), printable(caption)
+    said = [(printable(name), printable(value)) for name, value in facts]
+    widths = [max(canvas.text_width(a, 15.0), canvas.text_width(b, 25.0)) for a, b in said]
+    wanted = min(canvas.text_width(title, 34.0), across / 3.0)
+    while said and across - 2.0 * MARGIN - sum(widths) - 44.0 * len(said) < wanted:
+        said.pop()
+        widths.pop()
     right = across - MARGIN
-    for name, value in [(printable(name), printable(value)) for name, value in reversed(facts)]:
-        left = right - max(canvas.text_width(name, 15.0), canvas.text_width(value, 25.0))
+    for (name, value), width in zip(reversed(said), reversed(widths), strict=True):
+        left = right - width
         canvas.text((left, 44.0), name, 15.0, SOFT)
         canvas.text((left, 72.0), value, 25.0, INK, weight=0.012)
         canvas.line(np.array([[left - 22.0, 36.0], [left - 22.0, 84.0]]), BORDER, 1.5)
         right = left - 44.0
     room = right - MARGIN
-    title, caption = printable(title), printable(caption)
     middle = 47.0 if caption else 60.0
     title = canvas.truncated(title, 34.0, room)
     canvas.text((MARGIN, middle), title, 34.0, INK, weight=0.018)
@@ -163,12 +194,12 @@ def draw_entry(canvas: Canvas, entry: Entry, x: float, y: float, width: float) -
     if len(entry.numbers) > 1:
         _draw_arrow(canvas, x + 16.0 + _PAIR / 2.0, y)
     left, right = x + 40.0 + (len(entry.numbers) - 1) * _PAIR, x + width
-    if entry.confidence is not None:
-        share = min(max(entry.confidence, 0.0), 1.0)
+    if entry.share is not None:
+        share = min(max(entry.share, 0.0), 1.0)
         start = right - 130.0 if entry.name else left
         end = min(start + 80.0, right - 50.0)
         _draw_bar(canvas, (start, y - 3.5, end, y + 3.5), share, entry.colour)
-        canvas.text((end + 10.0, y), f"{share:.3f}", 16.0, INK)
+        canvas.text((end + 10.0, y), entry.said or f"{share:.3f}", 16.0, INK)
         right = start - 12.0
     if entry.name:
         canvas.text((left, y), canvas.truncated(entry.name, 16.0, right - left), 16.0, INK)

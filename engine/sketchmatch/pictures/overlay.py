@@ -48,12 +48,15 @@ class OverlayMatch:
     sketch_object, map_object
         Indices of the objects, from 0.
     confidence
-        How sure the pair is, 0 … 1.
+        How sure the pair is, 0 … 1: the length of its bar.
+    said
+        The same in words, beside the bar; the number where empty.
     """
 
     sketch_object: int
     map_object: int
     confidence: float
+    said: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +93,8 @@ def draw_overlay(
     title: str | None = None,
     caption: str = "",
     facts: Sequence[tuple[str, str]] = (),
+    alert: str = "",
+    footnote: str = "",
     underlay: OccupancyGrid | None = None,
     metres: bool | None = None,
     route: FloatArray | None = None,
@@ -108,6 +113,10 @@ def draw_overlay(
         The headline, which counts the matches when left out, and a line below it.
     facts
         Names and values for the header, e.g. ``[("OMAP confidence", "0.93")]``.
+    alert
+        What must be seen before all else, in a box below the header.
+    footnote
+        What the figures mean, in small letters at the bottom.
     underlay
         The grid that the map was made from, drawn softly under its objects.
     metres
@@ -144,12 +153,13 @@ def draw_overlay(
             drawn[match.sketch_object],
             _name(match, sketch, map),
             match.confidence,
+            match.said,
         )
         for match in matches
     ]
     if title is None:
         title = f"{len(matches)} of {len(sketch)} objects matched"
-    page = Page(_OVERLAY, panels, entries, _note(panels))
+    page = Page(_OVERLAY, panels, entries, _note(panels), alert, footnote)
     return page.drawn(title, caption, facts, width)
 
 

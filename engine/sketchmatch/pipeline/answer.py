@@ -14,6 +14,7 @@ from sketchmatch.pipeline.compare import Comparison
 from sketchmatch.pipeline.correspond import global_dilation, global_rotation
 from sketchmatch.pipeline.judge import Judged
 from sketchmatch.pipeline.result import AlternativeMap, MatchResult, Statistics
+from sketchmatch.pipeline.said import said
 from sketchmatch.pipeline.search import Goal, Search
 from sketchmatch.pipeline.words import nearest_relations
 
@@ -42,17 +43,18 @@ def answer(
     clock
         Of the match.
     """
-    swapped, best, judgement = comparison.swapped, judged.answer, judged.judgement
+    swapped, best = comparison.swapped, judged.answer
     mapped, table, kept, fmap = best.mapped, best.part.table, best.part.kept, best.fmap
     alike = (other for other in judged.others if np.array_equal(other.kept, kept))
     margins = partner_margins(mapped, best.confidence.total, alike, best.exchanges)
-    lines = judgement.lines
-    likely = None if lines is None else lines[kept, mapped.partners]
     matched = mapped.partners if swapped else kept
     relations = nearest_relations(comparison.sketch, comparison.sketch_descriptor, matched.tolist())
     rotation, dilation = global_rotation(fmap, table), global_dilation(fmap, table)
     outcome, bound = _proved(found, judged)
     sketch, map_ = segmentations
+    sides = len(sketch.scene), len(map_.scene)
+    says = said(judged.judgement, *sides, swapped, goal.shown)
+    likely = None if says.of_objects is None else says.of_objects[matched]
     return MatchResult(
         matches=reading.matches(mapped, swapped, kept, margins, likely, relations),
         omap_confidence=mapped.confidence,
@@ -80,12 +82,16 @@ def answer(
                 reading.matches(rival.mapped, swapped, rival.kept),
                 rival.confidence,
                 rival.mapped.confidence,
+                probability,
             )
-            for rival in judged.others[: goal.alternatives]
+            for rival, probability in zip(judged.others, says.of_alternatives, strict=False)
         ),
         search_note=found.best.best.note,
         sketch_route=sketch.route,
-        probability=judgement.maps[0].probability,
+        probability=says.of_map,
+        place_probability=says.of_place,
+        ambiguity=says.ambiguity,
+        unmatched_sketch_probabilities=says.of_unmatched,
     )
 
 

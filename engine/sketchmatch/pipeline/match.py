@@ -158,7 +158,10 @@ def _events(
     check_scenes(scenes, pipeline.histogram)
     check_exponent(pipeline.histogram.exponent)
     yield Segmented(sketch, map_)
-    goal = replace(goal, alternatives=alternatives_wanted(request.alternatives, *scenes))
+    shown = alternatives_wanted(request.alternatives, *scenes)
+    # How likely the answer is follows from maps that compete with it, seen or not.
+    wanted = max(shown, alternatives_wanted(None, *scenes))
+    goal = replace(goal, alternatives=wanted, shown=shown)
     comparison = yield from _compared(scenes, pipeline, goal.weights, registry, clock)
     with clock.timing("search"):
         work = search(comparison, pipeline.searcher, goal, registry, clock)

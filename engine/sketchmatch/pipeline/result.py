@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import zip_longest
 
 from sketchmatch.api import Outcome
 from sketchmatch.model import Confidence, FloatArray, Scene
@@ -11,6 +12,7 @@ from sketchmatch.model.text import Table, Tabular, likelihood, name
 
 __all__ = [
     "AlternativeMap",
+    "Ambiguity",
     "Correspondence",
     "MatchResult",
     "ObjectMatch",
@@ -55,7 +57,8 @@ class ObjectMatch:
         How the sketched object lies, in the sketch, to the nearest other matched one; None in
         progress and alternatives.
     probability
-        How likely this is its partner; None where unknown, see :class:`MatchResult`.
+        How likely the sketch shows this place and this is its partner; None where unknown, see
+        :class:`MatchResult`.
     """
 
     sketch_object: int
@@ -68,11 +71,24 @@ class ObjectMatch:
 
 @dataclass(frozen=True)
 class AlternativeMap:
-    """An object map that is not the best, with ζ of its FMAP and Ω."""
+    """An object map that is not the best.
+
+    Attributes
+    ----------
+    matches
+        Its lines, without margins, relations and probabilities.
+    confidence
+        ζ of its FMAP, and the parts.
+    omap_confidence
+        Ω, the mean of the lines' confidences.
+    probability
+        How likely it is the right one, as :attr:`MatchResult.probability`; None where unknown.
+    """
 
     matches: tuple[ObjectMatch, ...]
     confidence: Confidence
     omap_confidence: float
+    probability: float | None = None
 
     @property
     def object_map(self) -> dict[int, int]:
@@ -81,7 +97,29 @@ class AlternativeMap:
 
     def __repr__(self) -> str:
         confidences = _confidences(self.confidence.total, self.omap_confidence)
-        return f"<{type(self).__name__}: {confidences}, {self.object_map}>"
+        likely = _likely(self.probability)
+        return f"<{type(self).__name__}: {confidences}{likely}, {self.object_map}>"
+
+
+@dataclass(frozen=True)
+class Ambiguity:
+    """Several object maps that the sketch does not tell apart, as in a symmetric room.
+
+    Attributes
+    ----------
+    maps
+        How many of them are about equally likely, the best among them; 2 or more.
+    alternatives
+        Which of :attr:`MatchResult.alternatives` are among them, by index from 0; fewer than
+        ``maps`` − 1 where fewer alternatives were asked for.
+    deciding_sketch_objects
+        The sketched objects whose partners differ between them, the one first of which it would
+        help most to know what it is.
+    """
+
+    maps: int
+    alternatives: tuple[int, ...]
+    deciding_sketch_objects: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -129,6 +167,13 @@ class Statistics:
 class MatchResult(Tabular):
     """The result of a match.
 
+    All probabilities are of plain events, so they fit each other. That the map is right means that
+    the sketch shows this place and that every sketched object is what the map says, those without
+    partner too. It is never likelier than the place, nor than any of its lines, and it is at least
+    as likely as 1 less what all of these lack to certainty. Each line adds up all maps that have
+    it: so every line can be likely where the map is not, as twenty lines of 0.95 may each fail in
+    another map. That an object has no partner holds where the sketch shows another place, too.
+
     Attributes
     ----------
     matches
@@ -162,17 +207,24 @@ class MatchResult(Tabular):
     warnings
         What segmentation left out or decided, each naming its side.
     alternatives
-        The next best object maps that were found, the highest ζ first; where objects may stay
-        unmatched, the highest ζ less the price of those that do.
+        The next best object maps that were found, in the order in which the judge ranks them.
     search_note
         What the searcher says of what it did, or empty.
     sketch_route
         Shape (k, 2), the way drawn through the sketch, in its coordinates, or None.
     probability
-        How likely the object map is right as a whole, learned from simulated sketches. None where
-        nothing was learned: for other weights than 1, 1, 1 and those of the profile ``learned``,
-        histograms of other than constant forces, other similarities than the default, maps of
-        pairs, and too many objects.
+        How likely the object map is right as a whole, on this place, as learned from simulated
+        sketches. None where the judge knows no probabilities of such a match.
+    place_probability
+        How likely the sketch shows the place of the map at all: below one half it is probably
+        another one, and the object map means little. None where the judge does not know.
+    ambiguity
+        Where several maps are about equally likely, which, and what to ask. None where one is
+        clearly the best, where this is probably not the place, and where nothing is known of
+        probabilities.
+    unmatched_sketch_probabilities
+        How likely each of ``unmatched_sketch_objects`` has no partner on this map; empty where
+        unknown.
     """
 
     matches: tuple[ObjectMatch, ...]
@@ -193,6 +245,9 @@ class MatchResult(Tabular):
     search_note: str = ""
     sketch_route: FloatArray | None = field(default=None, compare=False)
     probability: float | None = None
+    place_probability: float | None = None
+    ambiguity: Ambiguity | None = None
+    unmatched_sketch_probabilities: tuple[float, ...] = ()
 
     @property
     def object_map(self) -> dict[int, int]:
@@ -217,10 +272,21 @@ class MatchResult(Tabular):
         return tuple(k for k in range(len(self.map)) if k not in matched)
 
     def _headline(self) -> str:
-        matched = f"{len(self.matches)} of {len(self.sketch)} sketched objects matched"
-        confidences = _confidences(self.fmap_confidence, self.omap_confidence)
-        likely = "" if self.probability is None else f", probability {likelihood(self.probability)}"
-        return f"{matched}, {confidences}{likely}, {self.outcome}"
+        facts = [
+            f"{len(self.matches)} of {len(self.sketch)} sketched objects matched",
+            _confidences(self.fmap_confidence, self.omap_confidence) + _likely(self.probability),
+        ]
+        if self.place_probability is not None:
+            likely = likelihood(self.place_probability)
+            if self.place_probability < 0.5:
+                facts[0] = f"probably not this place ({likely} that it is): {facts[0]}"
+            else:
+                facts.append(f"this place {likely}")
+        if self.ambiguity is not None:
+            first = self.ambiguity.deciding_sketch_objects[0]
+            asked = name(first, self.sketch.labels[first])
+            facts.append(f"{self.ambiguity.maps} maps about as likely, ask what {asked} is")
+        return ", ".join([*facts, self.outcome])
 
     def _table(self) -> Table:
         heads = ("in the sketch", "on the map", "confidence", "probability", "margin")
@@ -234,8 +300,19 @@ class MatchResult(Tabular):
             )
             for match in self.matches
         ]
+        unmatched = zip_longest(
+            self.unmatched_sketch_objects, map(likelihood, self.unmatched_sketch_probabilities)
+        )
+        rows += [
+            (name(k, self.sketch.labels[k]), "no partner", "", likely or "", "")
+            for k, likely in unmatched
+        ]
         return Table(self._headline(), heads, rows, 2)
 
 
 def _confidences(fmap: float, omap: float) -> str:
     return f"FMAP confidence {fmap:.3f}, OMAP confidence {omap:.3f}"
+
+
+def _likely(probability: float | None) -> str:
+    return "" if probability is None else f", probability {likelihood(probability)}"

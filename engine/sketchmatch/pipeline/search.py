@@ -35,6 +35,8 @@ class Goal:
         Of leaving all objects of the template out; infinite where none may be left out.
     alternatives
         How many maps beside the best are wanted.
+    shown
+        How many of these the caller wants to see.
     seed
         Of everything random.
     at_once
@@ -48,6 +50,7 @@ class Goal:
     weights: ConfidenceWeights
     price: float = math.inf
     alternatives: int = 0
+    shown: int = 0
     seed: int = 0
     at_once: bool = False
     allowed: BoolArray | None = None

@@ -366,15 +366,16 @@ class MatchResult(google.protobuf.message.Message):
     search_note: builtins.str
     """One sentence on what the searcher did, where it has something to say."""
     probability: builtins.float
-    """How likely the object map is right as a whole, within [0, 1], as learned from simulated
-    sketches. Absent where nothing was learned: for weights other than 1, 1, 1 and those of the
-    profile `learned`, for histograms of other than constant forces, for other similarities than
-    `cross-correlation`, for searchers that map pairs, and for too many objects.
+    """How likely the object map is right as a whole, within [0, 1]: that the sketch shows this place,
+    and that every sketched object is what the map says, those without a partner too. It exceeds
+    neither `place_probability` nor the probability of any line, and is at least 1 minus all that the
+    lines, those without a partner too, lack to 1: so each of many lines can be likely, and the map
+    not. Absent where the judge knows no probabilities of such a match.
     """
     place_probability: builtins.float
     """How likely the sketch shows the place of the map at all, within [0, 1]: below one half it is
-    probably another place, and the object map means little. `probability` and those of the lines
-    are of both, that it is this place and that they are right. Absent where nothing was learned.
+    probably another place, and the object map means little. Absent where the judge does not know:
+    then all probabilities take for granted that it is this one.
     """
     @property
     def object_matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectMatch]:
@@ -408,21 +409,21 @@ class MatchResult(google.protobuf.message.Message):
 
     @property
     def alternatives(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___AlternativeMap]:
-        """The next best object maps that were found, the highest ζ first, less the price of objects left
-        unmatched. Where one of them comes close to
-        the best, the sketch does not tell the two apart.
+        """The next best object maps that were found, in the order in which the judge ranks them. Where one
+        of them is about as likely as the best, `ambiguity` says so.
         """
 
     @property
     def ambiguity(self) -> global___Ambiguity:
         """Where several maps are about equally likely, which, and what to ask. Absent where one is
-        clearly the best, or nothing is known of probabilities.
+        clearly the best, where it is probably not this place, and where nothing is known of
+        probabilities.
         """
 
     @property
     def unmatched_sketch_probabilities(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.float]:
-        """How likely each of `unmatched_sketch_objects` has no partner, in their order; empty where
-        nothing is known of probabilities.
+        """How likely each of `unmatched_sketch_objects` has no partner on this map, in their order; it has
+        none where the sketch shows another place, either. Empty where nothing is known of probabilities.
         """
 
     def __init__(
@@ -461,7 +462,10 @@ global___MatchResult = MatchResult
 
 @typing.final
 class Ambiguity(google.protobuf.message.Message):
-    """Several object maps that the sketch does not tell apart, as in a symmetric room."""
+    """Several object maps that the sketch does not tell apart, as in a symmetric room: each is at least
+    half as likely as the best, and says something else of who is who. One that only leaves lines of
+    another out is not counted.
+    """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -469,15 +473,17 @@ class Ambiguity(google.protobuf.message.Message):
     ALTERNATIVES_FIELD_NUMBER: builtins.int
     DECIDING_SKETCH_OBJECTS_FIELD_NUMBER: builtins.int
     maps: builtins.int
-    """How many maps share the probability, the best among them; 2 or more."""
+    """How many they are, the best among them; 2 or more."""
     @property
     def alternatives(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.int]:
-        """Which of `MatchResult.alternatives` are among them, by index from 0."""
+        """Which of `MatchResult.alternatives` are among them, by index from 0; fewer than `maps` minus 1
+        where fewer alternatives were asked for.
+        """
 
     @property
     def deciding_sketch_objects(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.int]:
-        """The sketched objects that differ between them, the one first of which it would help most to
-        know what it is: ask for it, and send the answer as a `Pin`.
+        """The sketched objects whose partners differ between them, the one first whose partner would tell
+        most about which map is right: ask for it, and send the answer as a `Pin`. Never empty.
         """
 
     def __init__(
@@ -557,8 +563,9 @@ class ObjectMatch(google.protobuf.message.Message):
     Absent during the search, and where there are too many objects to try.
     """
     probability: builtins.float
-    """How likely this is its partner, within [0, 1]. Absent during the search, in alternatives, and
-    where `MatchResult.probability` is.
+    """How likely the sketch shows this place and this is its partner, within [0, 1]: of all maps that
+    say so together. Absent during the search, in alternatives, and where `MatchResult.probability`
+    is.
     """
     @property
     def relation(self) -> global___ObjectRelation:
