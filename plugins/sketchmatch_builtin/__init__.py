@@ -54,6 +54,7 @@ def sketchmatch_register_similarities() -> list[type[Similarity]]:
 @hookimpl
 def sketchmatch_register_searchers() -> list[type[Searcher]]:
     """Offer the built-in searchers."""
+    from sketchmatch_builtin.searchers.align import Align
     from sketchmatch_builtin.searchers.auto import Auto
     from sketchmatch_builtin.searchers.direct import Direct
     from sketchmatch_builtin.searchers.easm import Easm
@@ -62,15 +63,16 @@ def sketchmatch_register_searchers() -> list[type[Searcher]]:
     from sketchmatch_builtin.searchers.nn import Nn
     from sketchmatch_builtin.searchers.nn_pso import NnPso
 
-    return [Auto, Nn, NnPso, FsnnPso, Easm, Direct, Exact]
+    return [Align, Auto, Nn, NnPso, FsnnPso, Easm, Direct, Exact]
 
 
 @hookimpl
 def sketchmatch_register_judges() -> list[type[Judge]]:
     """Offer the built-in judges."""
     from sketchmatch_builtin.judges.confidence import HighestConfidence
+    from sketchmatch_builtin.judges.posterior import Posterior
 
-    return [HighestConfidence]
+    return [HighestConfidence, Posterior]
 
 
 @hookimpl

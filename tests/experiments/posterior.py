@@ -19,9 +19,10 @@ from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import default_registry
 from sketchmatch_builtin.alignment import Part, sides_of
 from sketchmatch_builtin.histograms.constant import ConstantForce
-from sketchmatch_builtin.judges._described import Described, described
+from sketchmatch_builtin.judges._described import described
 from sketchmatch_builtin.judges._evidence import (
     FIRST,
+    Described,
     detailed,
     lost_numbers,
     place_numbers,
@@ -132,8 +133,7 @@ def _detailed(case: Known, first: FloatArray) -> FloatArray:
 
 
 def _place(case: Known, first: FloatArray) -> FloatArray:
-    each = case.described
-    return place_numbers(each.numbers, each.maps, each.decoys, first, each.drawn, each.mapped)
+    return place_numbers(case.described, first)
 
 
 def _labels(cases: Sequence[Known], first: FloatArray, weights: FloatArray) -> FloatArray:

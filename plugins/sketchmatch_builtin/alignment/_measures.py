@@ -90,7 +90,7 @@ class Relations(NamedTuple):
         Shape (n, m, bins): how alike the own histograms of a sketched and a mapped object are for
         turns from sketch to map over half of the full turn.
     names
-        int64, shape (n, m): 1 where labels mean the same, −1 where they differ, 0 where one has none.
+        int64, shape (n, m): 1 where labels mean the same, −1 where they do not, 0 without one.
     swapped
         Whether the template is the map.
     """

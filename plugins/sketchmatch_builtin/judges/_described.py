@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,36 +15,13 @@ from sketchmatch_builtin.alignment import (
     measured,
     relations_of,
 )
-from sketchmatch_builtin.judges._evidence import numbers
+from sketchmatch_builtin.judges._evidence import Described, numbers
 
 __all__ = ["Described", "described"]
 
 _POSES, _MAPS = 60, 300
 _DECOY_POSES, _DECOY_MAPS = 40, 60
 _SEED = 0
-
-
-@dataclass(frozen=True, eq=False)
-class Described:
-    """The maps of a sketch in numbers.
-
-    Attributes
-    ----------
-    maps
-        int64, shape (c, n), at least one: the mapped object of each sketched one, −1 for none.
-    numbers
-        Shape (c, len(NUMBERS)).
-    decoys
-        The numbers of the maps of each decoy, maybe of none.
-    drawn, mapped
-        How many objects there are.
-    """
-
-    maps: IntArray
-    numbers: FloatArray
-    decoys: tuple[FloatArray, ...]
-    drawn: int
-    mapped: int
 
 
 def described(

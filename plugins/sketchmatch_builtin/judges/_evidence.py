@@ -11,7 +11,6 @@ less by how far the best map leaves places, sizes and shapes.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +22,7 @@ from sketchmatch_builtin.judges.calibration import Posterior
 __all__ = [
     "FIRST",
     "NUMBERS",
+    "Described",
     "Weighed",
     "detailed",
     "lost_numbers",
@@ -53,6 +53,29 @@ _BY_SKILL = np.array(
 )
 
 _NONE = -30.0
+
+
+@dataclass(frozen=True, eq=False)
+class Described:
+    """The maps of a sketch in numbers.
+
+    Attributes
+    ----------
+    maps
+        int64, shape (c, n), at least one: the mapped object of each sketched one, −1 for none.
+    numbers
+        Shape (c, len(NUMBERS)).
+    decoys
+        The numbers of the maps of each decoy, maybe of none.
+    drawn, mapped
+        How many objects there are.
+    """
+
+    maps: IntArray
+    numbers: FloatArray
+    decoys: tuple[FloatArray, ...]
+    drawn: int
+    mapped: int
 
 
 def numbers(parts: FloatArray, drawn: int, mapped: int) -> FloatArray:
@@ -92,14 +115,7 @@ def detailed(described: FloatArray, drawing: FloatArray) -> FloatArray:
     return np.hstack([described, *(by_skill * each for each in drawing)])
 
 
-def place_numbers(
-    described: FloatArray,
-    maps: IntArray,
-    decoys: Sequence[FloatArray],
-    weights: FloatArray,
-    drawn: int,
-    mapped: int,
-) -> FloatArray:
+def place_numbers(known: Described, first: FloatArray) -> FloatArray:
     """Return what says whether a sketch shows a place at all.
 
     Decoys are what the sketch is not: mirrored, or with things in each other's places. The best
@@ -107,24 +123,20 @@ def place_numbers(
 
     Parameters
     ----------
-    described, maps
-        Shapes (c, len(NUMBERS)) and (c, n): of at least one map.
-    decoys
-        The same numbers of the maps of each decoy.
-    weights
+    known
+        The maps and decoys.
+    first
         Shape (len(FIRST),): what places, sizes and shapes count for.
-    drawn, mapped
-        How many objects there are.
     """
-    worths = described[:, FIRST] @ weights
+    worths, maps, drawn = known.numbers[:, FIRST] @ first, known.maps, known.drawn
     best = int(worths.argmax())
     top = float(worths[best])
-    chance = [float((each[:, FIRST] @ weights).max(initial=_NONE)) for each in decoys]
+    chance = [float((each[:, FIRST] @ first).max(initial=_NONE)) for each in known.decoys]
     shared = ((maps == maps[best]) & (maps[best] >= 0)).sum(axis=1)
     other = shared <= max(1, np.count_nonzero(maps[best] >= 0) // 4)
     rival = float(worths[other].max(initial=float(worths.min()) - 4.0))
     most, mean, lead = top - max(chance), top - float(np.mean(chance)), top - rival
-    many, row = math.log(mapped), described[best]
+    many, row = math.log(known.mapped), known.numbers[best]
     matched = max(row[Part.MATCHED], 1.0)
     drawing = np.array([*skill(row), matched / drawn])
     return np.array(
@@ -174,22 +186,15 @@ class Weighed:
     elsewhere: float
 
 
-def weighed(
-    maps: IntArray,
-    described: FloatArray,
-    decoys: Sequence[FloatArray],
-    drawn: int,
-    mapped: int,
-    learned: Posterior,
-) -> Weighed:
-    """Return what the numbers of maps come to; arguments as of :func:`place_numbers`."""
-    first = np.array(learned.first)
-    best = described[(described[:, FIRST] @ first).argmax()]
-    scores = detailed(described, skill(best)) @ np.array(learned.weights)
+def weighed(known: Described, learned: Posterior) -> Weighed:
+    """Return what the numbers of maps come to."""
+    first, rows = np.array(learned.first), known.numbers
+    best = rows[(rows[:, FIRST] @ first).argmax()]
+    scores = detailed(rows, skill(best)) @ np.array(learned.weights)
     shares = np.exp(scores - scores.max())
     shares /= shares.sum()
-    here = place_numbers(described, maps, decoys, first, drawn, mapped) @ np.array(learned.place)
-    lost = lost_numbers(shares, drawn, mapped) @ np.array(learned.lost)
+    here = place_numbers(known, first) @ np.array(learned.place)
+    lost = lost_numbers(shares, known.drawn, known.mapped) @ np.array(learned.lost)
     return Weighed(shares, _logistic(lost), _logistic(-here))
 
 

@@ -27,7 +27,6 @@ class HighestConfidence(Judge):
 
     name = "confidence"
     summary = "The map with the highest confidence ζ wins, as in the thesis."
-    default = True
 
     def price(self, weights: ConfidenceWeights) -> float:
         """Return the price of leaving objects out that fits the weights."""

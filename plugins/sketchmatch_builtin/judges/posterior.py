@@ -80,9 +80,7 @@ class Posterior(Judge):
             partial=problem.price < math.inf,
             explore=not problem.explored,
         )
-        found = weighed(
-            known.maps, known.numbers, known.decoys, known.drawn, known.mapped, POSTERIOR
-        )
+        found = weighed(known, POSTERIOR)
         order = np.argsort(-found.shares, kind="stable")
         maps = [sides.template_partners(each) for each in known.maps[order]]
         told = problem.alternatives + 1
@@ -93,6 +91,7 @@ class Posterior(Judge):
         lines = _lines(maps, likely, problem.table)
         best = maps[0]
         lines[np.arange(len(best)), best] += here * found.lost * POSTERIOR.luck
+        lines[:, -1] += found.elsewhere
         told = max(told, min(told + _TOLD, int(np.count_nonzero(likely > _NEGLIGIBLE))))
         return Judgement(
             tuple(

@@ -57,7 +57,8 @@ class Align(Searcher):
     """
 
     name = "align"
-    summary = "Lays the sketch upon the map object by object; finds what is missing on either side."
+    summary = "The default: lays the sketch upon the map, and may leave out things of either side."
+    default = True
 
     class Params(Params):
         """Parameters of the search."""
@@ -93,7 +94,11 @@ class Align(Searcher):
         rng: np.random.Generator,  # noqa: ARG002
     ) -> Generator[SearchProgress, None, Outcome]:
         """Lay the sketch upon the map in every way that may be right."""
-        sides = sides_of(problem)
+        if problem.scenes is None:
+            raise ValueError("it lays scenes upon each other, and the problem has none")
+        sides = sides_of(
+            problem.scenes(), problem.swapped, problem.allowed, problem.pinned, problem.names
+        )
         best = _Best(problem)
         best.offer(completed(None, sides))
         yield best.progress(0)

@@ -1,4 +1,4 @@
-"""The default searcher: a proof where one comes fast, a good map in any case."""
+"""Whichever search fits: a proof where one comes fast, a good map in any case."""
 
 from __future__ import annotations
 
@@ -46,8 +46,7 @@ class Auto(Searcher):
     """
 
     name = "auto"
-    summary = "The default: exact where a proof comes fast, else direct, with a proof if it can."
-    default = True
+    summary = "Exact where a proof comes fast, else direct, with a proof if it can."
 
     class Params(Params):
         """Parameters of the choice."""
