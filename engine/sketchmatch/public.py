@@ -70,7 +70,7 @@ def match(
         polygons, ROS map YAML, images, and whatever plugins read; ``"plan.dxf#walls"`` names a
         part of a file.
     profile
-        A pipeline to start from, e.g. ``"fast"`` or ``"proof"``; what is said beside it wins.
+        A pipeline to start from, e.g. ``"proof"``; what is said beside it wins.
     sketch_segmenter, map_segmenter
         Names of the algorithms that find the objects, e.g. ``map_segmenter="rooms"``; a scene needs
         none. Left out, the profile decides, or else the configuration, or else the form of the

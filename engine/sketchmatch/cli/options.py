@@ -53,8 +53,7 @@ Profile = Annotated[
     typer.Option(
         "--profile",
         metavar="NAME",
-        help="Start from this pipeline: fast, learned, proof, thesis-easm, thesis-fsnn or one of "
-        "your own.",
+        help="Start from this pipeline: proof, thesis-easm, thesis-fsnn or one of your own.",
     ),
 ]
 Settings = Annotated[
