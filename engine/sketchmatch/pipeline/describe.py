@@ -67,9 +67,8 @@ def with_directions(histogram: Histogram, registry: Registry, *scenes: Scene) ->
     """
     if histogram.params.directions is not None:
         return histogram
-    chosen = {"directions": _needed_directions(*scenes)}
     with blaming(histogram, registry):
-        return type(histogram)(histogram.params.model_copy(update=chosen))
+        return _in_directions(histogram, _needed_directions(*scenes))
 
 
 def describe(scene: Scene, histogram: Histogram) -> Generator[float, None, SceneDescriptor]:
@@ -89,6 +88,8 @@ def describe(scene: Scene, histogram: Histogram) -> Generator[float, None, Scene
     SceneDescriptor
         One histogram for each pair (a, b), a < b.
     """
+    if histogram.params.directions is None:
+        histogram = _in_directions(histogram, histogram.directions)
     pairs = object_pairs(len(scene))
     histograms = np.empty((len(pairs), histogram.directions))
 
@@ -132,6 +133,11 @@ def described(
             return (yield from blamed(describe(scene, histogram), histogram, registry))
     except InvalidInputError as error:
         raise error.within(side) from None
+
+
+def _in_directions(histogram: Histogram, directions: int) -> Histogram:
+    params = histogram.params.model_copy(update={"directions": directions})
+    return type(histogram)(params)
 
 
 def _needed_directions(*scenes: Scene) -> int:
