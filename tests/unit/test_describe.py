@@ -169,6 +169,7 @@ class Reading(Histogram):
     exponent = 0.0
 
     def describe(self, scene, pairs):
+        assert len(scene)
         return np.ones((len(pairs), self.params.directions))
 
 
