@@ -31,8 +31,8 @@ _WIDTH = 108
 
 _NOTES = """\
 Sketches of neighbours among the objects of a map, by the generators of tests/experiments that \
-nothing is learned from, in turn; no time budget. p50 and p95 of whole calls of sketchmatch.match on two \
-scenes. The share of a stage is that of the sums over all sketches. \
+nothing is learned from, in turn; no time budget. p50 and p95 of whole calls of sketchmatch.match \
+on two scenes. The share of a stage is that of the sums over all sketches. \
 right: share of sketches matched wholly right."""
 
 
