@@ -25,7 +25,7 @@ __all__ = ["CASES", "DEFAULT", "NOTES", "Answer", "Case", "answers", "answers_ta
 DEFAULT = "default"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Case:
     """One kind of sketch: its name, and what the generators are asked for."""
 
@@ -47,8 +47,8 @@ NOTES = "\n".join(
         "Sketches of 8 neighbours on a map, by the generators of tests/experiments that nothing is "
         "learned from, in turn. Searchers: whole matches with all else at its default, judged; "
         f'"{DEFAULT}" chooses nothing at all.',
-        "wholly right: share of sketches with every partner right, and nothing matched that the map "
-        "lacks. objects right: share of sketched objects, likewise. p50, p95 ms: of whole matches "
+        "wholly right: share of sketches with every partner right, and nothing matched that the "
+        "map lacks. objects right: share of sketched objects, likewise. p50, p95 ms: of whole matches "
         "of two scenes. this place: share of sketches that are more likely than not of this place, "
         "as far as the answer says so.",
         *(f"{aligner.name}: {aligner.given}" for aligner in ALIGNERS),

@@ -1,8 +1,8 @@
 """How good and how fast every searcher is: simulated sketches, and the same for its peers.
 
-Run it with ``make bench-searchers``; it takes about twenty minutes. All rows of a size, or of a kind
-of sketch, are measured in the same run, on the same scenes. A second table has the judged answers of
-whole matches, where sketches show parts of maps, or what is not there, or another place.
+Run it with ``make bench-searchers``; it takes about twenty minutes. All rows of a size, or of a
+kind of sketch, are measured in the same run, on the same scenes. A second table has the judged
+answers of whole matches, where sketches show parts of maps, or what is not there, or another place.
 """
 
 from __future__ import annotations
