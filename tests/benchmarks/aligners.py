@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -17,9 +18,10 @@ from sketchmatch.testing import spacing
 
 __all__ = ["ALIGNERS", "Aligner", "dense_subgraph"]
 
-_REACH = 0.35
+_REACH = 0.6
 """Of the map's spacing: how far from its place an object may be drawn (RANSAC's threshold)."""
 
+_ALIKE = 4
 _ROUNDS = 200_000
 _SURENESS = 0.999
 
@@ -61,13 +63,21 @@ class Aligner:
         return all(importlib.util.find_spec(package) for package in self.packages)
 
 
-def _ransac(sketch: Scene, map_: Scene) -> IntArray:
-    """Lay the sketch over the map by RANSAC, and assign what lies near each other."""
+def _ransac(alike: float, sketch: Scene, map_: Scene) -> IntArray:
+    """Lay the sketch over the map by RANSAC, and assign what lies near each other.
+
+    Each object is paired with as many mapped ones as ``alike`` says, those nearest in size.
+    """
     import cv2
     from scipy.optimize import linear_sum_assignment
 
     drawn, mapped = _centroids(sketch), _centroids(map_)
-    first, second = np.indices((len(drawn), len(mapped))).reshape(2, -1)
+    sizes = [np.log([item.area for item in scene.objects]) for scene in (sketch, map_)]
+    relative, others = (each - np.median(each) for each in sizes)
+    order = np.abs(relative[:, None] - others).argsort(axis=1, kind="stable")
+    second = order[:, : int(min(alike, len(mapped)))]
+    first = np.repeat(np.arange(len(drawn)), second.shape[1])
+    second = second.reshape(-1)
     reach = _REACH * spacing(map_)
     pose, _ = cv2.estimateAffinePartial2D(
         drawn[first],
@@ -179,21 +189,27 @@ def _apart(points: FloatArray, chosen: IntArray) -> FloatArray:
 
 ALIGNERS = (
     Aligner(
-        "OpenCV RANSAC",
+        "RANSAC, all pairs",
         ("cv2", "scipy"),
-        "estimateAffinePartial2D (RANSAC, 200 000 rounds) is given the centroids of all N·N' "
+        "OpenCV's estimateAffinePartial2D (200 000 rounds) is given the centroids of all N·N' "
         f"pairings as if each were a correspondence, and {_REACH} of the map's spacing as its "
-        "threshold; what its pose lays within twice that is assigned, the nearest first as a "
-        "whole. It sees no sizes or shapes, and a pose that shrinks the sketch to a point has as "
-        "many inliers as the right one.",
-        _ransac,
+        "threshold; what its pose lays within twice that is assigned, so that the sum of distances "
+        "is least. A pose that shrinks the sketch to a point has as many inliers as the right one.",
+        partial(_ransac, np.inf),
+    ),
+    Aligner(
+        f"RANSAC, {_ALIKE} by size",
+        ("cv2", "scipy"),
+        f"the same, given only the {_ALIKE} mapped objects for each sketched one that are nearest "
+        "in size, in units of the median of each side.",
+        partial(_ransac, _ALIKE),
     ),
     Aligner(
         "CLIPPER (ours)",
         (),
         "the dense subgraph of Lusk et al. 2021, written from the paper, is given all N·N' "
-        "pairings of centroids. As the scale is unknown, two of them are consistent where the ratio of "
-        "their distances and the roots of both ratios of areas agree about it within a factor of "
+        "pairings of centroids. As the scale is unknown, two of them are consistent where the ratio "
+        "of their distances and the roots of both ratios of areas agree about it within a factor of "
         f"{np.exp(_FURTHEST):.0f}. It sees neither directions nor shapes, and mirrors freely.",
         _consistent_subset,
     ),

@@ -120,7 +120,7 @@ def test_the_tables_of_histograms_are_complete(monkeypatch):
     assert len(objects.columns) == len(histograms.names(Kind.SIMILARITY)) + 3
 
 
-# Parts of maps, extras and other places ------------------------------------------------------------
+# Parts of maps, extras and other places -----------------------------------------------------------
 
 
 def laid_out(copies, wobble=0.0):
@@ -140,12 +140,13 @@ def laid_out(copies, wobble=0.0):
 
 def test_a_consistent_subset_is_found_in_a_turned_and_scaled_part():
     sketch, map_, kept = laid_out(9)
+    assert aligners.ALIGNERS[-1].solve(sketch, map_).tolist() == kept.tolist()
+
+
+def test_a_pose_is_found_from_pairings_of_like_sizes():
+    require(aligners.ALIGNERS[1].installed, "scipy (`make .venv/bench` installs it)")
+    sketch, map_, kept = laid_out(9, 0.1)
     assert aligners.ALIGNERS[1].solve(sketch, map_).tolist() == kept.tolist()
-
-
-def test_a_pose_assigns_each_map_object_once_and_none_beyond_its_reach():
-    require(aligners.ALIGNERS[0].installed, "scipy (`make .venv/bench` installs it)")
-    sketch, map_, _ = laid_out(9, 0.1)
     found = aligners.ALIGNERS[0].solve(sketch, map_)
     taken = found[found >= 0]
     assert len(set(taken.tolist())) == len(taken) >= 1
@@ -182,7 +183,7 @@ def test_dense_subgraphs_are_cliques_about_as_dense_as_the_densest():
 
 @pytest.mark.parametrize("case", answers.CASES, ids=lambda case: case.name)
 def test_every_method_answers_each_kind_of_sketch(case):
-    found = answers.answers(case, 1, ["nn"], aligners.ALIGNERS[1:], 5.0)
+    found = answers.answers(case, 1, ["nn"], aligners.ALIGNERS[-1:], 5.0)
     assert list(found) == ["default", "nn", "CLIPPER (ours)"]
     assert all(len(each.right) == 8 and each.seconds > 0 for each in found.values())
     table = answers.answers_table({case: [found]})
