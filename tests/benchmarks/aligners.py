@@ -208,9 +208,10 @@ ALIGNERS = (
         "CLIPPER (ours)",
         (),
         "the dense subgraph of Lusk et al. 2021, written from the paper, is given all N·N' "
-        "pairings of centroids. As the scale is unknown, two of them are consistent where the ratio "
-        "of their distances and the roots of both ratios of areas agree about it within a factor of "
-        f"{np.exp(_FURTHEST):.0f}. It sees neither directions nor shapes, and mirrors freely.",
+        "pairings of centroids. As the scale is unknown, two of them are consistent where the "
+        "ratio of their distances and the roots of both ratios of areas agree about it within a "
+        f"factor of {np.exp(_FURTHEST):.0f}. It sees neither directions nor shapes, and mirrors "
+        "freely.",
         _consistent_subset,
     ),
 )

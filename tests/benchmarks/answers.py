@@ -49,8 +49,8 @@ NOTES = "\n".join(
         f'"{DEFAULT}" chooses nothing at all.',
         "wholly right: share of sketches with every partner right, and nothing matched that the "
         "map lacks. objects right: share of sketched objects, likewise. p50, p95 ms: of whole "
-        "matches of two scenes. this place: share of sketches that are more likely than not of this place, "
-        "as far as the answer says so.",
+        "matches of two scenes. this place: share of sketches that are more likely than not "
+        "of this place, as far as the answer says so.",
         *(f"{aligner.name}: {aligner.given}" for aligner in ALIGNERS),
     )
 )

@@ -88,7 +88,7 @@ def test_a_server_says_what_is_in_force(place, address):
 
 def test_a_profile_may_allow_it(command_line, files, place, tmp_path):
     mine = tmp_path / "mine.toml"
-    mine.write_text(f"[profiles.mine]\nweights = {[*WEIGHTS]}\nallow_unmatched = true\n")
+    mine.write_text("[profiles.mine]\nweights = [2, 2, 2]\nallow_unmatched = true\n")
     options = ("--config", mine, "--profile", "mine", "--json")
     done = command_line("match", *files, *options)
     assert done.returncode == 0, done.stderr
