@@ -15,7 +15,7 @@ from sketchmatch.pipeline import reading
 from sketchmatch.pipeline.answer import answer
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison, check_scenes, compare
-from sketchmatch.pipeline.describe import described
+from sketchmatch.pipeline.describe import described, with_directions
 from sketchmatch.pipeline.events import (
     Accepted,
     Finished,
@@ -158,6 +158,7 @@ def _events(
     check_scenes(scenes, pipeline.histogram)
     check_exponent(pipeline.histogram.exponent)
     yield Segmented(sketch, map_)
+    pipeline = replace(pipeline, histogram=with_directions(pipeline.histogram, registry, *scenes))
     goal = replace(goal, alternatives=alternatives_wanted(request.alternatives, *scenes))
     comparison = yield from _compared(scenes, pipeline, goal.weights, registry, clock)
     with clock.timing("search"):

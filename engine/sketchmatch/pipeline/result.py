@@ -170,9 +170,8 @@ class MatchResult(Tabular):
         Shape (k, 2), the way drawn through the sketch, in its coordinates, or None.
     probability
         How likely the object map is right as a whole, learned from simulated sketches. None where
-        nothing was learned: for other weights than 1, 1, 1 and those of the profile ``learned``,
-        histograms of other than constant forces, other similarities than the default, maps of
-        pairs, and too many objects.
+        nothing was learned: for other weights than 1, 1, 1, histograms of other than constant
+        forces, other similarities than the default, maps of pairs, and too many objects.
     """
 
     matches: tuple[ObjectMatch, ...]

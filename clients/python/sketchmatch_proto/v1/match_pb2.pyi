@@ -367,9 +367,9 @@ class MatchResult(google.protobuf.message.Message):
     """One sentence on what the searcher did, where it has something to say."""
     probability: builtins.float
     """How likely the object map is right as a whole, within [0, 1], as learned from simulated
-    sketches. Absent where nothing was learned: for weights other than 1, 1, 1 and those of the
-    profile `learned`, for histograms of other than constant forces, for other similarities than
-    `cross-correlation`, for searchers that map pairs, and for too many objects.
+    sketches. Absent where nothing was learned: for weights other than 1, 1, 1, for histograms of
+    other than constant forces, for other similarities than `cross-correlation`, for searchers that
+    map pairs, and for too many objects.
     """
     place_probability: builtins.float
     """How likely the sketch shows the place of the map at all, within [0, 1]: below one half it is
