@@ -145,7 +145,7 @@ def test_a_consistent_subset_is_found_in_a_turned_and_scaled_part():
 
 def test_a_pose_is_found_from_pairings_of_like_sizes():
     require(aligners.ALIGNERS[1].installed, "scipy (`make .venv/bench` installs it)")
-    sketch, map_, kept = laid_out(9, 0.1)
+    sketch, map_, kept = laid_out(12, 0.1)
     assert aligners.ALIGNERS[1].solve(sketch, map_).tolist() == kept.tolist()
     found = aligners.ALIGNERS[0].solve(sketch, map_)
     taken = found[found >= 0]
