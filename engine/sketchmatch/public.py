@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
@@ -71,7 +71,7 @@ def match(
         polygons, ROS map YAML, images, and whatever plugins read; ``"plan.dxf#walls"`` names a
         part of a file.
     profile
-        A pipeline to start from, e.g. ``"fast"`` or ``"proof"``; what is said beside it wins.
+        A pipeline to start from, e.g. ``"proof"``; what is said beside it wins.
     sketch_segmenter, map_segmenter
         Names of the algorithms that find the objects, e.g. ``map_segmenter="rooms"``; a scene needs
         none. Left out, the profile decides, or else the configuration, or else the form of the
@@ -296,7 +296,7 @@ def force_histogram(a: Any, b: Any, *, r: float = 0.0, directions: int = 180) ->
     >>> round(float(force_histogram(right, left, r=2)[0]), 6)  # ln (3² / (2 · 4))
     0.117783
     """
-    params = _force_params(r, directions)
+    params = _forces(r, directions)
     if _is_mask(a) or _is_mask(b):
         masks = [_mask(name, mask) for name, mask in (("a", a), ("b", b))]
         if masks[0].shape != masks[1].shape:
@@ -339,7 +339,7 @@ def label_force_histograms(labels: Any, *, r: float = 0.0, directions: int = 180
     >>> label_force_histograms([[1, 0, 2]], directions=4).tolist()
     [[0.0, 0.0, 1.0, 0.0]]
     """
-    params = _force_params(r, directions)
+    params = _forces(r, directions)
     image = np.asarray(labels)
     if image.ndim != 2 or not np.issubdtype(image.dtype, np.integer):
         raise InvalidInputError(
@@ -365,14 +365,28 @@ def _engine(config: str | Path | None = None) -> Engine:
     return replace(engine, limits=source_limits(engine.limits))
 
 
-def _force_params(r: float, directions: int) -> ForceParams:
+class _Forces(NamedTuple):
+    """Which histogram is asked for: its exponent, and how many directions."""
+
+    r: float
+    directions: int
+
+
+def _forces(r: float, directions: int) -> _Forces:
     try:
-        return ForceParams(r=r, directions=directions)
+        params = ForceParams(r=r, directions=directions)
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         raise InvalidInputError(
             Reason.INVALID_PARAMETER, str(fault["loc"][0]), fault_of(fault["input"], fault["msg"])
         ) from None
+    if params.directions is None:
+        raise InvalidInputError(
+            Reason.INVALID_PARAMETER,
+            "directions",
+            "is None; give an even number, as no scene is there to choose it by",
+        )
+    return _Forces(params.r, params.directions)
 
 
 def _is_mask(value: Any) -> bool:
@@ -390,7 +404,7 @@ def _mask(name: str, value: Any) -> BoolArray:
 
 
 def _pixel_forces(
-    objects: list[PixelObject], params: Any, name: Callable[[int], str]
+    objects: list[PixelObject], params: _Forces, name: Callable[[int], str]
 ) -> FloatArray:
     pairs = object_pairs(len(objects))
     relations = pixel_relations(objects, pairs)

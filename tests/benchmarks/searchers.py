@@ -1,7 +1,8 @@
 """How good and how fast every searcher is: simulated sketches, and the same for its peers.
 
-Run it with ``make bench-searchers``; it takes about ten minutes. All rows of a size are measured
-in the same run, on the same scenes.
+Run it with ``make bench-searchers``; it takes about twenty minutes. All rows of a size, or of a
+kind of sketch, are measured in the same run, on the same scenes. A second table has the judged
+answers of whole matches, where sketches show parts of maps, or what is not there, or another place.
 """
 
 from __future__ import annotations
@@ -27,12 +28,16 @@ from sketchmatch.pipeline.selection import resolve
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Kind, default_registry
 from sketchmatch.testing import random_scene, simulate_sketch
+from tests.benchmarks.aligners import ALIGNERS
+from tests.benchmarks.answers import CASES, NOTES, Answer, Case, answers, answers_table
 from tests.benchmarks.peers import PEERS, Peer
 from tests.oracle.enumeration import best_of_all
 
 _DRAWING = {"displacement": 0.3, "turn": 0.3, "stretch": 0.25, "wobble": 0.1}  # ζ* about 0.9
 _EQUAL = 1e-9
 _MOST_MAPS = math.factorial(8)
+_SKETCHES = 10
+_ANSWER_BUDGET = 2.0
 _WIDTH = 108
 
 TRUTH = "the truth"
@@ -150,11 +155,33 @@ def main(arguments: Sequence[str] | None = None) -> None:
     console = Console()
     if not console.is_terminal:
         console = Console(width=_WIDTH)
-    console.print(_table(results, [*methods, ENUMERATION, TRUTH]))
-    for line in [*_findings(results), _NOTES, *([_PEER_NOTES] if options.peers else [])]:
-        console.print(line, highlight=False, markup=False)
+    if results:
+        console.print(_table(results, [*methods, ENUMERATION, TRUTH]))
+        for line in [*_findings(results), _NOTES, *([_PEER_NOTES] if options.peers else [])]:
+            console.print(line, highlight=False, markup=False)
+    if options.cases:
+        console.print(answers_table(_answers(options)))
+        console.print(NOTES, highlight=False, markup=False)
     for package in sorted({peer.package for peer in options.peers if not peer.installed}):
         console.print(f"{package} is not installed, so it is left out (make .venv/bench)")
+
+
+def _answers(options: argparse.Namespace) -> dict[Case, list[dict[str, Answer]]]:
+    """Let every searcher, and the methods that align, answer sketches of each kind."""
+    aligners = [aligner for aligner in options.aligners if aligner.installed]
+    names = [searcher.name for searcher in options.searchers]
+    answers(options.cases[0], 0, names, aligners, options.answer_budget)  # loads what they need
+    with Progress(console=Console(stderr=True)) as progress:
+        task = progress.add_task("", total=len(options.cases) * options.sketches)
+        results: dict[Case, list[dict[str, Answer]]] = {}
+        for case in options.cases:
+            progress.update(task, description=case.name)
+            results[case] = []
+            for number in range(options.sketches):
+                found = answers(case, number, names, aligners, options.answer_budget)
+                results[case].append(found)
+                progress.advance(task)
+    return results
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -165,6 +192,13 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--budget", type=float, help="seconds for each search")
     parser.add_argument("--searchers", help=f"some of {','.join(known)}")
     parser.add_argument("--no-peers", dest="peers", action="store_const", const=(), default=PEERS)
+    parser.add_argument("--sketches", type=int, default=_SKETCHES, help="of each kind to answer")
+    parser.add_argument(
+        "--answers",
+        choices=("too", "only", "none"),
+        default="too",
+        help="the table of whole matches",
+    )
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args(arguments)
     names = options.searchers.split(",") if options.searchers else list(known)
@@ -179,7 +213,12 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     given = {key: value for key, value in chosen.items() if value is not None}
     if any(value <= 0 for value in given.values()):
         parser.error("--scenes and --budget must be positive")
-    options.sizes = [replace(size, **given) for size in sizes]
+    if options.sketches <= 0:
+        parser.error("--sketches must be positive")
+    options.sizes = [replace(size, **given) for size in sizes if options.answers != "only"]
+    options.cases = () if options.answers == "none" else CASES
+    options.answer_budget = options.budget or _ANSWER_BUDGET
+    options.aligners = ALIGNERS if options.peers else ()
     return options
 
 

@@ -176,5 +176,5 @@ def test_a_catalogue_is_a_table_of_all_its_algorithms():
 
 
 def test_other_messages_are_what_they_print():
-    request = scene_service_pb2.SegmentRequest(profile="fast")
+    request = scene_service_pb2.SegmentRequest(profile="proof")
     assert summary(request) == str(request)

@@ -131,7 +131,7 @@ def test_describe_relate_and_segment_take_it_too(command_line, mine):
 
     assert chosen("describe", LIVING_ROOM_SKETCH)["name"] == "hybrid"
     assert chosen("relate", *PAIR)["name"] == "hybrid"
-    assert chosen("describe", LIVING_ROOM_SKETCH, "--profile", "fast")["name"] == "constant"
+    assert chosen("describe", LIVING_ROOM_SKETCH, "--profile", "thesis-easm")["name"] == "constant"
     mine.write_text("[algorithms.segmenter.strokes]\nmin_size = 0.125\n")
     assert chosen("segment", LIVING_ROOM_SKETCH)["parameters"]["min_size"] == 0.125
 
@@ -174,7 +174,7 @@ def test_a_profile_or_file_that_is_not_there_is_refused(command_line):
     line = said(command_line("match", *PAIR, "--profile", "best"))
     assert line == (
         "sketchmatch: pipeline.profile is 'best', which is no profile; "
-        "choose one of: fast, learned, proof, thesis, thesis-easm, thesis-fsnn"
+        "choose one of: proof, thesis, thesis-easm, thesis-fsnn"
     )
     assert "away.toml does not exist" in said(command_line("match", *PAIR, "--config", "away.toml"))
     line = said(command_line("match", *PAIR, "--config", "a.toml", "--server", "127.0.0.1:1"))
@@ -216,7 +216,7 @@ def test_a_server_takes_its_file_and_options_over_it(mine):
         with pytest.raises(InvalidRequestError) as caught:
             client.match(sketch, sketch, profile="best")
         assert (caught.value.reason, caught.value.field) == ("UNKNOWN_PROFILE", "pipeline.profile")
-        assert "choose one of: fast, learned, mine, proof, thesis, thesis-easm" in str(caught.value)
+        assert "choose one of: mine, proof, thesis, thesis-easm" in str(caught.value)
         offered = client.algorithms()
         assert [item.name for item in offered.profiles if item.is_default] == ["mine"]
         assert all(item.source for item in offered.algorithms if item.name == "easm")
@@ -234,9 +234,9 @@ def test_a_server_reads_its_file_again_on_sighup_and_keeps_to_options(mine):
             running.wait_for(said)
             return client.match(sketch, sketch).accepted.pipeline.profile
 
-        assert reload("profile = 'fast'", "is reloaded") == "fast"
+        assert reload("profile = 'proof'", "is reloaded") == "proof"
         assert client.server_info().limits.max_concurrent_matches == 3
-        assert reload("profile = 'best'", f"{mine}: profile is 'best', which is no") == "fast"
+        assert reload("profile = 'best'", f"{mine}: profile is 'best', which is no") == "proof"
 
 
 def test_a_command_names_a_profile_of_the_server(command_line, address):

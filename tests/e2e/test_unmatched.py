@@ -1,4 +1,4 @@
-"""Objects without partner, learned weights and probabilities, through every door."""
+"""Objects without partner, weights and probabilities, through every door."""
 
 import json
 
@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from sketchmatch import Scene
+from sketchmatch.model import ConfidenceWeights
 from sketchmatch.testing import random_scene, simulate_sketch
-from sketchmatch_builtin.judges.calibration import LEARNED
 from sketchmatch_client import Client, InvalidRequestError, sources
+
+WEIGHTS = ConfidenceWeights(1.0, 3.8, 0.05, 2.9, 0.58, 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +45,7 @@ def where(request):
 
 
 def test_the_command_line_leaves_objects_out(command_line, files, place, where):
-    options = ("--profile", "learned", "--allow-unmatched", "--json", *where)
+    options = ("--allow-unmatched", "--json", *where)
     done = command_line("match", *files, *options)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
@@ -66,11 +68,11 @@ def test_a_server_says_what_is_in_force(place, address):
     sketch, map_, truth = place
     with Client(address) as client:
         request = (message(sketch), message(map_))
-        options = {"profile": "learned", "allow_unmatched": True, "unmatched_price": 0.25}
+        options = {"weights": WEIGHTS, "allow_unmatched": True, "unmatched_price": 0.25}
         first, *_, last = client.events(*request, **options)
         assert first.accepted.unmatched_price == 0.25
         weights = first.accepted.weights
-        assert tuple(getattr(weights, name) for name in LEARNED._fields) == tuple(LEARNED)
+        assert tuple(getattr(weights, name) for name in WEIGHTS._fields) == tuple(WEIGHTS)
         lines = last.result.object_matches
         assert {line.sketch_object: line.map_object for line in lines} == truth
         first, *_, last = client.events(*request)
@@ -78,8 +80,7 @@ def test_a_server_says_what_is_in_force(place, address):
         assert first.accepted.weights.rotation == first.accepted.weights.dilation == 1.0
         assert len(last.result.object_matches) == 8
         profiles = {profile.name: profile for profile in client.algorithms().profiles}
-        assert profiles["learned"].weights.rotation == LEARNED.rotation
-        assert not profiles["learned"].allow_unmatched
+        assert not profiles["proof"].allow_unmatched
         assert not profiles["proof"].HasField("weights")
         with pytest.raises(InvalidRequestError, match="allow_unmatched compares maps of objects"):
             client.match(*request, searcher="nn", allow_unmatched=True)
@@ -87,7 +88,7 @@ def test_a_server_says_what_is_in_force(place, address):
 
 def test_a_profile_may_allow_it(command_line, files, place, tmp_path):
     mine = tmp_path / "mine.toml"
-    mine.write_text(f"[profiles.mine]\nweights = {[*LEARNED]}\nallow_unmatched = true\n")
+    mine.write_text("[profiles.mine]\nweights = [2, 2, 2]\nallow_unmatched = true\n")
     options = ("--config", mine, "--profile", "mine", "--json")
     done = command_line("match", *files, *options)
     assert done.returncode == 0, done.stderr

@@ -21,7 +21,8 @@ def constant(**params):
 def test_it_is_registered_and_the_default():
     assert default_registry().find(Kind.HISTOGRAM, "constant").algorithm is ConstantForce
     assert isinstance(resolve(default_registry(), {}).histogram, ConstantForce)
-    assert constant().params.directions == 180
+    assert constant().params.directions is None
+    assert constant().directions == 180
     assert constant().exponent == 0.0
 
 
@@ -48,7 +49,6 @@ def test_slices_give_what_the_whole_gives():
         (7, "multiple of 2"),
         (180.5, "valid integer"),
         ("many", "valid integer"),
-        (None, "valid integer"),
     ],
 )
 def test_directions_that_cannot_be_are_refused(directions, words):

@@ -79,7 +79,8 @@ def test_it_is_registered_with_its_exponent_and_directions(name):
     assert algorithm.name == name
     assert algorithm.summary
     assert histogram(name).exponent == EXPONENTS[name]
-    assert histogram(name).params.directions == 180
+    assert histogram(name).params.directions is None
+    assert histogram(name).directions == 180
     algorithm.warm_up()
 
 
@@ -207,7 +208,6 @@ def test_small_objects_need_more_directions_to_match_themselves(name, scene, ang
         (3602, "less than or equal to 3600"),
         (7, "multiple of 2"),
         (180.5, "valid integer"),
-        (None, "valid integer"),
     ],
 )
 def test_directions_that_cannot_be_are_refused(name, directions, words):

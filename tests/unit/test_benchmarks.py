@@ -1,14 +1,17 @@
 """The benchmarks: what peers are given, what is counted, and that tables are complete."""
 
 import dataclasses
+import itertools
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
+from sketchmatch import Scene
 from sketchmatch.model import Fmap
 from sketchmatch.registry import Kind, default_registry
-from tests.benchmarks import histograms, peers, searchers
+from tests.benchmarks import aligners, answers, histograms, matches, peers, searchers
+from tests.experiments.generators import sample
 from tests.strategies import random_table
 from tests.tools import require
 
@@ -65,7 +68,7 @@ def test_rank_one_keeps_what_tells_maps_apart():
 
 
 def test_the_table_has_every_searcher(capsys):
-    searchers.main(["--sizes=3,3x4", "--scenes=1", "--budget=5", "--no-peers"])
+    searchers.main(["--sizes=3,3x4", "--scenes=1", "--budget=5", "--no-peers", "--answers=none"])
     printed = capsys.readouterr().out
     for item in default_registry().of_kind(Kind.SEARCHER):
         assert printed.count(f" {item.name} ") >= 2
@@ -83,7 +86,8 @@ def test_a_search_is_closed_at_its_budget():
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--sizes=2"], ["--sizes=8x4"], ["--searchers=x"], ["--budget=0"]]
+    "arguments",
+    [["--sizes=2"], ["--sizes=8x4"], ["--searchers=x"], ["--budget=0"], ["--sketches=0"]],
 )
 def test_senseless_options_are_refused(arguments, capsys):
     with pytest.raises(SystemExit):
@@ -114,3 +118,102 @@ def test_the_tables_of_histograms_are_complete(monkeypatch):
     assert "missing" in plugins.caption
     objects = histograms.by_objects([3])
     assert len(objects.columns) == len(histograms.names(Kind.SIMILARITY)) + 3
+
+
+# Parts of maps, extras and other places -----------------------------------------------------------
+
+
+def laid_out(copies, wobble=0.0):
+    """Return boxes of several sizes, and all but two of them turned and scaled as a sketch."""
+    rng = np.random.default_rng(3)
+    places = rng.uniform(0.0, 20.0, (copies, 2))
+    sides = np.exp(rng.uniform(-0.7, 0.7, copies))
+    corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    map_ = Scene.from_polygons(
+        [corners * side + at for side, at in zip(sides, places, strict=True)]
+    )
+    kept = rng.permutation(copies)[2:]
+    c, s = 0.4 * np.cos(2.0), 0.4 * np.sin(2.0)
+    rings = [map_.objects[k].rings[0] + rng.normal(0.0, wobble, 2) for k in kept]
+    return Scene.from_polygons([ring @ [[c, s], [-s, c]] for ring in rings]), map_, kept
+
+
+def test_a_consistent_subset_is_found_in_a_turned_and_scaled_part():
+    sketch, map_, kept = laid_out(9)
+    assert aligners.ALIGNERS[-1].solve(sketch, map_).tolist() == kept.tolist()
+
+
+def test_a_pose_is_found_from_pairings_of_like_sizes():
+    require(aligners.ALIGNERS[1].installed, "scipy (`make .venv/bench` installs it)")
+    sketch, map_, kept = laid_out(12, 0.1)
+    assert aligners.ALIGNERS[1].solve(sketch, map_).tolist() == kept.tolist()
+    found = aligners.ALIGNERS[0].solve(sketch, map_)
+    taken = found[found >= 0]
+    assert len(set(taken.tolist())) == len(taken) >= 1
+
+
+def best_clique(weights, consistent):
+    """Return the clique of the largest greatest eigenvalue, by trying all."""
+    best, value = (), -1.0
+    for size in range(1, len(weights) + 1):
+        for some in itertools.combinations(range(len(weights)), size):
+            block = np.ix_(some, some)
+            if consistent[block].sum() == size * (size - 1):
+                found = np.linalg.eigvalsh(weights[block] + np.eye(size))[-1]
+                if found > value + 1e-9:
+                    best, value = some, found
+    return best, value
+
+
+def test_dense_subgraphs_are_cliques_about_as_dense_as_the_densest():
+    close = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        joined = np.triu(rng.random((9, 9)) < 0.5, 1)
+        consistent = joined | joined.T
+        weights = np.triu(rng.uniform(0.5, 1.0, (9, 9)), 1)
+        weights = (weights + weights.T) * consistent
+        found = aligners.dense_subgraph(weights, consistent)
+        block = np.ix_(found, found)
+        assert consistent[block].sum() == len(found) * (len(found) - 1)
+        value = np.linalg.eigvalsh(weights[block] + np.eye(len(found)))[-1]
+        close.append(value / best_clique(weights, consistent)[1])
+    assert np.mean(close) > 0.9
+
+
+@pytest.mark.parametrize("case", answers.CASES, ids=lambda case: case.name)
+def test_every_method_answers_each_kind_of_sketch(case):
+    found = answers.answers(case, 1, ["nn"], aligners.ALIGNERS[-1:], 5.0)
+    assert list(found) == ["default", "nn", "CLIPPER (ours)"]
+    assert all(len(each.right) == 8 and each.seconds > 0 for each in found.values())
+    table = answers.answers_table({case: [found]})
+    assert table.row_count == 3
+    assert list(table.columns[2].cells) == list(found)
+
+
+def test_what_is_right_is_the_truth_and_nothing_where_there_is_none():
+    drawing = sample("plain", 0, objects=20, extra=1)
+    truth = drawing.truth.tolist()
+    assert answers._right(drawing, truth) == (True,) * 9
+    wrong = [(k + 1) % 20 for k in truth]
+    assert not any(answers._right(drawing, wrong))
+    answer = answers.Answer(0.5, (True, False, True), None)
+    assert answers._figures([answer])[:2] == ["0%", "66.7%"]
+    placed = [dataclasses.replace(answer, here=here) for here in (True, False, None)]
+    assert answers._figures(placed)[-1] == "50%"
+
+
+def test_whole_matches_are_timed_by_stage(capsys, monkeypatch):
+    monkeypatch.setattr(matches, "_SIZES", ((3, 4),))
+    monkeypatch.setattr(matches, "_alone", lambda: None)
+    matches.main(["--sketches=2", "--searchers=exact"])
+    printed = capsys.readouterr().out
+    for word in ("3 × 4", "default", "exact", "describe", "relate", "search"):
+        assert word in printed
+
+
+@pytest.mark.parametrize("arguments", [["--sketches=0"], ["--searchers=x"]])
+def test_senseless_options_of_whole_matches_are_refused(arguments, capsys):
+    with pytest.raises(SystemExit):
+        matches.main(arguments)
+    assert "error" in capsys.readouterr().err

@@ -92,8 +92,8 @@ def test_the_file_is_looked_for_here_and_then_in_the_users_folder(file, monkeypa
     file('profile = "proof"', "home/sketchmatch/sketchmatch.toml")
     if sys.platform == "linux":
         assert load().defaults.profile == "proof"
-    file('profile = "fast"')
-    assert load().defaults.profile == "fast"
+    file('profile = "proof"')
+    assert load().defaults.profile == "proof"
     monkeypatch.setenv("SKETCHMATCH_CONFIG", str(file('profile = "thesis-easm"', "named.toml")))
     assert load().defaults.profile == "thesis-easm"
     assert load(file("", "empty.toml")).defaults.profile == ""
@@ -148,11 +148,11 @@ def test_a_stronger_place_that_names_another_algorithm_drops_the_parameters(file
 
 
 def test_a_profile_of_ones_own_changes_the_built_in_one(file):
-    path = file("profile = 'fast'\n[profiles.fast.searcher]\nname = 'exact'\n")
+    path = file("profile = 'thesis-easm'\n[profiles.thesis-easm.searcher]\nname = 'exact'\n")
     configuration = load(path)
     pipeline = resolve(open_registry(configuration), {}, defaults=configuration.defaults)
     assert pipeline.searcher.name == "exact"
-    assert pipeline.histogram.params.directions == 90, "the other stages stay"
+    assert pipeline.histogram.params.directions == 180, "the other stages stay"
 
 
 # What is wrong with it --------------------------------------------------------------------------
@@ -169,7 +169,10 @@ def test_a_profile_of_ones_own_changes_the_built_in_one(file):
         ("[limits]\nmax_objects = 'few'", "{file}: limits.max_objects is 'few'; it should be a"),
         ("[limits]\nmax_objects = 1", "{file}: limits.max_objects is 1; it should be greater"),
         ("[server]\ngrace_seconds = inf", "{file}: server.grace_seconds is inf; it should be a f"),
-        ("profile = 'best'", "{file}: profile is 'best', which is no profile; choose one of: fast"),
+        (
+            "profile = 'best'",
+            "{file}: profile is 'best', which is no profile; choose one of: proof",
+        ),
         (
             "[pipeline.searcher]\nname = 'best'",
             "{file}: pipeline.searcher.name is 'best', which is no searcher; choose one of: auto",
@@ -207,7 +210,7 @@ def test_a_fault_is_one_sentence_with_its_place(file, text, sentence):
         ("LIMITS__MAX_BYTES", "0", "is 0; it should be greater than or equal to 1"),
         ("LIMITS__MAX_BYTES", "[" * 99_999, "is '[[[[[[[[[["),
         ("LIMITS__MAX_BYTES", "1" * 5000, "is '1111111111111111111111111111111111111111111111"),
-        ("PROFILE", "best", "is 'best', which is no profile; choose one of: fast, learned, proof"),
+        ("PROFILE", "best", "is 'best', which is no profile; choose one of: proof, thesis"),
         ("PIPELINE__SEARCHER", '{"nmae": 1}', ": nmae is no setting; did you mean SKETCHMATCH_PIP"),
     ],
 )
@@ -419,10 +422,7 @@ def test_the_built_in_profiles_are_sound_and_as_the_thesis_has_it():
     path, faults = check()
     assert (path, faults) == (None, [])
     profiles = {profile.name: profile for profile in builtin().defaults.profiles}
-    assert list(profiles) == [
-        *("fast", "learned", "proof"),
-        *("thesis", "thesis-easm", "thesis-fsnn"),
-    ]
+    assert list(profiles) == ["proof", "thesis", "thesis-easm", "thesis-fsnn"]
     assert all(profile.summary for profile in profiles.values())
     for name in ("proof", "thesis", "thesis-easm", "thesis-fsnn"):
         assert profiles[name].stages["judge"].name == "confidence"
@@ -544,7 +544,7 @@ def test_every_entry_tells_where_it_comes_from(file, monkeypatch):
 
 def test_no_entry_comes_from_a_place_that_does_not_say_it(file, monkeypatch):
     path = file(
-        "[limits]\n[profiles.fast]\n[pipeline.searcher]\nparameters = {}\n"
+        "[limits]\n[profiles.proof]\n[pipeline.searcher]\nparameters = {}\n"
         "[pipeline.histogram]\nparameters = {directions = 90}\n"
     )
     monkeypatch.setenv("SKETCHMATCH_PIPELINE__HISTOGRAM", '{"name": "constant"}')

@@ -58,6 +58,11 @@ def by_definition(first, second, r, directions=8):
     return law_histogram(first, second, force(r), directions)
 
 
+def test_a_pair_alone_needs_a_number_of_directions():
+    with pytest.raises(InvalidInputError, match="directions is None; give an even number"):
+        force_histogram(SQUARE, SQUARE + 2.0, directions=None)
+
+
 def computed(first, second, r, directions=8):
     return force_histogram(first, second, r=r, directions=directions)
 

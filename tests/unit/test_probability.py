@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from sketchmatch import Scene, match
 from sketchmatch.api import Candidate, JudgeProblem, MatchProblem
-from sketchmatch.config import builtin
 from sketchmatch.model import ConfidenceWeights, Fmap
 from sketchmatch.pipeline.alternatives import exchange_confidences
 from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
@@ -18,7 +17,7 @@ from sketchmatch.pipeline.slices import finish
 from sketchmatch.pipeline.unmatched import Part, omission_confidences, part_of
 from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.judges._odds import likelihood
-from sketchmatch_builtin.judges.calibration import LEARNED, Calibration, calibrated, default_price
+from sketchmatch_builtin.judges.calibration import Calibration, calibrated, default_price
 from sketchmatch_builtin.searchers.exact import Exact
 from tests.strategies import random_table
 
@@ -194,19 +193,19 @@ def test_nothing_is_said_where_nothing_was_learned(settings):
     assert all(line.probability is None for line in result.matches)
 
 
-def test_the_learned_weights_are_those_of_the_profile_whatever_their_unit():
-    profile = builtin().defaults.named("learned")
-    assert ConfidenceWeights(*profile.weights) == LEARNED
-    *parts, distance = LEARNED
-    assert calibrated(ConfidenceWeights(*(3.0 * each for each in parts), distance)) is not None
-    assert calibrated(LEARNED._replace(distance=distance + 0.5)) is None
+def test_weights_are_those_that_were_learned_whatever_their_unit():
+    assert calibrated(ConfidenceWeights(3, 3, 3)) == calibrated(ConfidenceWeights()) is not None
+    assert calibrated(ConfidenceWeights(distance=0.5)) is None
+    assert calibrated(ConfidenceWeights(shape=1.0)) is None
     assert calibrated(ConfidenceWeights(1, 1, 2)) is None
     assert default_price(ConfidenceWeights(1, 1, 2)) == default_price(ConfidenceWeights())
-    assert default_price(LEARNED) < default_price(ConfidenceWeights())
 
 
-def test_the_profile_weighs_unless_the_request_does():
+def test_the_profile_weighs_unless_the_request_does(tmp_path):
+    config = tmp_path / "mine.toml"
+    config.write_text("[profiles.mine]\nweights = [1, 3.8, 0.05, 2.9, 0.58, 1]\n")
     scene = random_scene(np.random.default_rng(4), 5)
-    assert match(scene, scene, profile="learned").confidence.shape is not None
-    assert match(scene, scene, profile="learned", weights=(1, 1, 1)).confidence.shape is None
+    options = {"profile": "mine", "config": config}
+    assert match(scene, scene, **options).confidence.shape is not None
+    assert match(scene, scene, **options, weights=(1, 1, 1)).confidence.shape is None
     assert match(scene, scene).confidence.shape is None

@@ -64,7 +64,7 @@ def test_parameters_reach_their_stage_alone():
     assert pipeline.searcher.params.population == 7
     assert pipeline.searcher.params.patience == 400
     assert pipeline.map_segmenter.params.min_size == 0.5
-    assert pipeline.histogram.params.directions == 180
+    assert pipeline.histogram.params.directions is None
 
 
 def test_an_unknown_stage_is_refused_with_the_choices():

@@ -214,7 +214,8 @@ def test_more_objects_on_one_side_may_still_leave_some_out_on_the_other(few):
     kept = [k for k in range(8) if k in truth][: few - 1]
     extra = next(k for k in range(8) if k not in truth)
     drawn = Scene(tuple(sketch.objects[k] for k in (*kept, extra)))
-    result = matched(drawn, map_, profile="learned", allow_unmatched=True)
+    weights = (1.0, 3.8, 0.05, 2.9, 0.58, 1.0)
+    result = matched(drawn, map_, weights=weights, allow_unmatched=True, unmatched_price=0.1)
     assert result.object_map == {k: truth[each] for k, each in enumerate(kept)}
     assert result.unmatched_sketch_objects == (len(kept),)
 

@@ -61,7 +61,7 @@ class MatchOptions(TypedDict, total=False):
         How many of the next best object maps the result shall hold. Left out: 3, or as many as
         there are.
     profile
-        Name of one of the server's pipelines, e.g. ``"fast"`` or ``"proof"``, to start from; what
+        Name of one of the server's pipelines, e.g. ``"proof"``, to start from; what
         the options above say wins. Left out: the server's default one.
     """
 

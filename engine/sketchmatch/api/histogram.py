@@ -12,15 +12,20 @@ from sketchmatch.model import FloatArray, IntArray, Scene
 __all__ = ["Histogram", "HistogramParams"]
 
 
+_DIRECTIONS = 180
+
+
 class HistogramParams(_algorithm.Params):
     """What every histogram is asked for: ``directions``, how many there are over the full turn."""
 
-    directions: int = Field(
-        default=180,
+    directions: int | None = Field(
+        default=None,
         ge=4,
         le=3600,
         multiple_of=2,
-        description="Number of directions over the full turn; direction k is 2πk/n from +x.",
+        description="Number of directions over the full turn; direction k is 2πk/n from +x. When "
+        "left out, as many as the narrow relations of the scene with fewer objects need, 180 to "
+        "720.",
     )
 
 
@@ -35,6 +40,15 @@ class Histogram(_algorithm.Algorithm, ABC):
         """The number of directions alone."""
 
     params: HistogramParams
+
+    @property
+    def directions(self) -> int:
+        """n, how many directions there are over the full turn.
+
+        The host fills in what the parameters leave out before it describes a scene, so that they
+        hold a number too; used alone it is 180.
+        """
+        return self.params.directions or _DIRECTIONS
 
     @property
     @abstractmethod

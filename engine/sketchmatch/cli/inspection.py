@@ -19,6 +19,7 @@ from sketchmatch.config import load, open_engine
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import FloatArray, Pairs, Scene, Source, object_pairs
+from sketchmatch.pipeline.describe import with_directions
 from sketchmatch.pipeline.result import Correspondence
 from sketchmatch.pipeline.selection import SIDES, Choice
 from sketchmatch.pipeline.warmup import announcing_compilation
@@ -108,6 +109,7 @@ def described(
         _check_pairs(pairs, scene, "--pair", "scene")
         work = engine.describe(scene, histogram)
         descriptor = display.follow(work, "describing relations")
+        histogram = with_directions(histogram, engine.registry, scene)
     pairs = pairs or [(a, b) for a, b in object_pairs(len(scene)).tolist()]
     rows = np.stack([descriptor.histogram(a, b) for a, b in pairs])
     turns = np.exp(2j * np.pi * np.arange(rows.shape[1]) / rows.shape[1])
@@ -156,6 +158,7 @@ def compared(
         _check_pairs(map_pairs, mapped, "--map-pair", "map")
         work = engine.compare((drawn, mapped), pipeline.histogram, pipeline.similarity)
         found = display.follow(work, "describing and comparing relations")
+        histogram = with_directions(pipeline.histogram, engine.registry, drawn, mapped)
     counts = [
         len(pairs) or len(object_pairs(len(scene)))
         for pairs, scene in ((sketch_pairs, drawn), (map_pairs, mapped))
@@ -163,7 +166,7 @@ def compared(
     return Listing(
         drawn,
         mapped,
-        pipeline.histogram,
+        histogram,
         pipeline.similarity,
         found.most_similar(sketch_pairs, map_pairs, limit),
         counts[0] * counts[1],

@@ -53,8 +53,8 @@ Profile = Annotated[
     typer.Option(
         "--profile",
         metavar="NAME",
-        help="Start from this pipeline: fast, learned, proof, thesis, thesis-easm, thesis-fsnn or "
-        "one of your own.",
+        help="Start from this pipeline: proof, thesis, thesis-easm, thesis-fsnn or one of your "
+        "own.",
     ),
 ]
 Settings = Annotated[

@@ -173,7 +173,7 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     profile: str = Field(
-        "", description="Profile for requests that name none; empty for none.", examples=["fast"]
+        "", description="Profile for requests that name none; empty for none.", examples=["proof"]
     )
     pipeline: _Pipeline = _Pipeline()
     algorithms: _Algorithms = _Algorithms()

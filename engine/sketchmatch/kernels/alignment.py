@@ -16,6 +16,7 @@ from sketchmatch.kernels._jit import kernel
 from sketchmatch.model.arrays import FloatArray, IntArray
 
 __all__ = [
+    "BLAS_MULTIPLICATIONS",
     "interpolated_products",
     "main_directions",
     "main_turns",
@@ -25,6 +26,12 @@ __all__ = [
     "split_turns",
     "turned_rows",
 ]
+
+BLAS_MULTIPLICATIONS = 2**18
+"""What a product of matrices may take: OpenBLAS shares larger ones among threads of its own.
+
+That is 3 to 10 times slower here, and sums in another order on a machine of more cores.
+"""
 
 
 def main_directions(histograms: FloatArray) -> FloatArray:
@@ -47,8 +54,14 @@ def main_directions(histograms: FloatArray) -> FloatArray:
     >>> np.degrees(main_directions(np.array([[0.0, 3.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0]])))
     array([90., 45.])
     """
-    angles = 2.0 * np.pi * np.arange(histograms.shape[1]) / histograms.shape[1]
-    directions: FloatArray = np.arctan2(histograms @ np.sin(angles), histograms @ np.cos(angles))
+    rows, bins = histograms.shape
+    angles = 2.0 * np.pi * np.arange(bins) / bins
+    cosines, sines = np.cos(angles), np.sin(angles)
+    directions = np.empty(rows)
+    block = max(1, BLAS_MULTIPLICATIONS // bins)
+    for first in range(0, rows, block):
+        some = histograms[first : first + block]
+        directions[first : first + block] = np.arctan2(some @ sines, some @ cosines)
     return directions
 
 

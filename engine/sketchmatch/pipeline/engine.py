@@ -11,7 +11,7 @@ from sketchmatch.model import ConfidenceWeights, Scene, SceneDescriptor, Source
 from sketchmatch.model.limits import SourceLimits, limited_to
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison, check_scenes, compare
-from sketchmatch.pipeline.describe import check_histograms, described
+from sketchmatch.pipeline.describe import check_histograms, described, with_directions
 from sketchmatch.pipeline.events import MatchEvent
 from sketchmatch.pipeline.judge import Judged, judged
 from sketchmatch.pipeline.match import run_match
@@ -93,7 +93,8 @@ class Engine:
     ) -> Generator[float, None, SceneDescriptor]:
         """Describe every pair of a scene, once it is known to fit into memory."""
         check_histograms(side or "scene", scene, histogram)
-        return described(scene, histogram, self.registry, side)
+        settled = with_directions(histogram, self.registry, scene)
+        return described(scene, settled, self.registry, side)
 
     def compare(
         self,
@@ -128,8 +129,9 @@ class Engine:
         similarity: Similarity,
         weights: ConfidenceWeights,
     ) -> Generator[float, None, Comparison]:
+        settled = with_directions(histogram, self.registry, *scenes)
         drawn, mapped = (
-            described(scene, histogram, self.registry, side)
+            described(scene, settled, self.registry, side)
             for side, scene in zip(SIDES, scenes, strict=True)
         )
         descriptors = ((yield from drawn), (yield from mapped))

@@ -15,7 +15,7 @@ from sketchmatch.pipeline import reading
 from sketchmatch.pipeline.answer import answer
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison, check_scenes, compare
-from sketchmatch.pipeline.describe import described
+from sketchmatch.pipeline.describe import described, with_directions
 from sketchmatch.pipeline.events import (
     Accepted,
     Finished,
@@ -158,6 +158,7 @@ def _events(
     check_scenes(scenes, pipeline.histogram)
     check_exponent(pipeline.histogram.exponent)
     yield Segmented(sketch, map_)
+    pipeline = replace(pipeline, histogram=with_directions(pipeline.histogram, registry, *scenes))
     shown = alternatives_wanted(request.alternatives, *scenes)
     # How likely the answer is follows from maps that compete with it, seen or not.
     wanted = max(shown, alternatives_wanted(None, *scenes))

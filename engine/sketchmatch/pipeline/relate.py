@@ -13,6 +13,7 @@ import numpy as np
 from sketchmatch.api import Alignment, ProductSimilarity, Similarity
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.kernels.alignment import (
+    BLAS_MULTIPLICATIONS,
     interpolated_products,
     main_directions,
     main_turns,
@@ -36,8 +37,6 @@ _LEAST_POWER = 0.5
 _MOST_LOG_DILATION = 700.0
 _PANEL_VALUES = 2**20
 _TILE_VALUES = 2**17
-# OpenBLAS shares larger products among threads of its own, which is 3 to 10 times slower here.
-_BLAS_MULTIPLICATIONS = 2**18
 _BLAS_ROWS = 16
 
 
@@ -299,7 +298,7 @@ class _MainTurns:
     def __init__(self, template: Histograms, argument: Histograms) -> None:
         self.template, self.argument = template, argument
         bins = template.bins
-        block = max(1, _BLAS_MULTIPLICATIONS // (3 * _BLAS_ROWS * bins))
+        block = max(1, BLAS_MULTIPLICATIONS // (3 * _BLAS_ROWS * bins))
         self.tile_shape = (_BLAS_ROWS, block * max(1, 8 * _TILE_VALUES // (block * bins)))
         self.blocks = np.zeros((math.ceil(len(argument) / block), block, bins))
         self.blocks.reshape(-1, bins)[: len(argument)] = argument.ahead

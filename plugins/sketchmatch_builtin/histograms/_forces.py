@@ -46,6 +46,4 @@ class PowerForce(ForceHistogram):
         if relations_matter(self.exponent):
             relations = scene_relations(scene, pairs)
             refuse_infinite(relations, pairs, self.exponent, partial(object_name, scene))
-        return force_histograms(
-            scene.edges, pairs, self.params.directions, self.exponent, relations
-        )
+        return force_histograms(scene.edges, pairs, self.directions, self.exponent, relations)

@@ -78,9 +78,7 @@ class HybridForce(ForceHistogram):
         """Return the histograms of pairs of objects, shape (k, directions)."""
         relations = scene_relations(scene, pairs)
         radii = self._radii(scene, pairs, relations)
-        return hybrid_force_histograms(
-            *scene.edges, pairs, self.params.directions, radii, relations
-        )
+        return hybrid_force_histograms(*scene.edges, pairs, self.directions, radii, relations)
 
     def _radii(self, scene: Scene, pairs: IntArray, relations: IntArray) -> FloatArray:
         """Return Y of each pair, or 0 where all distances exceed it."""

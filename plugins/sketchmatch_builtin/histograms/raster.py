@@ -80,9 +80,7 @@ class RasterForce(ForceHistogram):
         pixel, objects, edges = _rasterised(scene, self.params.pixels)
         relations = pixel_relations(objects, pairs)
         refuse_infinite(relations, pairs, self.exponent, partial(object_name, scene))
-        histograms = force_histograms(
-            edges, pairs, self.params.directions, self.exponent, relations
-        )
+        histograms = force_histograms(edges, pairs, self.directions, self.exponent, relations)
         histograms *= pixel ** (3.0 - self.exponent)
         return histograms
 

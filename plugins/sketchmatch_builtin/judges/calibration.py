@@ -13,10 +13,7 @@ from dataclasses import dataclass
 
 from sketchmatch.model import ConfidenceWeights
 
-__all__ = ["LEARNED", "Calibration", "calibrated", "default_price"]
-
-LEARNED = ConfidenceWeights(1.0, 3.8, 0.05, 2.9, 0.58, 1.0)
-"""The weights that tell right maps from wrong ones best; those of the profile ``learned``."""
+__all__ = ["Calibration", "calibrated", "default_price"]
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,6 @@ class Calibration:
 
 _CALIBRATIONS = {
     ConfidenceWeights(): Calibration(0.406, 20.1, 1.04, 0.88, -4.29, 0.43),
-    LEARNED: Calibration(0.1, 111.0, 0.856, 0.984, -17.1, 0.48),
 }
 
 

@@ -31,8 +31,8 @@ class Pipeline(google.protobuf.message.Message):
     PROFILE_FIELD_NUMBER: builtins.int
     JUDGE_FIELD_NUMBER: builtins.int
     profile: builtins.str
-    """Name of the profile, a pipeline of the server's configuration such as "fast" or "proof", that
-    decides what is left out here. Empty: the server's default one, if it has one.
+    """Name of the profile, a pipeline of the server's configuration such as "proof", that decides
+    what is left out here. Empty: the server's default one, if it has one.
     An unknown one is INVALID_ARGUMENT with UNKNOWN_PROFILE.
     """
     @property

@@ -124,7 +124,7 @@ CONTRACTS: tuple[Contract, ...] = (
     scale_multiplies_the_rows,
     translation_changes_nothing,
     pairs_are_described_alone,
-    *contracts_of_use(_uses),
+    *contracts_of_use(_uses, lambda algorithm: _of(algorithm, 180)),
 )
 
 

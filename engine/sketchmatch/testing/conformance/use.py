@@ -49,24 +49,32 @@ def view_within(array: NDArray[Any]) -> NDArray[Any]:
     return sealed(middle)
 
 
-def contracts_of_use(uses: Callable[[], Iterable[Use]]) -> tuple[Contract, ...]:
+def _made(algorithm: type[Any]) -> Any:
+    return algorithm()
+
+
+def contracts_of_use(
+    uses: Callable[[], Iterable[Use]], made: Callable[[type[Any]], Any] = _made
+) -> tuple[Contract, ...]:
     """Return the contracts that each use of an algorithm of some kind must keep.
 
     Parameters
     ----------
     uses
         Returns the same uses, two or more, each time in memory of their own.
+    made
+        Sets an algorithm up; with its default parameters, unless it is another.
     """
 
     def answers_repeat(algorithm: type[Any]) -> None:
         """Give the very same answer to the same input, and seed, bit by bit."""
         for use, again in zip(uses(), uses(), strict=True):
-            same = use.answer(algorithm()) == again.answer(algorithm())
+            same = use.answer(made(algorithm)) == again.answer(made(algorithm))
             require(same, f"two runs on {use.given} gave different answers")
 
     def threads_agree(algorithm: type[Any]) -> None:
         """Give each of several threads that use one object what it gives to one alone."""
-        one = algorithm()
+        one = made(algorithm)
 
         def answers() -> list[Hashable]:
             return [use.answer(one) for use in (*uses(), *uses(), *uses())]
@@ -81,7 +89,7 @@ def contracts_of_use(uses: Callable[[], Iterable[Use]]) -> tuple[Contract, ...]:
         """Leave what it is given as it is, byte by byte."""
         for use, writable in zip(uses(), uses(), strict=True):
             try:
-                _watched(algorithm, use)
+                _watched(made(algorithm), use)
             except BrokenError:
                 raise
             except Exception as error:
@@ -91,7 +99,7 @@ def contracts_of_use(uses: Callable[[], Iterable[Use]]) -> tuple[Contract, ...]:
                         with suppress(ValueError):  # a part of what is read-only stays so
                             array.flags.writeable = True
                     try:
-                        _watched(algorithm, writable)
+                        _watched(made(algorithm), writable)
                     except BrokenError as broken:
                         raise broken from None  # it names what was written to
                 raise
@@ -99,11 +107,11 @@ def contracts_of_use(uses: Callable[[], Iterable[Use]]) -> tuple[Contract, ...]:
     return (answers_repeat, threads_agree, inputs_stay_untouched)
 
 
-def _watched(algorithm: type[Any], use: Use) -> None:
+def _watched(algorithm: Any, use: Use) -> None:
     """Use an algorithm, and say what it wrote to."""
     before = {name: _memory(array) for name, array in use.inputs.items()}
     try:
-        use.answer(algorithm())
+        use.answer(algorithm)
     finally:
         wrote = [name for name, array in use.inputs.items() if _memory(array) != before[name]]
         if wrote:
