@@ -12,7 +12,6 @@ import numpy as np
 from sketchmatch.api import Candidate, Judge, JudgedMap, Judgement, JudgeProblem
 from sketchmatch.errors import AnswerUnavailableError, quoted
 from sketchmatch.model import (
-    BoolArray,
     Confidence,
     FloatArray,
     Fmap,

@@ -267,8 +267,8 @@ def _check_possible(pins: Sequence[Pin], allowed: BoolArray, swapped: bool, part
     if alone and not partial and not swapped:
         _refuse(
             f"pins[{alone[0]}].map_object",
-            "is not set, but nothing may stay unmatched, and the map has enough objects for all "
-            "of the sketch; allow unmatched objects or drop the pin",
+            "says that it is on no map, but every object of the sketch must find a partner; "
+            "allow unmatched objects or drop the pin",
         )
     if partial:
         _refuse(
@@ -288,7 +288,9 @@ def _found(reference: int | str, scene: Scene, field: str, side: str) -> int:
     """Return the index of the object that an index or a label names."""
     if not isinstance(reference, str):
         if reference >= len(scene):
-            _refuse(field, f"is beyond the {len(scene)} objects of the {side}; name one of them")
+            _refuse(
+                field, f"names an object beyond the {len(scene)} of the {side}; give one of them"
+            )
         return int(reference)
     wanted = folded(reference)
     alike = [k for k, label in enumerate(scene.labels) if folded(label) == wanted]
@@ -299,10 +301,10 @@ def _found(reference: int | str, scene: Scene, field: str, side: str) -> int:
     if alike:
         _refuse(
             field,
-            f"is {quoted(reference)}, the label of {len(alike)} objects of the {side}; "
+            f"names {quoted(reference)}, the label of {len(alike)} objects of the {side}; "
             "give the number of the one that is meant",
         )
-    _refuse(field, f"is {quoted(reference)}, and {_labels_of(scene, side)}")
+    return _refuse(field, f"names {quoted(reference)}, and {_labels_of(scene, side)}")
 
 
 def _labels_of(scene: Scene, side: str) -> str:
