@@ -153,7 +153,8 @@ def matching(allowed: BoolArray, preference: FloatArray | None = None) -> IntArr
     allowed
         Shape (N, N').
     preference
-        Shape (N, N'): of the partners that an object may take, the greatest comes first.
+        Shape (N, N'): of the partners that an object may take, the greatest comes first, and of
+        the objects that with the greatest of all.
 
     Returns
     -------
@@ -181,14 +182,18 @@ def matching(allowed: BoolArray, preference: FloatArray | None = None) -> IntArr
 
     def place(a: int, seen: set[int]) -> bool:
         for c in choices[a]:
+            if c not in holders:
+                holders[c] = a
+                return True
+        for c in choices[a]:
             if c not in seen:
                 seen.add(c)
-                if c not in holders or place(holders[c], seen):
+                if place(holders[c], seen):
                     holders[c] = a
                     return True
         return False
 
-    for a in range(len(choices)):
+    for a in np.argsort(-value.max(axis=1), kind="stable").tolist():
         place(a, set())
     partners = np.full(len(choices), -1)
     partners[list(holders.values())] = list(holders)
