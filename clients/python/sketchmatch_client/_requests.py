@@ -12,8 +12,8 @@ from google.protobuf.duration_pb2 import Duration
 from google.protobuf.struct_pb2 import Struct
 
 from sketchmatch_client.errors import InvalidRequestError, refused_as
-from sketchmatch_proto.v1.match_pb2 import ConfidenceWeights
 from sketchmatch_proto.v1 import match_service_pb2
+from sketchmatch_proto.v1.match_pb2 import ConfidenceWeights
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest, ObjectReference, Synonyms
 from sketchmatch_proto.v1.pipeline_pb2 import AlgorithmSelection, Pipeline
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest

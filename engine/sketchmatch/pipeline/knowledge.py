@@ -130,8 +130,8 @@ def knowledge(
         If a pin names no object or several, or pins contradict each other or leave no map.
     """
     sketch, map_ = scenes
-    labels = (sketch.labels, map_.labels)[:: -1 if swapped else 1]
-    names = compare_labels(*labels, synonyms)
+    template, argument = (map_, sketch) if swapped else (sketch, map_)
+    names = compare_labels(template.labels, argument.labels, synonyms)
     if not pins:
         return Knowledge(names=names)
     allowed, known = _read_pins(pins, sketch, map_)
