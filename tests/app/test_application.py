@@ -157,10 +157,13 @@ def test_an_error_is_what_the_log_ends_with():
 @pytest.mark.parametrize(
     ("request_", "named"),
     [
-        (match_request(SCENE, SCENE), {"polygons", "auto", "constant", "cross-correlation"}),
+        (
+            match_request(SCENE, SCENE),
+            {"polygons", "auto", "constant", "cross-correlation", "confidence"},
+        ),
         (
             match_request(SCENE, sources.strokes([SQUARE]), searcher="held"),
-            {"polygons", "strokes", "held", "constant", "cross-correlation"},
+            {"polygons", "strokes", "held", "constant", "cross-correlation", "confidence"},
         ),
         (segment_request(sources.image(b"no picture")), {"image"}),
         (match_request(SCENE, SCENE, searcher="nobody"), set()),

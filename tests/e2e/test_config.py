@@ -174,7 +174,7 @@ def test_a_profile_or_file_that_is_not_there_is_refused(command_line):
     line = said(command_line("match", *PAIR, "--profile", "best"))
     assert line == (
         "sketchmatch: pipeline.profile is 'best', which is no profile; "
-        "choose one of: fast, learned, proof, thesis-easm, thesis-fsnn"
+        "choose one of: fast, learned, proof, thesis, thesis-easm, thesis-fsnn"
     )
     assert "away.toml does not exist" in said(command_line("match", *PAIR, "--config", "away.toml"))
     line = said(command_line("match", *PAIR, "--config", "a.toml", "--server", "127.0.0.1:1"))
@@ -216,7 +216,7 @@ def test_a_server_takes_its_file_and_options_over_it(mine):
         with pytest.raises(InvalidRequestError) as caught:
             client.match(sketch, sketch, profile="best")
         assert (caught.value.reason, caught.value.field) == ("UNKNOWN_PROFILE", "pipeline.profile")
-        assert "choose one of: fast, learned, mine, proof, thesis-easm" in str(caught.value)
+        assert "choose one of: fast, learned, mine, proof, thesis, thesis-easm" in str(caught.value)
         offered = client.algorithms()
         assert [item.name for item in offered.profiles if item.is_default] == ["mine"]
         assert all(item.source for item in offered.algorithms if item.name == "easm")

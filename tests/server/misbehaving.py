@@ -2,6 +2,7 @@
 """A plugin, as third parties distribute them, whose algorithms all break their contract."""
 
 import ctypes
+import math
 import os
 import re
 import sys
@@ -11,6 +12,9 @@ import numpy as np
 
 from sketchmatch.api import (
     Histogram,
+    Judge,
+    JudgedMap,
+    Judgement,
     Params,
     Searcher,
     SearchProgress,
@@ -237,6 +241,18 @@ class NoteSearcher(Searcher):
         yield progress(problem, note=7)
 
 
+@broken("searcher", "its object map has a partner outside −1 … 3")
+class FarFetchingSearcher(Searcher):
+    def search(self, problem, rng):
+        yield progress(problem, maps=(np.array([0, 1, 2, 9]),))
+
+
+@broken("searcher", "its object map is 'none', not an array of whole numbers")
+class WordySearcher(Searcher):
+    def search(self, problem, rng):
+        yield progress(problem, maps=("none",))
+
+
 @broken("searcher", "it changed its input: similarity")
 class ScribblingSearcher(Searcher):
     def search(self, problem, rng):
@@ -360,6 +376,140 @@ class UnmakeableSearcher(Searcher):
         raise NotImplementedError
 
 
+@broken("judge", "ZeroDivisionError: no scales")
+class RaisingJudge(Judge):
+    def judge(self, problem):
+        raise ZeroDivisionError("no scales")
+
+
+@broken("judge", "TypeError: neither yes nor no")
+class UndecidedJudge(Judge):
+    @property
+    def partial(self):
+        raise TypeError("neither yes nor no")
+
+    def judge(self, problem):
+        raise NotImplementedError
+
+
+@broken("judge", "it returned a tuple, not a Judgement")
+class SilentJudge(Judge):
+    def judge(self, problem):
+        return ()
+
+
+@broken("judge", "its maps are no tuple of JudgedMap")
+class UnjudgingJudge(Judge):
+    def judge(self, problem):
+        return Judgement(problem.candidates)
+
+
+@broken("judge", "it returned no map")
+class MaplessJudge(Judge):
+    def judge(self, problem):
+        return Judgement(())
+
+
+@broken("judge", "it returned a map twice")
+class StammeringJudge(Judge):
+    def judge(self, problem):
+        return says([0, 1, 2, 3], [1, 0, 2, 3], [0, 1, 2, 3])
+
+
+@broken("judge", r"its object map has shape \(2,\), not \(4,\)")
+class ShortJudge(Judge):
+    def judge(self, problem):
+        return says([0, 1])
+
+
+@broken("judge", "its object map has a partner outside −1 … 3")
+class LostJudge(Judge):
+    def judge(self, problem):
+        return says([0, 1, 2, 4])
+
+
+@broken("judge", "its object map takes an object of the argument twice")
+class BigamousJudge(Judge):
+    def judge(self, problem):
+        return says([0, 1, 2, 2])
+
+
+@broken("judge", "its object map matches 3 objects, and at least 4 must")
+class ForgetfulJudge(Judge):
+    def judge(self, problem):
+        return says([0, 1, 2, -1])
+
+
+@broken("judge", "its probability of a map is 1.5, not a number within 0 … 1")
+class OverconfidentJudge(Judge):
+    def judge(self, problem):
+        return says([0, 1, 2, 3], probability=1.5)
+
+
+@broken("judge", "its probability of a map is nan, not a number within 0 … 1")
+class ConfusedJudge(Judge):
+    def judge(self, problem):
+        return says([0, 1, 2, 3], probability=math.nan)
+
+
+@broken("judge", "its elsewhere is -0.5, not a number within 0 … 1")
+class DisplacedJudge(Judge):
+    def judge(self, problem):
+        return says([0, 1, 2, 3], elsewhere=-0.5)
+
+
+@broken("judge", "right with probability 0.75, and the place another one with 0.5")
+class TornJudge(Judge):
+    def judge(self, problem):
+        return says([0, 1, 2, 3], probability=0.75, elsewhere=0.5)
+
+
+@broken("judge", r"it returned an array of shape \(4, 4\), not \(4, 5\)")
+class NarrowJudge(Judge):
+    def judge(self, problem):
+        return says([0, 1, 2, 3], lines=np.eye(4))
+
+
+@broken("judge", "it returned 1.5, which is more than 1")
+class BoldJudge(Judge):
+    def judge(self, problem):
+        return says([0, 1, 2, 3], lines=1.5 * np.eye(4, 5))
+
+
+@broken("judge", "right with probability 0.75, and one of its lines with 0.5")
+class ContradictingJudge(Judge):
+    def judge(self, problem):
+        lines = np.eye(4, 5)
+        lines[2, 2] = 0.5
+        return says([0, 1, 2, 3], probability=0.75, lines=lines)
+
+
+@broken("judge", "it changed its input: table.similarity")
+class ScribblingJudge(Judge):
+    def judge(self, problem):
+        scribble(problem.table.similarity)
+        return says([0, 1, 2, 3])
+
+
+@unstoppable("judge", "gave no sign of life for 1 s and was stopped")
+class PonderingJudge(Judge):
+    def judge(self, problem):
+        while True:
+            pass
+
+
+@unstoppable("judge", r"ended its process \(exit code 7\)")
+class ExitingJudge(Judge):
+    def judge(self, problem):
+        os._exit(7)
+
+
+def says(first, *others, probability=None, lines=None, elsewhere=None):
+    """Return a judgement of maps, of which the first is known how likely it is."""
+    maps = (JudgedMap(first, probability), *map(JudgedMap, others))
+    return Judgement(maps, lines, elsewhere)
+
+
 def scribble(array):
     """Change an array that is read-only."""
     array.flags.writeable = True
@@ -394,3 +544,8 @@ def sketchmatch_register_similarities():
 @hookimpl
 def sketchmatch_register_searchers():
     return _of(Searcher)
+
+
+@hookimpl
+def sketchmatch_register_judges():
+    return _of(Judge)

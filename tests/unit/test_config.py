@@ -179,6 +179,10 @@ def test_a_profile_of_ones_own_changes_the_built_in_one(file):
             "{file}: algorithms.searcher.easm.colour is no parameter of easm; it has: consistency",
         ),
         (
+            "[algorithms.judge.confidence]\nodds = 3",
+            "{file}: algorithms.judge.confidence.odds is no parameter of confidence; it has: none",
+        ),
+        (
             "[pipeline.map_segmenter.parameters]\nmin_size = 1",
             "{file}: pipeline.map_segmenter.parameters.min_size is set for no segmenter; give its",
         ),
@@ -436,6 +440,21 @@ def test_the_built_in_profiles_are_sound_and_as_the_thesis_has_it():
     }
 
 
+def test_a_profile_says_whether_objects_may_stay_unmatched_or_leaves_it_open(file):
+    path = file(
+        "[profiles.open.judge]\nname = 'confidence'\n[profiles.strict]\nallow_unmatched = false\n"
+        "[profiles.loose]\nallow_unmatched = true\n[pipeline.judge]\nname = 'confidence'\n"
+    )
+    configuration = load(path)
+    profiles = {each.name: each.allow_unmatched for each in configuration.defaults.profiles}
+    assert [profiles[name] for name in ("open", "strict", "loose")] == [None, False, True]
+    found = {entry.path: entry for entry in entries(configuration, default_registry())}
+    assert found["pipeline", "judge", "name"].origin is Origin.FILE
+    assert found["profiles", "strict", "allow_unmatched"].value is False
+    assert found["profiles", "loose", "allow_unmatched"].value is True
+    assert ("profiles", "open", "allow_unmatched") not in found
+
+
 def test_python_takes_profiles_and_files_but_reads_none_that_lies_around(file, monkeypatch):
     assert match(SCENE, SCENE, profile="proof").outcome == "OPTIMAL"
     path = file("[pipeline.searcher]\nname = 'nn'\nparameters = {seed_points = 3}\n")
@@ -475,7 +494,7 @@ def test_the_file_to_begin_with_is_sound_and_changes_nothing(file, uncommented):
     found, expected = load(path), builtin()
     assert found.limits == expected.limits
     assert found.settings.server == expected.settings.server
-    for kind in (Kind.HISTOGRAM, Kind.SIMILARITY, Kind.SEARCHER):
+    for kind in (Kind.HISTOGRAM, Kind.SIMILARITY, Kind.SEARCHER, Kind.JUDGE):
         for item in default_registry().of_kind(kind):
             one, other = (
                 getattr(resolve(default_registry(), {kind: Choice(item.name)}, defaults=d), kind)

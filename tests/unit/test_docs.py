@@ -5,11 +5,12 @@ import re
 import numpy as np
 
 import sketchmatch
-from sketchmatch.api import Reader, hookimpl
+from sketchmatch.api import Judge, JudgedMap, Judgement, Reader, hookimpl
 from sketchmatch.api.documents import decode_text, load_json
 from sketchmatch.io.files import _JSON_SUFFIXES, _KINDS
 from sketchmatch.model import LabelledPolygon, PolygonSet, Scene
-from sketchmatch.registry import OWN_DISTRIBUTION, default_registry
+from sketchmatch.registry import OWN_DISTRIBUTION, Kind, default_registry
+from sketchmatch.testing import check_plugin
 from sketchmatch_map_files import PICTURE_SUFFIXES
 from tests.tools import ROOT
 
@@ -27,9 +28,7 @@ SCENE = Scene.from_polygons(
 
 
 def test_the_readme_lists_exactly_the_algorithms_there_are():
-    listed = set(
-        re.findall(r"^\| (segmenter|histogram|similarity|searcher) \| `([^`]+)`", README, re.M)
-    )
+    listed = set(re.findall(rf"^\| ({'|'.join(Kind)}) \| `([^`]+)`", README, re.M))
     registered = {(str(item.kind), item.name) for item in BUILT_IN}
     assert listed == registered
 
@@ -61,6 +60,14 @@ def test_the_reader_that_is_shown_reads():
     (reader,) = names["sketchmatch_register_readers"]()
     found = reader().read(b'{"boxes": [[0, 0, 2, 1]]}')
     assert found.polygons[0].rings[0].tolist() == [[0, 0], [2, 0], [2, 1], [0, 1]]
+
+
+def test_the_judge_that_is_shown_keeps_the_contracts():
+    text = CONTRIBUTING.split("\n## Judging maps\n")[1].split("\n## ")[0]
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    names = {"Judge": Judge, "JudgedMap": JudgedMap, "Judgement": Judgement, "np": np}
+    exec(block, names)
+    check_plugin(names["Tidy"])
 
 
 def test_the_readme_gives_each_algorithm_the_source_that_it_names_itself():

@@ -17,6 +17,9 @@ from sketchmatch.api import (
     Histogram,
     HistogramParams,
     InvalidInputError,
+    Judge,
+    JudgedMap,
+    Judgement,
     Outcome,
     Params,
     ProductSimilarity,
@@ -124,6 +127,21 @@ class Boxes(Segmenter):
         return Segmentation(Scene.from_polygons(boxes))
 
 
+class Ranks(Judge):
+    """Takes the candidates as they come, and believes in the first. Source: none."""
+
+    name = "ranks"
+    summary = "The first candidate, and then the others."
+
+    def judge(self, problem):
+        believed = 0.5
+        first, *others = problem.candidates
+        lines = np.zeros((len(first.partners), problem.table.argument_objects + 1))
+        lines[np.arange(len(lines)), first.partners] = believed
+        maps = (JudgedMap(first.partners, believed), *(JudgedMap(o.partners) for o in others))
+        return Judgement(maps, lines, elsewhere=0.25)
+
+
 class Blocks(Segmenter):
     """Takes the box around each group of occupied cells as an object, walls among them."""
 
@@ -161,7 +179,7 @@ def groups(cells):
         yield box(np.min(group, axis=0), np.max(group, axis=0) + 1)
 
 
-GOOD = [RandomMaps, Centres, Cosine, ProductCosine, Boxes, Blocks]
+GOOD = [RandomMaps, Centres, Cosine, ProductCosine, Boxes, Blocks, Ranks]
 
 
 @parametrize_plugins(GOOD)
@@ -338,6 +356,12 @@ def forgetting(progress, problem, k):
     )
 
 
+def with_one_object(progress, problem, _):
+    partners = np.full(problem.table.template_objects, -1)
+    partners[0] = 2
+    return other(progress, maps=(partners,))
+
+
 def first_only(outcome, **changed):
     def at_once(self, problem, rng):
         progress = next(RandomMaps.search(self, problem, rng))
@@ -456,6 +480,10 @@ SEARCHERS = {
     "object-maps-are-kept-to": (
         "an FMAP leads to no object map",
         like(RandomMaps, search=search(crossing)),
+    ),
+    "maps-beside-are-possible": (
+        "its object map matches 1 objects, and at least 3 must",
+        like(RandomMaps, partial=True, search=search(with_one_object)),
     ),
     "evidence-is-weighed": ("it claims ζ =", like(RandomMaps, search=seeing_pairs_alone)),
     "rotations-are-weighed": ("it claims ζ =", like(RandomMaps, search=weighing_alike)),
@@ -697,6 +725,82 @@ SEGMENTERS = {
     ),
 }
 
+
+def judge(change):
+    """Return a judge() like Ranks' whose judgement of usual problems is changed."""
+
+    def changed(self, problem):
+        judgement = Ranks.judge(self, problem)
+        if not has_shape(problem, 5, 6):
+            return judgement
+        return change(judgement, problem, self)
+
+    return changed
+
+
+def has_shape(problem, few, many):
+    table = problem.table
+    return (table.template_objects, table.argument_objects) == (few, many)
+
+
+def with_first(judgement, **changed):
+    first, *others = judgement.maps
+    return replace(judgement, maps=(replace(first, **changed), *others))
+
+
+def taking_one_twice(judgement, *_):
+    first = judgement.maps[0].partners
+    twice = np.where(first == first[1], first[0], first)
+    return with_first(judgement, partners=twice, probability=None)
+
+
+def no_pair(self, problem):
+    if has_shape(problem, 2, 2):
+        raise ZeroDivisionError("nothing to compare")
+    return Ranks.judge(self, problem)
+
+
+def sharing_the_problem(self, problem):
+    self.problem = problem
+    time.sleep(0.005)
+    return Ranks.judge(self, self.problem)
+
+
+def writing_for_judges(self, problem):
+    if opened(problem.table.similarity):
+        problem.table.similarity[0, 0] += 1e-13
+    return Ranks.judge(self, problem)
+
+
+JUDGES = {
+    "maps-are-possible": (
+        "its object map takes an object of the argument twice",
+        like(Ranks, judge=judge(taking_one_twice)),
+    ),
+    "probabilities-agree": (
+        "its map is right with probability 0.625, and one of its lines with 0.5",
+        like(Ranks, judge=judge(lambda given, *_: with_first(given, probability=0.625))),
+    ),
+    "price-is-a-number": ("its price is 0.0", like(Ranks, price=lambda *_: 0.0)),
+    "odd-problems-are-judged": (
+        "with 2 on 2 objects, it raised ZeroDivisionError",
+        like(Ranks, judge=no_pair),
+    ),
+    "answers-repeat": (
+        "different answers",
+        like(
+            Ranks,
+            __init__=noisy,
+            judge=judge(lambda given, _, self: replace(given, elsewhere=0.1 * self.noise)),
+        ),
+    ),
+    "threads-agree": ("4 threads", like(Ranks, judge=sharing_the_problem)),
+    "inputs-stay-untouched": (
+        "it wrote to table.similarity of a problem of 5 on 6 objects",
+        like(Ranks, judge=writing_for_judges),
+    ),
+}
+
 BROKEN = [
     pytest.param(name, seen, algorithm, id=f"{kind}-{name}")
     for kind, cases in (
@@ -705,6 +809,7 @@ BROKEN = [
         ("histogram", HISTOGRAMS),
         ("similarity", SIMILARITIES),
         ("segmenter", SEGMENTERS),
+        ("judge", JUDGES),
     )
     for name, (seen, algorithm) in cases.items()
 ]
@@ -912,7 +1017,9 @@ def test_an_expected_failure_names_a_check_of_a_class_that_is_checked():
 
 
 def test_a_class_of_no_kind_is_refused():
-    with pytest.raises(TypeError, match="derives from none of Segmenter, Histogram"):
+    with pytest.raises(
+        TypeError, match="derives from none of Segmenter, Histogram, Similarity, Searcher and J"
+    ):
         check_plugin(dict)
 
 

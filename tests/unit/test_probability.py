@@ -105,6 +105,40 @@ def test_a_probability_is_a_share_of_all_odds(seed, few, more, left_out, doubt, 
             assert line == pytest.approx(agreeing / total, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("rival", "known"),
+    [
+        ([-1, 1, 2, 3], True),
+        ([1, 0, 2, 3], True),
+        ([0, 1, 2, 4], True),
+        ([-1, 1, 2, 4], False),
+        ([-1, 2, 1, 3], False),
+        ([1, 2, 0, 3], False),
+        ([1, 0, 3, 2], False),
+        ([4, 0, 2, 3], False),
+    ],
+)
+def test_a_rival_counts_once_where_it_is_an_exchange_or_an_omission_too(rival, known):
+    table = random_table(np.random.default_rng(1), 4, 5)
+    first = candidate(dict(enumerate(range(4))), table)
+    found = object_map(occm(Fmap.from_object_map(first.partners, 5), table))
+    problem = JudgeProblem(
+        SCENE,
+        SCENE,
+        table,
+        ConfidenceWeights(),
+        (first,),
+        exchanges=exchange_confidences(found, table, WEIGHTS),
+        omissions=omission_confidences(Fmap.from_object_map(first.partners, 5), table, WEIGHTS),
+    )
+    calibration = Calibration(0.2, 2.0, 1.3, 0.5, 0.0, 0.5)
+    other = candidate({g: h for g, h in enumerate(rival) if h >= 0}, table)
+    alone, beside = (likelihood(problem, others, calibration) for others in ((), (other,)))
+    same = beside.maps[0].probability == alone.maps[0].probability
+    assert same is known
+    assert (beside.lines == alone.lines).all() is np.bool_(known)
+
+
 def random_map(rng, few, many):
     kept = sorted(rng.permutation(few)[rng.integers(0, few - 2) :].tolist())
     return dict(zip(kept, rng.permutation(many).tolist(), strict=False))

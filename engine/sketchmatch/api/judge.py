@@ -55,8 +55,8 @@ class JudgeProblem:
     weights
         Of the parts of ζ.
     candidates
-        The maps met, at least one; the one that is worth most first, which is ζ less the price of
-        the template objects that it leaves out.
+        The maps met, at least one. First the best that was found, then the others, what is worth
+        most first: ζ less the price of the template objects that a map leaves out.
     swapped
         Whether the template is the map, and the argument the sketch.
     price

@@ -171,6 +171,7 @@ def _next_steps(folder: Path, name: str, kind: Kind) -> list[str]:
         "histogram": f"sketchmatch match sketch.svg map.yaml --histogram {name}",
         "similarity": f"sketchmatch match sketch.svg map.yaml --similarity {name}",
         "searcher": f"sketchmatch match sketch.svg map.yaml --searcher {name}",
+        "judge": f"sketchmatch match sketch.svg map.yaml --judge {name}",
     }
     return [
         f"cd {shlex.quote(str(folder))}",

@@ -16,6 +16,7 @@ _HEADINGS = {
     "histogram": "Histograms",
     "similarity": "Similarity measures",
     "searcher": "Searchers",
+    "judge": "Judges",
 }
 _PREAMBLE = (
     "A request, a configuration file, `--set STAGE.PARAMETER=VALUE` and `params` in Python set the "

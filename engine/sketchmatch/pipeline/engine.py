@@ -6,13 +6,14 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from sketchmatch.api import Histogram, Searcher, Segmentation, Segmenter, Similarity
+from sketchmatch.api import Histogram, Judge, Searcher, Segmentation, Segmenter, Similarity
 from sketchmatch.model import ConfidenceWeights, Scene, SceneDescriptor, Source
 from sketchmatch.model.limits import SourceLimits, limited_to
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison, check_scenes, compare
 from sketchmatch.pipeline.describe import check_histograms, described
 from sketchmatch.pipeline.events import MatchEvent
+from sketchmatch.pipeline.judge import Judged, judged
 from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.search import Goal, Search, search
@@ -113,6 +114,12 @@ class Engine:
     ) -> Generator[Search, None, Search]:
         """Look for the best map, as :func:`~sketchmatch.pipeline.search.search` does."""
         return search(comparison, searcher, goal, self.registry, clock or Clock())
+
+    def judge(
+        self, comparison: Comparison, found: Search, goal: Goal, judge: Judge, usual: bool = True
+    ) -> Generator[float, None, Judged]:
+        """Ask which map is the answer, as :func:`~sketchmatch.pipeline.judge.judged` does."""
+        return judged(comparison, found, goal, judge, self.registry, usual)
 
     def _compared(
         self,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sketchmatch.api import Candidate, Judge, JudgedMap, Judgement, JudgeProblem
-from sketchmatch.errors import AnswerUnavailableError, quoted
+from sketchmatch.errors import quoted
 from sketchmatch.model import (
     Confidence,
     FloatArray,
@@ -28,7 +28,15 @@ from sketchmatch.pipeline.search import Goal, Search
 from sketchmatch.pipeline.unmatched import Part, Rival, omission_confidences, part_of
 from sketchmatch.registry import Registry
 
-__all__ = ["Considered", "Judged", "considered", "judged", "problem_of"]
+__all__ = [
+    "Considered",
+    "Judged",
+    "check_maps",
+    "check_probabilities",
+    "considered",
+    "judged",
+    "problem_of",
+]
 
 # Probabilities that should be the same may come from different sums.
 _ROUNDING = 1e-9
@@ -122,14 +130,14 @@ def judged(
     ------
     PluginError
         If the judge breaks its contract.
-    AnswerUnavailableError
-        If no map was found that the caller does not rule out.
     """
     whole, weights = Part.whole(comparison.table, comparison.own), goal.weights.searched
     first, others = yield from considered(comparison, found, goal)
     problem = problem_of(comparison, first, others, goal, usual)
     with inspecting(judge, registry, problem), blaming(judge, registry):
-        judgement = _checked(judge.judge(problem), problem)
+        judgement = judge.judge(problem)
+        check_maps(judgement, problem)
+        check_probabilities(judgement, problem)
     known = {each.partners.tobytes(): each for each in (first.rival, *others)}
     ranked = [
         known.get(each.partners.tobytes()) or _rival(each.partners, whole, weights)
@@ -153,11 +161,6 @@ def considered(
     ------
     float
         The share that is done of what takes time.
-
-    Raises
-    ------
-    AnswerUnavailableError
-        If no map was found that the caller does not rule out.
     """
     whole, weights = Part.whole(comparison.table, comparison.own), goal.weights.searched
     searched, part = found.best, found.best.part
@@ -175,17 +178,11 @@ def considered(
     )
     alike = [Rival(part.kept, part.objects, other.mapped, other.confidence) for other in near]
     met = [each for each in (best, *found.rivals, *alike, *beside) if _is_possible(each, goal)]
-    if not met:
-        raise AnswerUnavailableError(
-            "the search found no map that keeps to what is known of the objects; pin fewer of "
-            "them, allow more time, or choose another searcher"
-        )
 
     def worth(rival: Rival) -> float:
         return rival.value(goal.price)
 
-    leaders = [each for each in (best, *beside) if _is_possible(each, goal)] or met
-    leader = max(leaders, key=worth)
+    leader = max((each for each in (best, *beside) if _is_possible(each, goal)), key=worth)
     others = {each.partners.tobytes(): each for each in sorted(met, key=worth)}
     others.pop(leader.partners.tobytes())
     ranked = tuple(sorted(others.values(), key=lambda each: -worth(each)))
@@ -229,6 +226,59 @@ def problem_of(
     )
 
 
+def check_maps(judgement: Any, problem: JudgeProblem) -> None:
+    """Refuse what is no judgement of one object map or more, all different and possible.
+
+    Raises
+    ------
+    TypeError, ValueError
+        With a sentence that tells what a judge did.
+    """
+    if not isinstance(judgement, Judgement):
+        raise TypeError(f"it returned a {type(judgement).__name__}, not a Judgement")
+    maps = judgement.maps
+    if not (isinstance(maps, tuple) and all(isinstance(each, JudgedMap) for each in maps)):
+        raise TypeError("its maps are no tuple of JudgedMap")
+    if not maps:
+        raise ValueError("it returned no map")
+    for each in maps:
+        check_map(each.partners, problem)
+    if len({each.partners.tobytes() for each in maps}) < len(maps):
+        raise ValueError("it returned a map twice")
+
+
+def check_probabilities(judgement: Judgement, problem: JudgeProblem) -> None:
+    """Refuse probabilities that are none, or contradict each other.
+
+    Raises
+    ------
+    TypeError, ValueError
+        With a sentence that tells what a judge did.
+    """
+    lines, elsewhere = judgement.lines, judgement.elsewhere
+    table = problem.table
+    if lines is not None:
+        checked_array(lines, (table.template_objects, table.argument_objects + 1), most=1.0)
+    if elsewhere is not None:
+        _check_probability("elsewhere", elsewhere)
+    for each in judgement.maps:
+        if each.probability is None:
+            continue
+        _check_probability("probability of a map", each.probability)
+        if elsewhere is not None and each.probability > 1.0 - elsewhere + _ROUNDING:
+            raise ValueError(
+                f"its map is right with probability {each.probability:g}, and the place another "
+                f"one with {elsewhere:g}"
+            )
+        if lines is not None:
+            least = lines[np.arange(len(lines)), each.partners].min()  # −1 is the last, of none
+            if each.probability > least + _ROUNDING:
+                raise ValueError(
+                    f"its map is right with probability {each.probability:g}, and one of its "
+                    f"lines with {least:g}"
+                )
+
+
 def _considered(rival: Rival, whole: Part, goal: Goal) -> Generator[float, None, Considered]:
     """Return a map with its relations, and ζ of the histogram map that it induces."""
     weights = goal.weights.searched
@@ -264,48 +314,6 @@ def _exchanges(mapped: ObjectMap, part: Part, goal: Goal) -> FloatArray | None:
     # Where h is held, its holder takes what g had.
     possible[:, partners] &= possible[:, partners].T
     return np.where(possible, exchanges, -np.inf)
-
-
-def _checked(judgement: Any, problem: JudgeProblem) -> Judgement:
-    """Return what a judge returned, if it keeps to the contract of judges."""
-    if not isinstance(judgement, Judgement):
-        raise TypeError(f"it returned a {type(judgement).__name__}, not a Judgement")
-    maps = judgement.maps
-    if not (isinstance(maps, tuple) and all(isinstance(each, JudgedMap) for each in maps)):
-        raise TypeError("its maps are no tuple of JudgedMap")
-    if not maps:
-        raise ValueError("it returned no map")
-    for each in maps:
-        check_map(each.partners, problem)
-    if len({each.partners.tobytes() for each in maps}) < len(maps):
-        raise ValueError("it returned a map twice")
-    _check_probabilities(judgement, problem)
-    return judgement
-
-
-def _check_probabilities(judgement: Judgement, problem: JudgeProblem) -> None:
-    lines, elsewhere = judgement.lines, judgement.elsewhere
-    table = problem.table
-    if lines is not None:
-        checked_array(lines, (table.template_objects, table.argument_objects + 1), most=1.0)
-    if elsewhere is not None:
-        _check_probability("elsewhere", elsewhere)
-    for each in judgement.maps:
-        if each.probability is None:
-            continue
-        _check_probability("probability of a map", each.probability)
-        if elsewhere is not None and each.probability > 1.0 - elsewhere + _ROUNDING:
-            raise ValueError(
-                f"its map is right with probability {each.probability:g}, and the place another "
-                f"one with {elsewhere:g}"
-            )
-        if lines is not None:
-            least = lines[np.arange(len(lines)), each.partners].min()  # −1 is the last, of none
-            if each.probability > least + _ROUNDING:
-                raise ValueError(
-                    f"its map is right with probability {each.probability:g}, and one of its "
-                    f"lines with {least:g}"
-                )
 
 
 def _check_probability(name: str, given: Any) -> None:

@@ -15,7 +15,7 @@ e′ is within [0, 1] as e is, and no searcher meets values that it does not exp
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Collection, Generator
 from dataclasses import dataclass, replace
 from itertools import combinations, islice
 
@@ -36,7 +36,7 @@ from sketchmatch.pipeline.knowledge import matching
 from sketchmatch.pipeline.slices import in_slices
 from sketchmatch.pipeline.unmatched import Part, PartSearch
 
-__all__ = ["Obedience", "first_parts", "obedience"]
+__all__ = ["Obedience", "first_parts", "obedience", "ruled_out"]
 
 _MARGIN = 1.001
 _FEW = 10
@@ -160,15 +160,35 @@ def obedience(
     return Obedience(part, weights, allowed, lowered, (most, weights[1], weights[2]))
 
 
-def first_parts(allowed: BoolArray, pinned: IntArray) -> list[tuple[int, ...]]:
+def ruled_out(allowed: BoolArray | None, pinned: IntArray, table: RelationTable) -> BoolArray:
+    """Return the pairings that are not ruled out, by known partners neither.
+
+    Parameters
+    ----------
+    allowed
+        Shape (N, N'): those that nothing else rules out; None for all.
+    pinned
+        Shape (N,): the known partners, −1 where none is known.
+    table
+        Of N and N' objects.
+    """
+    known = np.flatnonzero(pinned >= 0)
+    left = np.ones((table.template_objects, table.argument_objects), dtype=np.bool_)
+    left[known] = False
+    left[:, pinned[known]] = False
+    left[known, pinned[known]] = True
+    return sealed(left if allowed is None else left & allowed)
+
+
+def first_parts(allowed: BoolArray, fixed: Collection[int]) -> list[tuple[int, ...]]:
     """Return with which template objects to begin: as many as can all find a partner.
 
     Parameters
     ----------
     allowed
         Shape (N, N').
-    pinned
-        Shape (N,): the known partners, −1 where none is known.
+    fixed
+        The objects that must be among them.
 
     Returns
     -------
@@ -179,7 +199,7 @@ def first_parts(allowed: BoolArray, pinned: IntArray) -> list[tuple[int, ...]]:
     found = tuple(np.flatnonzero(matching(allowed) >= 0).tolist())
     if len(found) == len(free):
         return [found]
-    must = set(np.flatnonzero(pinned >= 0).tolist())
+    must = set(fixed)
     others = (
         kept
         for kept in islice(combinations(free, len(found)), _TRIED)

@@ -116,8 +116,8 @@ class Statistics:
     iterations, evaluations
         Of the searcher: its iterations, and the FMAPs that it evaluated.
     seconds
-        Time of each stage, ``segment``, ``describe``, ``relate``, ``search``, and ``total``, all
-        without the compilation of kernels.
+        Time of each stage, ``segment``, ``describe``, ``relate``, ``search`` with the judgement,
+        and ``total``, all without the compilation of kernels.
     """
 
     iterations: int

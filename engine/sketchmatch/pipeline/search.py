@@ -12,11 +12,12 @@ from functools import cache, partial
 import numpy as np
 
 from sketchmatch.api import MatchProblem, Outcome, Searcher, SearchProgress
+from sketchmatch.errors import AnswerUnavailableError
 from sketchmatch.model import BoolArray, ConfidenceWeights, IntArray, Scene
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison
-from sketchmatch.pipeline.guard import blaming, checked_progress, inspecting
-from sketchmatch.pipeline.obeying import Obedience, first_parts, obedience
+from sketchmatch.pipeline.guard import FEWEST, blaming, checked_progress, inspecting
+from sketchmatch.pipeline.obeying import Obedience, first_parts, obedience, ruled_out
 from sketchmatch.pipeline.slices import retold
 from sketchmatch.pipeline.unmatched import Part, PartSearch, Rival, part_of, trials
 from sketchmatch.registry import Registry
@@ -95,13 +96,20 @@ def search(
     ------
     PluginError
         If the searcher breaks its contract.
+    AnswerUnavailableError
+        If every map is ruled out.
     """
     whole = Part.whole(comparison.table, comparison.own)
     weights = goal.weights.searched
     first, fixed = [tuple(range(whole.objects))], frozenset[int]()
-    if goal.allowed is not None and goal.pinned is not None:
-        first = first_parts(goal.allowed, goal.pinned)
+    if goal.pinned is not None:
+        goal = replace(goal, allowed=ruled_out(goal.allowed, goal.pinned, whole.table))
         fixed = frozenset(np.flatnonzero(goal.pinned >= 0).tolist())
+    if goal.allowed is not None:
+        first = first_parts(goal.allowed, fixed)
+        fewest = whole.objects if goal.price == math.inf else min(FEWEST, whole.objects)
+        if len(first[0]) < fewest:
+            raise AnswerUnavailableError("no map keeps to what is known of the objects; pin fewer")
     plan = trials(first, weights, math.inf if goal.at_once else goal.price, fixed)
     trial, so_far, rivals = next(plan), None, list[Rival]()
     while True:

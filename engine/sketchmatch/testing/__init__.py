@@ -5,7 +5,8 @@
   :func:`search_report` says what of a searcher no contract asks for.
 - The oracle, slow and obvious: :func:`score_fmap`, :func:`best_object_map`, :func:`is_legal`,
   :func:`is_object_consistent`, :func:`mapped_pairs`.
-- Problems for searchers: :func:`matching_problem` with its truth, :func:`random_relations`.
+- Problems with their truth: :func:`matching_problem` for searchers, :func:`judging_problem` for
+  judges; :func:`random_relations` has none.
 - Scenes and sketches: :func:`random_scene`, :func:`simulate_sketch`, :func:`draw_strokes`,
   :func:`draw_sloppily`; photographs of drawings in :mod:`sketchmatch.testing.photographs`.
 - Maps: :func:`survey` sends a robot with a :class:`Lidar` through a :class:`World`, and
@@ -47,7 +48,7 @@ from sketchmatch.testing.oracle import (
     mapped_pairs,
     score_fmap,
 )
-from sketchmatch.testing.problems import matching_problem, random_relations
+from sketchmatch.testing.problems import judging_problem, matching_problem, random_relations
 from sketchmatch.testing.robot import Survey, survey
 from sketchmatch.testing.sketches import (
     SimulatedSketch,
@@ -79,6 +80,7 @@ __all__ = [
     "estimate_poses",
     "is_legal",
     "is_object_consistent",
+    "judging_problem",
     "map_scans",
     "mapped_pairs",
     "matching_problem",

@@ -242,7 +242,9 @@ class Profile(google.protobuf.message.Message):
     is_default: builtins.bool
     """Whether the server takes it where a request names none."""
     allow_unmatched: builtins.bool
-    """Whether objects may stay without partner on both sides."""
+    """Whether objects may stay without partner on both sides, whatever searcher and judge do by
+    themselves.
+    """
     @property
     def pipeline(self) -> sketchmatch_proto.v1.pipeline_pb2.Pipeline:
         """What it chooses: the stages that it leaves out are the server's defaults."""

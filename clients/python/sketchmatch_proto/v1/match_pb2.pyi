@@ -72,7 +72,9 @@ class _OutcomeEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._EnumTy
     OUTCOME_UNSPECIFIED: _Outcome.ValueType  # 0
     """Never sent."""
     OUTCOME_CONVERGED: _Outcome.ValueType  # 1
-    """The searcher found nothing better for as long as its parameters ask."""
+    """The searcher found nothing better for as long as its parameters ask, or it proved that another
+    map than the judge takes has the highest ζ.
+    """
     OUTCOME_OPTIMAL: _Outcome.ValueType  # 2
     """The searcher proved that no map has a higher ζ; where objects may stay unmatched, no map of the
     same objects of the smaller scene.
@@ -88,7 +90,9 @@ class Outcome(_Outcome, metaclass=_OutcomeEnumTypeWrapper):
 OUTCOME_UNSPECIFIED: Outcome.ValueType  # 0
 """Never sent."""
 OUTCOME_CONVERGED: Outcome.ValueType  # 1
-"""The searcher found nothing better for as long as its parameters ask."""
+"""The searcher found nothing better for as long as its parameters ask, or it proved that another
+map than the judge takes has the highest ζ.
+"""
 OUTCOME_OPTIMAL: Outcome.ValueType  # 2
 """The searcher proved that no map has a higher ζ; where objects may stay unmatched, no map of the
 same objects of the smaller scene.
@@ -349,7 +353,7 @@ class MatchResult(google.protobuf.message.Message):
     """Ω, the mean confidence of the object map, within [0, 1]."""
     upper_bound: builtins.float
     """A ζ that no map exceeds; where objects may stay unmatched, no map of the same objects of the
-    smaller scene. Absent where the searcher proves nothing.
+    smaller scene. Absent where the searcher proves nothing of maps of these objects.
     """
     rotation_radians: builtins.float
     """Radians counter-clockwise by which the sketch as a whole is turned to lie like the map, within
@@ -390,7 +394,7 @@ class MatchResult(google.protobuf.message.Message):
 
     @property
     def fmap_confidence(self) -> global___FmapConfidence:
-        """ζ and its parts, which is what the search maximised."""
+        """ζ and its parts, which is what the search maximised; the judge may take another map for it."""
 
     @property
     def fmap_entries(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___FmapEntry]:

@@ -43,12 +43,13 @@ class MatchRequest(google.protobuf.message.Message):
     """Whether an object may stay without partner on both sides where that is likelier: a sketch can
     show what the map lacks, while it lacks something itself. At least 3 objects of the smaller
     scene find a partner. Only searchers that map objects can do it. Absent: as the profile says, or
-    else not: the smaller scene is matched completely.
+    else where the searcher or the judge finds such maps by itself. Where they may not, the smaller
+    scene is matched completely.
     """
     unmatched_price: builtins.float
     """What a map loses that leaves all objects of the smaller scene out, in units of ζ, and in
     proportion where it leaves out some: more makes it rarer. Above 0, at most 1000, and only where
-    objects may stay unmatched. Absent: one that was learned for the weights.
+    objects may stay unmatched. Absent: the judge's own.
     """
     @property
     def sketch(self) -> sketchmatch_proto.v1.source_pb2.Source:

@@ -10,6 +10,7 @@ from sketchmatch.registry import Kind
 from sketchmatch.testing.conformance import (
     every_kind,
     histograms,
+    judges,
     searchers,
     segmenters,
     similarities,
@@ -38,6 +39,7 @@ _CONTRACTS: dict[Kind, Callable[[type[Any]], Sequence[Contract]]] = {
     Kind.HISTOGRAM: lambda _: histograms.CONTRACTS,
     Kind.SIMILARITY: lambda _: similarities.CONTRACTS,
     Kind.SEARCHER: lambda _: searchers.CONTRACTS,
+    Kind.JUDGE: lambda _: judges.CONTRACTS,
 }
 
 

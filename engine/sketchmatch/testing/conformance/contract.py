@@ -5,8 +5,8 @@ from __future__ import annotations
 import inspect
 import re
 import traceback
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import FrozenInstanceError, dataclass
 from enum import StrEnum
 from functools import partial
@@ -25,6 +25,7 @@ __all__ = [
     "ContractViolationError",
     "NotApplicableError",
     "PluginCheck",
+    "refused_as_broken",
     "require",
     "require_applicable",
     "writing_behind",
@@ -39,7 +40,7 @@ Contract = Callable[[type[Any]], None]
 Its name is the check's, its docstring says what it demands.
 """
 
-_METHODS = ("segment", "describe", "compare", "combine", "search")
+_METHODS = ("segment", "describe", "compare", "combine", "search", "judge")
 _READ_ONLY = re.compile(r"read.?only", re.IGNORECASE)
 
 
@@ -213,6 +214,15 @@ def require_applicable(applies: Any, reason: str) -> None:
     """Leave a contract unchecked, for a reason, unless it applies."""
     if not applies:
         raise NotApplicableError(reason)
+
+
+@contextmanager
+def refused_as_broken() -> Iterator[None]:
+    """Take what the host refuses within the block, with a sentence, for a broken contract."""
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        raise BrokenError(str(error)) from None
 
 
 def writing_behind(error: BaseException) -> BaseException | None:

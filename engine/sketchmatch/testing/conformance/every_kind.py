@@ -35,8 +35,8 @@ def kind_of_class(algorithm: type[Any]) -> Kind:
         if inspect.isclass(algorithm) and issubclass(algorithm, kind.interface):
             return kind
     raise TypeError(
-        f"{algorithm!r} derives from none of Segmenter, Histogram, Similarity and Searcher of "
-        "sketchmatch.api"
+        f"{algorithm!r} derives from none of Segmenter, Histogram, Similarity, Searcher and Judge "
+        "of sketchmatch.api"
     )
 
 

@@ -20,9 +20,12 @@ import numpy as np
 
 from sketchmatch.api import MatchProblem, Outcome, Searcher, SearchProgress
 from sketchmatch.model import Fmap, RelationTable, pair_count
+from sketchmatch.model.arrays import sealed
+from sketchmatch.pipeline.guard import check_map
 from sketchmatch.testing.conformance.contract import (
     BrokenError,
     Contract,
+    refused_as_broken,
     require,
     require_applicable,
 )
@@ -33,7 +36,7 @@ from sketchmatch.testing.oracle import (
     is_object_consistent,
     score_fmap,
 )
-from sketchmatch.testing.problems import random_relations
+from sketchmatch.testing.problems import matching_problem, random_relations
 
 __all__ = ["CONTRACTS", "Run", "large_problem", "run"]
 
@@ -182,6 +185,15 @@ def object_maps_are_kept_to(algorithm: type[Searcher]) -> None:
             )
 
 
+def maps_beside_are_possible(algorithm: type[Searcher]) -> None:
+    """Tell in SearchProgress.maps object maps of three objects or more, and none ruled out."""
+    require_applicable(algorithm().partial, "it says partial = False")
+    for problem in _partial_problems():
+        for partners in run(algorithm(), problem).seen[-1].maps:
+            with refused_as_broken():
+                check_map(partners, problem)
+
+
 def evidence_is_weighed(algorithm: type[Searcher]) -> None:
     """Take table.entry_evidence for σ, or say object_consistent = False."""
     require_applicable(algorithm().object_consistent, _OF_PAIRS)
@@ -275,6 +287,7 @@ CONTRACTS: tuple[Contract, ...] = (
     upper_bound_never_rises,
     optimal_is_optimal,
     object_maps_are_kept_to,
+    maps_beside_are_possible,
     evidence_is_weighed,
     rotations_are_weighed,
     odd_problems_are_solved,
@@ -293,6 +306,17 @@ def _problems() -> tuple[MatchProblem, ...]:
         MatchProblem(random_relations(rng, 4, 6), alternatives=2),
         MatchProblem(random_relations(rng, 5, 5), weights=(1.0, 2.0, 0.5), alternatives=2),
     )
+
+
+@lru_cache(maxsize=1)
+def _partial_problems() -> tuple[MatchProblem, ...]:
+    drawn, _ = matching_problem(np.random.default_rng(12), 7, missing=2, extra=1)
+    drawn = replace(drawn, partial=True, alternatives=3)
+    table = drawn.table
+    allowed = np.ones((table.template_objects, table.argument_objects), dtype=bool)
+    allowed[0], allowed[1:, 2] = np.arange(table.argument_objects) == 2, False
+    pinned = np.where(np.arange(table.template_objects) == 0, 2, -1)
+    return drawn, replace(drawn, allowed=sealed(allowed), pinned=sealed(pinned))
 
 
 @lru_cache(maxsize=1)
