@@ -41,6 +41,7 @@ class Stubborn(Searcher):
     summary = "Tells the same map each time."
     partners: tuple[int, ...] = ()
     outcome = Outcome.OPTIMAL
+    maps: tuple[np.ndarray, ...] = ()
     problems: list[MatchProblem]
 
     def search(self, problem, rng):
@@ -51,7 +52,7 @@ class Stubborn(Searcher):
         partners = np.array(partners[: table.template_objects])
         fmap = Fmap.from_object_map(partners, table.argument_objects)
         zeta = oracle.confidence(table, oracle.induced(partners.tolist()), problem.weights)[0]
-        yield SearchProgress(fmap, zeta, 1, 1, upper_bound=1.0)
+        yield SearchProgress(fmap, zeta, 1, 1, upper_bound=1.0, maps=self.maps)
         return self.outcome
 
 
@@ -263,6 +264,18 @@ def test_the_best_part_is_found_where_not_all_can_find_a_partner():
         values += [value for p, value in every.items() if not {extra, truth[2]} & set(p)]
     assert len(found.object_map) == 4
     assert found.fmap_confidence == pytest.approx(max(values), abs=1e-8)
+
+
+def test_maps_that_a_searcher_tells_of_a_part_are_maps_of_all(monkeypatch):
+    sketch, place, truth = drawn(8, 5, 6)
+    right = np.array(truth[1:])
+    monkeypatch.setattr(Stubborn, "partial", True)
+    monkeypatch.setattr(Stubborn, "partners", tuple(np.roll(right, 1).tolist()))
+    monkeypatch.setattr(Stubborn, "maps", (right,))
+    found = answered(sketch, place, searcher="stubborn", pins=[Pin(0, None)])
+    assert Stubborn.problems[0].partial
+    assert Stubborn.problems[0].table.template_objects == 4
+    assert found.object_map == {a: truth[a] for a in range(1, 5)}
 
 
 def test_parts_to_begin_with_are_all_that_can_find_partners_in_several_ways():

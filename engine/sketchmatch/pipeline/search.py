@@ -102,9 +102,9 @@ def search(
     whole = Part.whole(comparison.table, comparison.own)
     weights = goal.weights.searched
     first, fixed = [tuple(range(whole.objects))], frozenset[int]()
-    if goal.pinned is not None:
-        goal = replace(goal, allowed=ruled_out(goal.allowed, goal.pinned, whole.table))
-        fixed = frozenset(np.flatnonzero(goal.pinned >= 0).tolist())
+    if (pinned := goal.pinned) is not None:
+        goal = replace(goal, allowed=ruled_out(goal.allowed, pinned, whole.table))
+        fixed = frozenset(np.flatnonzero(pinned >= 0).tolist())
     if goal.allowed is not None:
         first = first_parts(goal.allowed, fixed)
         fewest = whole.objects if goal.price == math.inf else min(FEWEST, whole.objects)
