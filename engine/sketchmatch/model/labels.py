@@ -143,13 +143,13 @@ def compare_labels(
     drawn, mapped = list(map(_meaning, template)), list(map(_meaning, argument))
     if not any(drawn) or not any(mapped):
         return None
-    groups = _merged([[_meaning(label) for label in group] for group in synonyms])
+    groups = _grouped([[_meaning(label) for label in group] for group in synonyms])
 
     @cache
     def group_of(label: str) -> int:
         """Return the number of the group that a label is in, −1 for none."""
-        held = (any(_alike(label, other) for other in group) for group in groups)
-        return next((k for k, holds in enumerate(held) if holds), -1)
+        held = groups.get(_initials(label), ())
+        return next((k for other, k in held if _alike(label, other)), -1)
 
     @cache
     def compared(one: str, other: str) -> int:
@@ -171,18 +171,22 @@ def _meaning(label: str) -> str:
     return " ".join(word for word in words if word) or text
 
 
-def _merged(groups: Iterable[list[str]]) -> list[list[str]]:
-    """Return groups of which no two share a label."""
-    merged: list[list[str]] = []
-    for group in groups:
-        joined, apart = list(group), []
-        for other in merged:
-            if any(_alike(a, b) for a in joined for b in other):
-                joined += other
-            else:
-                apart.append(other)
-        merged = [*apart, joined]
-    return merged
+def _grouped(groups: Sequence[list[str]]) -> dict[str, list[tuple[str, int]]]:
+    """Return labels and their groups, by initials; groups that share a label have one number."""
+    number = list(range(len(groups)))
+    held: dict[str, list[tuple[str, int]]] = {}
+    for k, group in enumerate(groups):
+        for label in group:
+            alike = held.setdefault(_initials(label), [])
+            for joined in {number[j] for other, j in alike if _alike(label, other)}:
+                number = [number[k] if each == joined else each for each in number]
+            alike.append((label, k))
+    return {key: [(label, number[k]) for label, k in alike] for key, alike in held.items()}
+
+
+def _initials(label: str) -> str:
+    """Return the first letters of a label's words, which no plural changes."""
+    return "".join(word[0] for word in label.split())
 
 
 def _alike(one: str, other: str) -> bool:

@@ -101,12 +101,9 @@ class Obedience:
         partners = matching(self.allowed, preference)
         fmap = Fmap.from_object_map(partners, table.argument_objects)
         confidence = fmap_confidence(fmap, table, self.weights).total
-        bound = best.upper_bound
-        if bound is not None:
-            bound = max(bound, confidence)
         return replace(
             found,
-            best=replace(best, fmap=fmap, confidence=confidence, upper_bound=bound),
+            best=replace(best, fmap=fmap, confidence=confidence),
             outcome=Outcome.CONVERGED if found.outcome is Outcome.OPTIMAL else found.outcome,
             partners=sealed(partners),
             obeys=True,
