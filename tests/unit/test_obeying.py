@@ -10,11 +10,14 @@ from hypothesis import strategies as st
 from sketchmatch import Pin, Scene, compare, match
 from sketchmatch.api import MatchProblem, Outcome, Searcher, SearchProgress
 from sketchmatch.errors import InvalidInputError
-from sketchmatch.model import Fmap
+from sketchmatch.model import ConfidenceWeights, Fmap, RelationTable, object_pairs
+from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.events import Finished, Progress
+from sketchmatch.pipeline.knowledge import knowledge
 from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.obeying import first_parts, obedience
 from sketchmatch.pipeline.request import MatchRequest
+from sketchmatch.pipeline.search import Goal
 from sketchmatch.pipeline.selection import Choice
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.pipeline.unmatched import Part, part_of
@@ -182,6 +185,31 @@ def test_a_searcher_is_given_maps_in_an_order_in_which_all_that_obey_come_first(
         assert not given_.read(SearchProgress(fmap, told[p], 1, 1), None).obeys
 
 
+def reading(fmap, similarity=0.0):
+    """Return what a progress with an FMAP of three objects in four means, where nothing is out."""
+    table = RelationTable(np.full((3, 6), similarity), np.zeros((3, 6)), np.ones((3, 6)), 3, 4)
+    allowed = np.ones((3, 4), dtype=bool)
+    given_ = finish(obedience(Part.whole(table), (1.0, 1.0, 1.0), allowed))
+    return given_.read(SearchProgress(fmap, 0.5, 1, 1), None)
+
+
+@pytest.mark.parametrize("partners", itertools.permutations(range(4), 3))
+def test_a_map_is_known_where_no_evidence_speaks_for_it(partners):
+    read = reading(Fmap.from_object_map(np.array(partners), 4))
+    assert read.mapped.partners.tolist() == list(partners)
+    assert read.best.upper_bound is None
+
+
+@pytest.mark.parametrize("pairs", [[(0, 1), (2, 3), (0, 2)], [(0, 1), (2, 3), (1, 3)]])
+def test_an_fmap_of_no_object_map_is_read_by_its_evidence(pairs):
+    columns = object_pairs(4).tolist()
+    fmap = Fmap(np.array([columns.index(list(pair)) for pair in pairs]))
+    read = reading(fmap, 0.5)
+    assert read.partners is None
+    assert sorted(read.mapped.partners.tolist()) == sorted(set(read.mapped.partners.tolist()))
+    assert read.obeys
+
+
 def test_a_searcher_sees_what_is_known_and_no_value_that_it_does_not_expect():
     sketch, place, _ = drawn(3, 4, 5)
     answered(sketch, place, searcher="stubborn", pins=[Pin(1, 2), Pin(0, 4, excluded=True)])
@@ -264,6 +292,24 @@ def test_the_best_part_is_found_where_not_all_can_find_a_partner():
         values += [value for p, value in every.items() if not {extra, truth[2]} & set(p)]
     assert len(found.object_map) == 4
     assert found.fmap_confidence == pytest.approx(max(values), abs=1e-8)
+
+
+def test_what_is_known_is_certain():
+    sketch, place, truth = drawn(1, 6, 7)
+    pins = [Pin(0, None), Pin(1, truth[2])]
+    found = answered(sketch, place, pins=pins, allow_unmatched=True)
+    likely = {line.sketch_object: line.probability for line in found.matches}
+    assert likely.pop(1) == 1.0
+    assert max(likely.values()) < 1.0
+    assert found.probability < 1.0
+    comparison, engine = compare(sketch, place), Engine(REGISTRY)
+    known = knowledge(pins, (), (sketch, place), swapped=False, partial=True)
+    goal = Goal(ConfidenceWeights(), 0.4, allowed=known.allowed, pinned=known.pinned)
+    pipeline = engine.resolve({"searcher": Choice("auto")})
+    search = finish(engine.search(comparison, pipeline.searcher, goal))
+    lines = finish(engine.judge(comparison, search, goal, pipeline.judge)).judgement.lines
+    assert lines[0].tolist() == [*[0.0] * 7, 1.0]
+    assert lines[1].tolist() == [float(c == truth[2]) for c in range(8)]
 
 
 def test_maps_that_a_searcher_tells_of_a_part_are_maps_of_all(monkeypatch):
