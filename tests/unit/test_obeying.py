@@ -193,7 +193,7 @@ def reading(fmap, similarity=0.0):
     return given_.read(SearchProgress(fmap, 0.5, 1, 1), None)
 
 
-@pytest.mark.parametrize("partners", itertools.permutations(range(4), 3))
+@pytest.mark.parametrize("partners", [*itertools.permutations(range(4), 3)])
 def test_a_map_is_known_where_no_evidence_speaks_for_it(partners):
     read = reading(Fmap.from_object_map(np.array(partners), 4))
     assert read.mapped.partners.tolist() == list(partners)
