@@ -108,7 +108,7 @@ def test_what_is_said_twice_or_follows_is_no_contradiction():
         ([Pin(0, 0), Pin(0, None)], "pins[1].map_object contradicts pins[0], which gives the same"),
         ([Pin(0, None), Pin(0, 0)], "pins[1].map_object contradicts pins[0], which gives the same"),
         (
-            [Pin(0, 2), Pin(1, "Chair")],
+            [Pin(1, 2), Pin(0, "Chair")],
             "pins[1].map_object is the partner of another sketched object in pins[0]; drop one",
         ),
         (
@@ -116,7 +116,7 @@ def test_what_is_said_twice_or_follows_is_no_contradiction():
             "pins[0].excluded contradicts pins[2], which says that it is this one; drop one",
         ),
         (
-            [Pin(1, 0), Pin(0, None)],
+            [Pin(1, 0), Pin(0, None), Pin(3, None)],
             "pins[1].map_object says that it is on no map, but every object of the sketch must "
             "find a partner; allow unmatched objects or drop the pin",
         ),
