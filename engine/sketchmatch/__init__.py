@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from sketchmatch.pipeline.compare import Comparison
     from sketchmatch.pipeline.engine import Engine
     from sketchmatch.pipeline.events import Progress
+    from sketchmatch.pipeline.knowledge import Pin
     from sketchmatch.pipeline.result import MatchResult
     from sketchmatch.pipeline.words import DirectionalRelation, directional_relation
     from sketchmatch.public import (
@@ -31,6 +32,7 @@ __all__ = [
     "Engine",
     "InvalidInputError",
     "MatchResult",
+    "Pin",
     "Progress",
     "Scene",
     "SketchmatchError",
@@ -50,6 +52,7 @@ _HOMES = {
     "DirectionalRelation": "sketchmatch.pipeline.words",
     "InvalidInputError": "sketchmatch.errors",
     "MatchResult": "sketchmatch.pipeline.result",
+    "Pin": "sketchmatch.pipeline.knowledge",
     "Progress": "sketchmatch.pipeline.events",
     "Scene": "sketchmatch.model",
     "SketchmatchError": "sketchmatch.errors",

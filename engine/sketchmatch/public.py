@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,10 +29,12 @@ from sketchmatch.model import (
     Source,
     object_pairs,
 )
+from sketchmatch.model.labels import Synonyms
 from sketchmatch.model.limits import source_limits
 from sketchmatch.pipeline.compare import Comparison
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.events import Finished, Progress
+from sketchmatch.pipeline.knowledge import Pin
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import MatchResult
 from sketchmatch.pipeline.selection import SIDES, STAGES, Choice, Selection, fault_of
@@ -59,6 +61,8 @@ def match(
     allow_unmatched: bool | None = None,
     unmatched_price: float | None = None,
     alternatives: int | None = None,
+    pins: Mapping[int | str, int | str | None] | Iterable[Pin] | None = None,
+    synonyms: Synonyms | None = None,
     on_progress: Callable[[Progress], None] | None = None,
     config: str | Path | None = None,
 ) -> MatchResult:
@@ -101,6 +105,15 @@ def match(
     alternatives
         How many of the next best object maps the result shall hold; None for 3, or as many as
         there are.
+    pins
+        What is known of single objects: a dict from sketched objects to the mapped ones that they
+        are, or None for one that is on no map, e.g. ``{"desk": 3, 0: "sofa", 5: None}``; objects
+        by index, from 0, or by a label that no other of the scene has. Or a list of
+        :class:`~sketchmatch.Pin`, which can also say that one is *not* another. The answer obeys.
+    synonyms
+        Labels that mean the same, beside those that are equal but for case, plural and numbers
+        that count: ``[("couch", "sofa")]``. Labels are evidence where both scenes have some, for
+        algorithms that weigh them, and force nothing.
     on_progress
         Called with the state of the match, at most 20 times a second.
     config
@@ -149,6 +162,8 @@ def match(
             unmatched_price=unmatched_price,
             alternatives=alternatives,
             profile=profile or "",
+            pins=_pins(pins),
+            synonyms=() if synonyms is None else synonyms,  # type: ignore[arg-type]  # it checks
         )
     for event in engine.match(request):
         if isinstance(event, Finished):
@@ -456,6 +471,13 @@ def _selection(
         stage: Choice(names.get(stage) or "", _mapping(f"params.{stage}", params.get(stage)))
         for stage in {*names, *params}
     }
+
+
+def _pins(given: Mapping[int | str, int | str | None] | Iterable[Pin] | None) -> tuple[Pin, ...]:
+    """Return pins as a request has them, which checks them."""
+    if isinstance(given, Mapping):
+        return tuple(Pin(sketched, mapped) for sketched, mapped in given.items())
+    return () if given is None else given  # type: ignore[return-value]
 
 
 def _mapping(field: str, given: Mapping[str, Any] | None) -> Mapping[str, Any]:

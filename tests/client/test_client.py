@@ -105,6 +105,19 @@ class TestRequest:
         assert allowing.allow_unmatched
         assert allowing.unmatched_price == 0.5
 
+    def test_carries_what_is_known_of_objects(self, call, server):
+        pins = {"old desk": 3, 0: "sofa", 5: None}
+        call(server.address, "match", SKETCH, MAP, pins=pins, synonyms=[("couch", "sofa")])
+        (request,) = server.requests
+        first, second, third = request.pins
+        assert (first.sketch_object.label, first.map_object.index) == ("old desk", 3)
+        assert (second.sketch_object.index, second.map_object.label) == (0, "sofa")
+        assert second.sketch_object.HasField("index")
+        assert third.sketch_object.index == 5
+        assert not third.HasField("map_object")
+        assert not any(pin.excluded for pin in request.pins)
+        assert [list(group.labels) for group in request.synonyms] == [["couch", "sofa"]]
+
     def test_carries_weights_of_shape_size_and_distance(self, call, server):
         for given in ((1, 2, 3, 0.5, 0), (1, 2, 3, 0.5, 0, 1.5)):
             call(server.address, "match", SKETCH, MAP, weights=given)
@@ -125,6 +138,14 @@ class TestRequest:
             ({"time_budget": float("inf")}, "time_budget is inf; give a positive time"),
             ({"allow_unmatched": "yes"}, "allow_unmatched is 'yes'; give True or False"),
             ({"unmatched_price": "dear"}, "unmatched_price is 'dear'; give a number"),
+            ({"pins": 5}, "pins is 5; give a dict from sketched to mapped objects, or Pin"),
+            ({"pins": [(0, 1)]}, "pins is [(0, 1)]; give a dict"),
+            ({"pins": {-1: 2}}, "pins is {-1: 2}; give a dict"),
+            ({"pins": {True: 2}}, "pins is {True: 2}; give a dict"),
+            ({"pins": {0: 1.5}}, "pins is {0: 1.5}; give a dict"),
+            ({"synonyms": "couch"}, "synonyms is 'couch'; give groups of labels"),
+            ({"synonyms": ["couch"]}, "synonyms is ['couch']; give groups of labels"),
+            ({"synonyms": [(1, 2)]}, "synonyms is [(1, 2)]; give groups of labels"),
             ({"weights": (1, 1)}, "weights is (1, 1); give three numbers"),
             ({"weights": "abc"}, "weights is 'abc'; give three numbers"),
             (

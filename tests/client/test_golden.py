@@ -7,6 +7,7 @@ import pytest
 from sketchmatch_client import (
     DeadlineExceededError,
     InvalidRequestError,
+    Pin,
     ServerBusyError,
     ServerFailedError,
     SketchmatchError,
@@ -62,6 +63,8 @@ MATCHES = {
             "alternatives": 5,
             "allow_unmatched": True,
             "unmatched_price": 0.4375,
+            "pins": [Pin("sofa", 3), Pin(0, "couch", excluded=True), Pin(2, None)],
+            "synonyms": [("couch", "sofa", "settee"), ("desk", "bureau")],
         },
     ),
     "MatchRequest.sparse": (

@@ -30,6 +30,7 @@ from sketchmatch.model import (
     StrokeSet,
 )
 from sketchmatch.pipeline.events import Accepted, Finished, Phase, Progress, Segmented
+from sketchmatch.pipeline.knowledge import Pin
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import (
     AlternativeMap,
@@ -255,6 +256,8 @@ MATCHES = {
         profile="careful",
         allow_unmatched=True,
         unmatched_price=0.4375,
+        pins=(Pin("sofa", 3), Pin(0, "couch", excluded=True), Pin(2, None)),
+        synonyms=(("couch", "sofa", "settee"), ("desk", "bureau")),
     ),
     "MatchRequest.sparse": MatchRequest(
         sketch=PICTURE,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from sketchmatch.io.geojson import decode_geojson
 from sketchmatch.io.stroke_json import decode_strokes
 from sketchmatch.model import LabelledPolygon, Scene, SceneObject, Stroke
-from sketchmatch.model.labels import cleaned_label
+from sketchmatch.model.labels import cleaned_label, compare_labels
 from tests.pace import within
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
@@ -86,3 +86,78 @@ def test_escape_sequences_that_never_end_are_looked_at_once(opening):
 
 def test_an_escape_sequence_ends_where_another_begins():
     assert cleaned_label("a\x9db\x9dc\x07d") == "abd"
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("chair", "Chair"),
+        ("chairs", "chair"),
+        ("CHAIRS", "chair 2"),
+        ("chair2", "chair #12"),
+        ("shelves", "shelf"),
+        ("knives", "knife"),
+        ("stoves", "stove"),
+        ("batteries", "battery"),
+        ("movies", "movie"),
+        ("boxes", "box"),
+        ("glasses", "glass"),
+        ("buses", "bus"),
+        ("houses", "house"),
+        ("couches", "couch"),
+        ("potatoes", "potato"),
+        ("shoes", "shoe"),
+        ("people", "person"),
+        ("old  desks", "Old desk"),
+        ("coffee-table", "coffee tables"),
+        ("room 101", "ROOM 101"),
+        ("caf\xe9", "Cafe\N{COMBINING ACUTE ACCENT}"),
+        ("3", "3"),
+    ],
+)
+def test_labels_mean_the_same_but_for_case_plural_and_count(one, other):
+    assert compare_labels([one], [other]).tolist() == [[1]]
+    assert compare_labels([other], [one]).tolist() == [[1]]
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("chair", "armchair"),
+        ("desk", "old desk"),
+        ("bases", "bass"),
+        ("glas", "glass"),
+        ("room 101", "room 102"),
+        ("room 101", "room"),
+        ("caf\xe9", "cafe"),
+        ("3", "4"),
+        ("कुर्सी", "करस"),
+    ],
+)
+def test_other_labels_mean_other_things(one, other):
+    assert compare_labels([one], [other]).tolist() == [[-1]]
+
+
+def test_synonyms_mean_the_same_in_any_number_and_groups_that_share_one_are_one():
+    synonyms = [("couch", "sofa"), ("desk", "bureau"), ("sofas", "Settee")]
+    found = compare_labels(["Couches", "bureau 2"], ["settee", "desk", "sofa", "bed"], synonyms)
+    assert found.tolist() == [[1, -1, 1, -1], [-1, 1, -1, -1]]
+
+
+def test_an_object_without_a_label_is_compared_with_none():
+    found = compare_labels(["desk", ""], ["", "desk", "bed"])
+    assert found.tolist() == [[0, 1, -1], [0, 0, 0]]
+    assert found.dtype == np.int64
+    assert not found.flags.writeable
+
+
+@pytest.mark.parametrize("side", [["", ""], []])
+def test_nothing_is_compared_where_a_side_has_no_labels(side):
+    assert compare_labels(side, ["desk"]) is None
+    assert compare_labels(["desk"], side) is None
+
+
+def test_labels_as_long_as_a_file_are_compared_in_time():
+    label = "_" * 100_000 + "1" * 100_000 + " " * 100_000
+    with within(5):
+        compare_labels([label], [label[:-1]], [(label, "x")])

@@ -74,7 +74,7 @@ def best_values(table, price):
 def searched(table, price):
     """Return all that is found where exact searches each part, in order."""
     whole, found = Part.whole(table), []
-    plan = trials(table.template_objects, WEIGHTS, price)
+    plan = trials([tuple(range(table.template_objects))], WEIGHTS, price)
     trial = next(plan)
     while True:
         part = finish(part_of(whole, trial.kept))
@@ -156,7 +156,7 @@ def test_zeta_of_two_objects_means_nothing():
     ("objects", "price", "share"), [(4, 0.5, 0.5), (3, 0.5, 1.0), (4, math.inf, 1.0)]
 )
 def test_all_the_time_is_for_the_whole_where_nothing_can_be_left_out(objects, price, share):
-    first = next(trials(objects, WEIGHTS, price))
+    first = next(trials([tuple(range(objects))], WEIGHTS, price))
     assert (first.kept, first.share) == (tuple(range(objects)), share)
 
 

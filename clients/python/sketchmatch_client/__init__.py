@@ -8,7 +8,7 @@ from sketchmatch_client import sources
 from sketchmatch_client._aio import AsyncClient
 from sketchmatch_client._call import MatchCall
 from sketchmatch_client._match import Match, MatchCollector, Progress
-from sketchmatch_client._requests import MatchOptions, match_request, segment_request
+from sketchmatch_client._requests import MatchOptions, Pin, match_request, segment_request
 from sketchmatch_client._summary import summary
 from sketchmatch_client._sync import Client
 from sketchmatch_client.errors import (
@@ -35,6 +35,7 @@ __all__ = [
     "MatchOptions",
     "NotAuthenticatedError",
     "NotSupportedError",
+    "Pin",
     "Progress",
     "ServerBusyError",
     "ServerFailedError",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, TypedDict, Unpack
 
@@ -11,13 +12,14 @@ from google.protobuf.duration_pb2 import Duration
 from google.protobuf.struct_pb2 import Struct
 
 from sketchmatch_client.errors import InvalidRequestError, refused_as
+from sketchmatch_proto.v1 import match_service_pb2
 from sketchmatch_proto.v1.match_pb2 import ConfidenceWeights
-from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
+from sketchmatch_proto.v1.match_service_pb2 import MatchRequest, ObjectReference, Synonyms
 from sketchmatch_proto.v1.pipeline_pb2 import AlgorithmSelection, Pipeline
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest
 from sketchmatch_proto.v1.source_pb2 import Source
 
-__all__ = ["MatchOptions", "match_request", "segment_request"]
+__all__ = ["MatchOptions", "Pin", "match_request", "segment_request"]
 
 Weights = (
     tuple[float, float, float]
@@ -25,6 +27,29 @@ Weights = (
     | tuple[float, float, float, float, float, float]
 )
 """Of similarity, rotation and dilation in ζ, perhaps of shape and size, and of distance in ζR."""
+
+
+@dataclass(frozen=True)
+class Pin:
+    """What is known of a sketched object.
+
+    Attributes
+    ----------
+    sketch
+        The sketched object: its index, from 0, or its label, which no other one has.
+    map
+        The mapped object, in the same way; None if it is on no map and finds no partner.
+    excluded
+        Whether it is known that it is *not* this one: any other may be its partner, or none.
+    """
+
+    sketch: int | str
+    map: int | str | None
+    excluded: bool = False
+
+
+Pins = Mapping[int | str, int | str | None] | Iterable[Pin]
+"""What is known of sketched objects."""
 
 _STAGES = tuple(
     field.name
@@ -60,6 +85,14 @@ class MatchOptions(TypedDict, total=False):
     alternatives
         How many of the next best object maps the result shall hold. Left out: 3, or as many as
         there are.
+    pins
+        What is known of single objects, which the answer obeys: a dict from sketched objects to
+        the mapped ones that they are, or None for one that is on no map, e.g. ``{"desk": 3, 0:
+        "sofa", 5: None}``; objects by index, from 0, or by a label that no other of the scene has.
+        Or :class:`Pin` values, which can also say that one is *not* another.
+    synonyms
+        Labels that mean the same, beside those that are equal but for case, plural and numbers
+        that count: ``[("couch", "sofa")]``. Labels are evidence, and force nothing.
     profile
         Name of one of the server's pipelines, e.g. ``"proof"``, to start from; what
         the options above say wins. Left out: the server's default one.
@@ -78,6 +111,8 @@ class MatchOptions(TypedDict, total=False):
     allow_unmatched: bool | None
     unmatched_price: float | None
     alternatives: int | None
+    pins: Pins | None
+    synonyms: Iterable[Iterable[str]] | None
     profile: str | None
 
 
@@ -192,6 +227,44 @@ def _duration(value: float | timedelta) -> Duration:
     return duration
 
 
+def _pins(pins: Pins) -> list[match_service_pb2.Pin]:
+    given = [Pin(*each) for each in pins.items()] if isinstance(pins, Mapping) else pins
+    return [
+        match_service_pb2.Pin(
+            sketch_object=_reference(pin.sketch),
+            map_object=None if pin.map is None else _reference(pin.map),
+            excluded=pin.excluded,
+        )
+        for pin in map(_checked_pin, given)
+    ]
+
+
+def _checked_pin(given: Any) -> Pin:
+    if not isinstance(given, Pin):
+        raise TypeError
+    return given
+
+
+def _reference(given: Any) -> ObjectReference:
+    if isinstance(given, str):
+        return ObjectReference(label=given)
+    if isinstance(given, bool):
+        raise TypeError
+    return ObjectReference(index=given)
+
+
+def _synonyms(groups: Iterable[Iterable[str]]) -> list[Synonyms]:
+    if isinstance(groups, str):
+        raise TypeError
+    return [Synonyms(labels=_labels(group)) for group in groups]
+
+
+def _labels(group: Iterable[str]) -> list[str]:
+    if isinstance(group, str):
+        raise TypeError
+    return list(group)
+
+
 def _same(value: Any) -> Any:
     return value
 
@@ -207,6 +280,12 @@ _FIELDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "allow_unmatched": ("give True or False", _same),
     "unmatched_price": ("give a number", _same),
     "alternatives": ("give a whole number from 0 to 100", _same),
+    "pins": (
+        "give a dict from sketched to mapped objects, or Pin values; objects by index, from 0, or "
+        "by label",
+        _pins,
+    ),
+    "synonyms": ("give groups of labels, as in [('couch', 'sofa')]", _synonyms),
 }
 """Options that are fields of the request: what to give instead of a wrong value, and how to write
 one."""

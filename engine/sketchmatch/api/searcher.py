@@ -42,7 +42,8 @@ class MatchProblem:
         for. The template has at most as many objects as the argument.
     weights
         Weights of the three parts of ζ: of ζσ, or the mean of the evidence in its place where the
-        table holds any, ζR and ζL.
+        table holds any, ζR and ζL. Where the caller rules pairings out, the evidence says so, and
+        weighs more: this ζ has the order of the true one, which the host reports.
     alternatives
         How many object maps beside the best are wanted.
     time_budget

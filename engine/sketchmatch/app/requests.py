@@ -26,6 +26,7 @@ from sketchmatch.model import (
     StrokeSet,
 )
 from sketchmatch.model.limits import check_objects, check_pixels, check_vertices
+from sketchmatch.pipeline.knowledge import Pin
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import STAGES, Choice, Selection
 from sketchmatch.registry import RegisteredReader
@@ -82,6 +83,8 @@ def match_request(
         time_budget=time_budget(request, max_time_budget),
         weights=_weights(request.weights) if request.HasField("weights") else None,
         profile=request.pipeline.profile,
+        pins=tuple(_pin(pin, f"pins[{k}]") for k, pin in enumerate(request.pins)),
+        synonyms=tuple(tuple(group.labels) for group in request.synonyms),
         **{field.name: value for field, value in request.ListFields() if field.name in _OPTIONS},
     )
 
@@ -224,6 +227,21 @@ def _plain(value: struct_pb2.Value) -> Any:
 def _weights(message: match_pb2.ConfidenceWeights) -> ConfidenceWeights:
     """Read weights, of which any can be left out."""
     return ConfidenceWeights(**{field.name: value for field, value in message.ListFields()})
+
+
+def _pin(message: match_service_pb2.Pin, field: str) -> Pin:
+    sketched = _reference(message.sketch_object, f"{field}.sketch_object")
+    mapped = None
+    if message.HasField("map_object"):
+        mapped = _reference(message.map_object, f"{field}.map_object")
+    return Pin(sketched, mapped, message.excluded)
+
+
+def _reference(message: match_service_pb2.ObjectReference, field: str) -> int | str:
+    kind = message.WhichOneof("kind")
+    if kind is None:
+        raise InvalidInputError(Reason.MISSING_FIELD, field, "is not set; give index or label")
+    return message.index if kind == "index" else message.label
 
 
 def _stroke_set(message: source_pb2.StrokeSet) -> StrokeSet:

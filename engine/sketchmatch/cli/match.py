@@ -77,6 +77,9 @@ def match(
     alternatives: Annotated[
         int | None, typer.Option(metavar="K", help="How many of the next best maps; 3 by default.")
     ] = None,
+    pin: options.Pins = None,
+    no_pin: options.Exclusions = None,
+    synonyms: options.Synonyms = None,
     json: options.Json = False,
     overlay: options.Overlay = None,
     verbose: options.Verbose = False,
@@ -95,6 +98,7 @@ def match(
     options.refuse_config(config, server)
     if overlay is not None:
         pictures.check_path(overlay)
+    known = options.parse_pins(pin, no_pin)
     chosen: MatchOptions = {
         "sketch_segmenter": sketch_segmenter or segmenter_sketch,
         "map_segmenter": map_segmenter or segmenter_map,
@@ -109,9 +113,12 @@ def match(
         "allow_unmatched": allow_unmatched,
         "unmatched_price": unmatched_price,
         "alternatives": alternatives,
+        "pins": list(known.values()),
+        "synonyms": options.parse_synonyms(synonyms),
         "profile": profile,
     }
-    with places.places_in(sketch=sketch, map=map_), answerer(server, config) as asked:
+    named = options.pins_as_typed(list(known))
+    with places.places_in(sketch=sketch, map=map_), named, answerer(server, config) as asked:
         sources = source_of(sketch, "sketch"), source_of(map_, "map")
         answer = display.watch(asked.events(*sources, **chosen))
     metres = in_metres(sources[1])

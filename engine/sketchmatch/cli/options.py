@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from sketchmatch.cli.output import clean, tell
 from sketchmatch.errors import InvalidInputError, Reason
 
+if TYPE_CHECKING:
+    from sketchmatch_client import Pin
+
 __all__ = [
     "Config",
+    "Exclusions",
     "FormerMapSegmenter",
     "FormerSketchSegmenter",
     "Histogram",
@@ -20,13 +26,18 @@ __all__ = [
     "JsonDocument",
     "MapSegmenter",
     "Overlay",
+    "Pins",
     "Profile",
     "Server",
     "Settings",
     "SketchSegmenter",
+    "Synonyms",
     "Verbose",
     "parse_pairs",
+    "parse_pins",
     "parse_settings",
+    "parse_synonyms",
+    "pins_as_typed",
     "refuse_config",
     "say",
     "say_renamed",
@@ -64,6 +75,30 @@ Settings = Annotated[
         metavar="STAGE.PARAMETER=VALUE",
         help="Set a parameter, e.g. searcher.population=400; may be repeated. "
         "`sketchmatch plugins list` shows what there is.",
+    ),
+]
+Pins = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--pin",
+        metavar="SKETCHED=MAPPED",
+        help="This object is that one, by label or by number, from 1 as in tables and pictures; "
+        "desk=none: it is on no map. A label that looks like a number, or has a = in it, goes in "
+        "double quotes. May be repeated.",
+    ),
+]
+Exclusions = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--no-pin", metavar="SKETCHED=MAPPED", help="This object is not that one; as --pin."
+    ),
+]
+Synonyms = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--synonyms",
+        metavar="LABEL,LABEL…",
+        help="Labels that mean the same, e.g. couch,sofa; may be repeated.",
     ),
 ]
 Json = Annotated[
@@ -179,6 +214,113 @@ def parse_pairs(texts: Iterable[str] | None, option: str) -> list[tuple[int, int
             )
         pairs.append((a - 1, b - 1))
     return pairs
+
+
+_PIN = re.compile(r'\s*("[^"]*"|[^="]+?)\s*=\s*("[^"]*"|[^="]+?)\s*', re.DOTALL)
+_PIN_FIELD = re.compile(r"pins\[(\d+)\](?:\.\w+)?")
+
+
+def parse_pins(pins: Iterable[str] | None, exclusions: Iterable[str] | None) -> Mapping[str, Pin]:
+    """Read what is known of single objects, by option as typed; objects count from 0 then.
+
+    Raises
+    ------
+    InvalidInputError
+        If one has another form.
+
+    Examples
+    --------
+    >>> parse_pins(["old desk=3", '"3"=none'], ["2=5"]).values()
+    dict_values([Pin(sketch='old desk', map=2, excluded=False), \
+Pin(sketch='3', map=None, excluded=False), Pin(sketch=1, map=4, excluded=True)])
+    """
+    from sketchmatch_client import Pin
+
+    known = {}
+    for option, texts in (("--pin", pins), ("--no-pin", exclusions)):
+        excluded = option == "--no-pin"
+        for text in texts or ():
+            found = _PIN.fullmatch(text)
+            if found is None:
+                raise InvalidInputError(
+                    Reason.INVALID_FIELD,
+                    option,
+                    f"{text!r} has another form than SKETCHED=MAPPED, as in desk=3, 2=5 or "
+                    "desk=none; put labels with a = or quotes of their own in double quotes",
+                )
+            sketched, mapped = (part.strip() for part in found.groups())
+            nothing = mapped.lower() == "none"
+            if excluded and nothing:
+                raise InvalidInputError(
+                    Reason.INVALID_FIELD, option, f"{text!r} excludes none; name a mapped object"
+                )
+            known[f"{option} {text}"] = Pin(
+                _object_named(sketched, option, text),
+                None if nothing else _object_named(mapped, option, text),
+                excluded,
+            )
+    return known
+
+
+def _object_named(typed: str, option: str, text: str) -> int | str:
+    """Return a label, or a number counted from 0."""
+    if typed.startswith('"'):
+        typed = typed[1:-1].strip()
+    elif re.fullmatch(r"[+-]?\d+", typed):
+        if 0 < int(typed) < 2**32:
+            return int(typed) - 1
+        raise InvalidInputError(
+            Reason.INVALID_FIELD, option, f"{text!r} names object {typed}; they count from 1"
+        )
+    if not typed:
+        raise InvalidInputError(
+            Reason.INVALID_FIELD, option, f"{text!r} names nothing; give labels or numbers"
+        )
+    return typed
+
+
+@contextmanager
+def pins_as_typed(options: Sequence[str]) -> Iterator[None]:
+    """Give errors about pins the options that these were typed as."""
+    from sketchmatch_client import InvalidRequestError
+
+    def typed(found: re.Match[str]) -> str:
+        return options[int(found[1])]
+
+    try:
+        yield
+    except (InvalidInputError, InvalidRequestError) as error:
+        place = _PIN_FIELD.match(error.field)
+        if place is None:
+            raise
+        problem = _PIN_FIELD.sub(typed, str(error).removeprefix(f"{error.field} "))
+        raise InvalidInputError(Reason.INVALID_FIELD, typed(place), problem) from None
+
+
+def parse_synonyms(groups: Iterable[str] | None) -> list[tuple[str, ...]]:
+    """Read groups of labels that mean the same.
+
+    Raises
+    ------
+    InvalidInputError
+        If one is of fewer than two labels.
+
+    Examples
+    --------
+    >>> parse_synonyms(["couch, sofa"])
+    [('couch', 'sofa')]
+    """
+    read = []
+    for text in groups or ():
+        labels = tuple(label.strip() for label in text.split(","))
+        if len(labels) < 2 or not all(labels):
+            raise InvalidInputError(
+                Reason.INVALID_FIELD,
+                "--synonyms",
+                f"{text!r} is not two labels or more, as in couch,sofa",
+            )
+        read.append(labels)
+    return read
 
 
 def say_renamed(sketch_segmenter: str, map_segmenter: str) -> None:

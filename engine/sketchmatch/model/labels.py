@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Iterable, Sequence
+from functools import cache
 from numbers import Number
 from typing import Any
 
 import numpy as np
 
 from sketchmatch.errors import InvalidInputError, Reason, quoted
+from sketchmatch.model.arrays import IntArray, sealed
 
-__all__ = ["cleaned_label", "label_from"]
+__all__ = ["Synonyms", "cleaned_label", "compare_labels", "folded", "label_from"]
+
+Synonyms = Sequence[Sequence[str]]
+"""Groups of words for the same thing."""
 
 # A terminal would obey these: ESC [ … letter, ESC ] … BEL or ESC \, and ESC with one character.
 _ESCAPES = re.compile(
@@ -23,6 +29,32 @@ _ESCAPES = re.compile(
 _UNSEEN = ("Cc", "Cf")
 # Invisible, and yet part of words and of single pictures: joiners, and the tags in some flags.
 _KEPT = frozenset("\u200c\u200d") | frozenset(map(chr, range(0xE0020, 0xE0080)))
+
+# Numbers of one or two digits count things; longer ones name them, as in "room 101".
+_COUNT = re.compile(r"(?<!\d)\d{1,2}$")
+_GAPS = re.compile(r"[\s_#().,:;/-]+")
+_IRREGULAR = {
+    "children": "child",
+    "feet": "foot",
+    "men": "man",
+    "mice": "mouse",
+    "people": "person",
+    "teeth": "tooth",
+    "women": "woman",
+}
+# What a plural ends with, and what the singular may end with in its place.
+_PLURALS = (
+    ("ies", ("y", "ie")),
+    ("ves", ("f", "fe", "ve")),
+    ("ses", ("s", "se")),
+    ("zes", ("z", "ze")),
+    ("xes", ("x", "xe")),
+    ("ches", ("ch", "che")),
+    ("shes", ("sh", "she")),
+    ("oes", ("o", "oe")),
+    ("ss", ()),
+    ("s", ("",)),
+)
 
 
 def cleaned_label(label: Any) -> str:
@@ -67,3 +99,111 @@ def label_from(given: Any) -> str:
     raise InvalidInputError(
         Reason.INVALID_FIELD, "label", f"is {quoted(given)}, which is no name; give text"
     )
+
+
+def folded(label: str) -> str:
+    """Return a label without case, and with accents in their one usual form.
+
+    Examples
+    --------
+    >>> folded(" Old  DESK")
+    'old desk'
+    """
+    return unicodedata.normalize("NFC", cleaned_label(label).casefold())
+
+
+def compare_labels(
+    template: Iterable[str], argument: Iterable[str], synonyms: Synonyms = ()
+) -> IntArray | None:
+    """Return whether labels mean the same.
+
+    They do where they are equal but for case, English plurals and numbers that count, or where a
+    group of synonyms holds both. Groups that share a label are one.
+
+    Parameters
+    ----------
+    template, argument
+        Of N and of N' objects; empty for one without a label.
+    synonyms
+        Groups of labels that mean the same.
+
+    Returns
+    -------
+    ndarray
+        int64, shape (N, N'): 1 where they mean the same, −1 where they do not, 0 where one is
+        empty; None where a side has no labels at all.
+
+    Examples
+    --------
+    >>> compare_labels(["Chair 2", "couch", ""], ["shelves", "chairs", "sofa"], [("couch", "sofa")])
+    array([[-1,  1, -1],
+           [-1, -1,  1],
+           [ 0,  0,  0]])
+    """
+    drawn, mapped = list(map(_meaning, template)), list(map(_meaning, argument))
+    if not any(drawn) or not any(mapped):
+        return None
+    groups = _grouped([[_meaning(label) for label in group] for group in synonyms])
+
+    @cache
+    def group_of(label: str) -> int:
+        """Return the number of the group that a label is in, −1 for none."""
+        held = groups.get(_initials(label), ())
+        return next((k for other, k in held if _alike(label, other)), -1)
+
+    @cache
+    def compared(one: str, other: str) -> int:
+        if not one or not other:
+            return 0
+        same = _alike(one, other) or group_of(one) == group_of(other) != -1
+        return 1 if same else -1
+
+    found = [[compared(one, other) for other in mapped] for one in drawn]
+    return sealed(np.array(found, dtype=np.int64))
+
+
+def _meaning(label: str) -> str:
+    """Return a label as it is compared: its words alone, without a number that counts."""
+    text = folded(label)
+    words = [word for word in _GAPS.split(text) if word]
+    if words:
+        words[-1] = _COUNT.sub("", words[-1])
+    return " ".join(word for word in words if word) or text
+
+
+def _grouped(groups: Sequence[list[str]]) -> dict[str, list[tuple[str, int]]]:
+    """Return labels and their groups, by initials; groups that share a label have one number."""
+    number = list(range(len(groups)))
+    held: dict[str, list[tuple[str, int]]] = {}
+    for k, group in enumerate(groups):
+        for label in group:
+            alike = held.setdefault(_initials(label), [])
+            for joined in {number[j] for other, j in alike if _alike(label, other)}:
+                number = [number[k] if each == joined else each for each in number]
+            alike.append((label, k))
+    return {key: [(label, number[k]) for label, k in alike] for key, alike in held.items()}
+
+
+def _initials(label: str) -> str:
+    """Return the first letters of a label's words, which no plural changes."""
+    return "".join(word[0] for word in label.split())
+
+
+def _alike(one: str, other: str) -> bool:
+    """Whether two labels are equal but for plurals."""
+    pairs = list(zip(one.split(), other.split(), strict=False))
+    return len(one.split()) == len(other.split()) and all(
+        a == b or a in _singulars(b) or b in _singulars(a) for a, b in pairs
+    )
+
+
+@cache
+def _singulars(word: str) -> frozenset[str]:
+    """Return what a word may be the plural of."""
+    if word in _IRREGULAR:
+        return frozenset((_IRREGULAR[word],))
+    for ending, singular in _PLURALS:
+        if word.endswith(ending) and len(word) > len(ending):
+            stem = word.removesuffix(ending)
+            return frozenset(stem + each for each in singular)
+    return frozenset()

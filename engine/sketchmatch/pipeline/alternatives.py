@@ -140,7 +140,8 @@ def partner_margins(
     Returns
     -------
     ndarray
-        Shape (N,); about 0 where the object is ambiguous. None where ``exchanges`` is None.
+        Shape (N,); about 0 where the object is ambiguous, infinite where it may take no other.
+        None where ``exchanges`` is None.
     """
     if exchanges is None:
         return None

@@ -33,7 +33,7 @@ from sketchmatch.pipeline.selection import SIDES
 from sketchmatch.pipeline.slices import retold
 from sketchmatch.registry import Registry
 
-__all__ = ["Comparison", "check_scenes", "compare"]
+__all__ = ["Comparison", "check_scenes", "compare", "is_swapped"]
 
 # What 2 GB hold: 100 × 100 objects.
 _MAX_COMPARISONS = 30_000_000
@@ -70,7 +70,7 @@ class Comparison(Tabular):
     @property
     def swapped(self) -> bool:
         """Whether the template is the map: it has fewer objects than the sketch."""
-        return _swapped(self.sketch, self.map)
+        return is_swapped(self.sketch, self.map)
 
     @property
     def scenes(self) -> tuple[Scene, Scene]:
@@ -200,7 +200,7 @@ def compare(
         If the measure breaks its contract.
     """
     (template, argument), related = scenes, descriptors
-    if _swapped(*scenes):
+    if is_swapped(*scenes):
         (argument, template), related = scenes, (descriptors[1], descriptors[0])
     share = 0.4 if weights.of_objects else 1.0
     work = blamed(relate(*related, similarity), similarity, registry)
@@ -215,7 +215,8 @@ def compare(
     return Comparison(*scenes, *descriptors, table, own)
 
 
-def _swapped(sketch: Scene, map_: Scene) -> bool:
+def is_swapped(sketch: Scene, map_: Scene) -> bool:
+    """Whether the template is the map: it has fewer objects than the sketch."""
     return len(sketch) > len(map_)
 
 

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from sketchmatch.api import Candidate, Judge, JudgedMap, Judgement, JudgeProblem
-from sketchmatch.errors import AnswerUnavailableError, quoted
+from sketchmatch.errors import quoted
 from sketchmatch.model import (
-    BoolArray,
     Confidence,
     FloatArray,
     Fmap,
@@ -131,8 +130,6 @@ def judged(
     ------
     PluginError
         If the judge breaks its contract.
-    AnswerUnavailableError
-        If no map was found that the caller does not rule out.
     """
     whole, weights = Part.whole(comparison.table, comparison.own), goal.weights.searched
     first, others = yield from considered(comparison, found, goal)
@@ -148,7 +145,7 @@ def judged(
     ]
     answer = first
     if ranked[0] is not first.rival:
-        answer = yield from _considered(ranked[0], whole, weights)
+        answer = yield from _considered(ranked[0], whole, goal)
     return Judged(judgement, answer, tuple(ranked[1:]))
 
 
@@ -164,17 +161,12 @@ def considered(
     ------
     float
         The share that is done of what takes time.
-
-    Raises
-    ------
-    AnswerUnavailableError
-        If no map was found that the caller does not rule out.
     """
     whole, weights = Part.whole(comparison.table, comparison.own), goal.weights.searched
     searched, part = found.best, found.best.part
-    exchanges = exchange_confidences(searched.mapped, part.table, weights)
+    exchanges = _exchanges(searched.mapped, part, goal)
     best = searched.rival(weights)
-    beside = [_rival(partners, whole, weights) for partners in searched.best.maps]
+    beside = [_rival(part.in_whole(each), whole, weights) for each in searched.best.maps]
     near = other_maps(
         searched.mapped,
         searched.best.alternatives,
@@ -186,24 +178,18 @@ def considered(
     )
     alike = [Rival(part.kept, part.objects, other.mapped, other.confidence) for other in near]
     met = [each for each in (best, *found.rivals, *alike, *beside) if _is_possible(each, goal)]
-    if not met:
-        raise AnswerUnavailableError(
-            "the search found no map that keeps to what is known of the objects; pin fewer of "
-            "them, allow more time, or choose another searcher"
-        )
 
     def worth(rival: Rival) -> float:
         return rival.value(goal.price)
 
-    leaders = [each for each in (best, *beside) if _is_possible(each, goal)] or met
-    leader = max(leaders, key=worth)
+    leader = max((each for each in (best, *beside) if _is_possible(each, goal)), key=worth)
     others = {each.partners.tobytes(): each for each in sorted(met, key=worth)}
     others.pop(leader.partners.tobytes())
     ranked = tuple(sorted(others.values(), key=lambda each: -worth(each)))
     if leader is best:
         told = searched.best.confidence
         return Considered(part, searched.best.fmap, best, exchanges, told), ranked
-    return (yield from _considered(leader, whole, weights)), ranked
+    return (yield from _considered(leader, whole, goal)), ranked
 
 
 def problem_of(
@@ -216,12 +202,10 @@ def problem_of(
 ) -> JudgeProblem:
     """Return what the judge is given of the maps that :func:`considered` returns."""
     template, argument = comparison.scenes
-    exchanges = first.exchanges
-    if exchanges is not None and goal.allowed is not None:
-        exchanges = np.where(_exchangeable(first, goal.allowed), exchanges, -np.inf)
-    omissions = omission_confidences(first.fmap, first.part.table, goal.weights.searched)
+    exchanges, part = first.exchanges, first.part
+    omissions = omission_confidences(first.fmap, part.table, goal.weights.searched)
     if omissions is not None and goal.pinned is not None:
-        omissions = np.where(goal.pinned[first.part.kept] >= 0, -np.inf, omissions)
+        omissions = np.where(goal.pinned[part.kept] >= 0, -np.inf, omissions)
     return JudgeProblem(
         template,
         argument,
@@ -297,13 +281,14 @@ def check_probabilities(judgement: Judgement, problem: JudgeProblem) -> None:
                 )
 
 
-def _considered(rival: Rival, whole: Part, weights: Weights) -> Generator[float, None, Considered]:
+def _considered(rival: Rival, whole: Part, goal: Goal) -> Generator[float, None, Considered]:
     """Return a map with its relations, and ζ of the histogram map that it induces."""
+    weights = goal.weights.searched
     part = yield from part_of(whole, rival.kept.tolist())
     fmap = Fmap.from_object_map(rival.mapped.partners, part.table.argument_objects)
     mapped = induced_map(rival.partners, whole.table)
     confidence = fmap_confidence(fmap, part.table, weights, part.own)
-    exchanges = exchange_confidences(mapped, part.table, weights)
+    exchanges = _exchanges(mapped, part, goal)
     known = Rival(part.kept, part.objects, mapped, confidence)
     return Considered(part, fmap, known, exchanges, confidence.total)
 
@@ -322,13 +307,15 @@ def _is_possible(rival: Rival, goal: Goal) -> bool:
     return goal.pinned is None or not breaks_pins(rival.partners, goal.pinned)
 
 
-def _exchangeable(first: Considered, allowed: BoolArray) -> BoolArray:
-    """Return which exchanges in a map the caller does not rule out, shape (k, N')."""
-    kept, partners = first.part.kept, first.mapped.partners
-    possible: BoolArray = allowed[kept].copy()
+def _exchanges(mapped: ObjectMap, part: Part, goal: Goal) -> FloatArray | None:
+    """Return ζ after each exchange in a map, −inf where the caller rules it out, or None."""
+    exchanges = exchange_confidences(mapped, part.table, goal.weights.searched)
+    if exchanges is None or goal.allowed is None:
+        return exchanges
+    possible, partners = goal.allowed[part.kept], mapped.partners
     # Where h is held, its holder takes what g had.
-    possible[:, partners] &= allowed[np.ix_(kept, partners)].T
-    return possible
+    possible[:, partners] &= possible[:, partners].T
+    return np.where(possible, exchanges, -np.inf)
 
 
 def _check_probability(name: str, given: Any) -> None:

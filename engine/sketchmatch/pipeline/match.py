@@ -14,7 +14,7 @@ from sketchmatch.model.limits import SourceLimits, limited_to, source_limits
 from sketchmatch.pipeline import reading
 from sketchmatch.pipeline.answer import answer
 from sketchmatch.pipeline.clock import Clock
-from sketchmatch.pipeline.compare import Comparison, check_scenes, compare
+from sketchmatch.pipeline.compare import Comparison, check_scenes, compare, is_swapped
 from sketchmatch.pipeline.describe import described, with_directions
 from sketchmatch.pipeline.events import (
     Accepted,
@@ -25,6 +25,7 @@ from sketchmatch.pipeline.events import (
     Segmented,
 )
 from sketchmatch.pipeline.judge import judged
+from sketchmatch.pipeline.knowledge import check_pins_obeyed, knowledge
 from sketchmatch.pipeline.relate import check_exponent
 from sketchmatch.pipeline.request import (
     MatchRequest,
@@ -118,6 +119,7 @@ def _planned(request: MatchRequest, registry: Registry, defaults: Defaults) -> _
     profile = defaults.named(request.profile)
     weights = ConfidenceWeights(*(request.weights or profile.weights or ()))
     check_objects_weighed(weights, pipeline.searcher)
+    check_pins_obeyed(request.pins, pipeline.searcher)
     price = price_in_force(request, profile, weights, pipeline, registry)
     goal = Goal(weights, price, seed=request.seed, at_once=finds_partial(pipeline, registry))
     return _Plan(pipeline, goal, _is_usual(pipeline, registry))
@@ -163,6 +165,9 @@ def _events(
     # How likely the answer is follows from maps that compete with it, seen or not.
     wanted = max(shown, alternatives_wanted(None, *scenes))
     goal = replace(goal, alternatives=wanted, shown=shown)
+    partial = goal.price < math.inf
+    known = knowledge(request.pins, request.synonyms, scenes, is_swapped(*scenes), partial)
+    goal = replace(goal, allowed=known.allowed, pinned=known.pinned, names=known.names)
     comparison = yield from _compared(scenes, pipeline, goal.weights, registry, clock)
     with clock.timing("search"):
         work = search(comparison, pipeline.searcher, goal, registry, clock)
@@ -219,11 +224,17 @@ def _told(so_far: Search, swapped: bool, clock: Clock) -> Iterator[Progress]:
     if not clock.is_time_to_tell():
         return
     best = so_far.best
-    yield Progress(
+    progress = Progress(
         Phase.SEARCH,
         clock.elapsed(),
         iteration=so_far.iterations,
         evaluations=so_far.evaluations,
+    )
+    if not best.obeys:  # and what is ruled out is not shown
+        yield progress
+        return
+    yield replace(
+        progress,
         confidence=best.best.confidence,
         upper_bound=best.best.upper_bound,
         matches=reading.matches(best.mapped, swapped, best.part.kept),

@@ -33,7 +33,7 @@ def matches(
     kept
         Shape (k,), which template objects these are.
     margins, probabilities
-        Shape (k,), of each of them, or None where unknown.
+        Shape (k,), of each of them, or None where unknown; an infinite margin is none.
     relations
         By sketched object, where known.
     """
@@ -48,7 +48,14 @@ def matches(
         strict=True,
     )
     read = (
-        ObjectMatch(a, b, confidence, margin, relations.get(a), probability)
+        ObjectMatch(
+            a,
+            b,
+            confidence,
+            None if margin == math.inf else margin,
+            relations.get(a),
+            probability,
+        )
         for (a, b), confidence, margin, probability in lines
     )
     return tuple(sorted(read, key=lambda match: match.sketch_object))

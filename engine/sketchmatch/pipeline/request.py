@@ -13,11 +13,13 @@ from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model import ConfidenceWeights, RequestWeights, Scene, Source
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
 from sketchmatch.pipeline.guard import blaming
+from sketchmatch.pipeline.knowledge import Pin, check_pins, check_synonyms
 from sketchmatch.pipeline.selection import Pipeline, Profile, Selection
 from sketchmatch.registry import Registry
 
 __all__ = [
     "MatchRequest",
+    "Pin",
     "alternatives_wanted",
     "check_objects_weighed",
     "finds_partial",
@@ -59,6 +61,10 @@ class MatchRequest:
     unmatched_price
         What a map loses for leaving all objects of the smaller scene out, and for some of them
         their share of it, in units of ζ; None for the judge's own.
+    pins
+        What is known of single objects; every searcher of object maps obeys.
+    synonyms
+        Groups of labels that mean the same. Labels are evidence, and force nothing.
 
     Raises
     ------
@@ -76,6 +82,8 @@ class MatchRequest:
     profile: str = ""
     allow_unmatched: bool | None = None
     unmatched_price: float | None = None
+    pins: tuple[Pin, ...] = ()
+    synonyms: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self) -> None:
         if not (isinstance(self.seed, Integral) and 0 <= self.seed <= _MAX_SEED):
@@ -101,6 +109,8 @@ class MatchRequest:
             raise _refused(
                 "allow_unmatched", f"is {quoted(self.allow_unmatched)}; give True or False"
             )
+        object.__setattr__(self, "pins", check_pins(self.pins))
+        object.__setattr__(self, "synonyms", check_synonyms(self.synonyms))
 
 
 def check_objects_weighed(weights: ConfidenceWeights, searcher: Searcher) -> None:

@@ -12,10 +12,12 @@ from functools import cache, partial
 import numpy as np
 
 from sketchmatch.api import MatchProblem, Outcome, Searcher, SearchProgress
+from sketchmatch.errors import AnswerUnavailableError
 from sketchmatch.model import BoolArray, ConfidenceWeights, IntArray, Scene
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison
-from sketchmatch.pipeline.guard import blaming, checked_progress, inspecting
+from sketchmatch.pipeline.guard import FEWEST, blaming, checked_progress, inspecting
+from sketchmatch.pipeline.obeying import Obedience, first_parts, obedience, ruled_out
 from sketchmatch.pipeline.slices import retold
 from sketchmatch.pipeline.unmatched import Part, PartSearch, Rival, part_of, trials
 from sketchmatch.registry import Registry
@@ -97,16 +99,32 @@ def search(
     ------
     PluginError
         If the searcher breaks its contract.
+    AnswerUnavailableError
+        If every map is ruled out.
     """
     whole = Part.whole(comparison.table, comparison.own)
     weights = goal.weights.searched
-    plan = trials(whole.objects, weights, math.inf if goal.at_once else goal.price)
+    first, fixed = [tuple(range(whole.objects))], frozenset[int]()
+    if (pinned := goal.pinned) is not None:
+        goal = replace(goal, allowed=ruled_out(goal.allowed, pinned, whole.table))
+        fixed = frozenset(np.flatnonzero(pinned >= 0).tolist())
+    if goal.allowed is not None:
+        first = first_parts(goal.allowed, fixed)
+        fewest = whole.objects if goal.price == math.inf else min(FEWEST, whole.objects)
+        if len(first[0]) < fewest:
+            raise AnswerUnavailableError("no map keeps to what is known of the objects; pin fewer")
+    plan = trials(first, weights, math.inf if goal.at_once else goal.price, fixed)
     trial, so_far, rivals = next(plan), None, list[Rival]()
     while True:
         part = yield from retold(part_of(whole, trial.kept), _still(so_far))
+        obeying, allowed = None, part.known(goal.allowed)
+        if allowed is not None and not allowed.all():
+            work = obedience(part, weights, allowed)
+            obeying = yield from retold(work, _still(so_far))
         share = trial.share * clock.left()
-        problem = _problem(comparison, part, goal, share)
-        found, total = yield from _searched(part, problem, searcher, goal, registry, so_far)
+        problem = _problem(comparison, part, obeying, goal, share)
+        run = _searched(part, problem, obeying, searcher, goal, registry, so_far)
+        found, total = yield from run
         if so_far is not None:
             worse = so_far.best if total.best is found else found
             rivals.append(worse.rival(weights))
@@ -127,6 +145,7 @@ def _still(so_far: Search | None) -> Callable[[float], Iterable[Search]]:
 def _searched(
     part: Part,
     problem: MatchProblem,
+    obeying: Obedience | None,
     searcher: Searcher,
     goal: Goal,
     registry: Registry,
@@ -142,30 +161,36 @@ def _searched(
     seconds = math.inf if problem.time_budget is None else problem.time_budget
     until = time.monotonic() + seconds
     found: PartSearch | None = None
+    told: SearchProgress | None = None
     with _searching(searcher, problem, goal.seed, registry) as work:
         while True:
             with blaming(searcher, registry):
                 try:
-                    before = None if found is None else found.best
-                    best = checked_progress(next(work), problem, before)
+                    told = checked_progress(next(work), problem, told)
                 except StopIteration as stop:
                     if found is None:
                         raise ValueError("it ended without any answer") from None
                     found = replace(found, outcome=Outcome(stop.value or Outcome.CONVERGED))
-                    return found, _total(so_far, found, goal.price)
-            found = PartSearch(part, best)
-            total = _total(so_far, found, goal.price)
+                    break
+            found = PartSearch(part, told) if obeying is None else obeying.read(told, found)
             if time.monotonic() > until:
-                return found, total
-            yield total
+                break
+            yield _total(so_far, found, goal.price)
+    if obeying is not None:
+        found = obeying.mended(found)
+    return found, _total(so_far, found, goal.price)
 
 
-def _problem(comparison: Comparison, part: Part, goal: Goal, seconds: float) -> MatchProblem:
-    table = part.table
+def _problem(
+    comparison: Comparison, part: Part, obeying: Obedience | None, goal: Goal, seconds: float
+) -> MatchProblem:
+    table, weights = part.table, goal.weights.searched
+    if obeying is not None:
+        table, weights = obeying.table, obeying.searched
     there_are = math.perm(table.argument_objects, table.template_objects) - 1
     return MatchProblem(
         table,
-        goal.weights.searched,
+        weights,
         min(goal.alternatives, there_are),
         seconds if seconds < math.inf else None,
         scenes=cache(partial(_scenes, comparison, part)),

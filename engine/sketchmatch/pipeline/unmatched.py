@@ -6,7 +6,7 @@ what leaving out costs. Searchers know nothing of it: they are given parts of th
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
+from collections.abc import Collection, Generator, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -31,6 +31,7 @@ from sketchmatch.model.caching import cached_property
 from sketchmatch.pipeline.correspond import (
     confidence_relations,
     fmap_confidence,
+    induced_map,
     object_map,
     occm,
 )
@@ -98,6 +99,12 @@ class Part:
         """Return the rows of its objects, of what has one for each object of the template."""
         return values if values is None or not self.left_out else values[self.kept]
 
+    def in_whole(self, partners: IntArray) -> IntArray:
+        """Return a map of its objects as one of the whole template: −1 for all others."""
+        whole = np.full(self.objects, -1)
+        whole[self.kept] = partners
+        return whole
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -127,19 +134,29 @@ class PartSearch:
         The last progress.
     outcome
         Why it ended.
+    partners
+        The map of the part, where more is known of it than its histogram map says.
+    obeys
+        Whether it holds nothing that the caller rules out.
     """
 
     part: Part
     best: SearchProgress
     outcome: Outcome = Outcome.TIME_BUDGET
+    partners: IntArray | None = None
+    obeys: bool = True
 
     def value(self, price: float) -> float:
-        """Return what the best map is worth."""
+        """Return what the best map is worth; −inf if it is ruled out."""
+        if not self.obeys:
+            return -np.inf
         return net_confidence(self.best.confidence, self.part.left_out, self.part.objects, price)
 
     @cached_property
     def mapped(self) -> ObjectMap:
         """The object map, of the objects of the part alone."""
+        if self.partners is not None:
+            return induced_map(self.partners, self.part.table)
         return object_map(occm(self.best.fmap, self.part.table))
 
     def rival(self, weights: Weights) -> Rival:
@@ -192,7 +209,12 @@ def net_confidence(confidence: float, left_out: int, objects: int, price: float)
     return confidence - price * left_out / objects if left_out else confidence
 
 
-def trials(objects: int, weights: Weights, price: float) -> Generator[Trial, PartSearch, None]:
+def trials(
+    first: Sequence[tuple[int, ...]],
+    weights: Weights,
+    price: float,
+    fixed: Collection[int] = (),
+) -> Generator[Trial, PartSearch, None]:
     """Say which parts of a template to search, given what came of those before.
 
     First comes all of it. Then each object is left out in turn, or, of more than ten, the five
@@ -202,23 +224,30 @@ def trials(objects: int, weights: Weights, price: float) -> Generator[Trial, Par
 
     Parameters
     ----------
-    objects
-        N.
+    first
+        The objects to begin with, in ascending order: all, or, where not all can find a partner,
+        as many as can, in several ways.
     weights
         Of ζ.
     price
         Of leaving out; infinite where that is not allowed.
+    fixed
+        The objects that are not left out.
 
     Yields
     ------
     Trial
         What to search; what was found is to be sent.
     """
-    most = objects - FEWEST if price < np.inf else 0
-    found = yield Trial(tuple(range(objects)), share=0.5 if most > 0 else 1.0)
-    level = [_Lead.of(found, weights, price)]
+    objects = len(first[0])
+    most = objects - max(FEWEST, len(fixed)) if price < np.inf else 0
+    level = []
+    for k, kept in enumerate(first):
+        found = yield Trial(kept, share=(0.5 if most > 0 else 1.0) / (len(first) - k))
+        level.append(_Lead.of(found, weights, price))
+    level.sort(key=lambda lead: -lead.value)
     for _ in range(most):
-        best, wanted = level[0].value, _without_one_more(level[:_BRANCHES], objects)
+        best, wanted = level[0].value, _without_one_more(level[:_BRANCHES], objects, fixed)
         level = []
         for k, kept in enumerate(wanted):
             found = yield Trial(kept, share=1.0 / (len(wanted) - k + 1))
@@ -300,11 +329,15 @@ class _Lead:
         )
 
 
-def _without_one_more(level: Iterable[_Lead], objects: int) -> list[tuple[int, ...]]:
+def _without_one_more(
+    level: Iterable[_Lead], objects: int, fixed: Collection[int]
+) -> list[tuple[int, ...]]:
     """Return what is kept where some parts lose an object more, the most promising first."""
     promise: dict[tuple[int, ...], float] = {}
     for lead in level:
         for g, value in enumerate(lead.without):
+            if lead.kept[g] in fixed:
+                continue
             kept = lead.kept[:g] + lead.kept[g + 1 :]
             promise[kept] = max(value, promise.get(kept, value))
     width = objects if objects <= _FEW else _WIDTH

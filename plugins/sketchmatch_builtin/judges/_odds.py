@@ -84,6 +84,11 @@ def likelihood(
     free = np.flatnonzero(first.partners < 0)
     elsewhere = met_odds @ (maps[:, free] >= 0) + (1.0 - calibration.luck) * unknown
     lines[free, -1] = 1.0 - elsewhere / total
+    if problem.allowed is not None and problem.pinned is not None:
+        alone, known = ~problem.allowed.any(axis=1), problem.pinned >= 0
+        lines[alone | known] = 0.0
+        lines[alone, -1] = 1.0
+        lines[known, problem.pinned[known]] = 1.0
     judged = zip(others, (rival_odds / total).tolist(), strict=True)
     return Judgement(
         (
