@@ -189,18 +189,22 @@ def _drawn(
     along = _turning(rng.uniform(0.0, np.pi))
     page = along.T @ np.diag(np.exp(rng.normal(0.0, rng.uniform(0.0, 0.15)) * np.array([1, -1])))
     page = page @ along @ _turning(rng.uniform(0.0, 7.0)) * math.exp(rng.uniform(-1.0, 4.0))
+    # Some people draw all with the same care, others one thing well and the next anyhow.
+    uneven = rng.uniform(0.0, 0.7)
     rings = []
     for ring, centre in zip(things, centres, strict=True):
+        careless = np.exp(rng.normal(0.0, uneven, 4))
         outline = _simplified(ring - centre, simple)
         if evenly:
             outline = outline * (1.0 + 1.3 * stretched * rng.uniform(-1.0, 1.0, 2))
         else:
-            outline = outline * np.exp(rng.normal(0.0, stretched, 2))
+            outline = outline * np.exp(careless[0] * rng.normal(0.0, stretched, 2))
         growth = float(gradient @ (centre - middle)) / extent
-        outline = outline @ _turning(rng.normal(0.0, turned))
-        outline = outline * small * math.exp(rng.normal(0.0, sized) + growth)
+        outline = outline @ _turning(careless[1] * rng.normal(0.0, turned))
+        outline = outline * small * math.exp(careless[2] * rng.normal(0.0, sized) + growth)
         where = (centre - middle) * math.exp(growth / 2.0)
-        rings.append((outline + where) @ page + rng.normal(0.0, displaced, 2) @ page)
+        where = where + careless[3] * rng.normal(0.0, displaced, 2)
+        rings.append((outline + where) @ page)
     return rings
 
 

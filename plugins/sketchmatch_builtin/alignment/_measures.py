@@ -37,7 +37,9 @@ class Part(IntEnum):
     grow to one side, which costs ``BEND``; ``OFFSET`` is the square of how much larger things are
     drawn than their distances. ``MATCHED`` counts lines, ``MISSING`` and ``CROWD`` mapped objects
     that nobody drew amid those that somebody did, ``ALIKE`` and ``UNLIKE`` labels that mean the
-    same and that do not. ``WORST`` and ``SECOND`` are the two worst lines. ``SIMILARITY``,
+    same and that do not. ``WORST`` and ``SECOND`` are the two worst lines, ``OUTLIER``
+    the one that is worst for what the others are. ``NEAR`` is as ``PLACE``, of the way from each
+    object to its two nearest, in units of its length. ``SIMILARITY``,
     ``ROTATION`` and ``DILATION`` are the number of lines times what ζσ and ζR lack of 1 and δL,
     ``SELF`` what the objects' own histograms lack of being alike.
     """
@@ -70,11 +72,15 @@ class Part(IntEnum):
     SELF_TIGHT = 25
     ALIKE = 26
     UNLIKE = 27
+    NEAR = 28
+    NEAR_TIGHT = 29
+    OUTLIER = 30
 
 
 PARTS = tuple(part.name.lower() for part in Part)
 
 _FEWEST_AROUND = 3
+_USUAL = 0.04
 _BENDS = 6
 _PAGE = 0.12
 
@@ -141,6 +147,7 @@ def measure(
             if partners[i] >= 0:
                 used[partners[i]] = True
         _compare_lines(partners, drawn, mapped, relations, u, t, growth, count, row)
+        _compare_ways(partners, drawn, mapped, u, row)
         _bend(partners, drawn, mapped, u, t, count, row)
         _surround(partners, used, drawn, mapped, u, row)
         if relations.similarity.size > 0:
@@ -205,6 +212,8 @@ def _compare_lines(
         whole %= bins
         after = whole + 1 if whole + 1 < bins else 0
     places = sizes = shapes = 0.0
+    deviations = np.empty((count, 3))
+    line = 0
     for i in range(partners.size):
         j = partners[i]
         if j < 0:
@@ -212,6 +221,8 @@ def _compare_lines(
         d = square(mapped.places[j] - u * drawn.places[i] - t) / (unit * unit)
         e = (mapped.sizes[j] - drawn.sizes[i] - growth) ** 2
         h = square(drawn.shapes[i] * twist - mapped.shapes[j])
+        deviations[line, 0], deviations[line, 1], deviations[line, 2] = d, e, h
+        line += 1
         row[Part.PLACE] += _robust(d, 0.35)
         row[Part.PLACE_TIGHT] += _robust(d, 0.12)
         row[Part.PLACE_SQUARE] += min(d / 0.5**2, 4.0)
@@ -241,7 +252,50 @@ def _compare_lines(
     row[Part.SCATTER] = count * np.log(0.03 + np.sqrt(places / count))
     row[Part.SCATTER_SIZE] = count * np.log(0.05 + np.sqrt(sizes / count))
     row[Part.SCATTER_SHAPE] = count * np.log(0.03 + np.sqrt(shapes / count))
+    row[Part.OUTLIER] = _outlier(deviations)
     row[Part.OFFSET] = min((growth - 2.0 * np.log(abs(u))) ** 2, 6.0)
+
+
+@kernel
+def _outlier(deviations: FloatArray) -> float:
+    """Return ln(1 + x²/3) of the line that is worst in units of what the others deviate by."""
+    count, sums = deviations.shape[0], deviations.sum(axis=0)
+    worst = 0.0
+    for k in range(count):
+        odd = 0.0
+        for part in range(deviations.shape[1]):
+            others = (sums[part] - deviations[k, part] + _USUAL) / (count - 1 + 1)
+            odd += deviations[k, part] / others
+        worst = max(worst, odd)
+    return float(np.log(1.0 + worst / 3.0))
+
+
+@kernel
+def _compare_ways(
+    partners: IntArray, drawn: Things, mapped: Things, u: complex, row: FloatArray
+) -> None:
+    """Measure the ways from objects to their nearest, which shifts of whole groups leave alone."""
+    for i in range(partners.size):
+        if partners[i] < 0:
+            continue
+        first, second, near, next_near = -1, -1, np.inf, np.inf
+        for k in range(partners.size):
+            if k == i or partners[k] < 0:
+                continue
+            distance = square(drawn.places[k] - drawn.places[i])
+            if distance < near:
+                first, second, near, next_near = k, first, distance, near
+            elif distance < next_near:
+                second, next_near = k, distance
+        for k in (first, second):
+            if k < 0:
+                continue
+            way = drawn.places[k] - drawn.places[i]
+            other = (mapped.places[partners[k]] - mapped.places[partners[i]]) / u
+            length = max(square(way), 1e-12 * drawn.spacing**2)
+            deviation = square(other - way) / length
+            row[Part.NEAR] += 0.5 * _robust(deviation, 0.4)
+            row[Part.NEAR_TIGHT] += 0.5 * _robust(deviation, 0.15)
 
 
 @kernel
