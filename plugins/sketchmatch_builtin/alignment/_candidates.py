@@ -25,6 +25,10 @@ from sketchmatch_builtin.searchers._assignment import FORBIDDEN, reduce_by_assig
 
 __all__ = ["Laid", "completed", "drive", "laid_maps", "template_maps"]
 
+GUESSES = 40_000
+"""Poses to weigh; beyond, the pairs that were laid on others have met the right pose for sure."""
+
+_FEWEST_PAIRS = 8
 _ROOM = 400
 _PAIRS = 30
 _FLOOR = 0.8
@@ -67,7 +71,7 @@ class Laid:
 
 
 def laid_maps(
-    sides: Sides, poses: int, maps: int, partial: bool
+    sides: Sides, poses: int, maps: int, partial: bool, guesses: int = GUESSES
 ) -> Generator[int, None, list[Laid]]:
     """Lay a sketch upon a map in every way that may be right.
 
@@ -81,6 +85,8 @@ def laid_maps(
         How many to return at most.
     partial
         Whether objects of both sides may be without partner.
+    guesses
+        How many poses to weigh, or a few more: no more sketched pairs are laid on others then.
 
     Yields
     ------
@@ -92,9 +98,9 @@ def laid_maps(
     list of Laid
         Different maps, what is worth most first.
     """
-    guesses = yield from _guessed(sides)
-    laid = _refined(guesses, sides, poses)
-    yield int(guesses.state[1])
+    guessed = yield from _guessed(sides, guesses)
+    laid = _refined(guessed, sides, poses)
+    yield int(guessed.state[1])
     most = min(len(sides.drawn.places), len(sides.mapped.places))
     if not partial:
         laid = [_filled(each, sides) for each in laid]
@@ -148,15 +154,19 @@ def template_maps(laid: Iterable[Laid], sides: Sides) -> list[IntArray]:
     return [sides.template_partners(each.partners) for each in laid]
 
 
-def _guessed(sides: Sides) -> Generator[int, None, Guesses]:
-    """Weigh the poses that follow from two pairings each."""
+def _guessed(sides: Sides, most: int) -> Generator[int, None, Guesses]:
+    """Weigh the poses that follow from two pairings each, about so many at most."""
     drawn, mapped = sides.drawn, sides.mapped
     rough = TOLERANCES._replace(omission=_ROUGH)
     guesses = empty_guesses(_ROOM, -_FLOOR * _ROUGH * len(drawn.places))
     grid = grid_of(mapped)
     pairs = _pairs(drawn)
     allowed = np.isfinite(sides.bonus).astype(np.float64)
-    while guesses.state[2] < len(pairs) * len(mapped.places):
+    there_are = len(mapped.places)
+    fewest = min(len(pairs), _FEWEST_PAIRS) * there_are
+    while guesses.state[2] < len(pairs) * there_are:
+        if guesses.state[2] >= fewest and guesses.state[1] >= most:
+            break
         guess_poses(pairs, drawn, mapped, grid, allowed, rough, _STEP, guesses)
         yield int(guesses.state[1])
     return guesses
@@ -208,12 +218,14 @@ def _varied(laid: list[Laid], sides: Sides, most: int) -> list[Laid]:
 
 
 def _pairs(drawn: Things) -> IntArray:
-    """Return the sketched pairs to lay on others, far ones first: they fix a pose best."""
+    """Return the sketched pairs to lay on others: far ones first, and each object soon."""
     n = len(drawn.places)
     a, b = np.triu_indices(n, k=1)
-    pairs = np.stack([a, b], axis=1)
-    most = max(_PAIRS, 2 * n)
-    far = np.argsort(-np.abs(drawn.places[a] - drawn.places[b]), kind="stable")
-    if len(pairs) > most:  # evenly over all distances
-        far = far[np.linspace(0, len(pairs) - 1, most).astype(np.int64)]
-    return np.ascontiguousarray(pairs[far].astype(np.int64))
+    apart, used = np.abs(drawn.places[a] - drawn.places[b]), np.zeros(n)
+    chosen = []
+    for _ in range(min(len(a), max(_PAIRS, 2 * n))):
+        best = int(np.argmax(apart / (1.0 + used[a] + used[b])))
+        chosen.append((a[best], b[best]))
+        used[[a[best], b[best]]] += 1.0
+        apart[best] = -1.0
+    return np.array(chosen, dtype=np.int64)

@@ -204,13 +204,8 @@ def _compare_lines(
 ) -> None:
     """Measure each line under a pose."""
     unit, twist = abs(u) * drawn.spacing, u * u / square(u)
-    bins, whole, after, rest = relations.selves.shape[2], 0, 0, 0.0
-    if bins > 0:
-        turn = np.angle(u) % np.pi * bins / np.pi
-        whole = int(turn)
-        rest = turn - whole
-        whole %= bins
-        after = whole + 1 if whole + 1 < bins else 0
+    bins = relations.selves.shape[2]
+    whole, after, rest = _bin_of(u, bins)
     places = sizes = shapes = 0.0
     deviations = np.empty((count, 3))
     line = 0
@@ -243,8 +238,9 @@ def _compare_lines(
         if bins == 0:
             continue
         alike = (1.0 - rest) * relations.selves[i, j, whole] + rest * relations.selves[i, j, after]
-        row[Part.SELF] += max(0.0, 1.0 - alike)
-        row[Part.SELF_TIGHT] += np.log(1.0 + max(0.0, 1.0 - alike) / 0.01)
+        unlike = max(0.0, 1.0 - alike)
+        row[Part.SELF] += unlike
+        row[Part.SELF_TIGHT] += np.log(1.0 + unlike / 0.01)
         if relations.names[i, j] > 0:
             row[Part.ALIKE] += 1.0
         elif relations.names[i, j] < 0:
@@ -257,6 +253,18 @@ def _compare_lines(
 
 
 @kernel
+def _bin_of(u: complex, bins: int) -> tuple[int, int, float]:
+    """Return the bins between which the turn of a pose lies, and how far between."""
+    if bins == 0:
+        return 0, 0, 0.0
+    turn = np.angle(u) % np.pi * bins / np.pi
+    whole = int(turn)
+    rest = turn - whole
+    whole %= bins
+    return whole, whole + 1 if whole + 1 < bins else 0, rest
+
+
+@kernel
 def _outlier(deviations: FloatArray) -> float:
     """Return ln(1 + x²/3) of the line that is worst in units of what the others deviate by."""
     count, sums = deviations.shape[0], deviations.sum(axis=0)
@@ -264,7 +272,7 @@ def _outlier(deviations: FloatArray) -> float:
     for k in range(count):
         odd = 0.0
         for part in range(deviations.shape[1]):
-            others = (sums[part] - deviations[k, part] + _USUAL) / (count - 1 + 1)
+            others = (sums[part] - deviations[k, part] + _USUAL) / count
             odd += deviations[k, part] / others
         worst = max(worst, odd)
     return float(np.log(1.0 + worst / 3.0))

@@ -20,7 +20,7 @@ from sketchmatch_builtin.judges._evidence import Described, numbers
 __all__ = ["Described", "described"]
 
 _POSES, _MAPS = 60, 300
-_DECOY_POSES, _DECOY_MAPS = 40, 60
+_DECOY_POSES, _DECOY_MAPS, _DECOY_GUESSES = 30, 60, 12_000
 _SEED = 0
 
 
@@ -82,6 +82,6 @@ def _decoy_numbers(decoy: Things, mapped: Things) -> FloatArray:
     """Return the numbers of the best maps of a decoy; of none, where it fits nowhere."""
     drawn, there_are = len(decoy.places), len(mapped.places)
     sides = Sides(decoy, mapped, np.zeros((drawn, there_are)), swapped=False)
-    laid = drive(laid_maps(sides, _DECOY_POSES, _DECOY_MAPS, partial=True))
+    laid = drive(laid_maps(sides, _DECOY_POSES, _DECOY_MAPS, partial=True, guesses=_DECOY_GUESSES))
     maps = np.array([each.partners for each in laid], dtype=np.int64).reshape(-1, drawn)
     return numbers(measured(maps, decoy, mapped), drawn, there_are)
