@@ -6,7 +6,9 @@ Run it with ``python -m tests.experiments.learn``; it takes some minutes and wri
 
 - ``odds``: price, and what makes probabilities of the thesis's ζ, which the judge ``confidence``
   has;
-- and how well these probabilities hold on yet other sketches.
+- ``posterior``: what evidence counts for with the judge ``posterior``, by
+  :mod:`tests.experiments.posterior`;
+- and how well the probabilities of both hold on yet other sketches.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from tests.experiments.odds import considered_by, errors, learned_odds
+from tests.experiments.posterior import judged_errors, known_of, learned_posterior
 from tests.experiments.runs import each_of
 
 __all__ = ["LEARNED", "SKETCHES", "THESIS"]
@@ -27,7 +30,10 @@ __all__ = ["LEARNED", "SKETCHES", "THESIS"]
 LEARNED = Path(__file__).with_name("learned.json")
 """What came of it."""
 
-SKETCHES = {"odds": 600, "check": 600}
+SKETCHES = {"odds": 600, "check": 600, "posterior": 8000}
+
+CHECKED = 1000
+"""Sketches beyond those for ``posterior`` that its probabilities are checked with."""
 
 THESIS = (1.0, 1.0, 1.0)
 """The weights of the thesis."""
@@ -47,7 +53,14 @@ def main() -> None:
     calibration = learned_odds(known)
     odds = asdict(calibration) | {"errors": errors(others, calibration)}
     print(odds)
-    found = {"sketches": SKETCHES, "odds": odds}
+    numbered = range(SKETCHES["posterior"] + CHECKED)
+    every = list(each_of(known_of, numbered, "sketches for posterior"))
+    drawn = [*itertools.chain.from_iterable(every[: SKETCHES["posterior"]])]
+    learned = learned_posterior(drawn)
+    others = [*itertools.chain.from_iterable(every[SKETCHES["posterior"] :])]
+    posterior = asdict(learned) | {"errors": judged_errors(others, learned)}
+    print(posterior["errors"])
+    found = {"sketches": SKETCHES, "odds": odds, "posterior": posterior}
     text = json.dumps(found, indent=1, ensure_ascii=False)
     LEARNED.write_text(text + "\n", encoding="utf-8")
 

@@ -7,7 +7,7 @@ are evidence on their own, so what they count for is learned from labels put on 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,12 +27,15 @@ from sketchmatch_builtin.judges._evidence import (
     lost_numbers,
     place_numbers,
     skill,
+    weighed,
 )
 from sketchmatch_builtin.judges.calibration import Posterior
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+from tests.experiments.logits import significant
+from tests.experiments.reliability import reliability
 from tests.experiments.training import training_drawing
 
-__all__ = ["Known", "known_of", "learned_posterior"]
+__all__ = ["Known", "judged_errors", "known_of", "learned_posterior"]
 
 _ENGINE = Engine(default_registry())
 
@@ -120,6 +123,38 @@ def learned_posterior(cases: Sequence[Known]) -> Posterior:
         _rounded(lost),
         round(float(np.mean(luck)), 2),
     )
+
+
+def judged_errors(cases: Sequence[Known], learned: Posterior) -> dict[str, float]:
+    """Return how well the probabilities hold: expected calibration errors, and shares.
+
+    Of maps and of places, how many answers are wholly right, how many right ones are among those
+    known, and how many sketches of this place and of others are taken for what they are not.
+    """
+    maps, places = [], []
+    for case in cases:
+        known = case.described
+        found = weighed(known, learned)
+        best, here = int(found.shares.argmax()), 1.0 - found.elsewhere
+        right = best == case.right and not case.elsewhere
+        maps.append((here * (1.0 - found.lost) * float(found.shares[best]), right))
+        places.append((here, not case.elsewhere))
+    ours = [case for case in cases if not case.elsewhere]
+    rights = [right for (_, right), case in zip(maps, cases, strict=True) if not case.elsewhere]
+    return {
+        "maps": significant(reliability(maps).error, 2),
+        "places": significant(reliability(places).error, 2),
+        "right": significant(float(np.mean(rights)), 3),
+        "known": significant(float(np.mean([case.right >= 0 for case in ours])), 3),
+        "refused": significant(float(np.mean([here < 0.5 for here, ours in places if ours])), 2),
+        "accepted": significant(
+            float(np.mean([here > 0.5 for here, ours in places if not ours])), 2
+        ),
+    }
+
+
+def _share(told: Iterable[bool]) -> float:
+    return significant(float(np.mean([*told])), 2)
 
 
 def _counts(case: Known) -> bool:

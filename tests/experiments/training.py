@@ -190,7 +190,7 @@ def _drawn(
     page = along.T @ np.diag(np.exp(rng.normal(0.0, rng.uniform(0.0, 0.15)) * np.array([1, -1])))
     page = page @ along @ _turning(rng.uniform(0.0, 7.0)) * math.exp(rng.uniform(-1.0, 4.0))
     # Some people draw all with the same care, others one thing well and the next anyhow.
-    uneven = rng.uniform(0.0, 0.7)
+    uneven = rng.choice((0.0, rng.uniform(0.0, 0.7)))
     rings = []
     for ring, centre in zip(things, centres, strict=True):
         careless = np.exp(rng.normal(0.0, uneven, 4))

@@ -76,9 +76,6 @@ class JudgeProblem:
         None where there are too many.
     omissions
         Shape (k,): ζ of the first candidate without each of them; None where there are too many.
-    explored
-        Whether the searcher has looked for maps that leave objects out by itself, so that a judge
-        need not.
     usual
         Whether relations are those of the default similarity on histograms of constant forces,
         found by a searcher of object maps; what was learned of ζ holds for no others.
@@ -97,7 +94,6 @@ class JudgeProblem:
     names: IntArray | None = None
     exchanges: FloatArray | None = None
     omissions: FloatArray | None = None
-    explored: bool = False
     usual: bool = True
 
 

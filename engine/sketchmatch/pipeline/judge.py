@@ -133,7 +133,7 @@ def judged(
     """
     whole, weights = Part.whole(comparison.table, comparison.own), goal.weights.searched
     first, others = yield from considered(comparison, found, goal)
-    problem = problem_of(comparison, first, others, goal, usual, bool(found.best.best.maps))
+    problem = problem_of(comparison, first, others, goal, usual)
     with inspecting(judge, registry, problem), blaming(judge, registry):
         judgement = judge.judge(problem)
         check_maps(judgement, problem)
@@ -198,7 +198,6 @@ def problem_of(
     others: Iterable[Rival],
     goal: Goal,
     usual: bool = True,
-    explored: bool = False,
 ) -> JudgeProblem:
     """Return what the judge is given of the maps that :func:`considered` returns."""
     template, argument = comparison.scenes
@@ -223,7 +222,6 @@ def problem_of(
         goal.names,
         None if exchanges is None else sealed(exchanges),
         None if omissions is None else sealed(omissions),
-        explored,
         usual,
     )
 

@@ -5,6 +5,7 @@ from sketchmatch_builtin.alignment._candidates import (
     completed,
     drive,
     laid_maps,
+    refined_maps,
     template_maps,
 )
 from sketchmatch_builtin.alignment._measures import PARTS, Part, measured, relations_of
@@ -21,6 +22,7 @@ __all__ = [
     "drive",
     "laid_maps",
     "measured",
+    "refined_maps",
     "relations_of",
     "sides_of",
     "template_maps",

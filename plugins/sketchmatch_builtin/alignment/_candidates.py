@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,12 +25,12 @@ from sketchmatch_builtin.alignment._sides import Sides
 from sketchmatch_builtin.alignment._things import Things
 from sketchmatch_builtin.searchers._assignment import FORBIDDEN, reduce_by_assignment
 
-__all__ = ["Laid", "completed", "drive", "laid_maps", "template_maps"]
+__all__ = ["Laid", "completed", "drive", "laid_maps", "refined_maps", "template_maps"]
 
-GUESSES = 40_000
+GUESSES = 25_000
 """Poses to weigh; beyond, the pairs that were laid on others have met the right pose for sure."""
 
-_FEWEST_PAIRS = 8
+_FEWEST_PAIRS = 4
 _ROOM = 400
 _PAIRS = 30
 _FLOOR = 0.8
@@ -46,6 +48,8 @@ _LOSS = 9.0
 _VARIED = 20
 """Maps that changes are made of."""
 
+_KEPT = 4
+_RECENT: dict[Any, list[Laid]] = {}
 _CHANGES = 20_000
 _FARTHEST = 20.0
 _FEWEST = 3
@@ -69,11 +73,18 @@ class Laid:
     pose: tuple[complex, complex, float]
     score: float
 
+    @property
+    def lines(self) -> int:
+        """How many objects have a partner."""
+        return int(np.count_nonzero(self.partners >= 0))
+
 
 def laid_maps(
-    sides: Sides, poses: int, maps: int, partial: bool, guesses: int = GUESSES
+    sides: Sides, poses: int = 60, maps: int = 300, partial: bool = True, guesses: int = GUESSES
 ) -> Generator[int, None, list[Laid]]:
     """Lay a sketch upon a map in every way that may be right.
+
+    What came of the last few is kept: searcher and judge ask for the same.
 
     Parameters
     ----------
@@ -82,7 +93,7 @@ def laid_maps(
     poses
         How many different maps to refine.
     maps
-        How many to return at most.
+        How many to return at most, with what single changes make of the best.
     partial
         Whether objects of both sides may be without partner.
     guesses
@@ -98,15 +109,33 @@ def laid_maps(
     list of Laid
         Different maps, what is worth most first.
     """
-    guessed = yield from _guessed(sides, guesses)
-    laid = _refined(guessed, sides, poses)
-    yield int(guessed.state[1])
+    key = (sides.identity, poses, maps, partial, guesses)
+    known = _RECENT.get(key)
+    if known is not None:
+        return known
+    laid = yield from _laid(sides, poses, guesses)
     most = min(len(sides.drawn.places), len(sides.mapped.places))
     if not partial:
         laid = [_filled(each, sides) for each in laid]
     fewest = min(_FEWEST, most) if partial else most
-    varied = _varied(laid, sides, maps)
-    return [each for each in varied if np.count_nonzero(each.partners >= 0) >= fewest][:maps]
+    found = [each for each in _varied(laid, sides, maps) if each.lines >= fewest]
+    _RECENT[key] = found
+    while len(_RECENT) > _KEPT:
+        with suppress(KeyError, StopIteration, RuntimeError):  # another thread may do the same
+            del _RECENT[next(iter(_RECENT))]
+    return found
+
+
+def refined_maps(sides: Sides, poses: int, guesses: int) -> list[Laid]:
+    """Return the different maps that the best poses lead to, what is worth most first."""
+    return drive(_laid(sides, poses, guesses))
+
+
+def _laid(sides: Sides, poses: int, guesses: int) -> Generator[int, None, list[Laid]]:
+    guessed = yield from _guessed(sides, guesses)
+    laid = _refined(guessed, sides, poses)
+    yield int(guessed.state[1])
+    return laid
 
 
 def drive(work: Generator[int, None, list[Laid]]) -> list[Laid]:
@@ -200,21 +229,28 @@ def _filled(laid: Laid, sides: Sides) -> Laid:
 
 
 def _varied(laid: list[Laid], sides: Sides, most: int) -> list[Laid]:
-    """Return these maps and what single changes make of the best of them."""
-    found = {each.partners.tobytes(): each for each in laid}
+    """Return these maps and what single changes make of the best of them, the best so many."""
     maps = np.empty((_CHANGES, len(sides.drawn.places)), dtype=np.int64)
     losses = np.empty(_CHANGES)
+    found = [*laid]
     for each in laid[:_VARIED]:
         left = _LOSS - (laid[0].score - each.score)
         if left <= 0.0:
             break
         worths = pairing_worths(*each.pose, sides.drawn, sides.mapped, sides.bonus, TOLERANCES)
         count = vary(worths, TOLERANCES.omission, each.partners, left, maps, losses)
-        for x in np.argsort(losses[:count], kind="stable")[:most]:
-            key, score = maps[x].tobytes(), float(each.score - losses[x])
-            if key not in found or found[key].score < score:
-                found[key] = Laid(maps[x].copy(), each.pose, score)
-    return sorted(found.values(), key=lambda each: -each.score)
+        best = np.argsort(losses[:count], kind="stable")[:most]
+        found += [
+            Laid(partners, each.pose, each.score - loss)
+            for partners, loss in zip(maps[best], losses[best].tolist(), strict=True)
+        ]
+    found.sort(key=lambda each: -each.score)
+    different: dict[bytes, Laid] = {}
+    for each in found:
+        different.setdefault(each.partners.tobytes(), each)
+        if len(different) == most:
+            break
+    return [*different.values()]
 
 
 def _pairs(drawn: Things) -> IntArray:

@@ -52,8 +52,9 @@ _LOOKS = 50
 _REACH = 3.0
 """Tolerances that sizes and shapes of two pairings may differ by to make a pose."""
 
-_SMALLEST = 2.0
-"""How much, in ln of the area, a sketch may show all things larger or smaller between places."""
+_LARGEST, _SMALLEST = -1.0, 2.0
+"""How much, in ln of the area, things may grow beyond what their places do: a sketch may show all
+of them smaller between their places, and hardly larger."""
 
 _TRUST = 0.9
 """Of that, how much two pairings are believed."""
@@ -216,7 +217,7 @@ def guess_poses(
                 continue
             growth = np.log(square(u))
             mean = 0.5 * (larger + mapped.sizes[g] - drawn.sizes[k]) - growth
-            if abs(mean) > _SMALLEST:
+            if not _LARGEST <= mean <= _SMALLEST:
                 continue
             twist = u * u / square(u)
             if (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from hashlib import sha256
 
 import numpy as np
 
@@ -37,6 +38,16 @@ class Sides:
     mapped: Things
     bonus: FloatArray
     swapped: bool
+
+    @property
+    def identity(self) -> str:
+        """The same for two that are the same."""
+        digest = sha256(repr((self.bonus.shape, self.swapped)).encode())
+        for side in (self.drawn, self.mapped):
+            for each in (side.places, side.sizes, side.shapes):
+                digest.update(each.tobytes())
+        digest.update(self.bonus.tobytes())
+        return digest.hexdigest()
 
     def drawn_partners(self, partners: IntArray) -> IntArray:
         """Return a map of the template as one of the sketch."""

@@ -13,14 +13,14 @@ from sketchmatch_builtin.alignment import (
     drive,
     laid_maps,
     measured,
+    refined_maps,
     relations_of,
 )
 from sketchmatch_builtin.judges._evidence import Described, numbers
 
 __all__ = ["Described", "described"]
 
-_POSES, _MAPS = 60, 300
-_DECOY_POSES, _DECOY_MAPS, _DECOY_GUESSES = 30, 60, 12_000
+_DECOY_POSES, _DECOY_GUESSES = 30, 8_000
 _SEED = 0
 
 
@@ -31,7 +31,6 @@ def described(
     names: IntArray | None = None,
     met: Iterable[IntArray] = (),
     partial: bool = True,
-    explore: bool = True,
 ) -> Described:
     """Describe maps of a sketch, and of its decoys.
 
@@ -45,12 +44,8 @@ def described(
         Maps that are known, of the sketch.
     partial
         Whether objects of both sides may be without partner.
-    explore
-        Whether to look for more maps by laying the sketch upon the map.
     """
-    found = [*met]
-    if explore:
-        found += [each.partners for each in drive(laid_maps(sides, _POSES, _MAPS, partial))]
+    found = [*met, *(each.partners for each in drive(laid_maps(sides, partial=partial)))]
     unique = {each.tobytes(): each for each in found}
     maps = np.stack([*unique.values()])
     relations = relations_of(scenes, table, names, sides.swapped)
@@ -82,6 +77,6 @@ def _decoy_numbers(decoy: Things, mapped: Things) -> FloatArray:
     """Return the numbers of the best maps of a decoy; of none, where it fits nowhere."""
     drawn, there_are = len(decoy.places), len(mapped.places)
     sides = Sides(decoy, mapped, np.zeros((drawn, there_are)), swapped=False)
-    laid = drive(laid_maps(sides, _DECOY_POSES, _DECOY_MAPS, partial=True, guesses=_DECOY_GUESSES))
+    laid = refined_maps(sides, _DECOY_POSES, _DECOY_GUESSES)
     maps = np.array([each.partners for each in laid], dtype=np.int64).reshape(-1, drawn)
     return numbers(measured(maps, decoy, mapped), drawn, there_are)

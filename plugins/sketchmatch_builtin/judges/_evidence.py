@@ -32,7 +32,7 @@ __all__ = [
     "weighed",
 ]
 
-_MORE = ("matched_among_many", "matched_share")
+_MORE = ("matched_among_many", "matched_share", "matched_covering")
 
 NUMBERS = (*PARTS, *_MORE)
 """What a map is described by."""
@@ -94,7 +94,14 @@ def numbers(parts: FloatArray, drawn: int, mapped: int) -> FloatArray:
         Shape (c, len(NUMBERS)).
     """
     matched = parts[:, Part.MATCHED]
-    return np.column_stack([parts, matched * math.log(mapped), matched * matched / drawn])
+    return np.column_stack(
+        [
+            parts,
+            matched * math.log(mapped),
+            matched * matched / drawn,
+            matched * min(drawn, mapped) / max(drawn, mapped),
+        ]
+    )
 
 
 def skill(best: FloatArray) -> FloatArray:

@@ -24,8 +24,8 @@ _NEGLIGIBLE = 1e-6
 class Posterior(Judge):
     """Weighs all evidence for each map, and says how likely it is, and whether this is the place.
 
-    The maps are those met by the search and, unless it has looked for these itself, those that
-    laying the sketch upon the map leads to. A conditional logit [1]_ makes probabilities of how
+    The maps are those met by the search and those that laying the sketch upon the map leads to, as
+    the searcher ``align`` does. A conditional logit [1]_ makes probabilities of how
     well each one's places, sizes and shapes agree in one frame, with what a page is stretched by
     and how carefully somebody draws, of how alike the relations are, of what is left out on
     either side, and of labels where both sides have some. That the right map is none of them has
@@ -78,7 +78,6 @@ class Posterior(Judge):
             problem.names,
             [sides.drawn_partners(each.partners) for each in problem.candidates],
             partial=problem.price < math.inf,
-            explore=not problem.explored,
         )
         found = weighed(known, POSTERIOR)
         order = np.argsort(-found.shares, kind="stable")
@@ -86,12 +85,16 @@ class Posterior(Judge):
         told = problem.alternatives + 1
         if not problem.usual:
             return Judgement(tuple(JudgedMap(each) for each in maps[:told]))
-        here = 1.0 - found.elsewhere
+        # Whoever says that a sketched object is a mapped one says that this is the place.
+        pinned = problem.pinned is not None and bool((problem.pinned >= 0).any())
+        elsewhere = 0.0 if pinned else found.elsewhere
+        here = 1.0 - elsewhere
         likely = here * (1.0 - found.lost) * found.shares[order]
         lines = _lines(maps, likely, problem.table)
         best = maps[0]
         lines[np.arange(len(best)), best] += here * found.lost * POSTERIOR.luck
-        lines[:, -1] += found.elsewhere
+        lines[:, -1] += elsewhere
+        _state_known(lines, problem)
         told = max(told, min(told + _TOLD, int(np.count_nonzero(likely > _NEGLIGIBLE))))
         return Judgement(
             tuple(
@@ -99,7 +102,7 @@ class Posterior(Judge):
                 for each, probability in zip(maps[:told], likely[:told], strict=True)
             ),
             np.clip(lines, 0.0, 1.0),
-            found.elsewhere,
+            elsewhere,
         )
 
 
@@ -110,3 +113,15 @@ def _lines(maps: list[IntArray], likely: FloatArray, table: RelationTable) -> Fl
     for partners, probability in zip(maps, likely, strict=True):
         lines[rows, partners] += probability
     return lines
+
+
+def _state_known(lines: FloatArray, problem: JudgeProblem) -> None:
+    """Make certain what the caller knows."""
+    if problem.allowed is not None:
+        nobodys = np.flatnonzero(~problem.allowed.any(axis=1))
+        lines[nobodys] = 0.0
+        lines[nobodys, -1] = 1.0
+    if problem.pinned is not None:
+        known = np.flatnonzero(problem.pinned >= 0)
+        lines[known] = 0.0
+        lines[known, problem.pinned[known]] = 1.0

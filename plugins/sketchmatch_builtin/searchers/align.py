@@ -70,7 +70,7 @@ class Align(Searcher):
             description="Different maps of the best poses that are refined.",
         )
         maps: int = Field(
-            120, ge=1, le=10_000, description="Maps that are offered, single changes among them."
+            20, ge=1, le=10_000, description="The best maps, which a judge is told of."
         )
 
     params: Params
@@ -102,7 +102,7 @@ class Align(Searcher):
         best = _Best(problem)
         best.offer(completed(None, sides))
         yield best.progress(0)
-        work = laid_maps(sides, self.params.poses, self.params.maps, partial=problem.partial)
+        work = laid_maps(sides, self.params.poses, partial=problem.partial)
         poses = 0
         while True:
             try:
@@ -111,9 +111,9 @@ class Align(Searcher):
                 laid: list[Laid] = stop.value
                 break
             yield best.progress(poses)
-        for each in laid[: self.params.poses]:
+        for each in laid[: self.params.maps]:
             best.offer(completed(each, sides))
-        maps = template_maps(laid, sides)
+        maps = template_maps(laid[: self.params.maps], sides)
         yield best.progress(poses, tuple(maps) if problem.partial else ())
         return Outcome.CONVERGED
 
