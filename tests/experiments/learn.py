@@ -30,7 +30,7 @@ __all__ = ["LEARNED", "SKETCHES", "THESIS"]
 LEARNED = Path(__file__).with_name("learned.json")
 """What came of it."""
 
-SKETCHES = {"odds": 600, "check": 600, "posterior": 8000}
+SKETCHES = {"odds": 600, "check": 600, "posterior": 9200}
 
 CHECKED = 1000
 """Sketches beyond those for ``posterior`` that its probabilities are checked with."""

@@ -40,7 +40,7 @@ __all__ = ["Known", "judged_errors", "known_of", "learned_posterior"]
 _ENGINE = Engine(default_registry())
 
 _PENALTY = 1e-4
-_OTHER_PLACES = 2.5
+_OTHER_PLACES = 6.0
 """What a sketch of another place counts for: taking it for this one is the worse mistake."""
 
 _LABELLED, _RIGHTLY, _WORDS = 0.7, 0.9, 0.5
@@ -159,7 +159,7 @@ def _share(told: Iterable[bool]) -> float:
 
 def _counts(case: Known) -> bool:
     """Whether a sketch of another place shows enough to be told from one of this place."""
-    return case.elsewhere and case.described.drawn > 4
+    return case.elsewhere and case.described.drawn > 5
 
 
 def _detailed(case: Known, first: FloatArray) -> FloatArray:
