@@ -20,6 +20,9 @@ from sketchmatch_builtin.alignment import (
 
 __all__ = ["Align"]
 
+_OFFERED = 10
+"""Maps to complete between two pauses."""
+
 
 class Align(Searcher):
     """Matches the objects themselves in one frame, and may leave some of either side out.
@@ -111,8 +114,10 @@ class Align(Searcher):
                 laid: list[Laid] = stop.value
                 break
             yield best.progress(poses)
-        for each in laid[: self.params.poses]:
+        for k, each in enumerate(laid[: self.params.poses]):
             best.offer(completed(each, sides))
+            if (k + 1) % _OFFERED == 0:
+                yield best.progress(poses)
         maps = template_maps(laid, sides)
         yield best.progress(poses, tuple(maps) if problem.partial else ())
         return Outcome.CONVERGED
