@@ -146,7 +146,7 @@ def test_every_pose_of_two_pairings_is_guessed_once_and_weighed_rightly(seed, n,
         drawn = moved(mapped, rng.permutation(m)[:n], 0.5 - 0.3j, 2.0 + 1.0j)
     allowed = rng.random((n, m)) < 0.9
     pairs = np.array([(a, b) for a in range(n) for b in range(a + 1, n)])
-    found, slices = guessed(pairs, drawn, mapped, allowed)
+    found, _ = guessed(pairs, drawn, mapped, allowed)
     known = dict(aligning.guesses(pairs, drawn, mapped, allowed))
     count = found.state[0]
     assert found.state[1] == len(known)

@@ -100,7 +100,7 @@ def laid_maps(
     yield int(guesses.state[1])
     most = min(len(sides.drawn.places), len(sides.mapped.places))
     if not partial:
-        laid = [_filled(each, sides) for each in laid]
+        laid = _ranked(_filled(each, sides) for each in laid)
     fewest = min(_FEWEST, most) if partial else most
     varied = _varied(laid, sides, maps)
     return [each for each in varied if np.count_nonzero(each.partners >= 0) >= fewest][:maps]
@@ -193,6 +193,16 @@ def _filled(laid: Laid, sides: Sides) -> Laid:
     matched = np.flatnonzero(partners >= 0)
     score = float(worths[matched, partners[matched]].sum())
     return Laid(partners, laid.pose, score - TOLERANCES.omission * (len(partners) - len(matched)))
+
+
+def _ranked(laid: Iterable[Laid]) -> list[Laid]:
+    """Return the different maps, each under its best pose, what is worth most first."""
+    found: dict[bytes, Laid] = {}
+    for each in laid:
+        key = each.partners.tobytes()
+        if key not in found or found[key].score < each.score:
+            found[key] = each
+    return sorted(found.values(), key=lambda each: -each.score)
 
 
 def _varied(laid: list[Laid], sides: Sides, most: int) -> list[Laid]:
