@@ -204,7 +204,7 @@ def _robust(deviation, unit):
 
 
 def _bent(z, left, unit):
-    """Return what a shift, a stretch and a growth to one side leave, by weighed ridge regression."""
+    """Return what a shift, a stretch and a growth to one side leave, by ridge regression."""
     z = z - z.mean()
     extent = math.sqrt((abs(z) ** 2).mean())
     z, ratio = z / extent, extent / unit

@@ -231,8 +231,10 @@ def test_roles_of_template_and_argument_change_nothing(seed, n, m):
 def test_relations_are_those_of_the_table_and_of_the_objects_alone():
     rng = np.random.default_rng(0)
     box = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
-    first = Scene.from_polygons([box, box + (4, 0), box + (0, 5)])
-    second = Scene.from_polygons([box, box + (4, 1), box + (2, 6), box + (9, 9)])
+    first = Scene.from_polygons([box, box + np.array((4, 0)), box + np.array((0, 5))])
+    second = Scene.from_polygons(
+        [box, box + np.array((4, 1)), box + np.array((2, 6)), box + np.array((9, 9))]
+    )
     table = random_table(rng, 3, 4)
     found = relations_of((first, second), table, None, False)
     np.testing.assert_array_equal(found.similarity, table.similarity)
@@ -243,7 +245,8 @@ def test_relations_are_those_of_the_table_and_of_the_objects_alone():
     np.testing.assert_array_equal(found.names, np.zeros((3, 4)))
     names = rng.integers(-1, 2, (4, 3))
     swapped = relations_of((first, second), table, names, True)
-    assert swapped.swapped and not found.swapped
+    assert swapped.swapped
+    assert not found.swapped
     np.testing.assert_array_equal(swapped.names, names.T)
 
 
@@ -273,5 +276,5 @@ def test_turning_scaling_and_mirroring_both_scenes_changes_no_part(scene, turn, 
 
 
 def test_parts_are_named_by_their_places():
-    assert PARTS == tuple(part.name.lower() for part in sorted(Part))
+    assert tuple(part.name.lower() for part in sorted(Part)) == PARTS
     assert [*map(int, Part)] == list(range(len(PARTS)))
