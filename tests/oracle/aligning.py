@@ -9,6 +9,9 @@ import shapely
 from sketchmatch.model import object_pairs
 from sketchmatch.pipeline.correspond import map_confidence
 
+GROWTH = -2.0, 2.0
+"""Within which things may grow beyond what their places do, in ln of the area."""
+
 
 def moments(item):
     """Return area, centroid and central second moments by area, from triangles of a polygon."""
@@ -72,7 +75,7 @@ def guesses(pairs, drawn, mapped, allowed):
             twist = (u / abs(u)) ** 2
             if (
                 abs(first - second) <= 3.0 * 0.35
-                and abs((first + second) / 2.0 - grown) <= 2.0
+                and GROWTH[0] <= (first + second) / 2.0 - grown <= GROWTH[1]
                 and abs(drawn.shapes[i] * twist - mapped.shapes[j]) <= 3.0 * 0.35
                 and abs(drawn.shapes[k] * twist - mapped.shapes[g]) <= 3.0 * 0.35
             ):
