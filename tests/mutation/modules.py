@@ -73,6 +73,7 @@ _GROUPS = {
             "_relations": _EXACT,
             "_residual": _EXACT,
             "_swarm": "plugins/test_nn_pso plugins/test_fsnn_pso",
+            "align": "plugins/test_align",
             "auto": "plugins/test_auto",
             "direct": "plugins/test_direct",
             "easm": "plugins/test_easm",
@@ -88,6 +89,20 @@ _GROUPS = {
             "_odds": "unit/test_probability unit/test_judge",
             "calibration": "unit/test_probability unit/test_learning",
             "confidence": "unit/test_judge unit/test_thesis_profile",
+            "_described": "plugins/test_posterior",
+            "_evidence": "plugins/test_posterior",
+            "posterior": "plugins/test_posterior",
+        },
+    ),
+    "alignment": (
+        "plugins/sketchmatch_builtin/alignment",
+        {
+            "_candidates": "plugins/test_alignment_candidates plugins/test_align",
+            "_measures": "plugins/test_alignment_measures",
+            "_poses": "plugins/test_alignment_poses plugins/test_alignment_candidates",
+            "_selves": "plugins/test_alignment_things",
+            "_sides": "plugins/test_alignment_things",
+            "_things": "plugins/test_alignment_things",
         },
     ),
 }

@@ -39,8 +39,11 @@ _FLOOR = 0.8
 _ROUGH = 3.5
 """λ while poses are guessed: less, so that fewer objects have to be looked at."""
 
-_STEP = 20_000
+_STEP = 2_000
 """Poses to weigh between two pauses, or a few more."""
+
+_PAIRINGS = 100_000
+"""Pairings to weigh for poses that are refined between two pauses, or a few more."""
 
 _LOSS = 9.0
 """How much less than the best a map may be worth that changes make of others."""
@@ -116,7 +119,7 @@ def laid_maps(
     laid = yield from _laid(sides, poses, guesses)
     most = min(len(sides.drawn.places), len(sides.mapped.places))
     if not partial:
-        laid = [_filled(each, sides) for each in laid]
+        laid = _ranked(_filled(each, sides) for each in laid)
     fewest = min(_FEWEST, most) if partial else most
     found = [each for each in _varied(laid, sides, maps) if each.lines >= fewest]
     _RECENT[key] = found
@@ -133,7 +136,7 @@ def refined_maps(sides: Sides, poses: int, guesses: int) -> list[Laid]:
 
 def _laid(sides: Sides, poses: int, guesses: int) -> Generator[int, None, list[Laid]]:
     guessed = yield from _guessed(sides, guesses)
-    laid = _refined(guessed, sides, poses)
+    laid = yield from _refined(guessed, sides, poses)
     yield int(guessed.state[1])
     return laid
 
@@ -161,7 +164,6 @@ def completed(laid: Laid | None, sides: Sides) -> IntArray:
         worths = pairing_worths(*laid.pose, sides.drawn, sides.mapped, sides.bonus, TOLERANCES)
     if sides.swapped:
         worths = worths.T
-    best = worths.max(initial=0.0)
     rows, columns = worths.shape
     costs, candidates = np.empty((rows, columns)), np.empty((rows, columns), dtype=np.int64)
     sizes, holders = np.empty(rows, dtype=np.int64), np.empty(columns, dtype=np.int64)
@@ -169,7 +171,7 @@ def completed(laid: Laid | None, sides: Sides) -> IntArray:
         free = np.flatnonzero(np.isfinite(row))
         sizes[k] = len(free)
         candidates[k, : len(free)] = free
-        costs[k, : len(free)] = np.minimum(best - row[free], _FARTHEST)
+        costs[k, : len(free)] = np.minimum(row.max() - row[free], _FARTHEST)
     if reduce_by_assignment(costs, candidates, sizes, holders) >= FORBIDDEN:
         return np.arange(rows)
     found = np.empty(rows, dtype=np.int64)
@@ -201,12 +203,12 @@ def _guessed(sides: Sides, most: int) -> Generator[int, None, Guesses]:
     return guesses
 
 
-def _refined(guesses: Guesses, sides: Sides, poses: int) -> list[Laid]:
+def _refined(guesses: Guesses, sides: Sides, poses: int) -> Generator[int, None, list[Laid]]:
     """Return the different maps that the best guesses lead to."""
     drawn, mapped = sides.drawn, sides.mapped
     found: dict[bytes, Laid] = {}
     partners = np.empty(len(drawn.places), dtype=np.int64)
-    count = int(guesses.state[0])
+    count, weighed = int(guesses.state[0]), 0
     ranked = np.argsort(-guesses.scores[:count], kind="stable")
     for g in ranked[: 5 * poses]:
         pose = guessed_pose(guesses.pairings[g], drawn, mapped)
@@ -216,6 +218,10 @@ def _refined(guesses: Guesses, sides: Sides, poses: int) -> list[Laid]:
             found[key] = Laid(partners.copy(), (u, t, growth), score)
         if len(found) >= poses:
             break
+        weighed += sides.bonus.size
+        if weighed >= _PAIRINGS:
+            weighed = 0
+            yield int(guesses.state[1])
     return sorted(found.values(), key=lambda laid: -laid.score)
 
 
@@ -226,6 +232,16 @@ def _filled(laid: Laid, sides: Sides) -> Laid:
     matched = np.flatnonzero(partners >= 0)
     score = float(worths[matched, partners[matched]].sum())
     return Laid(partners, laid.pose, score - TOLERANCES.omission * (len(partners) - len(matched)))
+
+
+def _ranked(laid: Iterable[Laid]) -> list[Laid]:
+    """Return the different maps, each under its best pose, what is worth most first."""
+    found: dict[bytes, Laid] = {}
+    for each in laid:
+        key = each.partners.tobytes()
+        if key not in found or found[key].score < each.score:
+            found[key] = each
+    return sorted(found.values(), key=lambda each: -each.score)
 
 
 def _varied(laid: list[Laid], sides: Sides, most: int) -> list[Laid]:

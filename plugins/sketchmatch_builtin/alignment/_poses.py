@@ -46,7 +46,7 @@ __all__ = [
 _ROUNDS = 6
 _MOST_CELLS = 64
 _FULL = 1e3
-_LOOKS = 50
+_LOOKS = 500
 """Pairings to look at for each pose that may be weighed between two pauses."""
 
 _REACH = 3.0
@@ -277,8 +277,8 @@ def _worth(
         best = worst
         column = (place.real - grid.corner.real) / grid.cell
         row = (place.imag - grid.corner.imag) / grid.cell
-        left, right = max(0.0, column - reach), min(grid.columns - 1.0, column + reach)
-        low, high = max(0.0, row - reach), min(grid.rows - 1.0, row + reach)
+        left, right = max(0.0, np.floor(column - reach)), min(grid.columns - 1.0, column + reach)
+        low, high = max(0.0, np.floor(row - reach)), min(grid.rows - 1.0, row + reach)
         if left <= right and low <= high:
             for y in range(int(low), int(high) + 1):
                 first = grid.starts[y * grid.columns + int(left)]
@@ -525,9 +525,9 @@ def vary(
                 continue
             change -= worths[k, j]
             for g in range(-1, m):
-                if count >= losses.size or g == j:
+                if count >= losses.size:
                     break
-                if g >= 0 and holders[g] >= 0 and g != partners[i]:
+                if g >= 0 and holders[g] >= 0 and g != partners[i]:  # j is held too, by k
                     continue
                 if g >= 0 and g == partners[i] and i > k:
                     continue

@@ -17,8 +17,12 @@ from sketchmatch_builtin.alignment import (
     sides_of,
     template_maps,
 )
+from sketchmatch_builtin.searchers.auto import Auto
 
 __all__ = ["Align"]
+
+_OFFERED = 10
+"""Maps to complete between two pauses."""
 
 
 class Align(Searcher):
@@ -32,6 +36,8 @@ class Align(Searcher):
     nothing. Under the best poses a linear assignment gives each object its partner, or none, and
     the pose is fitted again to these, a few times. What single changes make of the best of these
     maps is offered as well.
+
+    Relations without scenes, which a match never has, are searched as ``auto`` does.
 
     It compares no relations: ζ decides only which of these maps, completed where they leave
     objects out, is the best histogram map. A judge that looks at the maps themselves makes the
@@ -91,11 +97,11 @@ class Align(Searcher):
     def search(
         self,
         problem: MatchProblem,
-        rng: np.random.Generator,  # noqa: ARG002
+        rng: np.random.Generator,
     ) -> Generator[SearchProgress, None, Outcome]:
         """Lay the sketch upon the map in every way that may be right."""
         if problem.scenes is None:
-            raise ValueError("it lays scenes upon each other, and the problem has none")
+            return (yield from Auto().search(problem, rng))
         sides = sides_of(
             problem.scenes(), problem.swapped, problem.allowed, problem.pinned, problem.names
         )
@@ -111,8 +117,10 @@ class Align(Searcher):
                 laid: list[Laid] = stop.value
                 break
             yield best.progress(poses)
-        for each in laid[: self.params.maps]:
+        for k, each in enumerate(laid[: self.params.maps]):
             best.offer(completed(each, sides))
+            if (k + 1) % _OFFERED == 0:
+                yield best.progress(poses)
         maps = template_maps(laid[: self.params.maps], sides)
         yield best.progress(poses, tuple(maps) if problem.partial else ())
         return Outcome.CONVERGED

@@ -1,0 +1,263 @@
+"""What alignment computes, slow and obvious: nothing compiled, no grid, all maps tried."""
+
+import itertools
+import math
+
+import numpy as np
+import shapely
+
+from sketchmatch.model import object_pairs
+from sketchmatch.pipeline.correspond import map_confidence
+
+GROWTH = -2.0, 2.0
+"""Within which things may grow beyond what their places do, in ln of the area."""
+
+
+def moments(item):
+    """Return area, centroid and central second moments by area, from triangles of a polygon."""
+    area, first, second = 0.0, np.zeros(2), np.zeros((2, 2))
+    for triangle in shapely.constrained_delaunay_triangles(item.polygon).geoms:
+        corners = np.array(triangle.exterior.coords[:3])
+        middle, part = corners.mean(axis=0), triangle.area
+        area += part
+        first += part * middle
+        # ∫ r rᵀ over a triangle: A/12 (Σ cᵢcᵢᵀ + 9 m mᵀ).
+        second += part / 12.0 * (corners.T @ corners + 9.0 * np.outer(middle, middle))
+    centre = first / area
+    return area, centre, second / area - np.outer(centre, centre)
+
+
+def shape(covariance):
+    """Return ½ ln(λ₁/λ₂)·e^{2iφ} of a covariance."""
+    values, vectors = np.linalg.eigh(covariance)
+    x, y = vectors[:, 1]
+    return 0.5 * math.log(values[1] / values[0]) * np.exp(2j * math.atan2(y, x))
+
+
+def spacing(places):
+    """Return the mean distance to the nearest other place."""
+    return float(
+        np.mean(
+            [min(abs(a - b) for j, b in enumerate(places) if j != i) for i, a in enumerate(places)]
+        )
+    )
+
+
+def worths(pose, drawn, mapped, tolerances, bonus=None):
+    """Return ℓ of every pairing under a pose."""
+    u, t, growth = pose
+    found = np.empty((len(drawn.places), len(mapped.places)))
+    for i, j in np.ndindex(found.shape):
+        d = abs(mapped.places[j] - u * drawn.places[i] - t) / (abs(u) * drawn.spacing)
+        e = mapped.sizes[j] - drawn.sizes[i] - growth
+        h = abs(mapped.shapes[j] - drawn.shapes[i] * (u / abs(u)) ** 2)
+        terms = d / tolerances.place, e / tolerances.size, h / tolerances.shape
+        found[i, j] = -2.0 * sum(math.log(1.0 + x * x / 3.0) for x in terms)
+    return found if bonus is None else found + bonus
+
+
+def pose_worth(pose, drawn, mapped, allowed, tolerances):
+    """Return Σ_i max(max_j ℓ_ij, −λ)."""
+    found = np.where(allowed, worths(pose, drawn, mapped, tolerances), -np.inf)
+    return float(np.maximum(found.max(axis=1), -tolerances.omission).sum())
+
+
+def guesses(pairs, drawn, mapped, allowed):
+    """Yield i, j, k, g and the pose of each two pairings that may make one."""
+    for i, k in pairs:
+        for j, g in itertools.permutations(range(len(mapped.places)), 2):
+            way, other = drawn.places[k] - drawn.places[i], mapped.places[g] - mapped.places[j]
+            if way == 0.0 or other == 0.0 or not (allowed[i, j] and allowed[k, g]):
+                continue
+            u = other / way
+            first, second = mapped.sizes[j] - drawn.sizes[i], mapped.sizes[g] - drawn.sizes[k]
+            grown = 2.0 * math.log(abs(u))
+            twist = (u / abs(u)) ** 2
+            if (
+                abs(first - second) <= 3.0 * 0.35
+                and GROWTH[0] <= (first + second) / 2.0 - grown <= GROWTH[1]
+                and abs(drawn.shapes[i] * twist - mapped.shapes[j]) <= 3.0 * 0.35
+                and abs(drawn.shapes[k] * twist - mapped.shapes[g]) <= 3.0 * 0.35
+            ):
+                growth = grown + 0.9 * ((first + second) / 2.0 - grown)
+                yield (i, j, k, g), (u, mapped.places[j] - u * drawn.places[i], growth)
+
+
+def all_maps(n, m):
+    """Yield every map of n objects to m, none of which two share; −1 for none."""
+    for partners in itertools.product(range(-1, m), repeat=n):
+        used = [j for j in partners if j >= 0]
+        if len(used) == len(set(used)):
+            yield partners
+
+
+def value(partners, found, omission):
+    """Return the sum of ℓ and −λ."""
+    return sum(found[i, j] if j >= 0 else -omission for i, j in enumerate(partners))
+
+
+def changed(partners, n, m):
+    """Return every map that one change makes: of one object, or of two over a partner taken.
+
+    The second is the one that had the partner that the first now has.
+    """
+    start, found = tuple(partners), set()
+    for i, j in itertools.product(range(n), range(-1, m)):
+        if j == start[i]:
+            continue
+        k = start.index(j) if j >= 0 and j in start else None
+        for g in range(-1, m) if k is not None else (None,):
+            after = list(start)
+            after[i] = j
+            if k is not None:
+                after[k] = g
+            used = [x for x in after if x >= 0]
+            if len(used) == len(set(used)):
+                found.add(tuple(after))
+    found.discard(start)
+    return found
+
+
+def best_pose(partners, drawn, mapped, tolerances, steps=3):
+    """Return the pose of a map: least squares first, then weighed by how well each line fits."""
+    lines = [(i, j) for i, j in enumerate(partners) if j >= 0]
+    z = np.array([drawn.places[i] for i, _ in lines])
+    w = np.array([mapped.places[j] for _, j in lines])
+    share = np.ones(len(lines))
+    u = t = None
+    least = 0.1 * math.sqrt(np.var(w) / np.var(z))
+    for _ in range(steps + 1):
+        a, b = np.average(z, weights=share), np.average(w, weights=share)
+        v = np.sum(share * (w - b) * np.conj(z - a)) / np.sum(share * abs(z - a) ** 2)
+        if u is None and abs(v) < least:
+            v = v / abs(v) * least
+        elif abs(v) < least:
+            break
+        u, t = v, b - v * a
+        away = abs(w - u * z - t) / (abs(u) * drawn.spacing * tolerances.place)
+        share = 1.0 / (1.0 + away**2 / 3.0)
+    e = np.array([mapped.sizes[j] - drawn.sizes[i] for i, j in lines]) - 2.0 * math.log(abs(u))
+    offset = 0.0
+    for _ in range(3):
+        share = 1.0 / (1.0 + ((e - offset) / tolerances.size) ** 2 / 3.0)
+        offset = np.sum(share * e) / (np.sum(share) + (tolerances.size / 0.6) ** 2)
+    return u, t, 2.0 * math.log(abs(u)) + offset
+
+
+def parts(partners, drawn, mapped, tolerances):
+    """Return what places, sizes and shapes say of a map, by name of the part."""
+    u, t, growth = best_pose(partners, drawn, mapped, tolerances)
+    lines = [(i, j) for i, j in enumerate(partners) if j >= 0]
+    left = np.array([(mapped.places[j] - u * drawn.places[i] - t) / u for i, j in lines])
+    left /= drawn.spacing
+    d = abs(left)
+    e = np.array([abs(mapped.sizes[j] - drawn.sizes[i] - growth) for i, j in lines])
+    twist = (u / abs(u)) ** 2
+    h = np.array([abs(drawn.shapes[i] * twist - mapped.shapes[j]) for i, j in lines])
+    odd = np.sort(_robust(d, 0.2) + _robust(e, 0.25) + _robust(h, 0.2))
+    count = len(lines)
+    return {
+        "matched": count,
+        "place": _robust(d, 0.35).sum(),
+        "place_tight": _robust(d, 0.12).sum(),
+        "place_square": np.minimum((d / 0.5) ** 2, 4.0).sum(),
+        "size": _robust(e, 0.4).sum(),
+        "size_tight": _robust(e, 0.15).sum(),
+        "size_square": np.minimum((e / 0.5) ** 2, 4.0).sum(),
+        "shape": _robust(h, 0.35).sum(),
+        "shape_tight": _robust(h, 0.12).sum(),
+        "shape_square": np.minimum((h / 0.4) ** 2, 4.0).sum(),
+        "scatter": count * math.log(0.03 + math.sqrt(np.minimum(d**2, 1.0).mean())),
+        "scatter_size": count * math.log(0.05 + math.sqrt(np.minimum(e**2, 2.0).mean())),
+        "scatter_shape": count * math.log(0.03 + math.sqrt(np.minimum(h**2, 1.0).mean())),
+        "offset": min((growth - 2.0 * math.log(abs(u))) ** 2, 6.0),
+        "worst": odd[-1],
+        "second": odd[-2],
+        **_bent(np.array([drawn.places[i] for i, _ in lines]), left, drawn.spacing),
+        **_surrounded(partners, mapped, abs(u) * drawn.spacing),
+        **_ways(lines, drawn, mapped, u),
+        "outlier": _outlier(np.array([d, e, h]) ** 2),
+    }
+
+
+def related(partners, table):
+    """Return what the relations say of a map that is read from the template."""
+    zeta, levels = map_confidence(np.asarray(partners), table), _levels(partners, table)
+    gaps = [abs(x - y) for x, y in itertools.combinations(levels, 2)]
+    count = sum(j >= 0 for j in partners)
+    return {
+        "similarity": count * (1.0 - zeta.similarity),
+        "rotation": count * (1.0 - zeta.rotation),
+        "dilation": count * float(np.mean(gaps)) if gaps else 0.0,
+    }
+
+
+def _levels(partners, table):
+    kept = [i for i, j in enumerate(partners) if j >= 0]
+    first = {tuple(pair): k for k, pair in enumerate(object_pairs(table.template_objects))}
+    second = {tuple(pair): k for k, pair in enumerate(object_pairs(table.argument_objects))}
+    return [
+        table.normalized_dilation[first[a, b], second[tuple(sorted((partners[a], partners[b])))]]
+        for a, b in itertools.combinations(kept, 2)
+    ]
+
+
+def _robust(deviation, unit):
+    return np.log(1.0 + (deviation / unit) ** 2 / 3.0)
+
+
+def _bent(z, left, unit):
+    """Return what a shift, a stretch and a growth to one side leave, by ridge regression."""
+    z = z - z.mean()
+    extent = math.sqrt((abs(z) ** 2).mean())
+    z, ratio = z / extent, extent / unit
+    effects = [np.ones_like(z), 1j * np.ones_like(z), z.conj(), 1j * z.conj()]
+    effects += [z * z.real, z * z.imag]
+    weights = np.sqrt(1.0 / (1.0 + (abs(left) / 0.35) ** 2 / 3.0))
+    design = np.array(effects).T * weights[:, None]
+    stacked = np.concatenate([design.real, design.imag])
+    ridge = np.diag([1e-3] * 2 + [0.2 / (0.12 * ratio)] * 4)
+    sought = np.concatenate([(left * weights).real, (left * weights).imag, np.zeros(6)])
+    found = np.linalg.lstsq(np.concatenate([stacked, ridge]), sought, rcond=None)[0]
+    rest = abs(left - np.array(effects).T @ found)
+    return {
+        "bent": _robust(rest, 0.35).sum(),
+        "bent_tight": _robust(rest, 0.12).sum(),
+        "bend": min((found[2:] ** 2).sum() / (0.12 * ratio) ** 2, 9.0),
+    }
+
+
+def _surrounded(partners, mapped, unit):
+    """Return the objects that nobody drew amid others."""
+    used = [j for j in partners if j >= 0]
+    missing = crowd = 0.0
+    for j in set(range(len(mapped.places))) - set(used):
+        ways = np.array([mapped.places[other] - mapped.places[j] for other in used])
+        crowd += (abs(ways) < 2.0 * unit).sum() >= 3
+        if len(ways) < 3:
+            continue
+        angles = np.sort(np.angle(ways))
+        gap = np.diff(np.append(angles, angles[0] + 2.0 * math.pi)).max()
+        missing += np.clip((math.pi - gap) / (math.pi / 4.0), 0.0, 1.0)
+    return {"missing": missing, "crowd": crowd}
+
+
+def _ways(lines, drawn, mapped, u):
+    """Return what the ways to the two nearest say."""
+    near = tight = 0.0
+    for i, j in lines:
+        others = [(k, g) for k, g in lines if k != i]
+        others.sort(key=lambda line: abs(drawn.places[line[0]] - drawn.places[i]))
+        for k, g in others[:2]:
+            way = drawn.places[k] - drawn.places[i]
+            off = abs((mapped.places[g] - mapped.places[j]) / u - way) / abs(way)
+            near += 0.5 * _robust(off, 0.4)
+            tight += 0.5 * _robust(off, 0.15)
+    return {"near": near, "near_tight": tight}
+
+
+def _outlier(squares):
+    """Return how odd the line is that is oddest for what the others are."""
+    count = squares.shape[1]
+    others = (squares.sum(axis=1, keepdims=True) - squares + 0.04) / count
+    return math.log(1.0 + (squares / others).sum(axis=0).max() / 3.0)

@@ -1,0 +1,194 @@
+"""The maps that poses lead to: complete or not, single changes among them."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sketchmatch_builtin.alignment import Laid, Sides, completed, drive, laid_maps, template_maps
+from sketchmatch_builtin.alignment import _candidates as module
+from sketchmatch_builtin.alignment._poses import TOLERANCES
+from tests.interpreted import examples
+from tests.oracle import aligning
+from tests.plugins.test_alignment_poses import moved, things
+
+
+def sides(drawn, mapped, bonus=None, swapped=False):
+    shape = len(drawn.places), len(mapped.places)
+    return Sides(drawn, mapped, np.zeros(shape) if bonus is None else bonus, swapped)
+
+
+def copied(seed, drawn, objects):
+    """Return a copy of some of what is there, and which it is."""
+    rng = np.random.default_rng(seed)
+    mapped = things(rng, objects)
+    order = rng.permutation(objects)[:drawn]
+    return moved(mapped, order, 0.5 - 0.7j, 2.0 - 1.0j), mapped, order
+
+
+def lay(seen, poses=60, maps=120, partial=True):
+    return drive(laid_maps(seen, poses, maps, partial))
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@given(st.integers(0, 2**32), st.integers(2, 4), st.integers(0, 2))
+@examples(40)
+def test_a_map_is_completed_at_the_least_loss(swapped, seed, rows, more):
+    rng = np.random.default_rng(seed)
+    shape = (rows + more, rows) if swapped else (rows, rows + more)
+    bonus = np.where(rng.random(shape) < 0.1, -np.inf, rng.choice([0.0, 2.0, -2.0, 50.0], shape))
+    seen = sides(things(rng, shape[0]), things(rng, shape[1]), bonus, swapped)
+    pose = complex(rng.normal() + 1.0, rng.normal()), complex(*rng.normal(size=2)), 0.0
+    for laid in (None, Laid(np.full(shape[0], -1), pose, 0.0)):
+        worths = bonus
+        if laid is not None:
+            worths = aligning.worths(pose, seen.drawn, seen.mapped, TOLERANCES, bonus)
+        worths = worths.T if swapped else worths
+        # What is worth much less than the best of an object is worth no less than that.
+        best = np.maximum(worths.max(axis=1, keepdims=True), -1e9)
+        lacks = np.where(np.isfinite(worths), np.minimum(best - worths, 20.0), np.inf)
+        ways = [np.array(way) for way in itertools.permutations(range(rows + more), rows)]
+        costs = [lacks[np.arange(rows), way].sum() for way in ways]
+        found = completed(laid, seen)
+        if np.isfinite(min(costs)):
+            assert lacks[np.arange(rows), found].sum() == pytest.approx(min(costs), abs=1e-9)
+        assert len(set(found.tolist())) == rows
+
+
+def test_where_something_is_pinned_the_others_are_completed_by_what_fits():
+    drawn, mapped, order = copied(0, 5, 7)
+    bonus = np.zeros((5, 7))
+    bonus[0], bonus[:, order[0]] = -np.inf, -np.inf
+    bonus[0, order[0]] = 50.0
+    u, t = 0.5 - 0.7j, 2.0 - 1.0j
+    pose = 1.0 / u, -t / u, 0.0
+    np.testing.assert_array_equal(
+        completed(Laid(np.full(5, -1), pose, 0.0), sides(drawn, mapped, bonus)), order
+    )
+
+
+def test_where_no_complete_map_is_allowed_one_is_returned_all_the_same():
+    drawn, mapped, _ = copied(0, 3, 4)
+    bonus = np.zeros((3, 4))
+    bonus[1] = -np.inf
+    assert completed(None, sides(drawn, mapped, bonus)).tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("partial", [True, False])
+@given(st.integers(0, 2**32), st.integers(2, 7), st.integers(0, 5))
+@examples(40)
+def test_a_copy_is_laid_wholly_and_exactly(partial, seed, count, more):
+    drawn, mapped, order = copied(seed, count, count + more)
+    best, *_ = lay(sides(drawn, mapped), partial=partial)
+    if count > 2:
+        np.testing.assert_array_equal(best.partners, order)
+        u, t, _ = best.pose
+        np.testing.assert_allclose(u * drawn.places + t, mapped.places[order], atol=1e-6)
+    assert best.score == pytest.approx(0.0, abs=1e-6)
+
+
+@given(st.integers(0, 2**32), st.integers(2, 5), st.integers(2, 6), st.booleans(), st.booleans())
+@examples(60)
+def test_what_is_laid_is_valid_different_allowed_and_rightly_scored(seed, n, m, partial, ruled):
+    rng = np.random.default_rng(seed)
+    drawn, mapped = things(rng, n), things(rng, m)
+    if n <= m:
+        drawn = moved(mapped, rng.permutation(m)[:n], 2.0j, 1.0)
+        drawn = drawn._replace(places=drawn.places + 0.1 * drawn.spacing * rng.normal(size=n))
+    bonus = np.where(rng.random((n, m)) < 0.2, -np.inf, 0.0) if ruled else np.zeros((n, m))
+    seen = sides(drawn, mapped, bonus, swapped=n > m)
+    laid = lay(seen, maps=40, partial=partial)
+    assert len({each.partners.tobytes() for each in laid}) == len(laid) <= 40
+    scores = [each.score for each in laid]
+    assert scores == sorted(scores, reverse=True)
+    fewest = min(3, n, m) if partial else min(n, m)
+    complete = [way for way in aligning.all_maps(n, m) if sum(j >= 0 for j in way) == min(n, m)]
+    possible = any(
+        all(np.isfinite(bonus[i, j]) for i, j in enumerate(way) if j >= 0) for way in complete
+    )
+    for each in laid:
+        matched = np.flatnonzero(each.partners >= 0)
+        assert len(set(each.partners[matched])) == len(matched) >= fewest
+        if partial or possible:
+            assert np.isfinite(bonus[matched, each.partners[matched]]).all()
+            found = aligning.worths(each.pose, drawn, mapped, TOLERANCES, bonus)
+            value = aligning.value(each.partners, found, TOLERANCES.omission)
+            assert each.score == pytest.approx(value, abs=1e-6)
+
+
+def test_single_changes_of_the_best_map_are_offered_as_well():
+    drawn, mapped, order = copied(4, 5, 6)
+    laid = lay(sides(drawn, mapped), poses=1, maps=500)
+    offered = {tuple(each.partners.tolist()) for each in laid}
+    found = aligning.worths(laid[0].pose, drawn, mapped, TOLERANCES)
+    best = aligning.value(order, found, TOLERANCES.omission)
+    near = {
+        each
+        for each in aligning.changed(order, 5, 6)
+        if best - aligning.value(each, found, TOLERANCES.omission) <= 9.0
+        and sum(j >= 0 for j in each) >= 3
+    }
+    assert offered == near | {tuple(order.tolist())}
+    # The best of these, where fewer are wanted.
+    few = lay(sides(drawn, mapped), poses=1, maps=4)
+    assert [each.score for each in few] == [each.score for each in laid[:4]]
+
+
+def test_maps_of_the_template_are_those_of_the_sketch_the_other_way_round():
+    drawn, mapped, order = copied(1, 4, 6)
+    straight = template_maps(lay(sides(drawn, mapped)), sides(drawn, mapped))
+    np.testing.assert_array_equal(straight[0], order)
+    # The map has fewer objects than the sketch, so the map is the template.
+    other = sides(mapped, drawn, swapped=True)
+    swapped = template_maps(lay(other), other)
+    np.testing.assert_array_equal(swapped[0], order)
+
+
+@pytest.mark.parametrize("partial", [True, False])
+def test_nothing_is_laid_where_all_lies_in_one_place(partial):
+    rng = np.random.default_rng(0)
+    drawn = things(rng, 3, places=np.zeros(3))
+    mapped = things(rng, 4)
+    assert lay(sides(drawn, mapped), partial=partial) == []
+    assert lay(sides(drawn, things(rng, 4, places=np.zeros(4))), partial=partial) == []
+
+
+def test_alike_things_on_a_square_are_laid_in_all_four_ways_alike():
+    corners = np.array([0.0, 1.0, 1.0 + 1j, 1j]) * 4.0
+    square = things(np.random.default_rng(0), 4, places=corners)
+    square = square._replace(sizes=np.zeros(4), shapes=np.zeros(4, dtype=complex))
+    laid = lay(sides(square, square))
+    best = {tuple(each.partners.tolist()) for each in laid if each.score > -1e-6}
+    assert best == {tuple((k + np.arange(4)) % 4) for k in range(4)}
+
+
+def test_work_between_pauses_is_bounded(monkeypatch):
+    weighed, refined = [], [0]
+    guess, refine = module.guess_poses, module.refine_pose
+
+    def counted(*arguments):
+        before = int(arguments[-1].state[1])
+        guess(*arguments)
+        weighed.append(int(arguments[-1].state[1]) - before)
+
+    def noted(*arguments):
+        refined[0] += 1
+        return refine(*arguments)
+
+    monkeypatch.setattr(module, "guess_poses", counted)
+    monkeypatch.setattr(module, "refine_pose", noted)
+    drawn, mapped, order = copied(0, 60, 60)
+    work = laid_maps(sides(drawn, mapped), 60, 120, True)
+    most = before = 0
+    while True:
+        try:
+            next(work)
+        except StopIteration as stop:
+            laid = stop.value
+            break
+        most, before = max(most, refined[0] - before), refined[0]
+    np.testing.assert_array_equal(laid[0].partners, order)
+    assert max(weighed) <= module._STEP + 60
+    assert 0 < most <= module._PAIRINGS // 60**2 + 1
