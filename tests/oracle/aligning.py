@@ -9,7 +9,7 @@ import shapely
 from sketchmatch.model import object_pairs
 from sketchmatch.pipeline.correspond import map_confidence
 
-GROWTH = -2.0, 2.0
+GROWTH = -1.0, 2.0
 """Within which things may grow beyond what their places do, in ln of the area."""
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Generator, Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +25,7 @@ from sketchmatch_builtin.alignment._sides import Sides
 from sketchmatch_builtin.alignment._things import Things
 from sketchmatch_builtin.searchers._assignment import FORBIDDEN, reduce_by_assignment
 
-__all__ = ["Laid", "completed", "drive", "laid_maps", "refined_maps", "template_maps"]
+__all__ = ["Laid", "completed", "drive", "known_maps", "laid_maps", "refined_maps", "template_maps"]
 
 GUESSES = 25_000
 """Poses to weigh; beyond, the pairs that were laid on others have met the right pose for sure."""
@@ -51,8 +51,7 @@ _LOSS = 9.0
 _VARIED = 20
 """Maps that changes are made of."""
 
-_KEPT = 4
-_RECENT: dict[Any, list[Laid]] = {}
+_RECENT: deque[tuple[Any, list[Laid]]] = deque(maxlen=8)
 _CHANGES = 20_000
 _FARTHEST = 20.0
 _FEWEST = 3
@@ -87,7 +86,7 @@ def laid_maps(
 ) -> Generator[int, None, list[Laid]]:
     """Lay a sketch upon a map in every way that may be right.
 
-    What came of the last few is kept: searcher and judge ask for the same.
+    What comes of it is kept for :func:`known_maps`.
 
     Parameters
     ----------
@@ -112,21 +111,29 @@ def laid_maps(
     list of Laid
         Different maps, what is worth most first.
     """
-    key = (sides.identity, poses, maps, partial, guesses)
-    known = _RECENT.get(key)
-    if known is not None:
-        return known
     laid = yield from _laid(sides, poses, guesses)
     most = min(len(sides.drawn.places), len(sides.mapped.places))
     if not partial:
         laid = _ranked(_filled(each, sides) for each in laid)
     fewest = min(_FEWEST, most) if partial else most
     found = [each for each in _varied(laid, sides, maps) if each.lines >= fewest]
-    _RECENT[key] = found
-    while len(_RECENT) > _KEPT:
-        with suppress(KeyError, StopIteration, RuntimeError):  # another thread may do the same
-            del _RECENT[next(iter(_RECENT))]
+    _RECENT.appendleft((_key(sides, poses, maps, partial, guesses), found))
     return found
+
+
+def known_maps(
+    sides: Sides, poses: int = 60, maps: int = 300, partial: bool = True, guesses: int = GUESSES
+) -> list[Laid]:
+    """Return what :func:`laid_maps` does, at once where a searcher asked for it just before."""
+    key = _key(sides, poses, maps, partial, guesses)
+    for known, found in tuple(_RECENT):
+        if known == key:
+            return found
+    return drive(laid_maps(sides, poses, maps, partial, guesses))
+
+
+def _key(sides: Sides, *how: int) -> tuple[Any, ...]:
+    return (sides.identity, *how)
 
 
 def refined_maps(sides: Sides, poses: int, guesses: int) -> list[Laid]:

@@ -10,8 +10,7 @@ from sketchmatch.model import FloatArray, IntArray, RelationTable, Scene
 from sketchmatch_builtin.alignment import (
     Sides,
     Things,
-    drive,
-    laid_maps,
+    known_maps,
     measured,
     refined_maps,
     relations_of,
@@ -45,7 +44,7 @@ def described(
     partial
         Whether objects of both sides may be without partner.
     """
-    found = [*met, *(each.partners for each in drive(laid_maps(sides, partial=partial)))]
+    found = [*met, *(each.partners for each in known_maps(sides, partial=partial))]
     unique = {each.tobytes(): each for each in found}
     maps = np.stack([*unique.values()])
     relations = relations_of(scenes, table, names, sides.swapped)
