@@ -173,10 +173,10 @@ def _refined(guesses: Guesses, sides: Sides, poses: int) -> Generator[int, None,
     ranked = np.argsort(-guesses.scores[:count], kind="stable")
     for g in ranked[: 5 * poses]:
         pose = guessed_pose(guesses.pairings[g], drawn, mapped)
-        *pose, score = refine_pose(*pose, drawn, mapped, sides.bonus, TOLERANCES, partners)
+        u, t, growth, score = refine_pose(*pose, drawn, mapped, sides.bonus, TOLERANCES, partners)
         key = partners.tobytes()
         if key not in found or found[key].score < score:
-            found[key] = Laid(partners.copy(), (pose[0], pose[1], pose[2]), score)
+            found[key] = Laid(partners.copy(), (u, t, growth), score)
         if len(found) >= poses:
             break
         weighed += sides.bonus.size
