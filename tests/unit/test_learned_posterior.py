@@ -227,6 +227,6 @@ def test_other_places_count_more_where_a_sketch_shows_enough():
         described = Described(maps, np.zeros((1, len(NUMBERS))), (), drawn, 9)
         return Known(described, -1, elsewhere, np.full(drawn, -1))
 
-    assert posterior._counts(case(5, True))
-    assert not posterior._counts(case(4, True))
-    assert not posterior._counts(case(9, False))
+    assert posterior._counts(case(12, True))
+    assert not posterior._counts(case(2, True))
+    assert not posterior._counts(case(12, False))
