@@ -146,12 +146,11 @@ def test_probabilities_bound_each_other_whatever_was_learned(seed, n, more, comp
 
 def nothing_is_laid(*_, **__):
     """Find no maps by laying the sketch upon the map."""
-    yield 0
     return []
 
 
 def test_shares_losses_and_lines_are_what_the_numbers_come_to(monkeypatch):
-    monkeypatch.setattr(_described, "laid_maps", nothing_is_laid)
+    monkeypatch.setattr(_described, "known_maps", nothing_is_laid)
     sketch, map_, order = sloppy(3, 4, 6)
     other = np.array([order[1], order[0], order[2], order[3]])
     fewer = np.array([order[0], order[1], order[2], -1])
@@ -422,7 +421,7 @@ def test_maps_are_described_once_each_with_those_that_were_met(monkeypatch):
     sides = sides_of((sketch, map_), False, None, None, None)
     met = [order, np.roll(order, 1), order.copy()]
     with monkeypatch.context() as patch:
-        patch.setattr(_described, "laid_maps", nothing_is_laid)
+        patch.setattr(_described, "known_maps", nothing_is_laid)
         known = described((sketch, map_), sides, table, None, met)
     np.testing.assert_array_equal(known.maps, [order, np.roll(order, 1)])
     assert (known.drawn, known.mapped) == (4, 6)
