@@ -19,10 +19,10 @@ from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from tests.experiments.odds import considered_by, errors, learned_odds
-from tests.experiments.posterior import judged_errors, known_of, learned_posterior
+from tests.experiments.posterior import Known, judged_errors, known_of, learned_posterior
 from tests.experiments.runs import each_of
 
 __all__ = ["LEARNED", "SKETCHES", "THESIS"]
@@ -30,7 +30,7 @@ __all__ = ["LEARNED", "SKETCHES", "THESIS"]
 LEARNED = Path(__file__).with_name("learned.json")
 """What came of it."""
 
-SKETCHES = {"odds": 600, "check": 600, "posterior": 9200}
+SKETCHES = {"odds": 600, "check": 600, "posterior": 9200, "many": 400}
 
 CHECKED = 1000
 """Sketches beyond those for ``posterior`` that its probabilities are checked with."""
@@ -46,23 +46,34 @@ _Case = TypeVar("_Case")
 
 def main() -> None:
     """Learn, print and write."""
+    found = {"sketches": SKETCHES, "odds": _odds(), "posterior": _posterior()}
+    text = json.dumps(found, indent=1, ensure_ascii=False)
+    LEARNED.write_text(text + "\n", encoding="utf-8")
+
+
+def _odds() -> dict[str, Any]:
     known, others = (
         _all_of(partial(considered_by, THESIS, _FIRST_PRICE, part), part)
         for part in ("odds", "check")
     )
     calibration = learned_odds(known)
-    odds = asdict(calibration) | {"errors": errors(others, calibration)}
-    print(odds)
-    numbered = range(SKETCHES["posterior"] + CHECKED)
-    every = list(each_of(known_of, numbered, "sketches for posterior"))
-    drawn = [*itertools.chain.from_iterable(every[: SKETCHES["posterior"]])]
-    learned = learned_posterior(drawn)
-    others = [*itertools.chain.from_iterable(every[SKETCHES["posterior"] :])]
-    posterior = asdict(learned) | {"errors": judged_errors(others, learned)}
-    print(posterior["errors"])
-    found = {"sketches": SKETCHES, "odds": odds, "posterior": posterior}
-    text = json.dumps(found, indent=1, ensure_ascii=False)
-    LEARNED.write_text(text + "\n", encoding="utf-8")
+    found = asdict(calibration) | {"errors": errors(others, calibration)}
+    print(found)
+    return found
+
+
+def _posterior() -> dict[str, Any]:
+    few, many = SKETCHES["posterior"], SKETCHES["many"]
+    learned = learned_posterior(_known(range(few)) + _known(range(many), many=True))
+    found = judged_errors(_known(range(few, few + CHECKED)), learned)
+    print(found)
+    return asdict(learned) | {"errors": found}
+
+
+def _known(numbers: range, many: bool = False) -> list[Known]:
+    """Return sketches in numbers, showing progress."""
+    every = each_of(partial(known_of, many=many), numbers, "sketches for posterior")
+    return list(itertools.chain.from_iterable(every))
 
 
 def _all_of(do: Callable[[int], list[_Case]], part: str) -> list[_Case]:

@@ -70,9 +70,9 @@ class Known:
     truth: IntArray
 
 
-def known_of(number: int) -> list[Known]:
-    """Return a sketch in numbers."""
-    drawn = training_drawing(number)
+def known_of(number: int, many: bool = False) -> list[Known]:
+    """Return a sketch in numbers; arguments as of :func:`training_drawing`."""
+    drawn = training_drawing(number, many)
     scenes = drawn.scene, drawn.map
     compared = finish(_ENGINE.compare(scenes, ConstantForce(), CrossCorrelation()))
     swapped = compared.swapped

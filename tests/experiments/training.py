@@ -26,6 +26,8 @@ _BY_PEOPLE = 0.25
 _ELSEWHERE = 0.35
 _OBJECTS = (3, 4, 5, 6, 8, 8, 12, 16, 20, 28, 36, 48, 60)
 _DRAWN = (2, 3, 4, 5, 6, 7, 8, 8, 9, 10, 12)
+_MANY_OBJECTS = (20, 28, 36, 48, 60)
+_MANY_DRAWN = (14, 18, 24, 32, 45)
 _EXTRAS = (0.65, 0.28, 0.07)
 _NEIGHBOURS = 0.8
 _STRENGTHS = (0.5, 0.7, 0.95, 1.05, 1.2)
@@ -33,17 +35,26 @@ _TRIES = 200
 _BETTER = 0.95
 
 
-def training_drawing(number: int) -> Drawing:
-    """Return a sketch, a map, and the truth; −1 for all where the sketch is of another place."""
-    rng = np.random.default_rng((271828, number))
+def training_drawing(number: int, many: bool = False) -> Drawing:
+    """Return a sketch, a map, and the truth; −1 for all where the sketch is of another place.
+
+    Parameters
+    ----------
+    number
+        Which one.
+    many
+        Whether many things are drawn, which few people do.
+    """
+    rng = np.random.default_rng((271828, number, int(many)) if many else (271828, number))
     by_people = rng.random() < _BY_PEOPLE
-    objects = int(rng.choice(_OBJECTS[2:10] if by_people else _OBJECTS))
+    sizes = _MANY_OBJECTS if many else _OBJECTS[2:10] if by_people else _OBJECTS
+    objects = int(rng.choice(sizes))
     furnish = random_scene if by_people else _strewn
     map_ = furnish(rng, objects)
     elsewhere = rng.random() < _ELSEWHERE
     there = max(2, round(objects * rng.uniform(0.7, 1.4)))
     place = furnish(rng, there) if elsewhere else map_
-    count = min(len(place), int(rng.choice(_DRAWN)))
+    count = min(len(place), int(rng.choice(_MANY_DRAWN if many else _DRAWN)))
     kept = _seen(place, count, rng)
     extra = int(rng.choice(3, p=_EXTRAS)) if count > 2 else 0
     if by_people:

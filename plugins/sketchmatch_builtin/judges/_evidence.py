@@ -54,6 +54,9 @@ _BY_SKILL = np.array(
 
 _NONE = -30.0
 
+_MANY = 16
+"""Things beyond which more of them say no more of a place."""
+
 
 @dataclass(frozen=True, eq=False)
 class Described:
@@ -135,7 +138,7 @@ def place_numbers(known: Described, first: FloatArray) -> FloatArray:
     first
         Shape (len(FIRST),): what places, sizes and shapes count for.
     """
-    worths, maps, drawn = known.numbers[:, FIRST] @ first, known.maps, known.drawn
+    worths, maps, drawn = known.numbers[:, FIRST] @ first, known.maps, min(known.drawn, _MANY)
     best = int(worths.argmax())
     top = float(worths[best])
     chance = [float((each[:, FIRST] @ first).max(initial=_NONE)) for each in known.decoys]
@@ -145,7 +148,7 @@ def place_numbers(known: Described, first: FloatArray) -> FloatArray:
     most, mean, lead = top - max(chance), top - float(np.mean(chance)), top - rival
     many, row = math.log(known.mapped), known.numbers[best]
     matched = max(row[Part.MATCHED], 1.0)
-    drawing = np.array([*skill(row), matched / drawn])
+    drawing = np.array([*skill(row), matched / known.drawn])
     return np.array(
         [
             1.0,
