@@ -40,7 +40,10 @@ _ROUGH = 3.5
 """λ while poses are guessed: less, so that fewer objects have to be looked at."""
 
 _STEP = 20_000
-"""Poses to weigh between two pauses, or a few more."""
+"""Poses to weigh before it is seen whether that will do, or a few more."""
+
+_AT_ONCE = 8
+"""So many objects of the sketch are weighed under that many poses without a pause."""
 
 _LOSS = 9.0
 """How much less than the best a map may be worth that changes make of others."""
@@ -193,11 +196,13 @@ def _guessed(sides: Sides, most: int) -> Generator[int, None, Guesses]:
     allowed = np.isfinite(sides.bonus).astype(np.float64)
     there_are = len(mapped.places)
     fewest = min(len(pairs), _FEWEST_PAIRS) * there_are
+    pauses = -(-len(drawn.places) // _AT_ONCE)
     while guesses.state[2] < len(pairs) * there_are:
         if guesses.state[2] >= fewest and guesses.state[1] >= most:
             break
-        guess_poses(pairs, drawn, mapped, grid, allowed, rough, _STEP, guesses)
-        yield int(guesses.state[1])
+        for _ in range(pauses):
+            guess_poses(pairs, drawn, mapped, grid, allowed, rough, _STEP // pauses, guesses)
+            yield int(guesses.state[1])
     return guesses
 
 
