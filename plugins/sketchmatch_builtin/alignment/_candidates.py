@@ -39,8 +39,8 @@ _FLOOR = 0.8
 _ROUGH = 3.5
 """λ while poses are guessed: less, so that fewer objects have to be looked at."""
 
-_STEP = 2_000
-"""Poses to weigh between two pauses, or a few more."""
+_STEP = 16_000
+"""Poses times sketched objects to weigh between two pauses, or a few more."""
 
 _PAIRINGS = 100_000
 """Pairings to weigh for poses that are refined between two pauses, or a few more."""
@@ -202,10 +202,11 @@ def _guessed(sides: Sides, most: int) -> Generator[int, None, Guesses]:
     allowed = np.isfinite(sides.bonus).astype(np.float64)
     there_are = len(mapped.places)
     fewest = min(len(pairs), _FEWEST_PAIRS) * there_are
+    step = max(1, _STEP // len(drawn.places))
     while guesses.state[2] < len(pairs) * there_are:
         if guesses.state[2] >= fewest and guesses.state[1] >= most:
             break
-        guess_poses(pairs, drawn, mapped, grid, allowed, rough, _STEP, guesses)
+        guess_poses(pairs, drawn, mapped, grid, allowed, rough, step, guesses)
         yield int(guesses.state[1])
     return guesses
 

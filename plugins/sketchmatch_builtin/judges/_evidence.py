@@ -54,8 +54,9 @@ _BY_SKILL = np.array(
 
 _NONE = -30.0
 
-_MANY = 16
-"""Things beyond which more of them say no more of a place."""
+_MOST_DRAWN, _PLAIN, _CAREFUL = 16, 50.0, -0.5
+"""How far numbers of a place go: many objects, and lines without a fault, lie beyond what was
+learned from, where what is linear may say anything."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,17 +139,22 @@ def place_numbers(known: Described, first: FloatArray) -> FloatArray:
     first
         Shape (len(FIRST),): what places, sizes and shapes count for.
     """
-    worths, maps, drawn = known.numbers[:, FIRST] @ first, known.maps, min(known.drawn, _MANY)
+    worths, maps = known.numbers[:, FIRST] @ first, known.maps
+    drawn = min(known.drawn, _MOST_DRAWN)
     best = int(worths.argmax())
     top = float(worths[best])
     chance = [float((each[:, FIRST] @ first).max(initial=_NONE)) for each in known.decoys]
     shared = ((maps == maps[best]) & (maps[best] >= 0)).sum(axis=1)
     other = shared <= max(1, np.count_nonzero(maps[best] >= 0) // 4)
     rival = float(worths[other].max(initial=float(worths.min()) - 4.0))
-    most, mean, lead = top - max(chance), top - float(np.mean(chance)), top - rival
+    part = drawn / known.drawn
+    most, mean, lead = (
+        min(part * (top - each), _PLAIN) for each in (max(chance), float(np.mean(chance)), rival)
+    )
+    top = min(part * top, _PLAIN)
     many, row = math.log(known.mapped), known.numbers[best]
     matched = max(row[Part.MATCHED], 1.0)
-    drawing = np.array([*skill(row), matched / known.drawn])
+    drawing = np.array([*np.maximum(skill(row), _CAREFUL), matched / known.drawn])
     return np.array(
         [
             1.0,
@@ -210,7 +216,8 @@ def weighed(known: Described, learned: Posterior) -> Weighed:
 
 def lost_numbers(shares: FloatArray, drawn: int, mapped: int) -> FloatArray:
     """Return what says whether the right map is among those that are known."""
-    return np.array([1.0, drawn, math.log(mapped), math.log(shares.max()), drawn / mapped])
+    few = min(drawn, _MOST_DRAWN)
+    return np.array([1.0, few, math.log(mapped), math.log(shares.max()), drawn / mapped])
 
 
 def _logistic(odds: float) -> float:
