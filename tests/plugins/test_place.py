@@ -39,3 +39,15 @@ def test_an_exact_copy_shows_the_place_however_much_it_shows(drawn, mapped):
 def test_another_place_of_many_objects_is_none(objects):
     sketch, place = (Scene.from_polygons(room(objects, seed)) for seed in (1, 2))
     assert match(sketch, place).place_probability < 0.5
+
+
+def test_the_better_somebody_draws_the_more_each_deviation_tells():
+    sizes = [(1e-6, 1e-6), (1e6, 1.0), (1.0, 1e-3), (2.0, 2.0), (1.0, 3.0)]
+    middles = [(0, 0), (1, 3), (5, 2), (9, -4), (4, -9)]
+    place = Scene.from_polygons(
+        [
+            rectangle(np.array(middle), *size, 0.0)
+            for middle, size in zip(middles, sizes, strict=True)
+        ]
+    )
+    assert match(place, place).object_map == {k: k for k in range(5)}

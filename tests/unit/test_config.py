@@ -63,7 +63,7 @@ def test_without_file_and_variables_the_built_in_values_hold():
     configuration = load()
     assert configuration == builtin()
     assert configuration.file == ""
-    assert searcher_of(configuration).name == "auto"
+    assert searcher_of(configuration).name == "align"
     assert configuration.limits.max_objects == 1000
     assert configuration.rules.objection("acme") == ""
 

@@ -129,7 +129,7 @@ class Match:
 
     @property
     def fmap_confidence(self) -> float:
-        """ζ, which is what the search maximised."""
+        """ζ of the answer."""
         return self.result.fmap_confidence.total
 
     @property

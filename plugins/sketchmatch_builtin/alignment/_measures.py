@@ -90,8 +90,8 @@ class Relations(NamedTuple):
 
     Attributes
     ----------
-    similarity, cosine, sine, level
-        Shape (Q, Q'/2) of template and argument: σ, cos R, sin R and L̂.
+    similarity, rotation, level
+        Shape (Q, Q'/2) of template and argument: σ, R and L̂.
     selves
         Shape (n, m, bins): how alike the own histograms of a sketched and a mapped object are for
         turns from sketch to map over half of the full turn.
@@ -102,8 +102,7 @@ class Relations(NamedTuple):
     """
 
     similarity: FloatArray
-    cosine: FloatArray
-    sine: FloatArray
+    rotation: FloatArray
     level: FloatArray
     selves: FloatArray
     names: IntArray
@@ -432,8 +431,8 @@ def _relate(
             if relations.swapped:
                 i, j = j, i
             similarity += relations.similarity[i, j]
-            cosine += sign * relations.cosine[i, j]
-            sine += sign * relations.sine[i, j]
+            cosine += sign * np.cos(relations.rotation[i, j])
+            sine += sign * np.sin(relations.rotation[i, j])
             scratch[pairs] = relations.level[i, j]
             pairs += 1
     row[Part.SIMILARITY] = count * (1.0 - similarity / pairs)
@@ -469,8 +468,7 @@ def relations_of(
         alike[:] = names.T if swapped else names
     return Relations(
         table.similarity,
-        np.cos(table.rotation),
-        np.sin(table.rotation),
+        table.rotation,
         table.normalized_dilation,
         self_similarities(*scenes),
         alike,
@@ -480,7 +478,6 @@ def relations_of(
 
 _NOTHING = frozen(np.zeros((0, 0)))
 _UNRELATED = Relations(
-    _NOTHING,
     _NOTHING,
     _NOTHING,
     _NOTHING,

@@ -55,8 +55,8 @@ _BY_SKILL = np.array(
 _NONE = -30.0
 
 _MOST_DRAWN, _PLAIN, _CAREFUL = 16, 50.0, -0.5
-"""How far numbers of a place go: many objects, and lines without a fault, lie beyond what was
-learned from, where what is linear may say anything."""
+"""How far numbers go: many objects, and lines without a fault, lie beyond what was learned from,
+where what is linear may say anything."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +111,14 @@ def numbers(parts: FloatArray, drawn: int, mapped: int) -> FloatArray:
 def skill(best: FloatArray) -> FloatArray:
     """Return how well somebody draws, by the best map, shape (3,); less is better."""
     matched = max(best[Part.MATCHED], 1.0)
-    return np.array(
+    left = np.array(
         [
             best[Part.SCATTER] / matched + 1.6,
             best[Part.SCATTER_SIZE] / matched + 1.2,
             best[Part.SCATTER_SHAPE] / matched + 1.8,
         ]
     )
+    return np.maximum(left, _CAREFUL)
 
 
 def detailed(described: FloatArray, drawing: FloatArray) -> FloatArray:
@@ -154,7 +155,7 @@ def place_numbers(known: Described, first: FloatArray) -> FloatArray:
     top = min(part * top, _PLAIN)
     many, row = math.log(known.mapped), known.numbers[best]
     matched = max(row[Part.MATCHED], 1.0)
-    drawing = np.array([*np.maximum(skill(row), _CAREFUL), matched / known.drawn])
+    drawing = np.array([*skill(row), matched / known.drawn])
     return np.array(
         [
             1.0,

@@ -395,7 +395,7 @@ class MatchResult(google.protobuf.message.Message):
 
     @property
     def fmap_confidence(self) -> global___FmapConfidence:
-        """ζ and its parts, which is what the search maximised; the judge may take another map for it."""
+        """ζ of the answer, and its parts. Some searchers maximise it; the judge may take another map."""
 
     @property
     def fmap_entries(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___FmapEntry]:
