@@ -118,7 +118,8 @@ def skill(best: FloatArray) -> FloatArray:
             best[Part.SCATTER_SHAPE] / matched + 1.8,
         ]
     )
-    return np.maximum(left, _CAREFUL)
+    held: FloatArray = np.maximum(left, _CAREFUL)
+    return held
 
 
 def detailed(described: FloatArray, drawing: FloatArray) -> FloatArray:
