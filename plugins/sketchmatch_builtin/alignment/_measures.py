@@ -40,8 +40,9 @@ class Part(IntEnum):
     same and that do not. ``WORST`` and ``SECOND`` are the two worst lines, ``OUTLIER``
     the one that is worst for what the others are. ``NEAR`` is as ``PLACE``, of the way from each
     object to its two nearest, in units of its length. ``SIMILARITY``,
-    ``ROTATION`` and ``DILATION`` are the number of lines times what ζσ and ζR lack of 1 and δL,
-    ``SELF`` what the objects' own histograms lack of being alike.
+    ``ROTATION`` and ``DILATION`` are the number of lines times what ζσ, ζR and ζL lack of 1,
+    ``SELF`` is
+    Σ ln(1 + 100 x) of what the objects' own histograms lack of being alike.
     """
 
     PLACE = 0
@@ -69,12 +70,11 @@ class Part(IntEnum):
     ROTATION = 22
     DILATION = 23
     SELF = 24
-    SELF_TIGHT = 25
-    ALIKE = 26
-    UNLIKE = 27
-    NEAR = 28
-    NEAR_TIGHT = 29
-    OUTLIER = 30
+    ALIKE = 25
+    UNLIKE = 26
+    NEAR = 27
+    NEAR_TIGHT = 28
+    OUTLIER = 29
 
 
 PARTS = tuple(part.name.lower() for part in Part)
@@ -237,9 +237,7 @@ def _compare_lines(
         if bins == 0:
             continue
         alike = (1.0 - rest) * relations.selves[i, j, whole] + rest * relations.selves[i, j, after]
-        unlike = max(0.0, 1.0 - alike)
-        row[Part.SELF] += unlike
-        row[Part.SELF_TIGHT] += np.log(1.0 + unlike / 0.01)
+        row[Part.SELF] += np.log(1.0 + max(0.0, 1.0 - alike) / 0.01)
         if relations.names[i, j] > 0:
             row[Part.ALIKE] += 1.0
         elif relations.names[i, j] < 0:
@@ -437,7 +435,8 @@ def _relate(
             pairs += 1
     row[Part.SIMILARITY] = count * (1.0 - similarity / pairs)
     row[Part.ROTATION] = count * (1.0 - np.sqrt(cosine * cosine + sine * sine) / pairs)
-    row[Part.DILATION] = count * mean_absolute_difference(scratch[:pairs])
+    spread = mean_absolute_difference(scratch[:pairs])
+    row[Part.DILATION] = count * (1.0 - np.exp2(-spread))
 
 
 def measured(

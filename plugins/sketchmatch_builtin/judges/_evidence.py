@@ -37,7 +37,7 @@ _MORE = ("matched_among_many", "matched_share", "matched_covering")
 NUMBERS = (*PARTS, *_MORE)
 """What a map is described by."""
 
-_RELATIONS = (Part.SIMILARITY, Part.ROTATION, Part.DILATION, Part.SELF, Part.SELF_TIGHT)
+_RELATIONS = (Part.SIMILARITY, Part.ROTATION, Part.DILATION, Part.SELF)
 
 FIRST = np.array(
     [k for k, name in enumerate(NUMBERS) if k not in _RELATIONS and name not in ("alike", "unlike")]
@@ -51,6 +51,9 @@ _BY_SKILL = np.array(
         if name not in ("offset", "bend", "alike", "unlike", "matched_among_many")
     ]
 )
+
+_SCATTERS = (Part.SCATTER, Part.SCATTER_SIZE, Part.SCATTER_SHAPE)
+_USUAL = (1.6, 1.2, 1.8)
 
 _NONE = -30.0
 
@@ -98,9 +101,12 @@ def numbers(parts: FloatArray, drawn: int, mapped: int) -> FloatArray:
         Shape (c, len(NUMBERS)).
     """
     matched = parts[:, Part.MATCHED]
+    bounded = parts.copy()
+    for part, usual in zip(_SCATTERS, _USUAL, strict=True):
+        bounded[:, part] = np.maximum(parts[:, part], matched * (_CAREFUL - usual))
     return np.column_stack(
         [
-            parts,
+            bounded,
             matched * math.log(mapped),
             matched * matched / drawn,
             matched * min(drawn, mapped) / max(drawn, mapped),
@@ -110,16 +116,8 @@ def numbers(parts: FloatArray, drawn: int, mapped: int) -> FloatArray:
 
 def skill(best: FloatArray) -> FloatArray:
     """Return how well somebody draws, by the best map, shape (3,); less is better."""
-    matched = max(best[Part.MATCHED], 1.0)
-    left = np.array(
-        [
-            best[Part.SCATTER] / matched + 1.6,
-            best[Part.SCATTER_SIZE] / matched + 1.2,
-            best[Part.SCATTER_SHAPE] / matched + 1.8,
-        ]
-    )
-    held: FloatArray = np.maximum(left, _CAREFUL)
-    return held
+    left: FloatArray = best[[*_SCATTERS]] / max(best[Part.MATCHED], 1.0) + np.array(_USUAL)
+    return left
 
 
 def detailed(described: FloatArray, drawing: FloatArray) -> FloatArray:
