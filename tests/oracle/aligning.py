@@ -6,7 +6,6 @@ import math
 import numpy as np
 import shapely
 
-from sketchmatch.model import object_pairs
 from sketchmatch.pipeline.correspond import map_confidence
 
 GROWTH = -1.0, 2.0
@@ -182,24 +181,13 @@ def parts(partners, drawn, mapped, tolerances):
 
 def related(partners, table):
     """Return what the relations say of a map that is read from the template."""
-    zeta, levels = map_confidence(np.asarray(partners), table), _levels(partners, table)
-    gaps = [abs(x - y) for x, y in itertools.combinations(levels, 2)]
+    zeta = map_confidence(np.asarray(partners), table)
     count = sum(j >= 0 for j in partners)
     return {
         "similarity": count * (1.0 - zeta.similarity),
         "rotation": count * (1.0 - zeta.rotation),
-        "dilation": count * float(np.mean(gaps)) if gaps else 0.0,
+        "dilation": count * (1.0 - zeta.dilation),
     }
-
-
-def _levels(partners, table):
-    kept = [i for i, j in enumerate(partners) if j >= 0]
-    first = {tuple(pair): k for k, pair in enumerate(object_pairs(table.template_objects))}
-    second = {tuple(pair): k for k, pair in enumerate(object_pairs(table.argument_objects))}
-    return [
-        table.normalized_dilation[first[a, b], second[tuple(sorted((partners[a], partners[b])))]]
-        for a, b in itertools.combinations(kept, 2)
-    ]
 
 
 def _robust(deviation, unit):

@@ -304,7 +304,7 @@ def test_numbers_of_a_map_are_its_parts_and_its_share():
 
 def test_what_relations_and_labels_tell_is_not_among_the_first():
     first = {NUMBERS[k] for k in FIRST}
-    apart = {"similarity", "rotation", "dilation", "self", "self_tight", "alike", "unlike"}
+    apart = {"similarity", "rotation", "dilation", "self", "alike", "unlike"}
     assert set(NUMBERS) - first == apart
 
 
