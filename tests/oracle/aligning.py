@@ -204,7 +204,7 @@ def _bent(z, left, unit):
     weights = np.sqrt(1.0 / (1.0 + (abs(left) / 0.35) ** 2 / 3.0))
     design = np.array(effects).T * weights[:, None]
     stacked = np.concatenate([design.real, design.imag])
-    ridge = np.diag([1e-3] * 2 + [0.2 / (0.12 * ratio)] * 4)
+    ridge = np.diag([1e-3] * 2 + [math.hypot(1e-3, 0.2 / (0.12 * ratio))] * 4)
     sought = np.concatenate([(left * weights).real, (left * weights).imag, np.zeros(6)])
     found = np.linalg.lstsq(np.concatenate([stacked, ridge]), sought, rcond=None)[0]
     rest = abs(left - np.array(effects).T @ found)

@@ -105,7 +105,7 @@ def test_a_margin_is_the_loss_with_the_best_other_partner():
 
 
 def test_a_symmetric_scene_shows_its_symmetric_answers():
-    result = match(GRID, GRID, alternatives=7)
+    result = match(GRID, GRID, alternatives=7, profile="thesis")
     assert result.fmap_confidence == pytest.approx(1.0)
     centre = 4
     turned = [other for other in result.alternatives if other.confidence.total > 0.999]

@@ -273,7 +273,7 @@ def pillars(columns, rows):
 
 
 def test_nine_pillars_fit_in_four_ways_and_the_result_says_so():
-    result = match(pillars(3, 3), pillars(3, 3))
+    result = match(pillars(3, 3), pillars(3, 3), profile="thesis")
     assert result.ambiguity == Ambiguity(4, (0, 1, 2), (0, 1, 2, 3, 5, 6, 7, 8))
     likely = [result.probability, *(each.probability for each in result.alternatives)]
     assert likely == pytest.approx([0.25] * 4, abs=0.02)
@@ -283,7 +283,7 @@ def test_nine_pillars_fit_in_four_ways_and_the_result_says_so():
 
 @pytest.mark.parametrize("shown", [0, 1])
 def test_how_many_alternatives_are_asked_for_does_not_make_the_answer_likelier(shown):
-    result = match(pillars(3, 3), pillars(3, 3), alternatives=shown)
+    result = match(pillars(3, 3), pillars(3, 3), alternatives=shown, profile="thesis")
     assert len(result.alternatives) == shown
     assert result.probability == pytest.approx(0.25, abs=0.02)
     assert result.ambiguity == Ambiguity(4, tuple(range(shown)), (0, 1, 2, 3, 5, 6, 7, 8))

@@ -175,7 +175,7 @@ def test_a_profile_of_ones_own_changes_the_built_in_one(file):
         ),
         (
             "[pipeline.searcher]\nname = 'best'",
-            "{file}: pipeline.searcher.name is 'best', which is no searcher; choose one of: auto",
+            "{file}: pipeline.searcher.name is 'best', which is no searcher; choose one of: align",
         ),
         (
             "[algorithms.searcher.easm]\ncolour = 1",

@@ -104,7 +104,7 @@ def drawn(few, many, seed=3, **how):
     return simulate_sketch(scene, rng, objects=range(few), **how).scene, scene
 
 
-def matched(sketch, map_, *, defaults=Defaults(), judge="told", searcher="", **options):  # noqa: B008
+def matched(sketch, map_, *, defaults=Defaults(), judge="told", searcher="auto", **options):  # noqa: B008
     selection = {"judge": Choice(judge), "searcher": Choice(searcher)}
     request = MatchRequest(sketch, map_, selection, **options)
     *_, last = run_match(request, REGISTRY, defaults)

@@ -25,6 +25,9 @@ from sketchmatch_builtin.searchers.easm import Easm
 from tests.oracle import maps as oracle
 from tests.pace import within
 
+THESIS = {"searcher": Choice("auto"), "judge": Choice("confidence")}
+"""What proves, and judges by ζ alone."""
+
 ENDLESS = {"searcher": Choice("easm", {"patience": 10_000_000, "generations": 10_000_000})}
 
 
@@ -105,7 +108,7 @@ def test_what_was_accepted_is_what_runs():
     first = next(events(seven(), seven(), seed=9))
     assert isinstance(first, Accepted)
     assert first.seed == 9
-    assert first.pipeline.searcher.name == "auto"
+    assert (first.pipeline.searcher.name, first.pipeline.judge.name) == ("align", "posterior")
     result = matched(seven(), seven(), seed=9)
     assert result.seed == 9
     assert result.match_id != first.match_id
@@ -114,7 +117,8 @@ def test_what_was_accepted_is_what_runs():
 @pytest.mark.parametrize("turn", [0.0, 0.7, math.pi, -2.0])
 def test_a_scene_and_its_turned_copy_are_one(turn):
     scene = seven()
-    result = matched(changed(scene, turn, 3.0), scene)
+    result = matched(changed(scene, turn, 3.0), scene, selection=THESIS)
+    assert matched(changed(scene, turn, 3.0), scene).object_map == result.object_map
     assert result.object_map == {k: k for k in range(7)}
     assert result.fmap_confidence > 0.99
     assert result.omap_confidence > 0.99
@@ -137,7 +141,8 @@ def test_turn_and_scale_read_from_sketch_to_map(drawn, mapped, degrees, scale):
     world = seven()
     # A multiple of the 2° between directions, so that nothing is lost between bins.
     sketch = changed(world, -math.radians(degrees), 1 / scale, drawn)
-    result = matched(sketch, changed(world, order=mapped))
+    directions = {"histogram": Choice("constant", {"directions": 180})}
+    result = matched(sketch, changed(world, order=mapped), selection=directions)
     common = {drawn.index(k): mapped.index(k) for k in drawn if k in mapped}
     assert result.object_map == common
     assert result.fmap_confidence == pytest.approx(1.0, abs=1e-6)

@@ -84,7 +84,9 @@ def drawn(seed, few, many):
 
 
 def events(sketch, map_, searcher="auto", **settings):
-    choices = {"searcher": Choice(searcher, SEARCHERS[searcher])}
+    # By ζ alone, which the oracle knows.
+    judge = Choice(settings.pop("judge", "confidence"))
+    choices = {"searcher": Choice(searcher, SEARCHERS[searcher]), "judge": judge}
     return list(run_match(MatchRequest(sketch, map_, choices, **settings), REGISTRY))
 
 

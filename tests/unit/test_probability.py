@@ -158,7 +158,7 @@ def test_good_sketches_are_likelier_right_than_bad_ones():
         for seed in range(8):
             rng = np.random.default_rng(seed)
             drawn = simulate_sketch(scene, rng, objects=range(6), displacement=displacement)
-            results.append(match(drawn.scene, scene))
+            results.append(match(drawn.scene, scene, profile="thesis"))
         for result in results:
             for line in result.matches:
                 assert result.probability - 1e-9 <= line.probability <= 1.0
@@ -169,7 +169,7 @@ def test_good_sketches_are_likelier_right_than_bad_ones():
 
 def test_a_symmetric_scene_may_be_any_of_its_turns():
     grid = Scene.from_polygons([np.add(SQUARE, (4 * k, 4 * m)) for k in range(3) for m in range(3)])
-    result = match(grid, grid)
+    result = match(grid, grid, profile="thesis")
     assert result.probability == pytest.approx(0.25, abs=0.03)
     by_object = {line.sketch_object: line.probability for line in result.matches}
     assert by_object.pop(4) > 0.9, "the object in the middle"
@@ -188,7 +188,7 @@ def test_a_symmetric_scene_may_be_any_of_its_turns():
 )
 def test_nothing_is_said_where_nothing_was_learned(settings):
     scene = random_scene(np.random.default_rng(3), 5)
-    result = match(scene, scene, **settings)
+    result = match(scene, scene, judge="confidence", **settings)
     assert result.probability is None
     assert all(line.probability is None for line in result.matches)
 

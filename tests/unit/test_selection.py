@@ -44,8 +44,8 @@ def test_every_kind_of_source_has_its_segmenter(name):
         "map_segmenter": "polygons",
         "histogram": "constant",
         "similarity": "cross-correlation",
-        "searcher": "auto",
-        "judge": "confidence",
+        "searcher": "align",
+        "judge": "posterior",
     }
     assert list(pipeline.stages()) == list(STAGES)
 
@@ -162,7 +162,7 @@ def oracle(chosen, parameters):
     counted = dict(parameters.get(name, {}))
     for k, level in enumerate(chosen):
         names = [upper.name for upper in chosen[k + 1 :] if upper.name]
-        own = next((lower.name for lower in reversed(chosen[: k + 1]) if lower.name), "auto")
+        own = next((lower.name for lower in reversed(chosen[: k + 1]) if lower.name), "align")
         if own == name and all(upper == name for upper in names):
             counted.update(level.parameters)
     return name, counted

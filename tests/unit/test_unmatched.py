@@ -95,8 +95,11 @@ def place_with_extra(seed=0):
     return drawn.scene, Scene(everything.objects[:8]), truth
 
 
+BY_ZETA = {"searcher": Choice("auto"), "judge": Choice("confidence")}
+
+
 def matched(sketch, map_, **settings):
-    request = MatchRequest(sketch, map_, **settings)
+    request = MatchRequest(sketch, map_, **{"selection": BY_ZETA} | settings)
     *_, last = run_match(request, default_registry(), builtin().defaults)
     assert isinstance(last, Finished)
     return last.result
@@ -252,6 +255,7 @@ def test_the_same_seed_gives_the_same_parts():
 def test_progress_never_falls_and_the_time_budget_holds():
     sketch, map_, _ = place_with_extra()
     endless = {"searcher": Choice("easm", {"patience": 10_000_000, "generations": 10_000_000})}
+    endless = {**endless, "judge": Choice("confidence")}
     request = MatchRequest(sketch, map_, endless, time_budget=0.6, allow_unmatched=True)
     seen = list(run_match(request, default_registry()))
     confidences = [
@@ -269,7 +273,10 @@ def test_progress_never_falls_and_the_time_budget_holds():
 @pytest.mark.parametrize(
     ("settings", "sentence"),
     [
-        ({"unmatched_price": 0.1}, "unmatched_price is 0.1, but no object may stay unmatched"),
+        (
+            {"unmatched_price": 0.1, "profile": "thesis"},
+            "unmatched_price is 0.1, but no object may stay unmatched",
+        ),
         ({"allow_unmatched": True, "unmatched_price": 0.0}, "unmatched_price is 0; give a number"),
         ({"allow_unmatched": True, "unmatched_price": math.nan}, "unmatched_price is nan; give"),
         ({"allow_unmatched": True, "searcher": "nn"}, "allow_unmatched compares maps of objects"),
@@ -303,7 +310,7 @@ def test_each_search_gets_its_share_of_the_time_that_is_left():
     request = MatchRequest(
         scene,
         scene,
-        selection={"searcher": Choice("frugal")},
+        selection={"searcher": Choice("frugal"), "judge": Choice("confidence")},
         time_budget=1000.0,
         allow_unmatched=True,
         unmatched_price=0.5,

@@ -351,7 +351,7 @@ def _bend(
                     effects[0, p] * effects[0, q] + effects[1, p] * effects[1, q]
                 )
     for p in range(_BENDS):
-        normal[p, p] += 1e-6 if p < 2 else (0.2 / (_PAGE * ratio)) ** 2
+        normal[p, p] += 1e-6 if p < 2 else 1e-6 + (0.2 / (_PAGE * ratio)) ** 2
     found = np.linalg.solve(normal, right)
     for i in range(partners.size):
         if partners[i] < 0:
