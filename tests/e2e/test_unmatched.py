@@ -45,7 +45,8 @@ def where(request):
 
 
 def test_the_command_line_leaves_objects_out(command_line, files, place, where):
-    options = ("--allow-unmatched", "--json", *where)
+    by_zeta = ("--searcher", "auto", "--judge", "confidence")
+    options = ("--allow-unmatched", "--json", *by_zeta, *where)
     done = command_line("match", *files, *options)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
@@ -75,7 +76,7 @@ def test_a_server_says_what_is_in_force(place, address):
         assert tuple(getattr(weights, name) for name in WEIGHTS._fields) == tuple(WEIGHTS)
         lines = last.result.object_matches
         assert {line.sketch_object: line.map_object for line in lines} == truth
-        first, *_, last = client.events(*request)
+        first, *_, last = client.events(*request, profile="thesis")
         assert not first.accepted.HasField("unmatched_price")
         assert first.accepted.weights.rotation == first.accepted.weights.dilation == 1.0
         assert len(last.result.object_matches) == 8

@@ -135,7 +135,7 @@ _SETTABLE = {
     "easm": ("patience", "population", "exchange_rate"),
     "direct": ("patience", "population", "exchange_rate"),
     "nn-pso": ("patience", "particles"),
-    "auto": ("proof_nodes",),
+    "align": ("poses", "maps"),
 }
 _VALUES = {"exchange_rate": st.floats(0, 1)}
 
@@ -148,7 +148,7 @@ def _parameters(name):
 @st.composite
 def levels(draw):
     """Return three levels that choose searchers, each sound upon those below."""
-    found, current = [], "auto"
+    found, current = [], "align"
     for _ in range(3):
         name = draw(st.sampled_from(["", *_SETTABLE]))
         current = name or current
@@ -158,7 +158,7 @@ def levels(draw):
 
 def oracle(chosen, parameters):
     """Return name and parameters: a level counts if all names from its own upwards agree."""
-    name = next((level.name for level in reversed(chosen) if level.name), "auto")
+    name = next((level.name for level in reversed(chosen) if level.name), "align")
     counted = dict(parameters.get(name, {}))
     for k, level in enumerate(chosen):
         names = [upper.name for upper in chosen[k + 1 :] if upper.name]
