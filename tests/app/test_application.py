@@ -159,11 +159,11 @@ def test_an_error_is_what_the_log_ends_with():
     [
         (
             match_request(SCENE, SCENE),
-            {"polygons", "auto", "constant", "cross-correlation", "confidence"},
+            {"polygons", "align", "constant", "cross-correlation", "posterior"},
         ),
         (
             match_request(SCENE, sources.strokes([SQUARE]), searcher="held"),
-            {"polygons", "strokes", "held", "constant", "cross-correlation", "confidence"},
+            {"polygons", "strokes", "held", "constant", "cross-correlation", "posterior"},
         ),
         (segment_request(sources.image(b"no picture")), {"image"}),
         (match_request(SCENE, SCENE, searcher="nobody"), set()),

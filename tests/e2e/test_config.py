@@ -111,7 +111,7 @@ def test_a_match_takes_file_profile_and_flags_each_over_the_other(command_line, 
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)
 
-    assert pipeline()["outcome"] == "OUTCOME_OPTIMAL"
+    assert pipeline()["statistics"]["iterations"] != "5"
     assert pipeline("--config", mine)["statistics"]["iterations"] == "5"
     assert pipeline("--config", mine, "--profile", "proof")["outcome"] == "OUTCOME_OPTIMAL"
     assert (

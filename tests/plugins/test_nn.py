@@ -22,6 +22,7 @@ from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Kind, Registered, Registry
 from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.histograms.constant import ConstantForce
+from sketchmatch_builtin.judges.confidence import HighestConfidence
 from sketchmatch_builtin.searchers._growers import Found, NnGrower, random_seed_point, read_features
 from sketchmatch_builtin.searchers.fsnn_pso import FsnnPso
 from sketchmatch_builtin.searchers.nn import Nn
@@ -308,7 +309,7 @@ def test_it_has_an_answer_before_it_is_set_up(searcher, monkeypatch):
         next(work)
 
 
-PLUGINS = (ConstantForce, CrossCorrelation, Nn, NnPso, FsnnPso)
+PLUGINS = (ConstantForce, CrossCorrelation, Nn, NnPso, FsnnPso, HighestConfidence)
 REGISTRY = Registry(
     Registered(kind, plugin, "sketchmatch", "0")
     for kind in Kind

@@ -112,7 +112,8 @@ def test_the_catalogue_tells_what_there_is_and_what_is_the_default(address):
     assert defaults >= {
         ("ALGORITHM_KIND_HISTOGRAM", "constant"),
         ("ALGORITHM_KIND_SIMILARITY", "cross-correlation"),
-        ("ALGORITHM_KIND_SEARCHER", "auto"),
+        ("ALGORITHM_KIND_SEARCHER", "align"),
+        ("ALGORITHM_KIND_JUDGE", "posterior"),
         ("ALGORITHM_KIND_SEGMENTER", "strokes"),
     }
     easm = next(a for a in catalogue.algorithms if a.name == "easm")

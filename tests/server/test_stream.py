@@ -93,7 +93,7 @@ def test_accepted_echoes_every_algorithm_with_every_parameter(address):
         "histogram": "constant",
         "similarity": "cross-correlation",
         "searcher": "easm",
-        "judge": "confidence",
+        "judge": "posterior",
     }
     for choice in chosen.values():
         schema = MessageToDict(catalogue[choice["name"]].parameters_schema)
