@@ -98,6 +98,7 @@ MATCHES = {
         {
             "params": {"histogram": {"directions": 36}},
             "searcher": "exact",
+            "judge": "confidence",
             "seed": 7,
             "weights": (1, 2, 3, 0.5, 0.25, 1.5),
             "alternatives": 2,

@@ -296,6 +296,7 @@ MATCHES = {
             **NOTHING_CHOSEN,
             "histogram": Choice("", {"directions": 36}),
             "searcher": Choice("exact"),
+            "judge": Choice("confidence"),
         },
         seed=7,
         time_budget=None,

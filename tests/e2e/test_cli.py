@@ -180,6 +180,7 @@ def test_an_overlay_that_cannot_be_written_is_refused_before_the_match(command_l
 
 
 def test_the_seed_decides_the_search(command_line, where):
+    random = ("--searcher", "auto", "--json", "--seed")
     same, again, other = (
         result(
             command_line("match", *ROOM, *where, "--searcher", "direct", "--json", "--seed", seed)

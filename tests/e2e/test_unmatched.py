@@ -57,7 +57,8 @@ def test_the_command_line_leaves_objects_out(command_line, files, place, where):
     assert len(result["unmatchedSketchObjects"]) == len(result["unmatchedMapObjects"]) == 1
     assert 0.5 < result["probability"] <= 1
     assert all(result["probability"] <= line["probability"] for line in result["objectMatches"])
-    dear = json.loads(command_line("match", *files, *options, "--unmatched-price", 9).stdout)
+    price = ("--judge", "confidence", "--unmatched-price", 9)
+    dear = json.loads(command_line("match", *files, *options, *price).stdout)
     assert len(dear["objectMatches"]) == 8
     without = ("--no-allow-unmatched", "--unmatched-price", "1")
     refused = command_line("match", *files, *without, *where)
@@ -79,7 +80,12 @@ def test_a_server_says_what_is_in_force(place, address):
         first, *_, last = client.events(*request, profile="thesis")
         assert not first.accepted.HasField("unmatched_price")
         assert first.accepted.weights.rotation == first.accepted.weights.dilation == 1.0
-        assert len(last.result.object_matches) == 8
+        lines = last.result.object_matches
+        assert {line.sketch_object: line.map_object for line in lines} == truth
+        for options in ({"allow_unmatched": False}, {"profile": "thesis"}):
+            first, *_, last = client.events(*request, **options)
+            assert not first.accepted.HasField("unmatched_price")
+            assert len(last.result.object_matches) == 8
         profiles = {profile.name: profile for profile in client.algorithms().profiles}
         assert not profiles["proof"].allow_unmatched
         assert not profiles["proof"].HasField("weights")

@@ -28,7 +28,7 @@ ENDLESS = {
     "searcher": "easm",
     "params": {"searcher": {"patience": 10_000_000, "generations": 10_000_000}},
 }
-"""Parameters with which the default searcher goes on until it is stopped."""
+"""A searcher with parameters with which it goes on until it is stopped."""
 
 # No search outlives its test, whatever fails to stop it.
 _LONGEST = {"max_time_budget": 20.0}

@@ -73,6 +73,7 @@ def test_seed_and_weights_are_in_force_as_they_were_sent(answer):
     assert accepted.seed == request.seed
     assert accepted.weights == request.weights
     assert accepted.pipeline.searcher.name == "exact"
+    assert accepted.pipeline.judge.name == "confidence"
     assert accepted.pipeline.histogram.parameters["directions"] == 36
     assert accepted.match_id == answer["result"].match_id != ""
 

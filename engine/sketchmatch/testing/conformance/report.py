@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from sketchmatch.api import MatchProblem
 from sketchmatch.model import Fmap
-from sketchmatch.testing.conformance.searchers import run
+from sketchmatch.testing.conformance.searchers import posed, run
 from sketchmatch.testing.oracle import best_object_map, is_object_consistent
 from sketchmatch.testing.problems import matching_problem, random_relations
 
@@ -51,7 +50,7 @@ def search_report(algorithm: type[Any], problems: int = 10) -> SearchReport:
     consistent = optimal = true = 0
     for seed in range(problems):
         rng = np.random.default_rng(seed)
-        problem = MatchProblem(random_relations(rng, 4, 5))
+        problem = posed(random_relations(rng, 4, 5))
         last = run(algorithm(), problem, seed).seen[-1]
         consistent += is_object_consistent(last.fmap, problem.table)
         optimal += last.confidence >= best_object_map(problem.table)[0] - 1e-9

@@ -19,7 +19,7 @@ from unittest import mock
 import numpy as np
 
 from sketchmatch.api import MatchProblem, Outcome, Searcher, SearchProgress
-from sketchmatch.model import Fmap, RelationTable, pair_count
+from sketchmatch.model import Fmap, RelationTable, Weights, pair_count
 from sketchmatch.model.arrays import sealed
 from sketchmatch.pipeline.guard import check_map
 from sketchmatch.testing.conformance.contract import (
@@ -37,8 +37,9 @@ from sketchmatch.testing.oracle import (
     score_fmap,
 )
 from sketchmatch.testing.problems import matching_problem, random_relations
+from sketchmatch.testing.sketches import random_scene
 
-__all__ = ["CONTRACTS", "Run", "large_problem", "run"]
+__all__ = ["CONTRACTS", "Run", "large_problem", "posed", "run"]
 
 _CLOSE = 1e-9
 _LONGEST_RUN = 20.0
@@ -90,7 +91,18 @@ def run(searcher: Searcher, problem: MatchProblem, seed: int = 0) -> Run:
 
 def large_problem() -> MatchProblem:
     """Return a problem that no search is done with at once."""
-    return MatchProblem(random_relations(np.random.default_rng(8), 12, 14))
+    return posed(random_relations(np.random.default_rng(8), 12, 14))
+
+
+def posed(
+    table: RelationTable, weights: Weights = (1.0, 1.0, 1.0), *, alternatives: int = 0
+) -> MatchProblem:
+    """Return the problem of a table, with scenes of as many objects, as the host gives them."""
+    rng = np.random.default_rng(11)
+    template, argument = (
+        random_scene(rng, objects) for objects in (table.template_objects, table.argument_objects)
+    )
+    return MatchProblem(table, weights, alternatives, scenes=lambda: (template, argument))
 
 
 def search_returns_a_generator(algorithm: type[Searcher]) -> None:
@@ -266,7 +278,7 @@ def _uses() -> Iterator[Use]:
         similarity, rotation = view_within(table.similarity), view_within(table.rotation)
         dilation = view_within(table.dilation)
         own = RelationTable(similarity, rotation, dilation, 4, 6)  # it holds these, and no copies
-        problem = MatchProblem(own, (1.0, 2.0, 0.5), alternatives=2)
+        problem = posed(own, (1.0, 2.0, 0.5), alternatives=2)
         inputs = {f"table.{name}": getattr(own, name) for name in _ARRAYS}
         yield Use("a problem of 4 on 6 objects", inputs, partial(_answer, problem))
 
@@ -303,8 +315,8 @@ CONTRACTS: tuple[Contract, ...] = (
 def _problems() -> tuple[MatchProblem, ...]:
     rng = np.random.default_rng(6)
     return (
-        MatchProblem(random_relations(rng, 4, 6), alternatives=2),
-        MatchProblem(random_relations(rng, 5, 5), weights=(1.0, 2.0, 0.5), alternatives=2),
+        posed(random_relations(rng, 4, 6), alternatives=2),
+        posed(random_relations(rng, 5, 5), (1.0, 2.0, 0.5), alternatives=2),
     )
 
 
@@ -324,29 +336,29 @@ def _problem_with_evidence() -> MatchProblem:
     rng = np.random.default_rng(9)
     table = random_relations(rng, 4, 5)
     evidence = rng.uniform(0.0, 1.0, (table.template_pairs, 2 * table.argument_pairs))
-    return MatchProblem(replace(table, evidence=evidence), alternatives=2)
+    return posed(replace(table, evidence=evidence), alternatives=2)
 
 
 @lru_cache(maxsize=1)
 def _problem_with_rotation_weights() -> MatchProblem:
     table = random_relations(np.random.default_rng(10), 4, 5)
     weights = np.linspace(0.2, 3.0, table.template_pairs)
-    return MatchProblem(replace(table, rotation_weights=weights), alternatives=2)
+    return posed(replace(table, rotation_weights=weights), alternatives=2)
 
 
 def _odd_problems() -> dict[str, MatchProblem]:
     rng = np.random.default_rng(7)
     usual = random_relations(rng, 4, 5)
     return {
-        "2 on 2 objects": MatchProblem(random_relations(rng, 2, 2)),
-        "2 on 5 objects": MatchProblem(random_relations(rng, 2, 5), alternatives=2),
-        "3 on 3 objects": MatchProblem(random_relations(rng, 3, 3), alternatives=9),
-        "equal relations": MatchProblem(_alike(4, 5, 0.5)),
-        "σ = 0 throughout": MatchProblem(_alike(4, 4, 0.0)),
-        "σ = 1 throughout": MatchProblem(_alike(3, 5, 1.0)),
-        "weights 1, 0, 0": MatchProblem(usual, (1.0, 0.0, 0.0)),
-        "weights 0, 1, 0": MatchProblem(usual, (0.0, 1.0, 0.0)),
-        "weights 0, 0, 1": MatchProblem(usual, (0.0, 0.0, 1.0)),
+        "2 on 2 objects": posed(random_relations(rng, 2, 2)),
+        "2 on 5 objects": posed(random_relations(rng, 2, 5), alternatives=2),
+        "3 on 3 objects": posed(random_relations(rng, 3, 3), alternatives=9),
+        "equal relations": posed(_alike(4, 5, 0.5)),
+        "σ = 0 throughout": posed(_alike(4, 4, 0.0)),
+        "σ = 1 throughout": posed(_alike(3, 5, 1.0)),
+        "weights 1, 0, 0": posed(usual, (1.0, 0.0, 0.0)),
+        "weights 0, 1, 0": posed(usual, (0.0, 1.0, 0.0)),
+        "weights 0, 0, 1": posed(usual, (0.0, 0.0, 1.0)),
     }
 
 
