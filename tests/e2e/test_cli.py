@@ -182,10 +182,7 @@ def test_an_overlay_that_cannot_be_written_is_refused_before_the_match(command_l
 def test_the_seed_decides_the_search(command_line, where):
     random = ("--searcher", "auto", "--json", "--seed")
     same, again, other = (
-        result(
-            command_line("match", *ROOM, *where, "--searcher", "direct", "--json", "--seed", seed)
-        )
-        for seed in (1, 1, 2)
+        result(command_line("match", *ROOM, *where, *random, seed)) for seed in (1, 1, 2)
     )
     assert same.statistics.evaluations == again.statistics.evaluations
     assert same.fmap_entries == again.fmap_entries
@@ -354,7 +351,8 @@ def test_plugins_list_says_the_same_here_and_of_a_server(command_line, address):
     assert known["excalidraw"] == ".excalidraw {type, elements}"
     head = ["kind", "name", "default", "distribution", "version", "summary", "source"]
     assert algorithms[0] == head
-    assert ["searcher", "align", "true", "sketchmatch"] in [line[:4] for line in algorithms]
+    for kind, name in (("searcher", "align"), ("judge", "posterior")):
+        assert [kind, name, "true", "sketchmatch"] in [line[:4] for line in algorithms]
     assert len(algorithms) == 1 + len(catalogue.algorithms)
     assert profiles[0] == ["profile", "default", "summary"]
     assert plugins[0] == ["plugin", "version", "state", "reason"]

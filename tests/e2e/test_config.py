@@ -111,17 +111,14 @@ def test_a_match_takes_file_profile_and_flags_each_over_the_other(command_line, 
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)
 
-    assert pipeline()["outcome"] == "OUTCOME_CONVERGED"
+    assert pipeline()["statistics"]["iterations"] != "5"
     assert pipeline("--config", mine)["statistics"]["iterations"] == "5"
     assert pipeline("--config", mine, "--profile", "proof")["outcome"] == "OUTCOME_OPTIMAL"
     assert (
         pipeline("--config", mine, "--set", "searcher.seed_points=3")["statistics"]["iterations"]
         == "3"
     )
-    assert (
-        pipeline("--config", mine, "--searcher", "exact", "--judge", "confidence")["outcome"]
-        == "OUTCOME_OPTIMAL"
-    )
+    assert pipeline("--config", mine, "--searcher", "exact")["outcome"] == "OUTCOME_OPTIMAL"
     mine.rename("sketchmatch.toml")
     assert pipeline()["statistics"]["iterations"] == "5", "the file that lies here is read"
 

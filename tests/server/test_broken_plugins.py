@@ -23,9 +23,7 @@ def test_a_broken_plugin_is_named_with_its_distribution_and_the_server_goes_on(
     # `auto` leaves no objects out, so that the judge is asked whether it does.
     chosen = {"searcher": "auto", stage: plugin.name}
     with pytest.raises(ServerFailedError, match=words) as raised:
-        client.match(
-            scene(4), scene(4), **{"searcher": "auto"} | {stage: plugin.name}, time_budget=1.0
-        )
+        client.match(scene(4), scene(4), **chosen, time_budget=1.0)
     sentence = str(raised.value)
     assert raised.value.reason == "PLUGIN_FAILED"
     assert raised.value.__cause__.code() is grpc.StatusCode.INTERNAL

@@ -30,10 +30,7 @@ def matched(channel, request):
 
 @pytest.fixture(scope="module")
 def answer(channel):
-    request = golden("MatchRequest.turned")
-    request.pipeline.judge.name = "confidence"  # that of ζ, which was found by hand
-    request.allow_unmatched = False
-    return matched(channel, request)
+    return matched(channel, golden("MatchRequest.turned"))
 
 
 def leaves(value, path=""):
