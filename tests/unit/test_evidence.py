@@ -140,11 +140,13 @@ def test_rotation_weights_are_powers_of_distances(scene, distance):
 def test_an_exponent_of_0_is_the_thesis_s_zeta():
     sketch, scene = sketched(5)
     three, six = (
-        match(sketch.scene, scene, weights=weights) for weights in ((1, 1, 1), (1, 1, 1, 0, 0, 0))
+        match(sketch.scene, scene, judge="confidence", weights=weights)
+        for weights in ((1, 1, 1), (1, 1, 1, 0, 0, 0))
     )
     assert three.confidence == six.confidence
     assert three.probability == six.probability is not None
-    assert match(sketch.scene, scene, weights=(1, 1, 1, 0, 0, 1)).probability is None
+    other = match(sketch.scene, scene, judge="confidence", weights=(1, 1, 1, 0, 0, 1))
+    assert other.probability is None
 
 
 def test_objects_around_one_centre_weigh_alike():
@@ -192,7 +194,7 @@ def test_every_searcher_of_object_maps_finds_the_best(searcher, exchanged):
     sketch, scene = sketched(3, 6, 5, displacement=0.3, turn=0.3, stretch=0.3, wobble=0.1)
     weights = (1, 2, 0.5, 0.7, 1.1)
     first, second = (scene, sketch.scene) if exchanged else (sketch.scene, scene)
-    result = match(first, second, searcher=searcher, weights=weights)
+    result = match(first, second, searcher=searcher, judge="confidence", weights=weights)
     table, _ = weighed(sketch.scene, scene, weights)
     best, partners = maps.best_object_map(table, ConfidenceWeights(*weights).searched)
     found = result.confidence
