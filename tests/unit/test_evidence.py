@@ -194,7 +194,9 @@ def test_every_searcher_of_object_maps_finds_the_best(searcher, exchanged):
     sketch, scene = sketched(3, 6, 5, displacement=0.3, turn=0.3, stretch=0.3, wobble=0.1)
     weights = (1, 2, 0.5, 0.7, 1.1)
     first, second = (scene, sketch.scene) if exchanged else (sketch.scene, scene)
-    result = match(first, second, searcher=searcher, judge="confidence", weights=weights)
+    directions = {"histogram": {"directions": 180}}
+    options = {"judge": "confidence", "weights": weights, "params": directions}
+    result = match(first, second, searcher=searcher, **options)
     table, _ = weighed(sketch.scene, scene, weights)
     best, partners = maps.best_object_map(table, ConfidenceWeights(*weights).searched)
     found = result.confidence
