@@ -79,7 +79,7 @@ def test_a_configuration_that_is_wrong_changes_nothing_and_the_server_says_why(r
     for text, words in [
         ("[pipeline]\nsearcher = = 3\n", "is no TOML at line 2"),
         ('[pipeline.searcher]\nname = "eezm"\n', "'eezm', which is no searcher"),
-        ("[pipeline.searcher]\nparameters = { tempo = 0 }\n", "tempo is no parameter of auto"),
+        ("[pipeline.searcher]\nparameters = { tempo = 0 }\n", "tempo is no parameter of align"),
     ]:
         reload(text, f"the configuration stays as it is: .*{words}")
         assert searcher_of(client.match(scene(4), scene(4))) == "easm"

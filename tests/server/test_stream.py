@@ -191,7 +191,10 @@ def test_the_blocking_and_the_asyncio_client_get_the_same_answer(address):
 @pytest.mark.slow
 def test_another_seed_searches_differently(address):
     with Client(address) as client:
-        answers = [client.match(scene(12), scene(12, 1), seed=seed).result for seed in (1, 2)]
+        asked = {"searcher": "auto", "judge": "confidence"}
+        answers = [
+            client.match(scene(12), scene(12, 1), seed=seed, **asked).result for seed in (1, 2)
+        ]
     assert answers[0].statistics.evaluations != answers[1].statistics.evaluations
 
 

@@ -12,7 +12,13 @@ from sketchmatch.api import Algorithm, Similarity
 from sketchmatch.kernels._jit import on_compile
 from sketchmatch.model import ConfidenceWeights, Fmap, RelationTable, Scene, SceneDescriptor
 from sketchmatch.pipeline.alternatives import exchange_confidences
-from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm, own_confidence
+from sketchmatch.pipeline.correspond import (
+    fmap_confidence,
+    map_confidence,
+    object_map,
+    occm,
+    own_confidence,
+)
 from sketchmatch.pipeline.evidence import compare_objects, weigh_objects
 from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, Pipeline, default_names
@@ -131,6 +137,7 @@ def _load_common() -> None:
     own = finish(compare_objects(scene, scene, 4))
     finish(weigh_objects(table, own, ConfidenceWeights(shape=1.0, size=1.0)))
     own_confidence(fmap, table, own)
+    map_confidence(np.array([0, 1, -1]), table, own=own)
     part = finish(part_of(Part.whole(table, own), (0, 1)))
     assert part.own is not None
     own_confidence(Fmap(np.array([0])), part.table, part.own)

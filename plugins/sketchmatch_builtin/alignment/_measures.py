@@ -352,7 +352,7 @@ def _bend(
                 )
     for p in range(_BENDS):
         normal[p, p] += 1e-6 if p < 2 else 1e-6 + (0.2 / (_PAGE * ratio)) ** 2
-    found = np.linalg.solve(normal, right)
+    found = _solve(normal, right)
     for i in range(partners.size):
         if partners[i] < 0:
             continue
@@ -362,6 +362,29 @@ def _bend(
         row[Part.BENT] += _robust(x * x + y * y, 0.35)
         row[Part.BENT_TIGHT] += _robust(x * x + y * y, 0.12)
     row[Part.BEND] = min((found[2:] ** 2).sum() / (_PAGE * ratio) ** 2, 9.0)
+
+
+@kernel
+def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve linear equations with a symmetric, positive definite matrix, which is overwritten.
+
+    By Cholesky's decomposition; ``np.linalg`` in a kernel needs SciPy, which not everyone has.
+    """
+    found = right.copy()
+    for i in range(right.size):
+        for j in range(i + 1):
+            rest = matrix[i, j]
+            for k in range(j):
+                rest -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = np.sqrt(rest) if i == j else rest / matrix[j, j]
+        for k in range(i):
+            found[i] -= matrix[i, k] * found[k]
+        found[i] /= matrix[i, i]
+    for i in range(right.size - 1, -1, -1):
+        for k in range(i + 1, right.size):
+            found[i] -= matrix[k, i] * found[k]
+        found[i] /= matrix[i, i]
+    return found
 
 
 @kernel
