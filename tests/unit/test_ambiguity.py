@@ -289,6 +289,15 @@ def test_how_many_alternatives_are_asked_for_does_not_make_the_answer_likelier(s
     assert result.ambiguity == Ambiguity(4, tuple(range(shown)), (0, 1, 2, 3, 5, 6, 7, 8))
 
 
+def test_by_default_a_row_of_pillars_fits_forwards_and_backwards():
+    result = match(pillars(5, 1), pillars(5, 1))
+    assert result.ambiguity == Ambiguity(2, (0,), (0, 1, 3, 4))
+    assert result.alternatives[0].probability == pytest.approx(result.probability, rel=1e-3)
+    centre = result.matches[2].probability
+    assert centre > 1.8 * result.probability
+    assert result.place_probability >= centre - 1e-9
+
+
 def test_a_room_in_which_every_thing_differs_is_not_ambiguous():
     scene = random_scene(np.random.default_rng(3), 6)
     result = match(scene, scene)

@@ -112,7 +112,8 @@ def test_turning_and_scaling_the_sketch_changes_nothing(seed, bins, factor, weig
 def test_rotations_of_distant_pairs_count_for_more(searcher, exchanged):
     sketch, scene = sketched(4, 6, 5, displacement=0.3, turn=0.3)
     first, second = (scene, sketch.scene) if exchanged else (sketch.scene, scene)
-    result = match(first, second, searcher=searcher, weights=(1, 2, 1, 0, 0, 1.5))
+    options = {"judge": "confidence", "weights": (1, 2, 1, 0, 0, 1.5)}
+    result = match(first, second, searcher=searcher, **options)
     few = [item.centroid for item in sketch.scene.objects]
     side = "map_pair" if exchanged else "sketch_pair"
     counts = [math.dist(*(few[k] for k in getattr(line, side))) ** 1.5 for line in result.fmap]
@@ -183,8 +184,9 @@ def test_objects_tell_apart_what_their_places_cannot():
         [item + place for item, place in zip([square, bar, dot, square], places, strict=True)]
     )
     drawn = Scene.from_polygons([item.rings[0][:, ::-1] * (-1, 1) for item in scene.objects])
-    partners = match(drawn, scene, weights=(1, 1, 1, 3, 3)).object_map
-    assert partners == {k: k for k in range(4)}
+    truth = {k: k for k in range(4)}
+    for profile in ("thesis", ""):
+        assert match(drawn, scene, profile=profile, weights=(1, 1, 1, 3, 3)).object_map == truth
 
 
 @compiled_only
@@ -214,7 +216,7 @@ def test_every_searcher_of_object_maps_finds_the_best(searcher, exchanged):
 def test_without_weights_for_objects_the_answer_is_the_thesis_s(searcher):
     sketch, scene = sketched(5)
     three, five = (
-        match(sketch.scene, scene, searcher=searcher, weights=weights)
+        match(sketch.scene, scene, searcher=searcher, judge="confidence", weights=weights)
         for weights in ((1, 1, 1), (1, 1, 1, 0, 0))
     )
     assert three.confidence == five.confidence

@@ -282,10 +282,11 @@ def test_sources_and_the_scenes_in_them_match_alike():
 @pytest.mark.parametrize(("weights", "part"), [((1, 0, 0), 0), ((0, 2, 0), 1), ((0, 0, 0.5), 2)])
 def test_weights_decide_what_is_sought_and_told(weights, part):
     scene = seven()
-    result = matched(simulate_sketch(scene, np.random.default_rng(1)).scene, scene, weights=weights)
+    sketch = simulate_sketch(scene, np.random.default_rng(1)).scene
+    result = matched(sketch, scene, selection=THESIS, weights=weights)
     parts = (result.confidence.similarity, result.confidence.rotation, result.confidence.dilation)
     assert result.fmap_confidence == pytest.approx(parts[part], rel=1e-12)
-    even = matched(simulate_sketch(scene, np.random.default_rng(1)).scene, scene).confidence
+    even = matched(sketch, scene, selection=THESIS).confidence
     assert parts[part] >= (even.similarity, even.rotation, even.dilation)[part] - 1e-9
 
 

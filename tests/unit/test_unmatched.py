@@ -96,10 +96,11 @@ def place_with_extra(seed=0):
 
 
 BY_ZETA = {"searcher": Choice("auto"), "judge": Choice("confidence")}
+"""Neither finds partial maps by itself, so that parts are searched."""
 
 
-def matched(sketch, map_, **settings):
-    request = MatchRequest(sketch, map_, **{"selection": BY_ZETA} | settings)
+def matched(sketch, map_, *, selection=BY_ZETA, **settings):
+    request = MatchRequest(sketch, map_, BY_ZETA | selection, **settings)
     *_, last = run_match(request, default_registry(), builtin().defaults)
     assert isinstance(last, Finished)
     return last.result
