@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sketchmatch.model import IntArray
+from sketchmatch.model import FloatArray, IntArray
 from sketchmatch_builtin.alignment._poses import (
     TOLERANCES,
     Guesses,
@@ -166,9 +166,7 @@ def completed(laid: Laid | None, sides: Sides) -> IntArray:
     ndarray
         Shape (N,): for each template object.
     """
-    worths = sides.bonus
-    if laid is not None:
-        worths = pairing_worths(*laid.pose, sides.drawn, sides.mapped, sides.bonus, TOLERANCES)
+    worths = sides.bonus if laid is None else _worths(laid, sides)
     if sides.swapped:
         worths = worths.T
     rows, columns = worths.shape
@@ -185,6 +183,10 @@ def completed(laid: Laid | None, sides: Sides) -> IntArray:
     taken = np.flatnonzero(holders >= 0)
     found[holders[taken]] = taken
     return found
+
+
+def _worths(laid: Laid, sides: Sides) -> FloatArray:
+    return pairing_worths(*laid.pose, sides.drawn, sides.mapped, sides.bonus, TOLERANCES)
 
 
 def template_maps(laid: Iterable[Laid], sides: Sides) -> list[IntArray]:
@@ -221,9 +223,7 @@ def _refined(guesses: Guesses, sides: Sides, poses: int) -> Generator[int, None,
     for g in ranked[: 5 * poses]:
         pose = guessed_pose(guesses.pairings[g], drawn, mapped)
         u, t, growth, score = refine_pose(*pose, drawn, mapped, sides.bonus, TOLERANCES, partners)
-        key = partners.tobytes()
-        if key not in found or found[key].score < score:
-            found[key] = Laid(partners.copy(), (u, t, growth), score)
+        _keep_better(found, Laid(partners.copy(), (u, t, growth), score))
         if len(found) >= poses:
             break
         weighed += sides.bonus.size
@@ -236,7 +236,7 @@ def _refined(guesses: Guesses, sides: Sides, poses: int) -> Generator[int, None,
 def _filled(laid: Laid, sides: Sides) -> Laid:
     """Return a map under the same pose that gives each template object a partner."""
     partners = sides.drawn_partners(completed(laid, sides))
-    worths = pairing_worths(*laid.pose, sides.drawn, sides.mapped, sides.bonus, TOLERANCES)
+    worths = _worths(laid, sides)
     matched = np.flatnonzero(partners >= 0)
     score = float(worths[matched, partners[matched]].sum())
     return Laid(partners, laid.pose, score - TOLERANCES.omission * (len(partners) - len(matched)))
@@ -246,10 +246,15 @@ def _ranked(laid: Iterable[Laid]) -> list[Laid]:
     """Return the different maps, each under its best pose, what is worth most first."""
     found: dict[bytes, Laid] = {}
     for each in laid:
-        key = each.partners.tobytes()
-        if key not in found or found[key].score < each.score:
-            found[key] = each
+        _keep_better(found, each)
     return sorted(found.values(), key=lambda each: -each.score)
+
+
+def _keep_better(found: dict[bytes, Laid], laid: Laid) -> None:
+    """Keep a map by what it matches, under the better pose where it was met before."""
+    key = laid.partners.tobytes()
+    if key not in found or found[key].score < laid.score:
+        found[key] = laid
 
 
 def _varied(laid: list[Laid], sides: Sides, most: int) -> list[Laid]:
@@ -261,7 +266,7 @@ def _varied(laid: list[Laid], sides: Sides, most: int) -> list[Laid]:
         left = _LOSS - (laid[0].score - each.score)
         if left <= 0.0:
             break
-        worths = pairing_worths(*each.pose, sides.drawn, sides.mapped, sides.bonus, TOLERANCES)
+        worths = _worths(each, sides)
         count = vary(worths, TOLERANCES.omission, each.partners, left, maps, losses)
         best = np.argsort(losses[:count], kind="stable")[:most]
         found += [

@@ -125,7 +125,7 @@ class Guesses(NamedTuple):
     scores
         Shape (room,).
     pairings
-        int64, shape (room, 4): i, j, k and l of a pose that lays i on j and k on l.
+        int64, shape (room, 4): i, j, k and g of a pose that lays i on j and k on g.
     state
         int64, shape (3,): how many there are, how many were weighed, and how many pairs of a
         sketched pair and a mapped object are done.
@@ -253,6 +253,32 @@ def square(z: complex) -> float:
 
 
 @kernel
+def _units(u: complex, drawn: Things, tolerances: Tolerances) -> tuple[float, float, float]:
+    """Return what squares of deviations count for, 1/(3κ²): of places, sizes and shapes."""
+    return (
+        1.0 / (3.0 * square(u) * (tolerances.place * drawn.spacing) ** 2),
+        1.0 / (3.0 * tolerances.size**2),
+        1.0 / (3.0 * tolerances.shape**2),
+    )
+
+
+@kernel
+def _unlike(
+    place: complex,
+    size: float,
+    shape: complex,
+    mapped: Things,
+    j: int,
+    units: tuple[float, float, float],
+) -> float:
+    """Return exp(−ℓ/2) of what lies there under a pose and a mapped object."""
+    unlike = 1.0 + units[0] * square(mapped.places[j] - place)
+    unlike *= 1.0 + units[1] * (mapped.sizes[j] - size) ** 2
+    unlike *= 1.0 + units[2] * square(shape - mapped.shapes[j])
+    return float(unlike)
+
+
+@kernel
 def _worth(
     u: complex,
     t: complex,
@@ -265,8 +291,7 @@ def _worth(
     floor: float,
 ) -> float:
     """Return what a pose is worth, or the floor where it is not above that."""
-    unit = 1.0 / (3.0 * square(u) * (tolerances.place * drawn.spacing) ** 2)
-    by_size, by_shape = 1.0 / (3.0 * tolerances.size**2), 1.0 / (3.0 * tolerances.shape**2)
+    unit, by_size, by_shape = _units(u, drawn, tolerances)
     worst = np.exp(0.5 * tolerances.omission)
     far, things = (worst - 1.0) / unit, grid.things
     reach = np.sqrt(far) / grid.cell
@@ -331,8 +356,8 @@ def refine_pose(
 
     Parameters
     ----------
-    u, t
-        The pose.
+    u, t, growth
+        The pose, and by how much ln of the areas grows.
     drawn, mapped, tolerances
         As for :func:`guess_poses`.
     bonus
@@ -342,8 +367,8 @@ def refine_pose(
 
     Returns
     -------
-    complex, complex, float
-        The pose, and the sum of ℓ and −λ under it.
+    complex, complex, float, float
+        The pose and the growth, and the sum of ℓ and −λ under them.
     """
     n, m = drawn.places.size, mapped.places.size
     costs, candidates = np.empty((n, m + 1)), np.empty((n, m + 1), dtype=np.int64)
@@ -401,18 +426,13 @@ def weigh_pairings(
 ) -> None:
     """Write −ℓ of the pairings that are better than leaving out, which comes last in each row."""
     n, m = drawn.places.size, mapped.places.size
-    unit = 1.0 / (3.0 * (tolerances.place * abs(u) * drawn.spacing) ** 2)
-    by_size, by_shape = 1.0 / (3.0 * tolerances.size**2), 1.0 / (3.0 * tolerances.shape**2)
-    twist, worst = u * u / abs(u * u), np.exp(0.5 * tolerances.omission)
+    units, twist = _units(u, drawn, tolerances), u * u / square(u)
+    worst = np.exp(0.5 * tolerances.omission)
     for i in range(n):
-        place, size, shape = u * drawn.places[i] + t, drawn.sizes[i] + growth, drawn.shapes[i]
-        shape = shape * twist
-        count = 0
+        place, size = u * drawn.places[i] + t, drawn.sizes[i] + growth
+        shape, count = drawn.shapes[i] * twist, 0
         for j in range(m):
-            away, other = mapped.places[j] - place, shape - mapped.shapes[j]
-            unlike = 1.0 + unit * (away.real * away.real + away.imag * away.imag)
-            unlike *= 1.0 + by_size * (mapped.sizes[j] - size) ** 2
-            unlike *= 1.0 + by_shape * (other.real * other.real + other.imag * other.imag)
+            unlike = _unlike(place, size, shape, mapped, j, units)
             if bonus[i, j] == 0.0 and unlike >= worst:
                 continue
             cost = 2.0 * np.log(unlike) - bonus[i, j]
@@ -433,13 +453,13 @@ def fitted_pose(
     partners: IntArray,
 ) -> tuple[complex, complex]:
     """Return the pose that fits pairings best, each weighed by how well it fits; 0 if none."""
-    unit = 1.0 / (3.0 * (tolerances.place * abs(u) * drawn.spacing) ** 2)
+    unit = _units(u, drawn, tolerances)[0]
     weight, before, after = 0.0, 0.0j, 0.0j
     count = 0
     for i in range(partners.size):
         if partners[i] >= 0:
             away = mapped.places[partners[i]] - u * drawn.places[i] - t
-            share = 1.0 / (1.0 + unit * (away.real * away.real + away.imag * away.imag))
+            share = 1.0 / (1.0 + unit * square(away))
             weight += share
             before += share * drawn.places[i]
             after += share * mapped.places[partners[i]]
@@ -451,7 +471,7 @@ def fitted_pose(
     for i in range(partners.size):
         if partners[i] >= 0:
             away = mapped.places[partners[i]] - u * drawn.places[i] - t
-            share = 1.0 / (1.0 + unit * (away.real * away.real + away.imag * away.imag))
+            share = 1.0 / (1.0 + unit * square(away))
             z, w = drawn.places[i] - before, mapped.places[partners[i]] - after
             product += share * w * z.conjugate()
             spread += share * square(z)
@@ -473,18 +493,13 @@ def pairing_worths(
 ) -> FloatArray:
     """Return ℓ of every pairing under a pose, shape (n, m)."""
     n, m = drawn.places.size, mapped.places.size
-    unit = 1.0 / (3.0 * (tolerances.place * abs(u) * drawn.spacing) ** 2)
-    by_size, by_shape = 1.0 / (3.0 * tolerances.size**2), 1.0 / (3.0 * tolerances.shape**2)
-    twist = u * u / abs(u * u)
+    units, twist = _units(u, drawn, tolerances), u * u / square(u)
     worths = np.empty((n, m))
     for i in range(n):
-        place, size, shape = u * drawn.places[i] + t, drawn.sizes[i] + growth, drawn.shapes[i]
-        shape = shape * twist
+        place, size = u * drawn.places[i] + t, drawn.sizes[i] + growth
+        shape = drawn.shapes[i] * twist
         for j in range(m):
-            away, other = mapped.places[j] - place, shape - mapped.shapes[j]
-            unlike = 1.0 + unit * (away.real * away.real + away.imag * away.imag)
-            unlike *= 1.0 + by_size * (mapped.sizes[j] - size) ** 2
-            unlike *= 1.0 + by_shape * (other.real * other.real + other.imag * other.imag)
+            unlike = _unlike(place, size, shape, mapped, j, units)
             worths[i, j] = bonus[i, j] - 2.0 * np.log(unlike)
     return worths
 
