@@ -32,11 +32,6 @@ def object_map(done):
     return {line.get("sketchObject", 0): line.get("mapObject", 0) for line in lines}
 
 
-SPARSE = pytest.mark.xfail(
-    strict=True, reason="two of six things of a hall with 52, far apart, are judged to be extras"
-)
-
-
 @pytest.mark.parametrize(
     "name",
     [
@@ -44,7 +39,7 @@ SPARSE = pytest.mark.xfail(
         "small-house-plus-1",
         "tb4-warehouse-9",
         "montreal-5",
-        pytest.param("ros-map12-6", marks=SPARSE),
+        "ros-map12-6",
     ],
 )
 def test_a_sketch_set_by_hand_is_matched_wholly_right_with_its_map(name, command_line):

@@ -2,7 +2,8 @@
 
 Run it with ``python -m tests.experiments.learn``; it takes some minutes and writes
 ``learned.json`` beside this file, from which the numbers of
-:mod:`sketchmatch_builtin.judges.calibration` are copied and the report tells how they were chosen:
+:mod:`sketchmatch_builtin.judges.calibration` are copied and the report tells how they were chosen,
+and ``posterior.json`` beside that module:
 
 - ``odds``: price, and what makes probabilities of the thesis's ζ, which the judge ``confidence``
   has;
@@ -21,8 +22,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
+from sketchmatch_builtin.judges import calibration
 from tests.experiments.odds import considered_by, errors, learned_odds
-from tests.experiments.posterior import Known, judged_errors, known_of, learned_posterior
+from tests.experiments.posterior import (
+    Known,
+    judged_errors,
+    known_of,
+    learned_posterior,
+    posterior_text,
+)
 from tests.experiments.runs import each_of
 
 __all__ = ["LEARNED", "SKETCHES", "THESIS"]
@@ -30,7 +38,10 @@ __all__ = ["LEARNED", "SKETCHES", "THESIS"]
 LEARNED = Path(__file__).with_name("learned.json")
 """What came of it."""
 
-SKETCHES = {"odds": 600, "check": 600, "posterior": 9200, "many": 400}
+JUDGE = Path(calibration.__file__).with_name("posterior.json")
+"""What the judge goes by."""
+
+SKETCHES = {"odds": 600, "check": 600, "posterior": 13000, "many": 300}
 
 CHECKED = 1000
 """Sketches beyond those for ``posterior`` that its probabilities are checked with."""
@@ -56,8 +67,8 @@ def _odds() -> dict[str, Any]:
         _all_of(partial(considered_by, THESIS, _FIRST_PRICE, part), part)
         for part in ("odds", "check")
     )
-    calibration = learned_odds(known)
-    found = asdict(calibration) | {"errors": errors(others, calibration)}
+    learned = learned_odds(known)
+    found = asdict(learned) | {"errors": errors(others, learned)}
     print(found)
     return found
 
@@ -65,9 +76,10 @@ def _odds() -> dict[str, Any]:
 def _posterior() -> dict[str, Any]:
     few, many = SKETCHES["posterior"], SKETCHES["many"]
     learned = learned_posterior(_known(range(few)) + _known(range(many), many=True))
+    JUDGE.write_text(posterior_text(learned), encoding="utf-8")
     found = judged_errors(_known(range(few, few + CHECKED)), learned)
     print(found)
-    return asdict(learned) | {"errors": found}
+    return {"errors": found}
 
 
 def _known(numbers: range, many: bool = False) -> list[Known]:

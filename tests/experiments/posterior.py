@@ -1,14 +1,16 @@
 """What the judge ``posterior`` goes by, learned from sketches of several kinds.
 
-Three fits, each a logit with a small penalty: which of the maps that are known is right, by a
-conditional logit; whether it is among them; and whether the sketch shows the place at all. Labels
-are evidence on their own, so what they count for is learned from labels put on the same sketches.
+Three fits, each with a small penalty: which of the maps that are known is right, by a conditional
+logit; whether it is among them; and whether the sketch shows the place at all. Labels are evidence
+on their own, so what they count for is learned from labels put on the same sketches.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -17,29 +19,35 @@ from sketchmatch.model import BoolArray, FloatArray, IntArray
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import default_registry
-from sketchmatch_builtin.alignment import Part, sides_of
+from sketchmatch_builtin.alignment import Whole, sides_of
 from sketchmatch_builtin.histograms.constant import ConstantForce
 from sketchmatch_builtin.judges._described import described
 from sketchmatch_builtin.judges._evidence import (
-    FIRST,
+    JUDGED,
     Described,
-    detailed,
+    line_numbers,
     lost_numbers,
+    map_numbers,
     place_numbers,
-    skill,
+    scene_numbers,
     weighed,
+    worths,
 )
-from sketchmatch_builtin.judges.calibration import Posterior
+from sketchmatch_builtin.judges.calibration import Layers, PlaceLayers, Posterior
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from tests.experiments.logits import significant
+from tests.experiments.networks import Case, fitted_maps, fitted_place
 from tests.experiments.reliability import reliability
 from tests.experiments.training import training_drawing
 
-__all__ = ["Known", "judged_errors", "known_of", "learned_posterior"]
+__all__ = ["Known", "judged_errors", "known_of", "learned_posterior", "posterior_text"]
 
 _ENGINE = Engine(default_registry())
 
 _PENALTY = 1e-4
+_UNRELATED = 0.3
+"""How many sketches are learned from as if nothing were known of relations."""
+
 _OTHER_PLACES = 6.0
 """What a sketch of another place counts for: taking it for this one is the worse mistake."""
 
@@ -81,6 +89,11 @@ def known_of(number: int, many: bool = False) -> list[Known]:
         found = described(scenes, sides, compared.table)
     except ValueError:  # nothing fits at all
         return []
+    found = replace(
+        found,
+        maps=found.maps[:JUDGED],
+        measured=found.measured.at(slice(JUDGED)),
+    )
     right = np.flatnonzero((found.maps == drawn.truth).all(axis=1))
     elsewhere = bool((drawn.truth < 0).all())
     return [Known(found, int(right[0]) if len(right) else -1, elsewhere, drawn.truth)]
@@ -88,14 +101,23 @@ def known_of(number: int, many: bool = False) -> list[Known]:
 
 def learned_posterior(cases: Sequence[Known]) -> Posterior:
     """Return what makes the truth likeliest."""
-    here = [each for each in cases if not each.elsewhere]
+    rng = np.random.default_rng(0)
+    told = [
+        replace(each, described=replace(each.described, related=False))
+        if rng.random() < _UNRELATED
+        else each
+        for each in cases
+    ]
+    here = [each for each in told if not each.elsewhere]
     found = [each for each in here if each.right >= 0]
-    rights = np.array([each.right for each in found])
-    first = _conditional([each.described.numbers[:, FIRST] for each in found], rights)
-    weights = _conditional([_detailed(each, first) for each in found], rights)
-    words = _labels(found, first, weights)
-    weights[[Part.ALIKE, Part.UNLIKE]] = words
-    shares = [_shares(_detailed(each, first) @ weights) for each in here]
+    # Each is learned from without relations too, since places are told by such worths.
+    maps, bare = (
+        _rounded_layers(fitted_maps([_case(each, related) for each in found]))
+        for related in (True, False)
+    )
+    layers = {True: maps, False: bare}
+    labels = _labels(found, layers)
+    shares = [_shares(_worths(each, layers)) for each in here]
     lost = _logit(
         np.array(
             [
@@ -106,22 +128,20 @@ def learned_posterior(cases: Sequence[Known]) -> Posterior:
         np.array([each.right < 0 for each in here], dtype=float),
         np.ones(len(here)),
     )
-    place = _logit(
-        np.array([_place(each, first) for each in cases]),
-        np.array([not each.elsewhere for each in cases], dtype=float),
-        np.array([_OTHER_PLACES if _counts(each) else 1.0 for each in cases]),
-    )
     luck = [
         float((each.described.maps[share.argmax()] == each.truth).mean())
         for share, each in zip(shares, here, strict=True)
         if each.right < 0
     ]
+    place = _rounded_place(
+        fitted_place(
+            np.array([place_numbers(each.described, bare) for each in told]),
+            np.array([not each.elsewhere for each in told]),
+            np.array([_OTHER_PLACES if _counts(each) else 1.0 for each in told]),
+        )
+    )
     return Posterior(
-        _rounded(first),
-        _rounded(weights),
-        _rounded(place),
-        _rounded(lost),
-        round(float(np.mean(luck)), 2),
+        maps, bare, place, _rounded(labels), _rounded(lost), round(float(np.mean(luck)), 2)
     )
 
 
@@ -153,25 +173,30 @@ def judged_errors(cases: Sequence[Known], learned: Posterior) -> dict[str, float
     }
 
 
-def _share(told: Iterable[bool]) -> float:
-    return significant(float(np.mean([*told])), 2)
-
-
 def _counts(case: Known) -> bool:
     """Whether a sketch of another place shows enough to be told from one of this place."""
     return case.elsewhere and case.described.drawn > 5
 
 
-def _detailed(case: Known, first: FloatArray) -> FloatArray:
-    rows = case.described.numbers
-    return detailed(rows, skill(rows[(rows[:, FIRST] @ first).argmax()]))
+def _case(known: Known, related: bool) -> Case:
+    """Return a sketch as the fit of maps wants it."""
+    found = known.described
+    return Case(
+        line_numbers(found.measured, related).astype(np.float32),
+        found.measured.matched,
+        map_numbers(found.measured, found.drawn),
+        scene_numbers(found),
+        found.measured.wholes[:, Whole.SCORE],
+        known.right,
+    )
 
 
-def _place(case: Known, first: FloatArray) -> FloatArray:
-    return place_numbers(case.described, first)
+def _worths(known: Known, layers: dict[bool, Layers]) -> FloatArray:
+    found = known.described
+    return worths(found, found.measured, layers[found.related], found.related)
 
 
-def _labels(cases: Sequence[Known], first: FloatArray, weights: FloatArray) -> FloatArray:
+def _labels(cases: Sequence[Known], layers: dict[bool, Layers]) -> FloatArray:
     """Return what labels count for that mean the same, and that do not."""
     rng = np.random.default_rng(0)
     rows, offsets = [], []
@@ -180,7 +205,7 @@ def _labels(cases: Sequence[Known], first: FloatArray, weights: FloatArray) -> F
         lines = np.arange(len(each.truth))
         told = np.where(each.described.maps >= 0, names[lines, each.described.maps], 0)
         rows.append(np.column_stack([(told > 0).sum(axis=1), (told < 0).sum(axis=1)]).astype(float))
-        offsets.append(_detailed(each, first) @ weights)
+        offsets.append(_worths(each, layers))
     return _conditional(rows, np.array([each.right for each in cases]), offsets)
 
 
@@ -198,9 +223,9 @@ def _named(case: Known, rng: np.random.Generator) -> IntArray:
 
 
 def _conditional(
-    rows: Sequence[FloatArray], rights: IntArray, offsets: Sequence[FloatArray] | None = None
+    rows: Sequence[FloatArray], rights: IntArray, offsets: Sequence[FloatArray]
 ) -> FloatArray:
-    """Return the weights under which the right rows are likeliest."""
+    """Return the weights under which the right rows are likeliest, beside what speaks for them."""
     x, none, beside = _padded(rows, offsets)
     unit = np.abs(x[~none]).mean(axis=0) + 1e-9
     x, cases = x / unit, np.arange(len(rights))
@@ -224,15 +249,13 @@ _PATIENT = {"maxiter": 1000}
 
 
 def _padded(
-    rows: Sequence[FloatArray], offsets: Sequence[FloatArray] | None
+    rows: Sequence[FloatArray], offsets: Sequence[FloatArray]
 ) -> tuple[FloatArray, BoolArray, FloatArray]:
     most = max(map(len, rows))
     x = np.zeros((len(rows), most, rows[0].shape[1]))
     none, beside = np.ones(x.shape[:2], dtype=bool), np.zeros(x.shape[:2])
     for k, each in enumerate(rows):
-        x[k, : len(each)], none[k, : len(each)] = each, False
-        if offsets is not None:
-            beside[k, : len(each)] = offsets[k]
+        x[k, : len(each)], none[k, : len(each)], beside[k, : len(each)] = each, False, offsets[k]
     return x, none, beside
 
 
@@ -257,5 +280,36 @@ def _shares(scores: FloatArray) -> FloatArray:
     return shares / shares.sum()
 
 
-def _rounded(values: FloatArray) -> tuple[float, ...]:
-    return tuple(float(f"{each:.4g}") for each in values)
+def _rounded(values: FloatArray) -> FloatArray:
+    """Return values to four digits, as they are written."""
+    rounded: FloatArray = np.vectorize(lambda each: float(f"{each:.4g}"))(values)
+    return rounded
+
+
+def _rounded_layers(layers: Layers) -> Layers:
+    *arrays, score = layers
+    return Layers(*map(_rounded, arrays), significant(score, 4))
+
+
+def _rounded_place(layers: PlaceLayers) -> PlaceLayers:
+    *arrays, constant = layers
+    return PlaceLayers(*map(_rounded, arrays), significant(constant, 4))
+
+
+def posterior_text(learned: Posterior) -> str:
+    """Return what was learned as JSON, a row of numbers on each line."""
+    parts = {
+        name: {key: np.asarray(value).tolist() for key, value in layers._asdict().items()}
+        for name, layers in (
+            ("maps", learned.maps),
+            ("bare", learned.bare),
+            ("place", learned.place),
+        )
+    }
+    beside = {"labels": learned.labels.tolist(), "lost": learned.lost.tolist()}
+    text = json.dumps(parts | beside | {"luck": learned.luck}, indent=1)
+    return re.sub(r"\[\s+(-?[\d.e\-+]+(?:,\s+-?[\d.e\-+]+)*)\s+\]", _in_one_line, text) + "\n"
+
+
+def _in_one_line(found: re.Match[str]) -> str:
+    return "[" + re.sub(r",\s+", ", ", found[1]) + "]"

@@ -6,8 +6,6 @@ import math
 import numpy as np
 import shapely
 
-from sketchmatch.pipeline.correspond import map_confidence
-
 GROWTH = -1.0, 2.0
 """Within which things may grow beyond what their places do, in ln of the area."""
 
@@ -143,59 +141,64 @@ def best_pose(partners, drawn, mapped, tolerances, steps=3):
     return u, t, 2.0 * math.log(abs(u)) + offset
 
 
-def parts(partners, drawn, mapped, tolerances):
-    """Return what places, sizes and shapes say of a map, by name of the part."""
+def lines(partners, drawn, mapped, tolerances):
+    """Return what places, sizes and shapes say of each object with a partner, by name."""
     u, t, growth = best_pose(partners, drawn, mapped, tolerances)
-    lines = [(i, j) for i, j in enumerate(partners) if j >= 0]
-    left = np.array([(mapped.places[j] - u * drawn.places[i] - t) / u for i, j in lines])
-    left /= drawn.spacing
-    d = abs(left)
-    e = np.array([abs(mapped.sizes[j] - drawn.sizes[i] - growth) for i, j in lines])
-    twist = (u / abs(u)) ** 2
-    h = np.array([abs(drawn.shapes[i] * twist - mapped.shapes[j]) for i, j in lines])
-    odd = np.sort(_robust(d, 0.2) + _robust(e, 0.25) + _robust(h, 0.2))
-    count = len(lines)
+    pairs = [(i, j) for i, j in enumerate(partners) if j >= 0]
+    found = {}
+    for i, j in pairs:
+        left = (mapped.places[j] - u * drawn.places[i] - t) / u / drawn.spacing
+        others = [(k, g) for k, g in pairs if k != i]
+        others.sort(key=lambda line: abs(drawn.places[line[0]] - drawn.places[i]))
+        ways = []
+        for k, g in others:
+            way = drawn.places[k] - drawn.places[i]
+            ways.append(min(abs((mapped.places[g] - mapped.places[j]) / u / way - 1.0) ** 2, 1e4))
+        found[i] = {
+            "place": abs(left) ** 2,
+            "size": mapped.sizes[j] - drawn.sizes[i] - growth,
+            "shape": abs(drawn.shapes[i] * (u / abs(u)) ** 2 - mapped.shapes[j]) ** 2,
+            "round": abs(mapped.shapes[j]),
+            "way": np.mean(ways),
+            "near": np.mean(ways[:2]),
+        }
+    return found
+
+
+def whole(partners, drawn, mapped, tolerances):
+    """Return what places, sizes and shapes say of a map as a whole, by name."""
+    u, t, growth = best_pose(partners, drawn, mapped, tolerances)
+    pairs = [(i, j) for i, j in enumerate(partners) if j >= 0]
+    found = worths((u, t, growth), drawn, mapped, tolerances)
+    z = np.array([drawn.places[i] for i, _ in pairs])
+    left = np.array([(mapped.places[j] - u * drawn.places[i] - t) / u for i, j in pairs])
     return {
-        "matched": count,
-        "place": _robust(d, 0.35).sum(),
-        "place_tight": _robust(d, 0.12).sum(),
-        "place_square": np.minimum((d / 0.5) ** 2, 4.0).sum(),
-        "size": _robust(e, 0.4).sum(),
-        "size_tight": _robust(e, 0.15).sum(),
-        "size_square": np.minimum((e / 0.5) ** 2, 4.0).sum(),
-        "shape": _robust(h, 0.35).sum(),
-        "shape_tight": _robust(h, 0.12).sum(),
-        "shape_square": np.minimum((h / 0.4) ** 2, 4.0).sum(),
-        "scatter": count * math.log(0.03 + math.sqrt(np.minimum(d**2, 1.0).mean())),
-        "scatter_size": count * math.log(0.05 + math.sqrt(np.minimum(e**2, 2.0).mean())),
-        "scatter_shape": count * math.log(0.03 + math.sqrt(np.minimum(h**2, 1.0).mean())),
-        "offset": min((growth - 2.0 * math.log(abs(u))) ** 2, 6.0),
-        "worst": odd[-1],
-        "second": odd[-2],
-        **_bent(np.array([drawn.places[i] for i, _ in lines]), left, drawn.spacing),
+        "score": value(partners, found, tolerances.omission),
+        "matched": len(pairs),
         **_surrounded(partners, mapped, abs(u) * drawn.spacing),
-        **_ways(lines, drawn, mapped, u),
-        "outlier": _outlier(np.array([d, e, h]) ** 2),
+        "offset": min((growth - 2.0 * math.log(abs(u))) ** 2, 6.0),
+        "bend": _bend(z, left / drawn.spacing, drawn.spacing),
     }
 
 
 def related(partners, table):
-    """Return what the relations say of a map that is read from the template."""
-    zeta = map_confidence(np.asarray(partners), table)
-    count = sum(j >= 0 for j in partners)
-    return {
-        "similarity": count * (1.0 - zeta.similarity),
-        "rotation": count * (1.0 - zeta.rotation),
-        "dilation": count * (1.0 - zeta.dilation),
-    }
+    """Return what σ lacks of 1 for each object with a partner, in the mean over the others."""
+    pairs = [(i, j) for i, j in enumerate(partners) if j >= 0]
+    found = {}
+    for i, j in pairs:
+        rows = [object_pair(i, k, table.template_objects) for k, _ in pairs if k != i]
+        columns = [object_pair(j, g, table.argument_objects) for _, g in pairs if g != j]
+        found[i] = np.mean(1.0 - table.similarity[rows, columns])
+    return found
 
 
-def _robust(deviation, unit):
-    return np.log(1.0 + (deviation / unit) ** 2 / 3.0)
+def object_pair(a, b, objects):
+    """Return the number of a pair of objects."""
+    return list(itertools.combinations(range(objects), 2)).index((min(a, b), max(a, b)))
 
 
-def _bent(z, left, unit):
-    """Return what a shift, a stretch and a growth to one side leave, by ridge regression."""
+def _bend(z, left, unit):
+    """Return how far a stretch and a growth to one side lead, by ridge regression."""
     z = z - z.mean()
     extent = math.sqrt((abs(z) ** 2).mean())
     z, ratio = z / extent, extent / unit
@@ -207,12 +210,7 @@ def _bent(z, left, unit):
     ridge = np.diag([1e-3] * 2 + [math.hypot(1e-3, 0.2 / (0.12 * ratio))] * 4)
     sought = np.concatenate([(left * weights).real, (left * weights).imag, np.zeros(6)])
     found = np.linalg.lstsq(np.concatenate([stacked, ridge]), sought, rcond=None)[0]
-    rest = abs(left - np.array(effects).T @ found)
-    return {
-        "bent": _robust(rest, 0.35).sum(),
-        "bent_tight": _robust(rest, 0.12).sum(),
-        "bend": min((found[2:] ** 2).sum() / (0.12 * ratio) ** 2, 9.0),
-    }
+    return min((found[2:] ** 2).sum() / (0.12 * ratio) ** 2, 9.0)
 
 
 def _surrounded(partners, mapped, unit):
@@ -228,24 +226,3 @@ def _surrounded(partners, mapped, unit):
         gap = np.diff(np.append(angles, angles[0] + 2.0 * math.pi)).max()
         missing += np.clip((math.pi - gap) / (math.pi / 4.0), 0.0, 1.0)
     return {"missing": missing, "crowd": crowd}
-
-
-def _ways(lines, drawn, mapped, u):
-    """Return what the ways to the two nearest say."""
-    near = tight = 0.0
-    for i, j in lines:
-        others = [(k, g) for k, g in lines if k != i]
-        others.sort(key=lambda line: abs(drawn.places[line[0]] - drawn.places[i]))
-        for k, g in others[:2]:
-            way = drawn.places[k] - drawn.places[i]
-            off = abs((mapped.places[g] - mapped.places[j]) / u - way) / abs(way)
-            near += 0.5 * _robust(off, 0.4)
-            tight += 0.5 * _robust(off, 0.15)
-    return {"near": near, "near_tight": tight}
-
-
-def _outlier(squares):
-    """Return how odd the line is that is oddest for what the others are."""
-    count = squares.shape[1]
-    others = (squares.sum(axis=1, keepdims=True) - squares + 0.04) / count
-    return math.log(1.0 + (squares / others).sum(axis=0).max() / 3.0)

@@ -1,6 +1,7 @@
-"""What speaks for a map, part by part, against plain sums; and the pose that fits a map best."""
+"""What speaks for lines and maps, against plain sums; and the pose that fits a map best."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch.model import Scene
-from sketchmatch_builtin.alignment import PARTS, Part, measured, relations_of
-from sketchmatch_builtin.alignment._measures import fit_map
+from sketchmatch_builtin.alignment import Line, Whole, measured, relations_of
+from sketchmatch_builtin.alignment._measures import Relations, fit_map
 from sketchmatch_builtin.alignment._poses import TOLERANCES
 from sketchmatch_builtin.alignment._selves import self_similarities
 from sketchmatch_builtin.alignment._things import Things, things_of
@@ -18,7 +19,8 @@ from tests.oracle import aligning
 from tests.plugins.test_alignment_poses import moved, things
 from tests.strategies import random_table, scenes
 
-RELATED = {"similarity", "rotation", "dilation", "self", "alike", "unlike"}
+LINE_RELATED = {"self", "relation"}
+WHOLE_RELATED = {"alike", "unlike"}
 
 
 def some_map(rng, n, m, least=2):
@@ -30,8 +32,16 @@ def some_map(rng, n, m, least=2):
 
 
 def row_of(partners, drawn, mapped, relations=None):
-    (row,) = measured(np.array([partners]), drawn, mapped, relations)
-    return dict(zip(PARTS, row.tolist(), strict=True))
+    """Return what is measured of a map, by name."""
+    found = measured(np.array([partners]), drawn, mapped, relations)
+    return {part.name.lower(): found.wholes[0, part] for part in Whole}
+
+
+def lines_of(partners, drawn, mapped, relations=None):
+    """Return what is measured of each object of a map, by name."""
+    found = measured(np.array([partners]), drawn, mapped, relations)
+    np.testing.assert_array_equal(found.matched[0], np.asarray(partners) >= 0)
+    return [{part.name.lower(): row[part] for part in Line} for row in found.lines[0]]
 
 
 def distorted(rng, n, noise):
@@ -52,13 +62,19 @@ def test_places_sizes_and_shapes_count_as_plain_sums_say(seed, n, noise):
     partners = np.where(rng.random(n) < 0.7, np.arange(n), -1)
     if rng.random() < 0.5 or np.count_nonzero(partners >= 0) < 2:
         partners = some_map(rng, n, n + 2)
-    found = row_of(partners, drawn, mapped)
-    known = aligning.parts(partners, drawn, mapped, TOLERANCES)
-    assert set(PARTS) - RELATED <= set(known)
-    for name in PARTS:
-        # Squares of deviations are lost below about 1e-16 of squares of places.
-        expected = 0.0 if name in RELATED else known[name]
-        assert found[name] == pytest.approx(expected, rel=1e-6, abs=1e-6), name
+    # Squares of deviations are lost below about 1e-16 of squares of places.
+    near = partial(pytest.approx, rel=1e-6, abs=1e-6)
+    known = aligning.whole(partners, drawn, mapped, TOLERANCES)
+    assert set(known) == {part.name.lower() for part in Whole} - WHOLE_RELATED
+    expected = known | dict.fromkeys(WHOLE_RELATED, 0.0)
+    assert row_of(partners, drawn, mapped) == near(expected)
+    known = aligning.lines(partners, drawn, mapped, TOLERANCES)
+    for i, row in enumerate(lines_of(partners, drawn, mapped)):
+        if partners[i] < 0:
+            assert set(row.values()) == {0.0}
+        else:
+            assert set(known[i]) == set(row) - LINE_RELATED
+            assert row == near(known[i] | dict.fromkeys(LINE_RELATED, 0.0))
 
 
 @pytest.mark.parametrize("lines", [0, 1])
@@ -68,7 +84,9 @@ def test_fewer_than_two_lines_say_how_many_they_are_and_nothing_else(lines):
     partners = np.array([2, -1, -1]) if lines else np.full(3, -1)
     row = row_of(partners, drawn, mapped)
     assert row.pop("matched") == lines
+    assert row.pop("score") == -3.0 * TOLERANCES.omission
     assert set(row.values()) == {0.0}
+    assert {value for each in lines_of(partners, drawn, mapped) for value in each.values()} == {0.0}
 
 
 def test_a_row_that_was_written_before_is_written_anew():
@@ -76,13 +94,14 @@ def test_a_row_that_was_written_before_is_written_anew():
     drawn, mapped = things(rng, 3), things(rng, 4)
     one, two, three = np.array([0, 1, 2]), np.array([3, -1, 1]), np.array([-1, -1, 0])
     together = measured(np.array([one, two, three, one]), drawn, mapped)
-    for each, row in zip((one, two, three, one), together, strict=True):
-        np.testing.assert_array_equal(row, measured(np.array([each]), drawn, mapped)[0])
+    for k, each in enumerate((one, two, three, one)):
+        for several, alone in zip(together, measured(each[None], drawn, mapped), strict=True):
+            np.testing.assert_array_equal(several[k], alone[0])
 
 
 @given(st.integers(0, 2**32), st.integers(2, 6), st.integers(0, 3), st.booleans())
 @examples(60)
-def test_relations_count_as_zeta_and_its_parts_do(seed, n, more, swapped):
+def test_relations_count_by_what_their_similarities_lack(seed, n, more, swapped):
     rng = np.random.default_rng(seed)
     table = random_table(rng, n, n + more)
     sizes = (n + more, n) if swapped else (n, n + more)
@@ -92,23 +111,23 @@ def test_relations_count_as_zeta_and_its_parts_do(seed, n, more, swapped):
     if swapped:
         template = np.full(n, -1)
         template[partners[partners >= 0]] = np.flatnonzero(partners >= 0)
-    level = table.normalized_dilation
-    relations = _bare(table.similarity, table.rotation, level)
-    relations = relations._replace(swapped=swapped)
-    found = row_of(partners, drawn, mapped, relations)
-    for name, expected in aligning.related(template, table).items():
-        assert found[name] == pytest.approx(expected, abs=1e-9), name
+    relations = _bare(*sizes, table.similarity)._replace(swapped=swapped)
+    known = aligning.related(template, table)
+    for i, row in enumerate(lines_of(partners, drawn, mapped, relations)):
+        if partners[i] >= 0:
+            expected = known[partners[i] if swapped else i]
+            assert row["relation"] == pytest.approx(expected, abs=1e-9)
 
 
-def _bare(*of_pairs, selves=None, names=None):
-    from sketchmatch_builtin.alignment._measures import Relations
-
-    selves = np.zeros((0, 0, 0)) if selves is None else selves
-    names = np.zeros((0, 0), dtype=np.int64) if names is None else names
-    return Relations(*of_pairs, selves, names, False)
-
-
-NONE = (np.zeros((0, 0)),) * 3
+def _bare(n, m, similarity=None, selves=None, names=None):
+    """Return relations of which nothing is known but what is given."""
+    pairs = n * (n - 1) // 2, m * (m - 1) // 2
+    return Relations(
+        np.zeros(pairs) if similarity is None else similarity,
+        np.zeros((n, m, 4)) if selves is None else selves,
+        np.zeros((n, m), dtype=np.int64) if names is None else names,
+        False,
+    )
 
 
 def test_own_histograms_are_read_between_the_bins_of_the_turn():
@@ -116,22 +135,26 @@ def test_own_histograms_are_read_between_the_bins_of_the_turn():
     drawn = things(rng, 3)
     selves = rng.uniform(0.2, 1.1, (3, 4, 90))
     names = np.array([[1, -1, 0, 0], [0, 1, 0, 0], [0, 0, -1, 0]])
-    relations = _bare(*NONE, selves=selves, names=names)
+    relations = _bare(3, 4, selves=selves, names=names)
     for degrees in (0.3, 31.5, 90.0, 178.6, 181.0, 300.2):
         u = 2.0 * np.exp(1j * math.radians(degrees))
         mapped = moved(drawn, np.array([0, 1, 2, 0]), u, 0.0)
-        row = row_of([0, 1, 2], drawn, mapped, relations)
         turn = degrees % 180.0 / 2.0
         low = int(turn)
         rest = turn - low
-        lack = 0.0
-        for i in range(3):
+        for i, row in enumerate(lines_of([0, 1, 2], drawn, mapped, relations)):
             alike = (1.0 - rest) * selves[i, i, low % 90] + rest * selves[i, i, (low + 1) % 90]
-            lack += math.log(1.0 + max(0.0, 1.0 - alike) / 0.01)
-        assert row["self"] == pytest.approx(lack, abs=1e-5)
+            assert row["self"] == pytest.approx(max(0.0, 1.0 - alike), abs=1e-6)
+        row = row_of([0, 1, 2], drawn, mapped, relations)
         assert (row["alike"], row["unlike"]) == (2.0, 1.0)
         row = row_of([1, -1, 2], drawn, mapped, relations)
         assert (row["alike"], row["unlike"]) == (0.0, 2.0)
+
+
+def assert_finite(partners, drawn, mapped):
+    found = measured(partners[None], drawn, mapped)
+    assert np.isfinite(found.lines).all()
+    assert np.isfinite(found.wholes).all()
 
 
 def line(*places):
@@ -160,18 +183,17 @@ def test_what_nobody_drew_amid_others_is_missed():
     assert row_of([0, -1, 2, -1], corners, centre)["crowd"] == 0.0
 
 
-def test_a_stretched_page_bends_and_leaves_little():
+def test_a_stretched_page_bends():
     rng = np.random.default_rng(1)
     drawn = things(rng, 9)
     z = drawn.places - drawn.places.mean()
     flat = moved(drawn, np.arange(9), 1.0 + 0.0j, 0.0)
     stretched = flat._replace(places=z + 0.1 * z.conj())
-    scattered = flat._replace(places=z + 0.15 * drawn.spacing * np.exp(7j * rng.random(9)))
+    scattered = flat._replace(places=z + 0.05 * drawn.spacing * np.exp(7j * rng.random(9)))
     plain, bent, wild = (row_of(np.arange(9), drawn, each) for each in (flat, stretched, scattered))
     assert plain["bend"] == pytest.approx(0.0, abs=1e-9)
     assert bent["bend"] > 0.1
-    assert bent["bent_tight"] < 0.5 * bent["place_tight"]
-    assert wild["bent_tight"] > 0.5 * wild["place_tight"]
+    assert wild["bend"] < 0.1 * bent["bend"]
 
 
 @given(st.integers(0, 2**32), st.integers(2, 8))
@@ -199,7 +221,7 @@ def test_a_map_in_which_nothing_turns_with_anything_shrinks_to_no_point():
     assert abs(u) >= 0.1 - 1e-9
     assert np.isfinite(growth)
     assert count == 4
-    assert np.isfinite(measured(np.arange(4)[None], drawn, mapped)).all()
+    assert_finite(np.arange(4), drawn, mapped)
 
 
 @pytest.mark.parametrize("which", ["drawn", "mapped", "both"])
@@ -210,7 +232,7 @@ def test_objects_in_one_place_are_measured_all_the_same(which):
     u, t, growth, _ = fit_map(np.arange(3), drawn, mapped, TOLERANCES)
     assert (u, growth) == (1.0, 0.0)
     assert t == pytest.approx(mapped.places.mean() - drawn.places.mean())
-    assert np.isfinite(measured(np.arange(3)[None], drawn, mapped)).all()
+    assert_finite(np.arange(3), drawn, mapped)
 
 
 @given(st.integers(0, 2**32), st.integers(3, 5), st.integers(3, 6))
@@ -219,10 +241,11 @@ def test_roles_of_template_and_argument_change_nothing(seed, n, m):
     rng = np.random.default_rng(seed)
     drawn, mapped = things(rng, n), things(rng, m)
     partners = some_map(rng, n, m)
-    of_pairs = [rng.normal(size=(n * (n - 1) // 2, m * (m - 1) // 2)) for _ in range(3)]
-    straight = _bare(*of_pairs)
-    swapped = _bare(*(each.T.copy() for each in of_pairs))._replace(swapped=True)
-    assert row_of(partners, drawn, mapped, straight) == row_of(partners, drawn, mapped, swapped)
+    similarity = rng.normal(size=(n * (n - 1) // 2, m * (m - 1) // 2))
+    straight = _bare(n, m, similarity)
+    swapped = _bare(n, m, similarity.T.copy())._replace(swapped=True)
+    for of in (row_of, lines_of):
+        assert of(partners, drawn, mapped, straight) == of(partners, drawn, mapped, swapped)
 
 
 def test_relations_are_those_of_the_table_and_of_the_objects_alone():
@@ -235,8 +258,6 @@ def test_relations_are_those_of_the_table_and_of_the_objects_alone():
     table = random_table(rng, 3, 4)
     found = relations_of((first, second), table, None, False)
     np.testing.assert_array_equal(found.similarity, table.similarity)
-    np.testing.assert_array_equal(found.rotation, table.rotation)
-    np.testing.assert_array_equal(found.level, table.normalized_dilation)
     np.testing.assert_array_equal(found.selves, self_similarities(first, second))
     np.testing.assert_array_equal(found.names, np.zeros((3, 4)))
     names = rng.integers(-1, 2, (4, 3))
@@ -255,7 +276,7 @@ def test_turning_scaling_and_mirroring_both_scenes_changes_no_part(scene, turn, 
     one = one._replace(places=one.places + 0.2 * one.spacing * rng.normal(size=len(scene)))
     partners = some_map(rng, len(scene), len(scene))
     turned = np.exp(1j * turn)
-    known = row_of(partners, one, two)
+    known, known_lines = row_of(partners, one, two), lines_of(partners, one, two)
     for mirrored in (False, True):
         seen = [
             Things(
@@ -266,11 +287,6 @@ def test_turning_scaling_and_mirroring_both_scenes_changes_no_part(scene, turn, 
             )
             for each in (one, two)
         ]
-        found = row_of(partners, *seen)
-        for name in PARTS:
-            assert found[name] == pytest.approx(known[name], rel=1e-5, abs=1e-5), name
-
-
-def test_parts_are_named_by_their_places():
-    assert tuple(part.name.lower() for part in sorted(Part)) == PARTS
-    assert [*map(int, Part)] == list(range(len(PARTS)))
+        assert row_of(partners, *seen) == pytest.approx(known, rel=1e-5, abs=1e-5)
+        for found, expected in zip(lines_of(partners, *seen), known_lines, strict=True):
+            assert found == pytest.approx(expected, rel=1e-5, abs=1e-5)

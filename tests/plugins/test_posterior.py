@@ -11,22 +11,26 @@ from hypothesis import strategies as st
 from sketchmatch.api import Candidate, JudgeProblem
 from sketchmatch.model import Confidence, RelationTable, Scene, SceneObject
 from sketchmatch.testing import judging_problem
-from sketchmatch_builtin.alignment import PARTS, Part, Things, sides_of
+from sketchmatch_builtin.alignment import Line, Measured, Things, Whole, sides_of
 from sketchmatch_builtin.alignment._poses import TOLERANCES
 from sketchmatch_builtin.judges import _described, _evidence
 from sketchmatch_builtin.judges import posterior as module
 from sketchmatch_builtin.judges._described import described
 from sketchmatch_builtin.judges._evidence import (
-    FIRST,
-    NUMBERS,
+    AT_FIRST,
+    FARTHEST,
+    JUDGED,
+    LINES,
     Described,
-    detailed,
+    best_first,
+    line_numbers,
     lost_numbers,
-    numbers,
+    map_numbers,
     place_numbers,
-    skill,
     weighed,
+    worths,
 )
+from sketchmatch_builtin.judges.calibration import POSTERIOR, Layers, PlaceLayers
 from sketchmatch_builtin.judges.calibration import Posterior as Learned
 from sketchmatch_builtin.judges.posterior import Posterior
 from tests.interpreted import examples
@@ -35,43 +39,40 @@ from tests.plugins.test_align import seen_as, sloppy, strewn
 from tests.searching import relations_of
 from tests.strategies import random_table
 
-BY_SKILL = len(NUMBERS) - 5
-PLACE, LOST = 13 + 4 * 4, 5
+OF_LINE, OF_BARE, OF_MAP, OF_SCENE, PLACE, LOST = 11, 9, 8, 3, 38, 5
 
 
-def learned(rng=None, scale=0.3, **given):
-    """Return numbers that might have been learned."""
-    shapes = {
-        "first": len(FIRST),
-        "weights": len(NUMBERS) + 3 * BY_SKILL,
-        "place": PLACE,
-        "lost": LOST,
-    }
-    numbers_ = {
-        name: np.zeros(count) if rng is None else rng.normal(0.0, scale, count)
-        for name, count in shapes.items()
-    }
-    return Learned(
-        **{name: tuple((given.get(name, each)).tolist()) for name, each in numbers_.items()},
-        luck=given.get("luck", 0.4),
+def learned(rng=None, scale=0.3, width=3, score=1.0, constant=2.0, lost=-2.0, luck=0.4):
+    """Return numbers that might have been learned; without randomness what aligns best wins."""
+
+    def numbers(*shape):
+        return np.zeros(shape) if rng is None else rng.normal(0.0, scale, shape)
+
+    def scaling(count):
+        return np.stack([numbers(count), 1.0 + abs(numbers(count))])
+
+    def layers(of_line):
+        return Layers(
+            scaling(of_line),
+            scaling(OF_MAP),
+            scaling(OF_SCENE),
+            numbers(of_line + OF_SCENE, width),
+            numbers(width),
+            numbers(OF_MAP + OF_SCENE + width, width + 1),
+            numbers(width + 1),
+            numbers(width + 1),
+            numbers(OF_MAP),
+            score,
+        )
+
+    place = PlaceLayers(
+        scaling(PLACE), numbers(PLACE, 2), numbers(2), numbers(2), numbers(PLACE), constant
     )
+    lost = np.append(lost, numbers(LOST - 1))
+    return Learned(layers(OF_LINE), layers(OF_BARE), place, numbers(2), lost, luck)
 
 
-def of_number(**values):
-    """Return weights of numbers by name, 0 for all others."""
-    weights = np.zeros(len(NUMBERS) + 3 * BY_SKILL)
-    for name, value in values.items():
-        weights[NUMBERS.index(name)] = value
-    return weights
-
-
-GOOD = {"place": -2.0, "size": -1.0, "shape": -1.0, "matched": 3.0}
-PLAIN = learned(
-    first=of_number(**GOOD)[: len(NUMBERS)][FIRST],
-    weights=of_number(**GOOD),
-    place=np.eye(PLACE)[0] * 2.0,
-    lost=np.eye(LOST)[0] * -2.0,
-)
+PLAIN = learned()
 
 
 def problem(template, argument, candidates, **options):
@@ -174,20 +175,22 @@ def test_shares_losses_and_lines_are_what_the_numbers_come_to(monkeypatch):
     for each in judgement.maps:
         share = by_map[tuple(each.partners.tolist())]
         assert each.probability == pytest.approx(here * (1.0 - found.lost) * share)
-    scores = known.numbers @ np.array(PLAIN.weights)[: len(NUMBERS)]
-    shares = np.exp(scores) / np.exp(scores).sum()
+    scores = np.exp(AT_FIRST * known.measured.wholes[:, Whole.SCORE])
+    shares = scores / scores.sum()
     np.testing.assert_allclose(found.shares, shares, atol=1e-12)
 
 
-def test_on_unusual_relations_it_ranks_and_names_no_probability():
+def test_unusual_relations_do_not_count():
     sketch, map_, order = sloppy(3, 4, 6)
-    posed = problem(sketch, map_, [order[::-1], order], usual=False, alternatives=2)
-    judgement = judge(posed)
-    np.testing.assert_array_equal(judgement.maps[0].partners, order)
-    assert len(judgement.maps) == 3
-    assert {each.probability for each in judgement.maps} == {None}
-    assert judgement.lines is None
-    assert judgement.elsewhere is None
+    numbers_ = learned(np.random.default_rng(0), 0.3)
+    one, other, usual = (
+        judge(problem(sketch, map_, [order], table=random_table(rng, 4, 6), usual=plain), numbers_)
+        for rng, plain in zip(map(np.random.default_rng, (1, 2, 2)), (0, 0, 1), strict=True)
+    )
+    np.testing.assert_array_equal(one.lines, other.lines)
+    assert one.elsewhere == other.elsewhere
+    assert abs(usual.lines - other.lines).max() > 1e-6
+    assert usual.elsewhere != other.elsewhere
 
 
 def test_it_looks_for_maps_itself():
@@ -201,11 +204,11 @@ def test_it_looks_for_maps_itself():
 @pytest.mark.parametrize("alternatives", [0, 3, 500])
 def test_as_many_maps_are_told_as_are_wanted_and_some_that_are_likely(alternatives):
     sketch, map_, order = sloppy(6, 6, 9)
-    flat = learned(place=np.eye(PLACE)[0], lost=-np.eye(LOST)[0])  # all maps alike
+    flat = learned(score=0.0)  # all maps that are weighed are alike
     told = judge(problem(sketch, map_, [order], alternatives=alternatives), flat)
     known = judge(problem(sketch, map_, [order], alternatives=10_000), flat)
     assert len(told.maps) == min(len(known.maps), alternatives + 1 + 20)
-    steep = dataclasses.replace(PLAIN, weights=tuple(100.0 * np.array(PLAIN.weights)))
+    steep = learned(score=1000.0)
     sure = judge(problem(sketch, map_, [order], alternatives=alternatives), steep)
     assert len(sure.maps) == min(len(known.maps), alternatives + 1)
 
@@ -290,84 +293,182 @@ def test_the_same_is_judged_the_same():
     assert one.elsewhere == two.elsewhere
 
 
-def test_numbers_of_a_map_are_its_parts_and_its_share():
-    parts = np.arange(2.0 * len(PARTS)).reshape(2, -1)
-    parts[:, Part.MATCHED] = 3.0, 4.0
-    found = numbers(parts, 5, 20)
-    np.testing.assert_array_equal(found[:, : len(PARTS)], parts)
-    np.testing.assert_allclose(
-        found[:, NUMBERS.index("matched_among_many")], [3.0 * math.log(20), 4.0 * math.log(20)]
-    )
-    np.testing.assert_allclose(found[:, NUMBERS.index("matched_share")], [9.0 / 5.0, 16.0 / 5.0])
-    assert found.shape[1] == len(NUMBERS)
+def test_lines_are_described_by_what_is_measured_of_them():
+    row = np.zeros((1, 2, len(Line)))
+    row[0, 0] = 0.04, -0.5, 0.09, 0.7, 0.01, 0.2, 0.3, 0.4
+    found = line_numbers(Measured(row, np.zeros((1, 8)), np.array([[True, False]])), related=True)
+    ln = math.log
+    shape = ln(0.093), 0.7, ln(0.31), ln(0.41), ln(0.013), 0.2
+    np.testing.assert_allclose(found[0, 0], [1.0, ln(0.043), 0.2, ln(0.253), -0.5, *shape])
+    np.testing.assert_array_equal(found[0, 1], np.zeros(OF_LINE))
+    bare = line_numbers(Measured(row, np.zeros((1, 8)), np.array([[True, True]])), related=False)
+    np.testing.assert_array_equal(bare[0, 0], found[0, 0, :OF_BARE])
+    far = row.copy()
+    far[0, 0, [Line.PLACE, Line.SIZE]] = 100.0, 7.0
+    bounded = line_numbers(Measured(far, np.zeros((1, 8)), np.array([[True, False]])), True)
+    np.testing.assert_allclose(bounded[0, 0, [2, 4]], [3.0, 3.0])
 
 
-def test_what_relations_and_labels_tell_is_not_among_the_first():
-    first = {NUMBERS[k] for k in FIRST}
-    apart = {"similarity", "rotation", "dilation", "self", "alike", "unlike"}
-    assert set(NUMBERS) - first == apart
+def test_maps_are_described_by_what_is_measured_of_them_and_by_shares():
+    wholes = np.array([[-9.0, 4.0, 1.5, 2.0, 0.3, 0.7, 1.0, 2.0]])
+    found = map_numbers(Measured(np.zeros((1, 5, 8)), wholes, np.ones((1, 5), bool)), 5)
+    np.testing.assert_allclose(found, [[0.3, 0.7, 4.0, 1.5, 2.0, 0.8, 0.3, 0.4]])
 
 
-def test_a_skill_is_by_how_much_the_lines_scatter():
-    best = np.zeros(len(NUMBERS))
-    best[[Part.MATCHED, Part.SCATTER, Part.SCATTER_SIZE, Part.SCATTER_SHAPE]] = 4, -8, -6, -4
-    np.testing.assert_allclose(skill(best), [-0.4, -0.3, 0.8])
-    np.testing.assert_allclose(skill(np.zeros(len(NUMBERS))), [1.6, 1.2, 1.8])
+def test_what_fits_best_at_first_sight_comes_first_labels_counting_two_each():
+    wholes = np.zeros((4, len(Whole)))
+    wholes[:, Whole.SCORE] = -5.0, -4.0, -6.5, -5.0
+    wholes[2, Whole.ALIKE] = 1.0
+    wholes[1, Whole.UNLIKE] = 1.0
+    order = best_first(Measured(np.zeros((4, 2, 8)), wholes, np.ones((4, 2), bool)))
+    np.testing.assert_array_equal(order, [2, 0, 3, 1])
 
 
-def test_details_are_most_numbers_times_each_number_of_a_skill():
+def some_described(rng, maps=4, n=5, m=9, decoys=3, related=True):
+    """Return maps and decoys with measures of any kind."""
+
+    def measures(count):
+        matched = rng.random((count, n)) < 0.8
+        matched[:, :2] = True
+        lines = abs(rng.normal(size=(count, n, len(Line)))) * matched[:, :, None]
+        wholes = rng.normal(size=(count, len(Whole)))
+        wholes[:, Whole.MATCHED] = matched.sum(axis=1)
+        return Measured(lines, wholes, matched)
+
+    known = measures(maps)
+    found = np.array([rng.permutation(m)[:n] for _ in range(maps)])
+    found[~known.matched] = -1
+    return Described(found, known, tuple(measures(2) for _ in range(decoys)), n, m, related)
+
+
+def bounded(number, middle, scale):
+    return min(max((number - middle) / scale, -FARTHEST), FARTHEST)
+
+
+@pytest.mark.parametrize("related", [True, False])
+def test_a_map_is_worth_what_two_layers_make_of_its_lines(related):
     rng = np.random.default_rng(0)
-    rows, drawing = rng.normal(size=(3, len(NUMBERS))), np.array([2.0, -1.0, 0.5])
-    found = detailed(rows, drawing)
-    apart = [NUMBERS.index(each) for each in ("offset", "bend", "alike", "unlike")]
-    apart.append(NUMBERS.index("matched_among_many"))
-    kept = np.delete(rows, apart, axis=1)
-    np.testing.assert_allclose(found, np.hstack([rows, 2.0 * kept, -kept, 0.5 * kept]))
+    known, layers = some_described(rng), learned(rng, 0.5, score=0.7).layers(related)
+    rows, wholes = line_numbers(known.measured, related), map_numbers(known.measured, 5)
+    scene = [math.log(5), math.log(9), 0.2]
+    scene = [bounded(*each) for each in zip(scene, *layers.of_scenes, strict=True)]
+    expected = []
+    for x, map_ in enumerate(wholes):
+        summed = np.zeros(3)
+        for i in range(5):
+            row = np.zeros(OF_LINE if related else OF_BARE)
+            if known.measured.matched[x, i]:
+                row[:] = [bounded(*each) for each in zip(rows[x, i], *layers.of_lines, strict=True)]
+                row[0] = 1.0
+            summed += np.maximum(np.array([*row, *scene]) @ layers.first + layers.first_bias, 0.0)
+        whole = [bounded(*each) for each in zip(map_, *layers.of_maps, strict=True)]
+        among = np.array([*whole, *scene, *(LINES * summed)])
+        second = np.maximum(among @ layers.second + layers.second_bias, 0.0)
+        score = AT_FIRST * known.measured.wholes[x, Whole.SCORE]
+        expected.append(second @ layers.last + whole @ layers.direct + 0.7 * score)
+    np.testing.assert_allclose(worths(known, known.measured, layers, related), expected)
 
 
-def known_of(maps, rows, decoys, drawn, mapped):
-    return Described(np.array(maps), np.array(rows), tuple(decoys), drawn, mapped)
+def test_the_order_of_objects_changes_no_worth():
+    rng = np.random.default_rng(1)
+    known, layers = some_described(rng), learned(rng, 0.5).maps
+    order = rng.permutation(5)
+    lines, wholes, matched = known.measured
+    turned = Measured(lines[:, order], wholes, matched[:, order])
+    np.testing.assert_allclose(
+        worths(known, turned, layers, True), worths(known, known.measured, layers, True)
+    )
 
 
-def rows_of(*values):
-    """Return rows of numbers that places alone tell apart."""
-    rows = np.zeros((len(values), len(NUMBERS)))
-    rows[:, 0] = values
-    rows[:, Part.MATCHED] = 4.0
-    return rows
+def scored(*scores, n=4):
+    """Return measures of maps that their scores alone tell apart."""
+    wholes = np.zeros((len(scores), len(Whole)))
+    wholes[:, Whole.SCORE] = scores
+    wholes[:, Whole.MATCHED] = n
+    matched = np.ones((len(scores), n), dtype=bool)
+    return Measured(np.zeros((len(scores), n, len(Line))), wholes, matched)
 
 
 def test_a_place_is_described_by_how_far_its_best_map_exceeds_chance_and_rivals():
-    first = np.zeros(len(FIRST))
-    first[0] = 1.0
-    maps = [[0, 1, 2, 3], [0, 1, 2, -1], [3, 2, 1, 0], [0, 3, 1, 2]]
-    decoys = [rows_of(1.0, 2.0), rows_of(-1.0), rows_of(), rows_of(0.5, 0.0)]
-    known = known_of(maps, rows_of(5.0, 4.5, 1.0, 3.0), decoys, 4, 10)
-    found = place_numbers(known, first)
-    many = math.log(10)
+    maps = np.array([[0, 1, 2, 3], [0, 1, 2, -1], [3, 2, 1, 0], [0, 3, 1, 2]])
+    measured_ = scored(-1.0, -2.0, -8.0, -4.0)
+    measured_.lines[0, :, Line.PLACE] = 0.01, 0.04, 0.0, 0.09
+    measured_.wholes[0, [Whole.MISSING, Whole.CROWD]] = 1.0, 2.0
+    measured_.wholes[0, [Whole.OFFSET, Whole.BEND]] = 0.3, 0.7
+    decoys = scored(-7.0, -5.0), scored(-9.0), scored()
+    known = Described(maps, measured_, decoys, 4, 10, True)
+    found = place_numbers(known, PLAIN.bare)
+    assert found.shape == (PLACE,)
+    np.testing.assert_allclose(found[:4], [math.log(4), math.log(10), 0.25, 1.0])
     # The second shares three lines with the best and is no rival; the fourth, with one, is.
-    most, mean, lead = 5.0 - 2.0, 5.0 - (2.0 - 1.0 - 30.0 + 0.5) / 4.0, 5.0 - 3.0
-    above = [math.log1p(math.exp(each)) for each in (most, lead)]
-    assert mean == pytest.approx(12.125)
-    np.testing.assert_allclose(
-        found[:13],
-        [1, 4, many, 4 * many, 0.25, 5.0, 1.25, most, mean, above[0], lead, above[1], lead],
-    )
-    drawing = np.array([1.6, 1.2, 1.8, 1.0])
-    np.testing.assert_allclose(
-        found[13:], np.concatenate([drawing, most * drawing, 4 * drawing, many * drawing])
-    )
-    assert len(found) == PLACE
+    most, mean, lead, ahead = AT_FIRST * 4.0, AT_FIRST * 6.0, AT_FIRST * 3.0, 4.0
+    by_object = np.array([most, mean, lead, ahead]) / 4.0
+    np.testing.assert_allclose(found[4:12], np.column_stack([by_object, 4.0 * by_object]).ravel())
+    np.testing.assert_allclose(found[12:18], [-0.25, 1.0, 0.25, 0.5, 0.3, 0.7])
+    lines = line_numbers(measured_, True)[0, :, 1:]
+    np.testing.assert_allclose(found[18:], [*lines.mean(axis=0), *lines.max(axis=0)])
 
 
-def test_a_map_without_rivals_leads_by_more_than_the_worst_map_lacks():
-    first = np.zeros(len(FIRST))
-    first[0] = 1.0
-    known = known_of([[0, 1, 2, 3], [0, 1, 2, -1]], rows_of(5.0, 4.0), [rows_of(-100.0)], 4, 10)
-    found = place_numbers(known, first)
-    assert found[10] == pytest.approx(5.0 - (4.0 - 4.0))
-    assert found[7] == pytest.approx(35.0)  # chance achieves −30 at least
-    assert found[9] == pytest.approx(20.0, abs=1e-6)
+def test_a_map_without_rivals_or_decoys_leads_by_far():
+    known = Described(np.array([[0, 1, 2, 3], [0, 1, 2, -1]]), scored(-1.0, -2.0), (), 4, 10, True)
+    found = place_numbers(known, PLAIN.bare)
+    assert found[5] == found[7] == found[11] == 30.0
+    assert found[9] == pytest.approx(AT_FIRST * 1.0 + 4.0)
+
+
+def test_differences_of_many_objects_count_as_those_of_sixteen():
+    maps = np.arange(32)[None]
+    known = Described(maps, scored(-1.0, n=32), (scored(-9.0, n=32),), 32, 40, True)
+    found = place_numbers(known, PLAIN.bare)
+    assert found[5] == pytest.approx(16.0 * found[4])
+    assert found[4] == pytest.approx(AT_FIRST * 8.0 / 32.0)
+
+
+def test_a_place_is_told_by_a_layer_and_what_is_direct():
+    rng = np.random.default_rng(2)
+    known, numbers_ = some_described(rng), learned(rng, 0.4, constant=0.3)
+    place = numbers_.place
+    row = place_numbers(known, numbers_.bare)
+    row = np.array([bounded(*each) for each in zip(row, *place.of_places, strict=True)])
+    hidden = np.maximum(row @ place.first + place.first_bias, 0.0)
+    odds = hidden @ place.last + row @ place.direct + 0.3
+    assert weighed(known, numbers_).elsewhere == pytest.approx(1.0 / (1.0 + math.exp(odds)))
+
+
+def test_maps_beyond_those_that_are_weighed_have_no_share():
+    rng = np.random.default_rng(0)
+    known = some_described(rng, maps=JUDGED + 5)
+    found = weighed(known, learned(rng, 0.3))
+    assert found.shares.sum() == pytest.approx(1.0)
+    assert (found.shares[:JUDGED] > 0.0).all()
+    assert (found.shares[JUDGED:] == 0.0).all()
+
+
+def test_labels_count_for_what_was_learned():
+    known = Described(np.array([[0, 1], [1, 0]]), scored(-1.0, -1.0, n=2), (), 2, 2, True)
+    known.measured.wholes[0, Whole.ALIKE] = 2.0
+    known.measured.wholes[1, Whole.UNLIKE] = 1.0
+    found = weighed(known, PLAIN._replace(labels=np.array([0.4, -0.5])))
+    assert found.shares[0] / found.shares[1] == pytest.approx(math.exp(2 * 0.4 + 0.5))
+
+
+def test_without_relations_lines_of_a_place_say_nothing_of_them():
+    known = some_described(np.random.default_rng(4))
+    unrelated = dataclasses.replace(known, related=False)
+    with_, without = (place_numbers(each, PLAIN.bare) for each in (known, unrelated))
+    apart = [3, 18 + 8, 18 + 9, 28 + 8, 28 + 9]
+    np.testing.assert_array_equal(np.delete(with_, apart), np.delete(without, apart))
+    np.testing.assert_array_equal(without[apart], 0.0)
+    assert (with_[apart] != 0.0).all()
+
+
+@pytest.mark.parametrize("related", [True, False])
+def test_what_was_learned_has_the_shapes_that_are_read(related):
+    known = dataclasses.replace(some_described(np.random.default_rng(0)), related=related)
+    found = weighed(known, POSTERIOR)
+    assert found.shares.sum() == pytest.approx(1.0)
+    assert 0.0 < found.lost < 1.0
+    assert 0.0 < found.elsewhere < 1.0
 
 
 def test_whether_the_right_map_is_known_follows_from_the_best_share():
@@ -384,20 +485,28 @@ def test_odds_are_bounded():
     assert _evidence._logistic(2.0) == pytest.approx(1.0 / (1.0 + math.exp(-2.0)))
 
 
-def test_decoys_are_the_sketch_in_the_mirror_and_with_its_things_elsewhere():
+def test_decoys_are_the_sketch_in_the_mirror_squeezed_and_with_its_things_elsewhere():
     rng = np.random.default_rng(0)
+    places = rng.normal(size=8) + 1j * rng.normal(size=8)
     drawn = Things(
-        rng.normal(size=8) + 1j * rng.normal(size=8),
+        places - places.mean(),
         np.arange(8.0),
         np.arange(8.0) * np.exp(0.3j),
         0.5,
     )
-    decoys = list(_described._decoys(drawn))
-    assert len(decoys) == 4
-    mirrored, *shuffled = decoys
+    mirrored, along, across, *shuffled = _described._decoys(drawn)
     np.testing.assert_array_equal(mirrored.places, drawn.places.conj())
     np.testing.assert_array_equal(mirrored.shapes, drawn.shapes.conj())
     np.testing.assert_array_equal(mirrored.sizes, drawn.sizes)
+    axes = np.linalg.eigh(np.cov(mirrored.places.real, mirrored.places.imag))[1]
+    for each, by in ((along, 1.35), (across, 1.0 / 1.35)):
+        np.testing.assert_array_equal(each.shapes, mirrored.shapes)
+        before, after = (
+            np.column_stack([places.real, places.imag]) @ axes[:, ::-1]
+            for places in (mirrored.places, each.places)
+        )
+        np.testing.assert_allclose(after, before * [math.sqrt(by), 1.0 / math.sqrt(by)])
+    assert len(shuffled) == 3
     for each, of in zip(shuffled, (drawn, mirrored, drawn), strict=True):
         np.testing.assert_array_equal(each.places, of.places)
         order = each.sizes.astype(int)
@@ -405,6 +514,17 @@ def test_decoys_are_the_sketch_in_the_mirror_and_with_its_things_elsewhere():
         np.testing.assert_array_equal(each.shapes, of.shapes[order])
         assert each.spacing == drawn.spacing
     assert not np.array_equal(shuffled[0].sizes, shuffled[2].sizes)
+
+
+def test_what_is_the_sketch_again_is_no_decoy():
+    x, y = np.meshgrid(np.arange(4.0), np.arange(3.0))
+    places = (x + 1j * y).ravel()
+    pillars = Things(places - places.mean(), np.zeros(12), np.zeros(12, complex), 1.0)
+    assert not _described._decoys(pillars)
+    sizes = np.random.default_rng(0).normal(0.0, 1.5, 12)
+    assert len(_described._decoys(pillars._replace(sizes=sizes))) == 6
+    # One odd thing among many is left out, and the rest is the sketch again.
+    assert not _described._decoys(pillars._replace(sizes=np.append(np.zeros(11), 3.0)))
 
 
 @pytest.mark.parametrize("count", [2, 3, 8])
@@ -425,13 +545,14 @@ def test_maps_are_described_once_each_with_those_that_were_met(monkeypatch):
         known = described((sketch, map_), sides, table, None, met)
     np.testing.assert_array_equal(known.maps, [order, np.roll(order, 1)])
     assert (known.drawn, known.mapped) == (4, 6)
-    assert known.numbers.shape == (2, len(NUMBERS))
-    expected = aligning.parts(order, sides.drawn, sides.mapped, TOLERANCES)
-    assert known.numbers[0, Part.PLACE] == pytest.approx(expected["place"], abs=1e-6)
-    assert known.numbers[0, Part.SIMILARITY] == pytest.approx(
-        aligning.related(order, table)["similarity"]
+    expected = aligning.whole(order, sides.drawn, sides.mapped, TOLERANCES)
+    assert known.measured.wholes[0, Whole.SCORE] == pytest.approx(expected["score"], abs=1e-6)
+    lines = aligning.lines(order, sides.drawn, sides.mapped, TOLERANCES)
+    assert known.measured.lines[0, 2, Line.PLACE] == pytest.approx(lines[2]["place"], abs=1e-6)
+    assert known.measured.lines[0, 2, Line.RELATION] == pytest.approx(
+        aligning.related(order, table)[2]
     )
-    assert len(known.decoys) == 4
+    assert len(known.decoys) == 6
     explored = described((sketch, map_), sides, table, None, met)
     assert len(explored.maps) > 2
     assert len({each.tobytes() for each in explored.maps}) == len(explored.maps)
@@ -439,19 +560,16 @@ def test_maps_are_described_once_each_with_those_that_were_met(monkeypatch):
     assert (complete.maps >= 0).all()
 
 
-def test_decoys_are_judged_by_places_sizes_and_shapes_alone():
+def test_of_decoys_nothing_but_places_sizes_and_shapes_is_measured():
     sketch, map_, _ = sloppy(1, 5, 7)
     sides = sides_of((sketch, map_), False, None, None, None)
-    rows = _described._decoy_numbers(sides.drawn, sides.mapped)
-    right = rows[rows[:, Part.PLACE].argmin()]
-    assert rows.shape[1] == len(NUMBERS)
-    assert (rows[:, Part.SELF] == 0.0).all()
-    assert (rows[:, Part.SIMILARITY] == 0.0).all()
-    assert right[Part.MATCHED] >= 2.0
+    found = _described._measured_decoy(sides.drawn, sides.mapped)
+    assert (found.lines[:, :, [Line.SELF, Line.RELATION]] == 0.0).all()
+    assert found.wholes[0, Whole.MATCHED] >= 2.0
+    assert (np.diff(found.wholes[:, Whole.SCORE]) < 1.0).all()  # about as they were laid
 
 
 def test_a_sketch_of_this_place_exceeds_what_its_decoys_achieve():
-    first = np.array(PLAIN.first)
     leads = []
     for elsewhere in (False, True):
         sketch, map_, _ = sloppy(11, 6, 9)
@@ -460,8 +578,8 @@ def test_a_sketch_of_this_place_exceeds_what_its_decoys_achieve():
         sides = sides_of((sketch, map_), False, None, None, None)
         table = random_table(np.random.default_rng(0), 6, 9)
         known = described((sketch, map_), sides, table, None, [np.arange(6)])
-        leads.append(place_numbers(known, first)[7])
-    assert leads[0] > leads[1] + 3.0
+        leads.append(place_numbers(known, PLAIN.bare)[5])
+    assert leads[0] > leads[1] + 3.0 * AT_FIRST
 
 
 def test_objects_in_one_place_are_judged_all_the_same():

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 import shapely
 
-from sketchmatch_builtin.alignment import Part
-from sketchmatch_builtin.judges._evidence import FIRST, NUMBERS, Described
-from tests.experiments import posterior, training
-from tests.experiments.posterior import Known, known_of, learned_posterior
+from sketchmatch_builtin.alignment import Line, Measured, Whole
+from sketchmatch_builtin.judges._evidence import JUDGED, Described, weighed
+from sketchmatch_builtin.judges.calibration import posterior_of
+from tests.experiments import networks, posterior, training
+from tests.experiments.networks import Case, fitted_place
+from tests.experiments.posterior import Known, known_of, learned_posterior, posterior_text
 from tests.experiments.training import training_drawing
 from tests.tools import ROOT
 
@@ -119,46 +121,144 @@ def test_no_code_of_the_generators_that_measure_is_learned_from():
                 assert not any("generators" in each.name for each in node.names)
 
 
-def made_up(rng, count, weights, elsewhere=0.3):
-    """Return cases of which the right map, and the place, follow from known weights."""
+def made_up(rng, count, elsewhere=0.3, maps=8, n=5):
+    """Return cases in which the right map follows from deviations of places and of sizes.
+
+    A map is worth −Σ (1.5 |size| + ln(.003 + place)) of its lines, and a place is told by the
+    decoys: elsewhere they score as the maps do.
+    """
     cases = []
     for _ in range(count):
-        maps, drawn = 8, 6
-        rows = np.zeros((maps, len(NUMBERS)))
-        rows[:, [NUMBERS.index(name) for name in weights]] = rng.normal(size=(maps, len(weights)))
-        # The same lines and scatter for all, so that a skill is 0 and only the weights count.
-        rows[:, Part.MATCHED] = 6.0
-        rows[:, [Part.SCATTER, Part.SCATTER_SIZE, Part.SCATTER_SHAPE]] = -9.6, -7.2, -10.8
-        scores = rows[:, [NUMBERS.index(name) for name in weights]] @ list(weights.values())
-        shares = np.exp(scores - scores.max())
+        lines = np.zeros((maps, n, len(Line)))
+        lines[:, :, Line.PLACE] = np.exp(rng.normal(-2.0, 0.7, (maps, n)))
+        lines[:, :, Line.SIZE] = rng.normal(0.0, 0.6, (maps, n))
+        wholes = np.zeros((maps, len(Whole)))
+        wholes[:, Whole.MATCHED] = n
+        wholes[:, Whole.SCORE] = rng.normal(-10.0, 1.0, maps)  # says nothing
+        found = np.array([rng.permutation(9)[:n] for _ in range(maps)])
+        deviations = 1.5 * abs(lines[:, :, Line.SIZE]) + np.log(0.003 + lines[:, :, Line.PLACE])
+        worths = -deviations.sum(axis=1)
+        shares = np.exp(worths - worths.max())
         right = int(rng.choice(maps, p=shares / shares.sum()))
-        other = bool(rng.random() < elsewhere)
-        lost = bool(rng.random() < 0.2)
-        found = np.array([rng.permutation(9)[:drawn] for _ in range(maps)])
-        decoys = tuple(rng.normal(size=(3, len(NUMBERS))) * 0.1 for _ in range(4))
-        truth = np.full(drawn, -1) if other else found[right]
-        if lost or other:
-            known = -1
-            truth = truth if other else np.roll(found[right], 1)
-        else:
-            known = right
-        cases.append(Known(Described(found, rows, decoys, drawn, 9), known, other, truth))
+        other, lost = rng.random(2) < (elsewhere, 0.2)
+        decoy = Measured(lines[:3], wholes[:3].copy(), np.ones((3, n), dtype=bool))
+        decoy.wholes[:, Whole.SCORE] = -10.0 if other else -30.0
+        described = Described(
+            found, Measured(lines, wholes, found >= 0), (decoy, decoy), n, 9, True
+        )
+        truth = np.full(n, -1) if other else np.roll(found[right], 1) if lost else found[right]
+        cases.append(Known(described, -1 if lost or other else right, bool(other), truth))
     return cases
 
 
-def test_a_fit_finds_the_weights_that_made_the_cases():
-    weights = {"place": -2.0, "size": 1.0, "similarity": -1.5}
-    found = learned_posterior(made_up(np.random.default_rng(0), 3000, weights))
-    assert len(found.first) == len(FIRST)
-    for name, weight in weights.items():
-        assert found.weights[NUMBERS.index(name)] == pytest.approx(weight, abs=0.25), name
-    first = dict(zip([NUMBERS[k] for k in FIRST], found.first, strict=True))
-    assert first["place"] < -0.5
-    assert first["size"] > 0.3
-    assert first["crowd"] == pytest.approx(0.0, abs=1e-6)
-    assert found.weights[Part.ALIKE] > 0.3
-    assert found.weights[Part.UNLIKE] < -0.3
-    assert 0.0 <= found.luck <= 1.0
+@pytest.mark.slow
+def test_a_fit_finds_what_made_the_cases():
+    learned = learned_posterior(made_up(np.random.default_rng(0), 3000))
+    best, ideal, told = [], [], []
+    for case in made_up(np.random.default_rng(1), 1000):
+        found, known = weighed(case.described, learned), case.described.measured
+        told.append((found.elsewhere > 0.5) == case.elsewhere)
+        if case.right >= 0:
+            deviations = 1.5 * abs(known.lines[:, :, Line.SIZE])
+            worths = -(deviations + np.log(0.003 + known.lines[:, :, Line.PLACE])).sum(axis=1)
+            ideal.append(worths[case.right] - np.logaddexp.reduce(worths))
+            best.append(np.log(found.shares[case.right]))
+    assert np.mean(told) > 0.98
+    nothing = np.log(1.0 / 8.0)  # of eight maps; so many numbers learn most from so few cases
+    assert np.mean(best) - nothing > 0.6 * (np.mean(ideal) - nothing) > 0.4
+    assert learned.labels[0] > 0.3
+    assert learned.labels[1] < -0.3
+    assert 0.0 <= learned.luck <= 1.0
+
+
+def test_what_was_learned_is_written_and_read_again():
+    cases = [networks_case(np.random.default_rng(k)) for k in range(8)]
+    layers = posterior._rounded_layers(networks.fitted_maps(cases))
+    place = posterior._rounded_place(
+        fitted_place(np.random.default_rng(0).normal(size=(9, 38)), np.arange(9) < 5, np.ones(9))
+    )
+    learned = posterior.Posterior(
+        layers, layers, place, np.array([1.0, -2.0]), np.arange(5.0), 0.25
+    )
+    text = posterior_text(learned)
+    again = posterior_of(text)
+    for one, other in ((again.maps, layers), (again.place, place), (again[3:], learned[3:])):
+        for a, b in zip(one, other, strict=True):
+            np.testing.assert_array_equal(a, b)
+    assert max(map(len, text.splitlines())) < 500
+    assert len(text.splitlines()) < 250
+
+
+def networks_case(rng):
+    maps, n = int(rng.integers(2, 6)), int(rng.integers(2, 5))
+    matched = rng.random((maps, n)) < 0.7
+    matched[0] = True
+    return Case(
+        rng.normal(size=(maps, n, 11)) * matched[:, :, None],
+        matched,
+        rng.normal(size=(maps, 8)),
+        rng.normal(size=3),
+        rng.normal(size=maps),
+        int(rng.integers(maps)),
+    )
+
+
+def test_slopes_of_maps_are_those_of_small_steps():
+    rng = np.random.default_rng(0)
+    cases = [networks_case(rng) for _ in range(5)]
+    at = {
+        "first": rng.normal(size=(14, 3)),
+        "first_bias": rng.normal(size=3),
+        "second": rng.normal(size=(14, 4)),
+        "second_bias": rng.normal(size=4),
+        "last": rng.normal(size=4),
+        "direct": rng.normal(size=8),
+        "score": rng.normal(size=1),
+    }
+
+    def loss():
+        total = 0.0
+        for case in cases:
+            worths = []
+            for x in range(len(case.whole)):
+                lines = [np.append(line, case.scene) for line in case.lines[x]]
+                hidden = [np.maximum(line @ at["first"] + at["first_bias"], 0.0) for line in lines]
+                among = np.concatenate([case.whole[x], case.scene, networks.LINES * sum(hidden)])
+                second = np.maximum(among @ at["second"] + at["second_bias"], 0.0)
+                worth = second @ at["last"] + case.whole[x] @ at["direct"]
+                worths.append(worth + at["score"][0] * case.score[x])
+            total += np.logaddexp.reduce(worths) - worths[case.right]
+        return total / len(cases)
+
+    slopes = networks._map_slopes(at, cases)
+    assert set(slopes) == set(at)
+    for name, values in at.items():
+        for k in rng.permutation(values.size)[:6]:
+            spot = np.unravel_index(k, values.shape)
+            before, around = values[spot], []
+            for step in (1e-6, -1e-6):
+                values[spot] = before + step
+                around.append(loss())
+            values[spot] = before
+            expected = (around[0] - around[1]) / 2e-6
+            assert slopes[name][spot] == pytest.approx(expected, abs=1e-6), (name, spot)
+
+
+def test_a_place_fit_finds_known_odds_and_counts_cases_as_told():
+    rng = np.random.default_rng(3)
+    rows = rng.normal(size=(4000, 2)) * [1.0, 3.0] + [5.0, 0.0]
+    odds = abs(rows[:, 0] - 5.0) * 3.0 - rows[:, 1] - 2.0
+    here = rng.random(4000) < 1.0 / (1.0 + np.exp(-odds))
+    plain = odds_of(fitted_place(rows, here, np.ones(4000)), rows)
+    assert np.sqrt(np.mean((plain - odds)[abs(odds) < 4.0] ** 2)) < 0.5
+    counted = odds_of(fitted_place(rows, here, np.where(here, 1.0, 3.0)), rows)
+    assert np.mean((counted - plain)[abs(odds) < 2.0]) == pytest.approx(-np.log(3.0), abs=0.25)
+
+
+def odds_of(layers, rows):
+    z = (rows - layers.of_places[0]) / layers.of_places[1]
+    hidden = np.maximum(z @ layers.first + layers.first_bias, 0.0)
+    return hidden @ layers.last + z @ layers.direct + layers.constant
 
 
 def test_a_conditional_logit_finds_known_weights_beside_offsets():
@@ -187,10 +287,17 @@ def test_a_logit_finds_known_weights_and_counts_cases_as_told():
     assert counted[0] == pytest.approx(0.5 - np.log(3.0), abs=0.2)
 
 
+def bare(maps, mapped):
+    """Return maps of which nothing is measured."""
+    lines, wholes = np.zeros((*maps.shape, len(Line))), np.zeros((len(maps), len(Whole)))
+    measured = Measured(lines, wholes, maps >= 0)
+    return Described(maps, measured, (), maps.shape[1], mapped, True)
+
+
 def test_labels_that_were_put_on_a_sketch_are_mostly_right():
     rng = np.random.default_rng(0)
     truth = np.array([0, 2, 4, -1, 6, 8])
-    case = Known(Described(truth[None], np.zeros((1, len(NUMBERS))), (), 6, 12), 0, False, truth)
+    case = Known(bare(truth[None], 12), 0, False, truth)
     tallies = np.zeros(3)
     for _ in range(400):
         names = posterior._named(case, rng)
@@ -212,6 +319,7 @@ def test_a_sketch_is_known_by_its_maps_and_which_of_them_is_right():
             assert known.elsewhere == bool((drawing.truth < 0).all())
             assert known.described.drawn == len(drawing.scene)
             assert known.described.mapped == len(drawing.map)
+            assert len(known.described.maps) == len(known.described.measured.lines) <= JUDGED
             others += known.elsewhere
             if known.right >= 0:
                 rights += 1
@@ -223,9 +331,9 @@ def test_a_sketch_is_known_by_its_maps_and_which_of_them_is_right():
 
 def test_other_places_count_more_where_a_sketch_shows_enough():
     def case(drawn, elsewhere):
-        maps = np.zeros((1, drawn), dtype=np.int64)
-        described = Described(maps, np.zeros((1, len(NUMBERS))), (), drawn, 9)
-        return Known(described, -1, elsewhere, np.full(drawn, -1))
+        return Known(
+            bare(np.zeros((1, drawn), dtype=np.int64), 9), -1, elsewhere, np.full(drawn, -1)
+        )
 
     assert posterior._counts(case(12, True))
     assert not posterior._counts(case(2, True))

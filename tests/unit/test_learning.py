@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sketchmatch.model import ConfidenceWeights
-from sketchmatch_builtin.judges.calibration import POSTERIOR, calibrated
+from sketchmatch_builtin.judges.calibration import calibrated
 from tests.experiments import calibrate, drawings, learn, odds, thesis
 from tests.experiments.protocol import STRONGER
 from tests.experiments.study import STRENGTH
@@ -23,15 +23,6 @@ def found():
 def test_the_engine_has_the_numbers_that_were_learned(found):
     calibration = dataclasses.asdict(calibrated(ConfidenceWeights(*learn.THESIS)))
     assert {key: found["odds"][key] for key in calibration} == calibration
-
-
-def test_the_judge_has_the_numbers_that_were_learned(found):
-    learned = {
-        name: tuple(value) if isinstance(value, list) else value
-        for name, value in found["posterior"].items()
-    }
-    posterior = dataclasses.asdict(POSTERIOR)
-    assert {name: learned[name] for name in posterior} == posterior
 
 
 def test_the_study_learns_from_no_sketch_that_a_table_is_made_of():

@@ -9,16 +9,17 @@ from sketchmatch_builtin.alignment._candidates import (
     refined_maps,
     template_maps,
 )
-from sketchmatch_builtin.alignment._measures import PARTS, Part, measured, relations_of
+from sketchmatch_builtin.alignment._measures import Line, Measured, Whole, measured, relations_of
 from sketchmatch_builtin.alignment._sides import Sides, sides_of
 from sketchmatch_builtin.alignment._things import Things
 
 __all__ = [
-    "PARTS",
     "Laid",
-    "Part",
+    "Line",
+    "Measured",
     "Sides",
     "Things",
+    "Whole",
     "completed",
     "drive",
     "known_maps",

@@ -37,6 +37,7 @@ __all__ = [
     "grown",
     "guess_poses",
     "guessed_pose",
+    "pair_score",
     "pairing_worths",
     "refine_pose",
     "square",
@@ -276,6 +277,23 @@ def _unlike(
     unlike *= 1.0 + units[1] * (mapped.sizes[j] - size) ** 2
     unlike *= 1.0 + units[2] * square(shape - mapped.shapes[j])
     return float(unlike)
+
+
+@kernel
+def pair_score(
+    u: complex,
+    t: complex,
+    growth: float,
+    drawn: Things,
+    i: int,
+    mapped: Things,
+    j: int,
+    tolerances: Tolerances,
+) -> float:
+    """Return ℓ of a pairing under a pose."""
+    place, size = u * drawn.places[i] + t, drawn.sizes[i] + growth
+    units, shape = _units(u, drawn, tolerances), drawn.shapes[i] * (u * u / square(u))
+    return float(-2.0 * np.log(_unlike(place, size, shape, mapped, j, units)))
 
 
 @kernel

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 import numpy as np
 
-from sketchmatch.model import FloatArray, IntArray, RelationTable, Scene
+from sketchmatch.model import IntArray, RelationTable, Scene
 from sketchmatch_builtin.alignment import (
+    Laid,
+    Measured,
     Sides,
     Things,
     known_maps,
@@ -15,11 +17,15 @@ from sketchmatch_builtin.alignment import (
     refined_maps,
     relations_of,
 )
-from sketchmatch_builtin.judges._evidence import Described, numbers
+from sketchmatch_builtin.judges._evidence import Described, best_first
 
 __all__ = ["Described", "described"]
 
-_DECOY_POSES, _DECOY_GUESSES = 30, 8_000
+_DECOY_POSES, _DECOY_GUESSES = 10, 6_000
+_SQUEEZED = 1.35
+_SAME = -1.0
+"""What a decoy is worth for each object, laid upon the sketch, that is the sketch again."""
+
 _SEED = 0
 
 
@@ -30,6 +36,7 @@ def described(
     names: IntArray | None = None,
     met: Iterable[IntArray] = (),
     partial: bool = True,
+    related: bool = True,
 ) -> Described:
     """Describe maps of a sketch, and of its decoys.
 
@@ -43,25 +50,49 @@ def described(
         Maps that are known, of the sketch.
     partial
         Whether objects of both sides may be without partner.
+    related
+        Whether relations are those that were learned from.
     """
     found = [*met, *(each.partners for each in known_maps(sides, partial=partial))]
     unique = {each.tobytes(): each for each in found}
     maps = np.stack([*unique.values()])
     relations = relations_of(scenes, table, names, sides.swapped)
-    drawn, mapped = len(sides.drawn.places), len(sides.mapped.places)
-    parts = measured(maps, sides.drawn, sides.mapped, relations)
-    decoys = tuple(_decoy_numbers(each, sides.mapped) for each in _decoys(sides.drawn))
-    return Described(maps, numbers(parts, drawn, mapped), decoys, drawn, mapped)
+    known = measured(maps, sides.drawn, sides.mapped, relations)
+    order = best_first(known)
+    decoys = tuple(_measured_decoy(each, sides.mapped) for each in _decoys(sides.drawn))
+    return Described(
+        maps[order],
+        known.at(order),
+        decoys,
+        len(sides.drawn.places),
+        len(sides.mapped.places),
+        related,
+    )
 
 
-def _decoys(drawn: Things) -> Iterator[Things]:
-    """Yield what the sketch is not, and might be as likely where it shows another place."""
+def _decoys(drawn: Things) -> list[Things]:
+    """Return what the sketch is not, and might be as likely where it shows another place.
+
+    In the mirror, which keeps rows and corners; squeezed too; and with things in each other's
+    places. One that is the sketch again, as where it shows a regular grid, is none.
+    """
     rng = np.random.default_rng(_SEED)
     mirrored = drawn._replace(places=np.conj(drawn.places), shapes=np.conj(drawn.shapes))
-    yield mirrored
+    squeezed = [_squeezed(mirrored, by) for by in (_SQUEEZED, 1.0 / _SQUEEZED)]
+    shuffled = []
     for each in (drawn, mirrored, drawn):
         order = _derangement(rng, len(each.sizes))
-        yield each._replace(sizes=each.sizes[order], shapes=each.shapes[order])
+        shuffled.append(each._replace(sizes=each.sizes[order], shapes=each.shapes[order]))
+    limit = _SAME * len(drawn.places)
+    return [each for each in (mirrored, *squeezed, *shuffled) if _best(each, drawn) < limit]
+
+
+def _squeezed(things: Things, by: float) -> Things:
+    """Return things whose places are squeezed to their axis, or off it."""
+    axis = np.exp(0.5j * np.angle((things.places**2).sum()))
+    along = things.places / axis
+    places = axis * (along.real * np.sqrt(by) + 1j * along.imag / np.sqrt(by))
+    return things._replace(places=places)
 
 
 def _derangement(rng: np.random.Generator, count: int) -> IntArray:
@@ -72,10 +103,18 @@ def _derangement(rng: np.random.Generator, count: int) -> IntArray:
             return order
 
 
-def _decoy_numbers(decoy: Things, mapped: Things) -> FloatArray:
-    """Return the numbers of the best maps of a decoy; of none, where it fits nowhere."""
-    drawn, there_are = len(decoy.places), len(mapped.places)
-    sides = Sides(decoy, mapped, np.zeros((drawn, there_are)), swapped=False)
-    laid = refined_maps(sides, _DECOY_POSES, _DECOY_GUESSES)
-    maps = np.array([each.partners for each in laid], dtype=np.int64).reshape(-1, drawn)
-    return numbers(measured(maps, decoy, mapped), drawn, there_are)
+def _best(decoy: Things, drawn: Things) -> float:
+    """Return what a decoy is worth, laid upon the sketch that it is of."""
+    laid = _laid(decoy, drawn)
+    return laid[0].score if laid else -np.inf
+
+
+def _laid(decoy: Things, upon: Things) -> list[Laid]:
+    bonus = np.zeros((len(decoy.places), len(upon.places)))
+    return refined_maps(Sides(decoy, upon, bonus, swapped=False), _DECOY_POSES, _DECOY_GUESSES)
+
+
+def _measured_decoy(decoy: Things, mapped: Things) -> Measured:
+    """Return what speaks for the best maps of a decoy; of none, where it fits nowhere."""
+    laid = [each.partners for each in _laid(decoy, mapped)]
+    return measured(np.array(laid, dtype=np.int64).reshape(-1, len(decoy.places)), decoy, mapped)

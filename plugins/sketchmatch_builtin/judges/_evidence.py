@@ -1,11 +1,9 @@
-"""What the judge ``posterior`` goes by: numbers of a map, of a sketch, and of a place.
+"""What the judge ``posterior`` goes by: what maps are worth, and what a place is.
 
-A map of a sketch is described by the parts that :mod:`sketchmatch_builtin.alignment` measures,
-sums over its lines, and a place by how far the best of its maps exceeds what chance achieves.
-What each number counts for is learned; this says what they are.
-
-How much a deviation says depends on how well somebody draws, so each number counts the more or
-less by how far the best map leaves places, sizes and shapes.
+A map is worth what its lines, summed, and a few numbers of the whole speak for it: what a hidden
+layer makes of each line is added up, and a second one weighs the sum. Nothing depends on the order
+of objects, and every deviation counts by what the others are. A place is told by how far the best
+map exceeds what chance achieves. What each number counts for is learned; this says what they are.
 """
 
 from __future__ import annotations
@@ -16,50 +14,41 @@ from dataclasses import dataclass
 import numpy as np
 
 from sketchmatch.model import FloatArray, IntArray
-from sketchmatch_builtin.alignment import PARTS, Part
-from sketchmatch_builtin.judges.calibration import Posterior
+from sketchmatch_builtin.alignment import Measured, Whole
+from sketchmatch_builtin.judges.calibration import Layers, Posterior
 
 __all__ = [
-    "FIRST",
-    "NUMBERS",
+    "AT_FIRST",
+    "FARTHEST",
+    "JUDGED",
+    "LINES",
     "Described",
     "Weighed",
-    "detailed",
+    "best_first",
+    "line_numbers",
     "lost_numbers",
-    "numbers",
+    "map_numbers",
     "place_numbers",
-    "skill",
+    "scene_numbers",
     "weighed",
+    "worths",
 ]
 
-_MORE = ("matched_among_many", "matched_share", "matched_covering")
+JUDGED = 40
+"""How many maps are weighed: those that fit best at first sight."""
 
-NUMBERS = (*PARTS, *_MORE)
-"""What a map is described by."""
+_LABEL = 2.0
+"""What a label that means the same, or does not, is worth at first sight."""
 
-_RELATIONS = (Part.SIMILARITY, Part.ROTATION, Part.DILATION, Part.SELF)
+_MOST_DRAWN = 16
+AT_FIRST = 0.3
+FARTHEST = 5.0
+"""How far numbers go, in standard deviations of what was learned from: beyond, what is linear may
+say anything."""
 
-FIRST = np.array(
-    [k for k, name in enumerate(NUMBERS) if k not in _RELATIONS and name not in ("alike", "unlike")]
-)
-"""Which of them the places, sizes and shapes of objects alone tell."""
-
-_BY_SKILL = np.array(
-    [
-        k
-        for k, name in enumerate(NUMBERS)
-        if name not in ("offset", "bend", "alike", "unlike", "matched_among_many")
-    ]
-)
-
-_SCATTERS = (Part.SCATTER, Part.SCATTER_SIZE, Part.SCATTER_SHAPE)
-_USUAL = (1.6, 1.2, 1.8)
-
+LINES = 0.25
+_RELATIONS = 2
 _NONE = -30.0
-
-_MOST_DRAWN, _PLAIN, _CAREFUL = 16, 50.0, -0.5
-"""How far numbers go: many objects, and lines without a fault, lie beyond what was learned from,
-where what is linear may say anything."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,118 +58,24 @@ class Described:
     Attributes
     ----------
     maps
-        int64, shape (c, n), at least one: the mapped object of each sketched one, −1 for none.
-    numbers
-        Shape (c, len(NUMBERS)).
+        int64, shape (c, n), at least one: the mapped object of each sketched one, −1 for none;
+        those that fit best at first sight come first.
+    measured
+        What speaks for each.
     decoys
-        The numbers of the maps of each decoy, maybe of none.
+        What speaks for the best maps of each decoy.
     drawn, mapped
         How many objects there are.
+    related
+        Whether relations are those that were learned from.
     """
 
     maps: IntArray
-    numbers: FloatArray
-    decoys: tuple[FloatArray, ...]
+    measured: Measured
+    decoys: tuple[Measured, ...]
     drawn: int
     mapped: int
-
-
-def numbers(parts: FloatArray, drawn: int, mapped: int) -> FloatArray:
-    """Return what maps are described by.
-
-    Parameters
-    ----------
-    parts
-        Shape (c, parts), as measured.
-    drawn, mapped
-        How many objects there are.
-
-    Returns
-    -------
-    ndarray
-        Shape (c, len(NUMBERS)).
-    """
-    matched = parts[:, Part.MATCHED]
-    bounded = parts.copy()
-    for part, usual in zip(_SCATTERS, _USUAL, strict=True):
-        bounded[:, part] = np.maximum(parts[:, part], matched * (_CAREFUL - usual))
-    return np.column_stack(
-        [
-            bounded,
-            matched * math.log(mapped),
-            matched * matched / drawn,
-            matched * min(drawn, mapped) / max(drawn, mapped),
-        ]
-    )
-
-
-def skill(best: FloatArray) -> FloatArray:
-    """Return how well somebody draws, by the best map, shape (3,); less is better."""
-    left: FloatArray = best[[*_SCATTERS]] / max(best[Part.MATCHED], 1.0) + np.array(_USUAL)
-    return left
-
-
-def detailed(described: FloatArray, drawing: FloatArray) -> FloatArray:
-    """Return the numbers of maps, and most of them times each of the numbers of a skill."""
-    by_skill = described[:, _BY_SKILL]
-    return np.hstack([described, *(by_skill * each for each in drawing)])
-
-
-def place_numbers(known: Described, first: FloatArray) -> FloatArray:
-    """Return what says whether a sketch shows a place at all.
-
-    Decoys are what the sketch is not: mirrored, or with things in each other's places. The best
-    that they achieve on the map is what chance achieves there.
-
-    Parameters
-    ----------
-    known
-        The maps and decoys.
-    first
-        Shape (len(FIRST),): what places, sizes and shapes count for.
-    """
-    worths, maps = known.numbers[:, FIRST] @ first, known.maps
-    drawn = min(known.drawn, _MOST_DRAWN)
-    best = int(worths.argmax())
-    top = float(worths[best])
-    chance = [float((each[:, FIRST] @ first).max(initial=_NONE)) for each in known.decoys]
-    shared = ((maps == maps[best]) & (maps[best] >= 0)).sum(axis=1)
-    other = shared <= max(1, np.count_nonzero(maps[best] >= 0) // 4)
-    rival = float(worths[other].max(initial=float(worths.min()) - 4.0))
-    part = drawn / known.drawn
-    most, mean, lead = (
-        min(part * (top - each), _PLAIN) for each in (max(chance), float(np.mean(chance)), rival)
-    )
-    top = min(part * top, _PLAIN)
-    many, row = math.log(known.mapped), known.numbers[best]
-    matched = max(row[Part.MATCHED], 1.0)
-    drawing = np.array([*skill(row), matched / known.drawn])
-    return np.array(
-        [
-            1.0,
-            drawn,
-            many,
-            drawn * many,
-            1.0 / drawn,
-            top,
-            top / drawn,
-            most,
-            mean,
-            _above(most),
-            lead,
-            _above(lead),
-            min(most, lead),
-            *drawing,
-            *(most * drawing),
-            *(drawn * drawing),
-            *(many * drawing),
-        ]
-    )
-
-
-def _above(difference: float) -> float:
-    """Return a smooth positive part."""
-    return float(np.logaddexp(0.0, np.clip(difference, -20.0, 20.0)))
+    related: bool
 
 
 @dataclass(frozen=True)
@@ -202,15 +97,141 @@ class Weighed:
     elsewhere: float
 
 
+def best_first(measured: Measured) -> IntArray:
+    """Return the order of maps by how well they fit at first sight."""
+    labels = measured.wholes[:, Whole.ALIKE] - measured.wholes[:, Whole.UNLIKE]
+    order: IntArray = np.argsort(-measured.wholes[:, Whole.SCORE] - _LABEL * labels, kind="stable")
+    return order
+
+
+def line_numbers(measured: Measured, related: bool) -> FloatArray:
+    """Return what describes lines; 0 for objects without partner.
+
+    Returns
+    -------
+    ndarray
+        Shape (c, n, 11), or 9 where relations do not count.
+    """
+    place, size, shape, round_, own, relation, way, near = np.moveaxis(measured.lines, 2, 0)
+    numbers = [
+        np.ones_like(place),
+        np.log(0.003 + place),
+        np.minimum(np.sqrt(place), 3.0),
+        np.log(0.003 + size**2),
+        np.clip(size, -3.0, 3.0),
+        np.log(0.003 + shape),
+        round_,
+        np.log(0.01 + way),
+        np.log(0.01 + near),
+    ]
+    if related:
+        numbers += [np.log(0.003 + own), relation]
+    return np.stack(numbers, axis=2) * measured.matched[:, :, None]
+
+
+def map_numbers(measured: Measured, drawn: int) -> FloatArray:
+    """Return what describes maps as wholes, shape (c, 8)."""
+    matched, missing, crowd, offset, bend = measured.wholes[:, Whole.MATCHED : Whole.BEND + 1].T
+    return np.column_stack(
+        [offset, bend, matched, missing, crowd, matched / drawn, missing / drawn, crowd / drawn]
+    )
+
+
+def scene_numbers(known: Described) -> FloatArray:
+    """Return what describes both scenes, shape (3,)."""
+    return np.array([math.log(known.drawn), math.log(known.mapped), 1.0 / known.drawn])
+
+
+def worths(known: Described, measured: Measured, layers: Layers, related: bool) -> FloatArray:
+    """Return what maps are worth, shape (c,), up to what is the same for all maps of a sketch.
+
+    Parameters
+    ----------
+    known
+        Whose maps, or whose decoy's, they are.
+    measured
+        What speaks for them.
+    layers
+        What was learned, with relations or without.
+    related
+        Whether relations count, or places, sizes and shapes alone.
+    """
+    lines = _within(line_numbers(measured, related), *layers.of_lines)
+    lines *= measured.matched[:, :, None]
+    lines[:, :, 0] = measured.matched
+    scene = _within(scene_numbers(known), *layers.of_scenes)
+    whole = _within(map_numbers(measured, known.drawn), *layers.of_maps)
+    width = lines.shape[2]
+    hidden = lines @ layers.first[:width] + (scene @ layers.first[width:] + layers.first_bias)
+    summed = LINES * np.maximum(hidden, 0.0).sum(axis=1)
+    among = np.hstack([whole, np.broadcast_to(scene, (len(whole), len(scene))), summed])
+    second = np.maximum(among @ layers.second + layers.second_bias, 0.0)
+    score = AT_FIRST * measured.wholes[:, Whole.SCORE]
+    found: FloatArray = second @ layers.last + whole @ layers.direct + layers.score * score
+    return found
+
+
+def place_numbers(known: Described, layers: Layers) -> FloatArray:
+    """Return what says whether a sketch shows a place at all.
+
+    Decoys are what the sketch is not: mirrored, or with things in each other's places. The best
+    that they achieve on the map is what chance achieves there. Of decoys nothing but places, sizes
+    and shapes is known, so these alone are compared.
+    """
+    measured = known.measured.at(slice(JUDGED))
+    values = worths(known, measured, layers, related=False)
+    best = int(values.argmax())
+    top, maps = float(values[best]), known.maps[: len(values)]
+    chance = [
+        float(worths(known, each, layers, related=False).max())
+        for each in known.decoys
+        if len(each.lines)
+    ] or [top + _NONE]
+    shared = ((maps == maps[best]) & (maps[best] >= 0)).sum(axis=1)
+    other = shared <= max(1, int(measured.matched[best].sum()) // 4)
+    rival = float(values[other].max()) if other.any() else float(values.min()) - 4.0
+    most, mean, lead = top - max(chance), top - float(np.mean(chance)), top - rival
+    at_first = measured.wholes[:, Whole.SCORE]
+    first = float(at_first.max())
+    by_chance = [float(each.wholes[:, Whole.SCORE].max(initial=_NONE)) for each in known.decoys]
+    ahead = first - max(by_chance, default=first + _NONE)
+    lines = line_numbers(measured, True)[best, measured.matched[best], 1:]
+    if not len(lines):
+        lines = np.zeros((1, lines.shape[1]))
+    if not known.related:
+        lines[:, -_RELATIONS:] = 0.0
+    count, few = known.drawn, min(known.drawn, _MOST_DRAWN)
+    offset, bend, matched, missing, crowd = map_numbers(measured, count)[best, :5]
+    return np.array(
+        [
+            *scene_numbers(known),
+            known.related,
+            *(each / count * scale for each in (most, mean, lead, ahead) for scale in (1.0, few)),
+            first / count,
+            matched / count,
+            missing / count,
+            crowd / count,
+            offset,
+            bend,
+            *lines.mean(axis=0),
+            *lines.max(axis=0),
+        ]
+    )
+
+
 def weighed(known: Described, learned: Posterior) -> Weighed:
     """Return what the numbers of maps come to."""
-    first, rows = np.array(learned.first), known.numbers
-    best = rows[(rows[:, FIRST] @ first).argmax()]
-    scores = detailed(rows, skill(best)) @ np.array(learned.weights)
-    shares = np.exp(scores - scores.max())
+    measured = known.measured.at(slice(JUDGED))
+    values = worths(known, measured, learned.layers(known.related), known.related)
+    labels = measured.wholes[:, [Whole.ALIKE, Whole.UNLIKE]] @ learned.labels
+    shares = np.zeros(len(known.maps))
+    shares[: len(values)] = np.exp(values + labels - (values + labels).max())
     shares /= shares.sum()
-    here = place_numbers(known, first) @ np.array(learned.place)
-    lost = lost_numbers(shares, known.drawn, known.mapped) @ np.array(learned.lost)
+    numbers, layers = place_numbers(known, learned.bare), learned.place
+    numbers = _within(numbers, *layers.of_places)
+    hidden = np.maximum(numbers @ layers.first + layers.first_bias, 0.0)
+    here = float(hidden @ layers.last + numbers @ layers.direct) + layers.constant
+    lost = float(lost_numbers(shares, known.drawn, known.mapped) @ learned.lost)
     return Weighed(shares, _logistic(lost), _logistic(-here))
 
 
@@ -218,6 +239,12 @@ def lost_numbers(shares: FloatArray, drawn: int, mapped: int) -> FloatArray:
     """Return what says whether the right map is among those that are known."""
     few = min(drawn, _MOST_DRAWN)
     return np.array([1.0, few, math.log(mapped), math.log(shares.max()), drawn / mapped])
+
+
+def _within(numbers: FloatArray, middle: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return numbers in units of what was learned from, and not far beyond it."""
+    bounded: FloatArray = np.clip((numbers - middle) / scale, -FARTHEST, FARTHEST)
+    return bounded
 
 
 def _logistic(odds: float) -> float:

@@ -1,19 +1,34 @@
-"""What was learned of how ζ tells right maps from wrong ones: the one place of these numbers.
+"""What was learned of how right maps are told from wrong ones: the one place of these numbers.
 
 They come from ``python -m tests.experiments.learn``, which writes ``learned.json``, and a test
-compares the two: simulated sketches of the study's scenes and of random ones of 5 to 16 objects,
-with missing and extra objects, drawn well or badly, as outlines, boxes and ellipses; none of those
-that the study's tables are made of. All hold for the default measure of similarity on histograms of
-constant forces.
+compares the two. Those of ζ: simulated sketches of the study's scenes and of random ones of 5 to
+16 objects, with missing and extra objects, drawn well or badly, as outlines, boxes and ellipses;
+none of those that the study's tables are made of. All hold for the default measure of similarity on
+histograms of constant forces. Those of the judge ``posterior`` are too many for a module: it writes
+them into ``posterior.json`` beside this one.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from sketchmatch.model import ConfidenceWeights
+import numpy as np
 
-__all__ = ["Calibration", "calibrated", "default_price"]
+from sketchmatch.model import ConfidenceWeights, FloatArray
+
+__all__ = [
+    "POSTERIOR",
+    "Calibration",
+    "Layers",
+    "PlaceLayers",
+    "Posterior",
+    "calibrated",
+    "default_price",
+    "posterior_of",
+]
 
 
 @dataclass(frozen=True)
@@ -68,217 +83,103 @@ def _shares(weights: ConfidenceWeights) -> tuple[float, ...]:
     return (*(weight / weights.total for weight in parts), distance)
 
 
-@dataclass(frozen=True)
-class Posterior:
+class Layers(NamedTuple):
+    """What maps are worth: a layer for each line, summed, and one for the sum and the whole.
+
+    Attributes
+    ----------
+    of_lines, of_maps, of_scenes
+        Shape (2, k) each: middle and scale of the numbers of lines, of maps and of scenes.
+    first, first_bias
+        Shape (k + 3, h) and (h,): from the k numbers of a line and those of the scenes.
+    second, second_bias
+        Shape (8 + 3 + h, g) and (g,): from the numbers of a map, of the scenes, and the sum.
+    last, direct
+        Shape (g,) and (8,): from the second layer, and from the numbers of a map.
+    score
+        What the score of an alignment counts for.
+    """
+
+    of_lines: FloatArray
+    of_maps: FloatArray
+    of_scenes: FloatArray
+    first: FloatArray
+    first_bias: FloatArray
+    second: FloatArray
+    second_bias: FloatArray
+    last: FloatArray
+    direct: FloatArray
+    score: float
+
+
+class PlaceLayers(NamedTuple):
+    """Whether a sketch shows a place at all: one hidden layer.
+
+    Attributes
+    ----------
+    of_places
+        Shape (2, k): middle and scale of the numbers of a place.
+    first, first_bias
+        Shape (k, h) and (h,).
+    last, direct
+        Shape (h,) and (k,).
+    constant
+        The odds where all of them are 0.
+    """
+
+    of_places: FloatArray
+    first: FloatArray
+    first_bias: FloatArray
+    last: FloatArray
+    direct: FloatArray
+    constant: float
+
+
+class Posterior(NamedTuple):
     """What the judge ``posterior`` goes by.
 
     Attributes
     ----------
-    first
-        What places, sizes and shapes count for: ``FIRST`` of the numbers of a map.
-    weights
-        What all numbers count for, by themselves and times each number of a skill.
+    maps, bare
+        What maps are worth by all that is known, and by places, sizes and shapes alone.
     place
-        What the numbers of a place count for.
+        What tells a place.
+    labels
+        Shape (2,): what labels count for that mean the same, and that do not.
     lost
-        What the numbers count for that say whether the right map is known.
+        Shape (5,): what the numbers count for that say whether the right map is known.
     luck
         As in :class:`Calibration`.
     """
 
-    first: tuple[float, ...]
-    weights: tuple[float, ...]
-    place: tuple[float, ...]
-    lost: tuple[float, ...]
+    maps: Layers
+    bare: Layers
+    place: PlaceLayers
+    labels: FloatArray
+    lost: FloatArray
     luck: float
 
+    def layers(self, related: bool) -> Layers:
+        """Return what maps are worth, by relations too or without them."""
+        return self.maps if related else self.bare
 
-POSTERIOR = Posterior(
-    first=(
-        -0.09175,
-        0.2529,
-        0.3504,
-        -1.986,
-        -0.1806,
-        -0.9018,
-        0.04196,
-        0.1402,
-        -0.8533,
-        -0.1086,
-        -0.005648,
-        -1.002,
-        -0.5108,
-        -0.8215,
-        -1.006,
-        -0.5902,
-        0.6402,
-        -0.08458,
-        -0.342,
-        -0.3644,
-        -0.5337,
-        0.1504,
-        -0.2246,
-        -0.2501,
-        0.1518,
-        1.096,
-        2.214,
-    ),
-    weights=(
-        -0.1695,
-        0.1208,
-        0.1055,
-        -1.037,
-        -0.1358,
-        -0.4857,
-        0.06855,
-        -0.04595,
-        -0.459,
-        -0.178,
-        0.03609,
-        -1.049,
-        -0.4703,
-        -0.7064,
-        -0.9242,
-        -0.7628,
-        0.5888,
-        0.02674,
-        -0.2502,
-        -0.1662,
-        -0.4882,
-        -0.3383,
-        -2.083,
-        0.2003,
-        -0.5299,
-        1.961,
-        -2.04,
-        0.2753,
-        -0.1389,
-        -0.3005,
-        0.1657,
-        1.004,
-        1.564,
-        -1.028,
-        0.03214,
-        0.2448,
-        -1.155,
-        0.4356,
-        0.5472,
-        -0.4002,
-        -0.0786,
-        -2.297,
-        0.2095,
-        0.259,
-        -0.297,
-        0.01424,
-        -0.1442,
-        0.0002208,
-        0.04772,
-        -0.05849,
-        0.03156,
-        0.7141,
-        0.7435,
-        0.4838,
-        -0.118,
-        0.5891,
-        -0.506,
-        0.2786,
-        0.3916,
-        -0.1417,
-        0.2507,
-        -0.8393,
-        0.1523,
-        -0.05903,
-        0.08779,
-        0.1877,
-        -1.46,
-        0.4101,
-        0.3659,
-        0.4457,
-        -0.07861,
-        -0.04869,
-        -0.05735,
-        0.06281,
-        0.2062,
-        0.04629,
-        0.07393,
-        -0.09257,
-        -0.1976,
-        0.2194,
-        -0.7489,
-        2.208,
-        -1.092,
-        -0.1093,
-        0.1708,
-        0.03557,
-        0.4895,
-        -0.1078,
-        0.4776,
-        0.2168,
-        0.2856,
-        0.4471,
-        -1.339,
-        -0.2263,
-        0.2439,
-        -0.1711,
-        0.00511,
-        -1.183,
-        0.2617,
-        -0.03878,
-        0.05005,
-        0.03315,
-        -0.129,
-        0.3041,
-        -0.1397,
-        -0.1447,
-        0.03097,
-        0.1952,
-        0.2642,
-        -1.183,
-        -0.9182,
-        0.5314,
-        0.4298,
-        -0.2977,
-        0.1279,
-        0.1737,
-        0.8973,
-    ),
-    place=(
-        -1.785,
-        -0.583,
-        -0.3617,
-        -0.008209,
-        -2.646,
-        0.02064,
-        0.3033,
-        -0.2517,
-        0.06934,
-        0.4053,
-        -0.01679,
-        0.2766,
-        -0.002301,
-        -1.382,
-        -0.4257,
-        -1.268,
-        1.721,
-        0.01863,
-        -0.01901,
-        -0.0008137,
-        0.3268,
-        0.06373,
-        -0.1602,
-        -0.1118,
-        0.1803,
-        0.01644,
-        0.2564,
-        0.3493,
-        0.415,
-    ),
-    lost=(
-        -4.861,
-        0.201,
-        0.02941,
-        -1.736,
-        -2.095,
-    ),
-    luck=0.36,
-)
+
+def posterior_of(text: str) -> Posterior:
+    """Return what the judge ``posterior`` goes by, from JSON as it is learned."""
+    found = json.loads(text)
+    maps, bare, place = (_arrays(found[part]) for part in ("maps", "bare", "place"))
+    labels, lost = np.array(found["labels"]), np.array(found["lost"])
+    return Posterior(
+        Layers(**maps), Layers(**bare), PlaceLayers(**place), labels, lost, found["luck"]
+    )
+
+
+def _arrays(values: dict[str, Any]) -> dict[str, Any]:
+    return {
+        name: np.array(value) if isinstance(value, list) else value
+        for name, value in values.items()
+    }
+
+
+POSTERIOR = posterior_of(Path(__file__).with_name("posterior.json").read_text(encoding="utf-8"))
+"""Learned by ``python -m tests.experiments.learn``, which writes that file."""

@@ -25,24 +25,27 @@ class Posterior(Judge):
     """Weighs all evidence for each map, and says how likely it is, and whether this is the place.
 
     The maps are those met by the search and those that laying the sketch upon the map leads to, as
-    the searcher ``align`` does. A conditional logit [1]_ makes probabilities of how
-    well each one's places, sizes and shapes agree in one frame, with what a page is stretched by
-    and how carefully somebody draws, of how alike the relations are, of what is left out on
-    either side, and of labels where both sides have some. That the right map is none of them has
-    a share as well.
+    the searcher ``align`` does. A conditional logit [1]_ makes probabilities of what each one is
+    worth: how well its places, sizes and shapes agree in one frame, the ways between objects,
+    their relations and the forces within them, what a page is stretched by, what is left out on
+    either side, and labels where both sides have some. What that comes to is a network of two
+    small layers over the lines of a map, in any order [2]_, so that a deviation counts the more,
+    the better the others fit. That the right map is none of them has a share as well.
 
     Whether the sketch shows this place at all follows from how far the best map exceeds what
     chance achieves on the same map: decoys, the sketch in the mirror, which nobody draws, and
     with its things in each other's places. Verifying by a model of chance agreement is what
-    star trackers do [2]_.
+    star trackers do [3]_.
 
-    All of it was learned from simulated sketches, on the default relations. On others it ranks by
-    places, sizes and shapes alone, and names no probabilities.
+    All of it was learned from simulated sketches, on the default relations. Others do not count:
+    then it judges by places, sizes and shapes alone.
 
     References
     ----------
     .. [1] D. McFadden, "Conditional logit analysis of qualitative choice behavior", 1974.
-    .. [2] D. Lang et al., "Astrometry.net: blind astrometric calibration of arbitrary
+    .. [2] M. Zaheer et al., "Deep sets", Advances in Neural Information Processing Systems 30,
+       2017.
+    .. [3] D. Lang et al., "Astrometry.net: blind astrometric calibration of arbitrary
        astronomical images", The Astronomical Journal 139, 2010.
     """
 
@@ -78,13 +81,12 @@ class Posterior(Judge):
             problem.names,
             [sides.drawn_partners(each.partners) for each in problem.candidates],
             partial=problem.price < math.inf,
+            related=problem.usual,
         )
         found = weighed(known, POSTERIOR)
         order = np.argsort(-found.shares, kind="stable")
         maps = [sides.template_partners(each) for each in known.maps[order]]
         told = problem.alternatives + 1
-        if not problem.usual:
-            return Judgement(tuple(JudgedMap(each) for each in maps[:told]))
         # Whoever says that a sketched object is a mapped one says that this is the place.
         pinned = problem.pinned is not None and bool((problem.pinned >= 0).any())
         elsewhere = 0.0 if pinned else found.elsewhere
