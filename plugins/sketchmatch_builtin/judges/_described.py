@@ -22,6 +22,7 @@ from sketchmatch_builtin.judges._evidence import Described, best_first
 __all__ = ["Described", "described"]
 
 _DECOY_POSES, _DECOY_GUESSES = 10, 6_000
+_SELF_GUESSES = 1_000
 _SQUEEZED = 1.35
 _SAME = -1.0
 """What a decoy is worth for each object, laid upon the sketch, that is the sketch again."""
@@ -105,13 +106,13 @@ def _derangement(rng: np.random.Generator, count: int) -> IntArray:
 
 def _best(decoy: Things, drawn: Things) -> float:
     """Return what a decoy is worth, laid upon the sketch that it is of."""
-    laid = _laid(decoy, drawn)
+    laid = _laid(decoy, drawn, _SELF_GUESSES)
     return laid[0].score if laid else -np.inf
 
 
-def _laid(decoy: Things, upon: Things) -> list[Laid]:
+def _laid(decoy: Things, upon: Things, guesses: int = _DECOY_GUESSES) -> list[Laid]:
     bonus = np.zeros((len(decoy.places), len(upon.places)))
-    return refined_maps(Sides(decoy, upon, bonus, swapped=False), _DECOY_POSES, _DECOY_GUESSES)
+    return refined_maps(Sides(decoy, upon, bonus, swapped=False), _DECOY_POSES, guesses)
 
 
 def _measured_decoy(decoy: Things, mapped: Things) -> Measured:
