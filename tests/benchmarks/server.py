@@ -98,9 +98,12 @@ async def _measured(
 
 def _processor_seconds(pid: int) -> float:
     """Return the processor time of a process and of all that it started and that still run."""
-    stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-    own = sum(map(int, stat[11:15])) / os.sysconf("SC_CLK_TCK")
-    return own + sum(map(_processor_seconds, children_of(pid)))
+    ticks = 0
+    for each in (pid, *children_of(pid)):
+        with suppress(FileNotFoundError):
+            text = Path(f"/proc/{each}/stat").read_text(encoding="ascii")
+            ticks += sum(map(int, text.rpartition(")")[2].split()[11:13]))
+    return ticks / os.sysconf("SC_CLK_TCK")
 
 
 async def _loaded(running: Server, request: bytes, clients: int, seconds: float) -> _Load:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sketchmatch.app import children
+from sketchmatch.app import workers
 from sketchmatch.app.setup import Isolation, Setup
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import discover
@@ -105,7 +105,7 @@ def test_its_time_budget_ends_it_with_an_answer(client):
 
 
 def test_its_time_budget_begins_when_it_has_compiled_what_it_needs(client, monkeypatch):
-    monkeypatch.setattr(children, "_OVERTIME", 0.2)
+    monkeypatch.setattr(workers, "_OVERTIME", 0.2)
     slow = {"searcher": "compiling", "params": {"searcher": ENDLESS["guessing"]}}
     found = client.match(scene(4), scene(4), **slow, judge="confidence", time_budget=0.5)
     assert Outcome.Name(found.result.outcome) == "OUTCOME_TIME_BUDGET"

@@ -99,7 +99,10 @@ class Setup:
 
     def __post_init__(self) -> None:
         registry = self.engine.registry
-        offered = (*registry.algorithms, *registry.readers)
+        offered: tuple[Registered | RegisteredReader, ...] = (
+            *registry.algorithms,
+            *registry.readers,
+        )
         strangers = self.isolation.strangers(offered)
         trusted = tuple(item for item in offered if item not in strangers)
         object.__setattr__(self, "strangers", strangers)

@@ -68,7 +68,7 @@ class FairQueue(Generic[_Item]):
 
     def remove(self, item: _Item, caller: Caller) -> bool:
         """Take out a certain item; return whether it was there."""
-        lines = self._lines.get(caller.name, {})
+        lines = self._lines.get(caller.name, OrderedDict[str, deque[_Item]]())
         line = lines.get(caller.connection, deque())
         if item not in line:
             return False

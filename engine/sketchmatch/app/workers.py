@@ -17,17 +17,16 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-import multiprocessing
 import os
 import pickle
 import socket
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+from sketchmatch.app.forking import forking
 from sketchmatch.app.frames import Flag, Frames, Says, failure_of, frame
 from sketchmatch.app.jobs import time_budget
 from sketchmatch.app.setup import Setup
@@ -61,15 +60,6 @@ _Key = frozenset[tuple[str, str]]
 """Distributions, with their versions, whose algorithms a worker loads beside the engine's own."""
 _Strangers = tuple[Registered | RegisteredReader, ...]
 _Ended = Callable[[Task, BaseException | None], None]
-
-
-def _context() -> multiprocessing.context.BaseContext:
-    """Return how processes are started: forked from one that is warm, where forking is sound."""
-    if sys.platform != "linux":
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["sketchmatch.app.template"])
-    return context
 
 
 class WorkerError(Exception):
@@ -224,7 +214,7 @@ class Workers:
     def _in_background(self, work: object) -> None:
         task = asyncio.ensure_future(cast("asyncio.Future[None]", work))
         self._background.add(cast("asyncio.Task[None]", task))
-        task.add_done_callback(self._background.discard)  # type: ignore[arg-type]
+        task.add_done_callback(self._background.discard)
 
 
 class _Worker(asyncio.Protocol):
@@ -268,7 +258,7 @@ class _Worker(asyncio.Protocol):
         names = tuple(sorted(name for name, _ in self.key))
         self._process = cast(
             "SpawnProcess",
-            _context().Process(  # type: ignore[attr-defined]
+            forking().Process(  # type: ignore[attr-defined]
                 target=live,
                 args=(theirs, names, bool(self._strangers)),
                 name="-".join(("sketchmatch-worker", *names)),

@@ -95,9 +95,8 @@ def serve(
     import asyncio
     import os
 
+    from sketchmatch.app.forking import prepare
     from sketchmatch.config import load
-    from sketchmatch.server.serve import ServerSettings
-    from sketchmatch.server.serve import serve as serve_forever
 
     flags = {
         "profile": profile,
@@ -118,6 +117,11 @@ def serve(
     }
     server = load(config, flags).settings.server
     kept = (os.cpu_count() or 1) if server.workers is None else server.workers
+    if kept:
+        prepare()
+    from sketchmatch.server.serve import ServerSettings
+    from sketchmatch.server.serve import serve as serve_forever
+
     settings = ServerSettings(server.address, server.grace_seconds, kept)
     asyncio.run(serve_forever(lambda: _setup(load(config, flags)), settings, say))
 

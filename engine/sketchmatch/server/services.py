@@ -42,7 +42,7 @@ class MatchService:
                 async for response in responses:
                     await context.write(response)
 
-    def handler(self) -> grpc.GenericRpcHandler[Any, Any]:
+    def handler(self) -> grpc.GenericRpcHandler:
         """Return what answers the calls of the service."""
         return _handler(_MATCH, Match=grpc.unary_stream_rpc_method_handler(self.Match))
 
@@ -61,7 +61,7 @@ class SceneService:
         # Nobody waits for an answer to a request that was stopped.
         return responses[0] if responses else b""
 
-    def handler(self) -> grpc.GenericRpcHandler[Any, Any]:
+    def handler(self) -> grpc.GenericRpcHandler:
         """Return what answers the calls of the service."""
         return _handler(_SCENE, Segment=grpc.unary_unary_rpc_method_handler(self.Segment))
 
@@ -93,7 +93,7 @@ def caller_of(context: _Context) -> Caller:
     return Caller(peer.rpartition(":")[0] or peer, peer)
 
 
-def _handler(service: str, **methods: Any) -> grpc.GenericRpcHandler[Any, Any]:
+def _handler(service: str, **methods: Any) -> grpc.GenericRpcHandler:
     return grpc.method_handlers_generic_handler(service, methods)
 
 
