@@ -99,7 +99,9 @@ def test_a_match_whose_worker_is_killed_may_be_sent_again_and_no_other_notices()
         worker = busy_process(pid)
         with within(1.0):
             os.kill(worker, signal.SIGKILL)
-            with pytest.raises(ServerUnavailableError, match="worker process ended") as lost:
+            with pytest.raises(
+                ServerUnavailableError, match="the worker ended its process"
+            ) as lost:
                 list(events)
         assert lost.value.reason == "WORKER_LOST"
         assert client.match(scene(5), scene(5)).object_map == small[0]

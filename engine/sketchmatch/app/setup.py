@@ -26,19 +26,19 @@ class RequestLimits:
         Size of one request. A little more passes the transport, so that the refusal can be clear.
     max_concurrent_matches
         Matches and segmentations that run at the same time, each in a place of its own.
-    max_waiting
-        Those that wait for a place.
-    max_wait
-        Seconds that one may wait.
     max_time_budget
         Seconds that one match may take, or None for no limit.
+    max_waiting
+        Requests that wait for a place.
+    max_wait
+        Seconds that one may wait.
     """
 
     max_request_bytes: int = 64 * 1024 * 1024
     max_concurrent_matches: int = 4 * (os.cpu_count() or 1)
+    max_time_budget: float | None = None
     max_waiting: int = 100
     max_wait: float = 10.0
-    max_time_budget: float | None = None
 
     @property
     def strangers_places(self) -> int:

@@ -43,6 +43,7 @@ __all__ = ["WorkerError", "Workers"]
 
 _log = logging.getLogger(__name__)
 
+_MOMENT = 0.01
 _STOPPING = 0.5
 _OVERTIME = 2.0
 _STARTING = 60.0
@@ -170,8 +171,8 @@ class Workers:
         self._closed = True
         for worker in tuple(self._all):
             worker.kill()
-        while self._background:
-            await asyncio.wait(self._background)
+        while self._all or self._background:
+            await asyncio.sleep(_MOMENT)
 
     def lost(self, worker: _Worker) -> None:
         """Bury a worker whose connection is gone."""
@@ -292,7 +293,7 @@ class _Worker(asyncio.Protocol):
         self._started = self._stop_until = math.inf
         self._budget = self._seconds(task)
         self._spent = self._processor_seconds()
-        self._task = task
+        self._task, self._strangers = task, task.strangers
         self.send(Says.ORDER, pickle.dumps(task.order))
 
     def stop(self) -> None:
@@ -347,6 +348,7 @@ class _Worker(asyncio.Protocol):
         """Wait until the process has ended, and return what that means for who waits for it."""
         process = self._process
         if process is not None and process.pid is not None:
+            await asyncio.to_thread(process.join, _STOPPING)
             with suppress(OSError, ValueError):
                 process.kill()
             await asyncio.to_thread(process.join)
@@ -439,7 +441,7 @@ class _Worker(asyncio.Protocol):
     def _blame(self, what: str) -> BaseException:
         if self._strangers:
             return PluginError(f"{_culprits(self._strangers)} {what}; {_REMEDY}")
-        return WorkerLostError(f"the worker process {what}")
+        return WorkerLostError(f"the worker {what}")
 
     def _is_long(self, now: float) -> bool:
         long = self._processor_seconds() - self._spent > _LONG_PROCESSOR
