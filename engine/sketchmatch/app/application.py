@@ -305,8 +305,8 @@ class Application:
             self._place(task).begin(task)
 
     def _has_room(self) -> bool:
-        """Whether there is a place: one a worker, and more beside requests that take long."""
-        short = sum(1 for task in self._running if not task.long)
+        """Whether there is a place: one a worker, and more beside what gives way to it."""
+        short = sum(1 for task in self._running if not (task.long or task.strangers))
         all_places = len(self._running) < self._setup.limits.max_concurrent_matches
         return all_places and (not self._kept or short < self._kept)
 
