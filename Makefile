@@ -17,7 +17,7 @@ KERNEL_SHARE := 99
 says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 
 .PHONY: demo test test-slow test-all test-units test-interpreted mutation lint proto bench \
-  bench-histograms bench-match bench-searchers bench-startup experiments fuzz reference api serve clean
+  bench-histograms bench-match bench-searchers bench-server bench-startup experiments fuzz reference api serve clean
 
 demo: $(VENV)/runtime
 	@$(BIN)/sketchmatch demo
@@ -71,6 +71,9 @@ bench-match: $(VENV)/dev
 
 bench-searchers: $(VENV)/bench
 	@$(BIN)/python -m tests.benchmarks.searchers $(ARGS)
+
+bench-server: $(VENV)/dev
+	@$(BIN)/python -m tests.benchmarks.server $(ARGS)
 
 bench-startup: $(VENV)/dev
 	@$(BIN)/python -m tests.benchmarks.startup

@@ -44,12 +44,15 @@ def let_children_be_interrupted() -> None:
 
 
 def children_of(pid: int) -> list[int]:
-    """Return the processes that a process has started and that still run."""
-    folder = Path(f"/proc/{pid}/task")
-    if not folder.is_dir():
+    """Return the processes that a process has started, or one of these, and that still run."""
+    if not Path("/proc/self/task").is_dir():
         pytest.skip("this system does not tell which processes a process has started")
-    lists = ((thread / "children").read_text(encoding="ascii") for thread in folder.iterdir())
-    return [int(child) for children in lists for child in children.split()]
+    found = []
+    with suppress(FileNotFoundError):  # it has ended meanwhile
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            for child in (thread / "children").read_text(encoding="ascii").split():
+                found += [int(child), *children_of(int(child))]
+    return found
 
 
 def is_alive(pid: int) -> bool:

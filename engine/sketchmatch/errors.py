@@ -17,8 +17,10 @@ __all__ = [
     "InvalidInputError",
     "PluginError",
     "Reason",
+    "ServerStoppingError",
     "SketchmatchError",
     "TooBusyError",
+    "WorkerLostError",
     "quoted",
 ]
 
@@ -66,6 +68,8 @@ class Reason(StrEnum):
     PLUGIN_FAILED = "PLUGIN_FAILED"
     INFINITE_FORCE = "INFINITE_FORCE"
     UNKNOWN_PROFILE = "UNKNOWN_PROFILE"
+    SERVER_STOPPING = "SERVER_STOPPING"
+    WORKER_LOST = "WORKER_LOST"
 
 
 class SketchmatchError(Exception):
@@ -124,22 +128,39 @@ class PluginError(SketchmatchError):
     reason = Reason.PLUGIN_FAILED
 
 
-class TooBusyError(SketchmatchError):
-    """There is no room for one more request now.
+class _RetryableError(SketchmatchError):
+    """The same request may succeed later.
 
     Parameters
     ----------
-    running
-        How many there are.
+    problem
+        What is wrong now.
+    retry_seconds
+        When to ask again.
     """
 
-    reason = Reason.LIMIT_EXCEEDED
-    retry_seconds = 1
-    """When to ask again."""
+    def __init__(self, problem: str, retry_seconds: int = 1) -> None:
+        super().__init__(f"{problem}; send the request again in {retry_seconds} s")
+        self.problem = problem
+        self.retry_seconds = retry_seconds
 
-    def __init__(self, running: int) -> None:
-        super().__init__(
-            f"the server runs {running} requests already, which is its limit; "
-            f"send the request again in {self.retry_seconds} s"
-        )
-        self.running = running
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.problem, self.retry_seconds)
+
+
+class TooBusyError(_RetryableError):
+    """There is no room for one more request now."""
+
+    reason = Reason.LIMIT_EXCEEDED
+
+
+class ServerStoppingError(_RetryableError):
+    """The server is about to stop."""
+
+    reason = Reason.SERVER_STOPPING
+
+
+class WorkerLostError(_RetryableError):
+    """The process that answered the request has ended, through no fault of the request."""
+
+    reason = Reason.WORKER_LOST

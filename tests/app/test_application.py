@@ -1,5 +1,9 @@
 """Requests in the application, without any transport: admitted, done, followed, stopped."""
 
+import asyncio
+import contextlib
+import functools
+import inspect
 import pickle
 import threading
 import time
@@ -9,13 +13,23 @@ import pytest
 from sketchmatch.api import Outcome, Searcher, SearchProgress
 from sketchmatch.app.application import Application
 from sketchmatch.app.jobs import Job, algorithms
+from sketchmatch.app.orders import Order
 from sketchmatch.app.setup import Isolation, RequestLimits, Setup
-from sketchmatch.errors import InvalidInputError, PluginError, Reason, TooBusyError
+from sketchmatch.app.waiting import Caller
+from sketchmatch.errors import (
+    InvalidInputError,
+    PluginError,
+    Reason,
+    ServerStoppingError,
+    TooBusyError,
+)
 from sketchmatch.model import Fmap
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from sketchmatch_client import match_request, segment_request, sources
-from tests.pace import wait_until
+from sketchmatch_proto.v1.match_pb2 import OUTCOME_SERVER_STOPPING
+from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+from tests.pace import within
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
 SCENE = sources.polygons([SQUARE, [[5, 0], [9, 0], [9, 1]], [[1, 6], [2, 6], [2, 7]]])
@@ -54,104 +68,216 @@ def held():
     Held.go.set()
 
 
-def application(isolation=None, **limits):
+def setup(isolation=None, **limits):
     offered = Registered(Kind.SEARCHER, Held, "acme-plugins", "1.2")
     registry = Registry([*default_registry().algorithms, offered])
-    setup = Setup(Engine(registry), RequestLimits(**limits), isolation or Isolation(frozenset("*")))
-    return Application(setup)
+    return Setup(Engine(registry), RequestLimits(**limits), isolation or Isolation(frozenset("*")))
 
 
-def ended(task):
-    """Wait until a task has ended, and return the kinds of its responses."""
-    wait_until(lambda: task.log.ended, "the task does not end")
-    kinds, seen = [], 0
+def in_loop(test):
+    """Run a test that is a coroutine of an application's, without workers."""
+
+    @functools.wraps(test)
+    def run(**given):
+        limits = getattr(test, "limits", {})
+
+        async def running():
+            app = Application(setup(**limits))
+            await app.start(lambda _: None)
+            try:
+                await test(app, **given)
+            finally:
+                Held.go.set()
+                await app.close()
+
+        asyncio.run(running())
+
+    signature = inspect.signature(test)
+    run.__signature__ = signature.replace(parameters=list(signature.parameters.values())[1:])
+    return run
+
+
+def limited(**limits):
+    def mark(test):
+        test.limits = limits
+        return test
+
+    return mark
+
+
+def begun(app, request, caller=Caller()):  # noqa: B008
+    return app.running(request.DESCRIPTOR.name, request.SerializeToString(), caller)
+
+
+async def until(condition, complaint):
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < deadline, complaint
+        await asyncio.sleep(0.005)
+
+
+async def ended(task):
+    """Wait until a task has ended, and return its responses."""
+    await until(lambda: task.log.ended, "the task does not end")
+    told, seen = [], 0
     while (found := task.log.next(seen)) is not None:
         seen, response = found
-        kinds.append(response.WhichOneof("event"))
-    return kinds
+        told.append(MatchResponse.FromString(response))
+    return told
 
 
-def test_a_task_tells_what_a_match_does_under_the_name_that_it_was_admitted_with():
-    app = application()
-    with app.running(match_request(SCENE, SCENE)) as task:
-        kinds = [kind for kind in ended(task) if kind != "progress"]
-    assert kinds == ["accepted", "scenes", "result"]
-    assert task.log.next(0)[1].accepted.match_id == task.id
-    app.close()
+def kinds(responses):
+    return [response.WhichOneof("event") for response in responses]
 
 
-def test_the_same_request_is_answered_alike_in_this_thread():
-    app, request = application(), match_request(SCENE, SCENE, seed=3)
+@in_loop
+async def test_a_task_tells_what_a_match_does_under_the_name_that_it_was_admitted_with(app):
+    with begun(app, match_request(SCENE, SCENE)) as task:
+        told = await ended(task)
+    assert [kind for kind in kinds(told) if kind != "progress"] == ["accepted", "scenes", "result"]
+    assert told[0].accepted.match_id == task.id
+
+
+@in_loop
+async def test_the_same_request_is_answered_alike_in_this_thread(app):
+    request = match_request(SCENE, SCENE, seed=3)
     *_, last = app.answers(request)
-    with app.running(request) as task:
-        ended(task)
-        here = dict(task.log._kept)[max(dict(task.log._kept))]
+    with begun(app, request) as task:
+        *_, here = await ended(task)
     for each in (last, here):
         each.result.ClearField("match_id")
         each.result.ClearField("statistics")
     assert last == here
-    app.close()
 
 
-def test_a_place_is_taken_until_the_work_has_ended_even_if_nobody_waits_for_it(held):
-    app = application(max_concurrent_matches=1)
-    with app.running(held):
+@in_loop
+@limited(max_concurrent_matches=1, max_waiting=0)
+async def test_a_place_is_taken_until_the_work_has_ended_even_if_nobody_waits_for_it(app, held):
+    with begun(app, held):
         with pytest.raises(TooBusyError, match="runs 1 requests already") as refused:
-            app.running(held).__enter__()
+            begun(app, held).__enter__()
         assert refused.value.reason is Reason.LIMIT_EXCEEDED
-        wait_until(Held.began.is_set, "the search does not begin")
-    wait_until(Held.stopped.is_set, "the search is not stopped")
-
-    def admitted():
-        try:
-            with app.running(match_request(SCENE, SCENE)) as task:
-                return ended(task)
-        except TooBusyError:
-            return None
-
-    wait_until(admitted, "the place is never given back")
-    app.close()
+        await until(Held.began.is_set, "the search does not begin")
+    await until(Held.stopped.is_set, "the search is not stopped")
+    await until(lambda: app.idle, "the place is never given back")
+    with begun(app, match_request(SCENE, SCENE)) as task:
+        assert kinds(await ended(task))[-1] == "result"
 
 
-def test_leaving_the_block_stops_the_search(held):
-    app = application()
-    with app.running(held):
-        assert not app.idle
-        wait_until(Held.began.is_set, "the search does not begin")
+@in_loop
+@limited(max_concurrent_matches=1)
+async def test_what_waits_begins_when_there_is_a_place_and_whoever_leaves_does_not_wait(app, held):
+    small = match_request(SCENE, SCENE)
+    with begun(app, held) as first, begun(app, small) as second:
+        with begun(app, small) as third:
+            await asyncio.sleep(0.05)
+        assert third.log.ended
+        assert not third.log.begun
+        assert not second.log.begun
+        Held.go.set()
+        assert kinds(await ended(second))[-1] == "result"
+        assert kinds(await ended(first))[-1] == "result"
     assert app.idle
-    wait_until(Held.stopped.is_set, "the search is not stopped")
-    app.close()
 
 
-def test_closing_stops_what_runs_and_waits_for_it(held):
-    app = application()
-    with app.running(held) as one, app.running(held) as other:
-        wait_until(lambda: one.log.next(0) and other.log.next(0), "nothing runs")
-        app.close()
+@in_loop
+@limited(max_concurrent_matches=1, max_waiting=3)
+async def test_callers_take_turns_and_a_full_queue_loses_the_last_of_the_greediest(app, held):
+    small, order = match_request(SCENE, SCENE), []
+    flood, polite = Caller("flood", "1"), Caller("polite", "1")
+
+    async def note(name, task):
+        if kinds(await ended(task)):
+            order.append(name)
+
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(begun(app, held, flood))
+        waiting = [stack.enter_context(begun(app, small, flood)) for _ in range(3)]
+        with pytest.raises(TooBusyError, match="runs 1 requests already and 3 wait"):
+            begun(app, small, flood).__enter__()
+        last = stack.enter_context(begun(app, small, polite))
+        with pytest.raises(TooBusyError, match="3 wait"):
+            waiting[2].log.check()
+        noting = [
+            asyncio.create_task(note(name, task))
+            for name, task in [("flood 1", waiting[0]), ("flood 2", waiting[1]), ("polite", last)]
+        ]
+        Held.go.set()
+        await asyncio.gather(*noting)
+    assert order == ["flood 1", "polite", "flood 2"]
+
+
+@in_loop
+@limited(max_concurrent_matches=1, max_wait=0.2)
+async def test_who_waits_too_long_is_told_when_to_come_again(app, held):
+    with begun(app, held), begun(app, match_request(SCENE, SCENE)) as late:
+        assert await ended(late) == []
+        with pytest.raises(TooBusyError, match=r"waited 0\.2 s for its turn") as refused:
+            late.log.check()
+    assert 1 <= refused.value.retry_seconds <= 60
+
+
+@in_loop
+async def test_leaving_the_block_stops_the_search(app, held):
+    with begun(app, held):
+        assert not app.idle
+        await until(Held.began.is_set, "the search does not begin")
+    await until(Held.stopped.is_set, "the search is not stopped")
+    await until(lambda: app.idle, "the place is never given back")
+
+
+@in_loop
+async def test_closing_stops_what_runs_and_waits_for_it(app, held):
+    with begun(app, held) as one, begun(app, held) as other:
+        await until(lambda: one.log.begun and other.log.begun, "nothing runs")
+        await app.close()
         assert one.log.ended
         assert other.log.ended
 
 
-def test_a_request_of_exactly_the_limit_passes_and_one_byte_more_does_not():
+@in_loop
+@limited(max_concurrent_matches=1)
+async def test_draining_ends_what_runs_with_its_best_so_far_and_begins_nothing(app, held):
+    with begun(app, held) as running, begun(app, match_request(SCENE, SCENE)) as waiting:
+        await until(Held.began.is_set, "the search does not begin")
+        await app.drain(0.1)
+        result = (await ended(running))[-1].result
+        assert result.outcome == OUTCOME_SERVER_STOPPING
+        assert len(result.object_matches) == 3
+        assert await ended(waiting) == []
+        with pytest.raises(ServerStoppingError):
+            waiting.log.check()
+    with pytest.raises(ServerStoppingError, match="about to stop; send the request again in 1 s"):
+        begun(app, held).__enter__()
+
+
+@in_loop
+async def test_draining_waits_no_longer_than_what_runs(app):
+    with begun(app, match_request(SCENE, SCENE)) as task, within(10.0):
+        await app.drain(60.0)
+        assert (await ended(task))[-1].result.outcome != OUTCOME_SERVER_STOPPING
+
+
+@in_loop
+async def test_a_request_of_exactly_the_limit_passes_and_one_byte_more_does_not(app):
     request = segment_request(SCENE)
-    app = application(max_request_bytes=request.ByteSize())
-    with app.running(request) as task:
-        wait_until(lambda: task.log.ended, "the task does not end")
-    app.change(application(max_request_bytes=request.ByteSize() - 1).setup)
+    app.change(setup(max_request_bytes=request.ByteSize()))
+    with begun(app, request) as task:
+        await until(lambda: task.log.ended, "the task does not end")
+        task.log.check()
+    app.change(setup(max_request_bytes=request.ByteSize() - 1))
     with pytest.raises(InvalidInputError) as refused:
-        app.running(request).__enter__()
+        begun(app, request).__enter__()
     assert refused.value.reason is Reason.MESSAGE_TOO_LARGE
-    app.close()
 
 
-def test_an_error_is_what_the_log_ends_with():
-    app = application()
-    with app.running(match_request(SCENE, SCENE, searcher="nobody")) as task:
-        assert ended(task) == []
+@in_loop
+async def test_an_error_is_what_the_log_ends_with(app):
+    with begun(app, match_request(SCENE, SCENE, searcher="nobody")) as task:
+        assert await ended(task) == []
         with pytest.raises(InvalidInputError, match="no searcher") as refused:
             task.log.check()
     assert refused.value.field == "pipeline.searcher.name"
-    app.close()
 
 
 @pytest.mark.parametrize(
@@ -170,8 +296,9 @@ def test_an_error_is_what_the_log_ends_with():
     ],
 )
 def test_whose_algorithms_are_asked_for_is_told_without_decoding_anything(request_, named):
-    app = application()
-    assert {item.name for item in algorithms(Job("", request_), app.setup)} == named
+    order = Order("", request_.DESCRIPTOR.name, request_.SerializeToString())
+    for job in (Job("", request_), order.outline()):
+        assert {item.name for item in algorithms(job, setup())} == named
 
 
 def test_errors_survive_the_way_between_processes():
@@ -180,3 +307,5 @@ def test_errors_survive_the_way_between_processes():
     assert (copy.reason, copy.field, copy.problem) == (error.reason, error.field, error.problem)
     assert str(copy) == str(error)
     assert str(pickle.loads(pickle.dumps(PluginError("it failed")))) == "it failed"
+    busy = pickle.loads(pickle.dumps(TooBusyError("it is full", 7)))
+    assert str(busy) == "it is full; send the request again in 7 s"

@@ -13,6 +13,7 @@ from sketchmatch.errors import (
     PluginError,
     Reason,
     TooBusyError,
+    WorkerLostError,
 )
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.pipeline.engine import Engine
@@ -35,11 +36,16 @@ REFUSALS = {
             Reason.INVALID_STROKE, "sketch.stroke_set.strokes[3]", "has one point; draw a line"
         )
     ),
-    "Status.resource_exhausted": status.refusal(TooBusyError(12)),
+    "Status.resource_exhausted": status.refusal(
+        TooBusyError("the server runs 12 requests already, which is its limit")
+    ),
     "Status.deadline_exceeded": status.refusal(
         AnswerUnavailableError(
             "the time budget of 0.25 s ended in phase describe, before there was any answer"
         )
+    ),
+    "Status.unavailable": status.refusal(
+        WorkerLostError("the worker ended its process (signal 9)", 2)
     ),
     "Status.internal": status.refusal(
         PluginError("searcher guessing of acme-tiles 2.1 failed: it ended without any answer")
@@ -85,7 +91,9 @@ def test_the_server_tells_versions_limits_and_its_age(monkeypatch):
     monkeypatch.setattr(sketchmatch, "__version__", "4.5.6")
     monkeypatch.setattr(responses, "API_VERSION", 3)
     engine = Engine(REGISTRY, limits=SourceLimits(max_objects=250))
-    written = responses.server_info(Setup(engine, RequestLimits(1_048_576, 12, 90.5)), 75.5)
+    written = responses.server_info(
+        Setup(engine, RequestLimits(1_048_576, 12, 90.5, 40, 7.5)), 75.5
+    )
     assert as_json(written) == as_written("GetServerInfoResponse")
 
 

@@ -90,7 +90,7 @@ def serving(
     sources: SourceLimits = SourceLimits(),  # noqa: B008
     **limits: float,
 ) -> Iterator[Host]:
-    """Run a server that offers the built-in algorithms and ``plugins``, in its own process."""
+    """Run a server that offers the built-in algorithms and ``plugins``, without workers."""
     setup = Setup(
         Engine(registry_with(*plugins), defaults, sources),
         RequestLimits(**{**_LONGEST, **limits}),
@@ -101,9 +101,11 @@ def serving(
 
 
 @contextmanager
-def hosting(setup: Setup, warm: bool = True, grace: float = 0.0) -> Iterator[Host]:
+def hosting(
+    setup: Setup, warm: bool = True, grace: float = 0.0, workers: int = 0
+) -> Iterator[Host]:
     """Run a server with a setup."""
-    host = Host(setup, ServerSettings("127.0.0.1:0", grace))
+    host = Host(setup, ServerSettings("127.0.0.1:0", grace, workers))
     try:
         host.wait_until_listening()
         if warm:

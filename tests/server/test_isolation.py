@@ -6,17 +6,24 @@ import re
 import statistics
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
-from sketchmatch.app import children
-from sketchmatch.app.setup import Isolation, Setup
+from sketchmatch.app import workers
+from sketchmatch.app.setup import Isolation, RequestLimits, Setup
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import discover
-from sketchmatch_client import Client, InvalidRequestError, ServerFailedError
+from sketchmatch_client import (
+    CallCancelledError,
+    Client,
+    InvalidRequestError,
+    ServerFailedError,
+)
 from sketchmatch_proto.v1.catalog_service_pb2 import PluginState
 from sketchmatch_proto.v1.match_pb2 import Outcome
+from tests.pace import wait_until
 from tests.processes import assert_all_end, children_of, server, sketchmatch
 from tests.server.harness import hosting, scene
 from tests.server.misbehaving import BROKEN, UNSTOPPABLE
@@ -105,7 +112,7 @@ def test_its_time_budget_ends_it_with_an_answer(client):
 
 
 def test_its_time_budget_begins_when_it_has_compiled_what_it_needs(client, monkeypatch):
-    monkeypatch.setattr(children, "_OVERTIME", 0.2)
+    monkeypatch.setattr(workers, "_OVERTIME", 0.2)
     slow = {"searcher": "compiling", "params": {"searcher": ENDLESS["guessing"]}}
     found = client.match(scene(4), scene(4), **slow, judge="confidence", time_budget=0.5)
     assert Outcome.Name(found.result.outcome) == "OUTCOME_TIME_BUDGET"
@@ -234,6 +241,37 @@ def test_a_search_that_ignores_its_time_budget_is_stopped(host):
         pytest.raises(ServerFailedError, match=words),
     ):
         connected.match(scene(4), scene(4), searcher="sleepingsearcher", time_budget=0.5)
+
+
+def test_stuck_requests_of_strangers_leave_places_to_all_others(host):
+    """Half of four places are theirs: six of eight requests wait for one."""
+    del host
+    crowded = Setup(
+        Engine(discover()), RequestLimits(max_concurrent_matches=4), Isolation(patience=60.0)
+    )
+    with hosting(crowded, workers=2) as other, Client(other.address) as connected:
+        stuck = [
+            connected.events(scene(4), scene(4), searcher="sleepingsearcher") for _ in range(8)
+        ]
+        told = []
+
+        def ask(events):
+            with suppress(CallCancelledError):
+                told.extend(event.WhichOneof("event") for event in events)
+
+        asking = [threading.Thread(target=ask, args=(events,)) for events in stuck]
+        for each in asking:
+            each.start()
+        wait_until(lambda: told.count("accepted") == 2, "they do not begin")
+        for _ in range(10):
+            found = connected.match(scene(4), scene(4), timeout=60)
+            assert found.object_map == {k: k for k in range(4)}
+        assert told.count("accepted") == 2
+        for events in stuck:
+            events.cancel()
+        for each in asking:
+            each.join(30)
+        wait_until(lambda: connected.match(scene(4), scene(4), searcher="guessing"), "")
 
 
 @pytest.mark.slow

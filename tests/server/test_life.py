@@ -16,6 +16,7 @@ from sketchmatch.server import serve
 from sketchmatch_client import Client, ServerUnavailableError
 from sketchmatch_client.errors import CallCancelledError
 from sketchmatch_proto.v1 import catalog_service_pb2
+from sketchmatch_proto.v1.match_pb2 import OUTCOME_SERVER_STOPPING
 from tests.pace import wait_until, within
 from tests.processes import server
 from tests.processes import sketchmatch as run
@@ -155,18 +156,36 @@ def test_sigterm_lets_a_running_match_end_within_the_grace():
             assert running.end() == 0
 
 
+@pytest.mark.parametrize("workers", ["2", "0"])
+def test_sigterm_ends_matches_with_their_best_so_far_before_the_grace_ends(workers):
+    said = ("--grace", "2", "--workers", workers)
+    with server(*said) as running, Client(running.address) as client:
+        searches = [client.events(scene(20), scene(20, 1), **ENDLESS) for _ in range(2)]
+        for events in searches:
+            while not next(events).progress.HasField("confidence"):
+                pass
+        with within(5.0) as watch:
+            running.process.send_signal(signal.SIGTERM)
+            for events in searches:
+                result = list(events)[-1].result
+                assert result.outcome == OUTCOME_SERVER_STOPPING
+                assert result.object_matches
+            assert running.end() == 0
+        assert watch.seconds > 0.9
+    assert not any("Traceback" in line for line in running.said)
+
+
 @pytest.mark.slow
-def test_sigterm_ends_matches_that_outlast_the_grace():
-    with server("--grace", "0.5") as running, Client(running.address) as client:
+def test_sigterm_with_no_grace_at_all_ends_matches_at_once():
+    with server("--grace", "0") as running, Client(running.address) as client:
         events = client.events(scene(20), scene(20, 1), **ENDLESS)
         while not next(events).progress.HasField("confidence"):
             pass
-        with within(3.0) as watch:
+        with within(3.0):
             running.process.send_signal(signal.SIGTERM)
             with pytest.raises((ServerUnavailableError, CallCancelledError)):
                 list(events)
             assert running.end() == 0
-        assert watch.seconds > 0.4
     assert not any("Traceback" in line for line in running.said)
 
 

@@ -121,7 +121,8 @@ def test_cancel_stops_the_description_of_many_objects_within_100_ms(recorded):
 
 
 def test_a_search_that_is_stopped_frees_its_place_and_leaves_no_error_in_the_log(caplog):
-    with serving(max_concurrent_matches=1) as host, Client(host.address) as client:
+    full = {"max_concurrent_matches": 1, "max_waiting": 0}
+    with serving(**full) as host, Client(host.address) as client:
 
         def start_and_leave():
             events = client.events(scene(30), scene(30, 1), **ENDLESS)

@@ -30,6 +30,9 @@ class Outcome(StrEnum):
     ITERATION_LIMIT = "ITERATION_LIMIT"
     """It has done as much as its parameters allow."""
 
+    SERVER_STOPPING = "SERVER_STOPPING"
+    """The host stopped it because it is about to stop itself; a searcher does not return it."""
+
 
 @dataclass(frozen=True)
 class MatchProblem:

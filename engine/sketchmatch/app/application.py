@@ -2,76 +2,141 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
-import threading
+import math
 import time
 import uuid
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from typing import Protocol
 
 from google.protobuf.message import Message
 
 from sketchmatch.app import responses
-from sketchmatch.app.children import Children
-from sketchmatch.app.jobs import Job, algorithms, answers
+from sketchmatch.app.frames import Flag
+from sketchmatch.app.jobs import Job, answers
+from sketchmatch.app.orders import Order
 from sketchmatch.app.setup import RequestLimits, Setup
 from sketchmatch.app.tasks import Task
-from sketchmatch.errors import InvalidInputError, Reason, TooBusyError
-from sketchmatch.pipeline.warmup import warm_up, warm_up_others
-from sketchmatch.registry import Registered, Registry
+from sketchmatch.app.waiting import Caller, FairQueue
+from sketchmatch.app.worker import flags
+from sketchmatch.app.workers import Workers
+from sketchmatch.errors import (
+    InvalidInputError,
+    Reason,
+    ServerStoppingError,
+    TooBusyError,
+    WorkerLostError,
+)
+from sketchmatch.pipeline.clock import Clock
+from sketchmatch.pipeline.warmup import COMPILING, announcing_compilation, warm_up, warm_up_others
+from sketchmatch.registry import Registry
 from sketchmatch_proto.v1.catalog_service_pb2 import (
     GetServerInfoResponse,
     ListAlgorithmsResponse,
 )
-from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
 __all__ = ["Application", "Place"]
 
 _log = logging.getLogger(__name__)
+_LOOK = 0.05
+_LONGEST_RETRY = 60
+_FIRST_GUESS = 1.0
+_Ended = Callable[[Task, BaseException | None], None]
 
 
 class Place(Protocol):
-    """Somewhere that jobs can be done."""
+    """Somewhere that tasks can be done; it tells of their ends in the event loop."""
 
-    def answers(
-        self, job: Job, setup: Setup, stop: threading.Event
-    ) -> Generator[Message, None, None]:
-        """Do a job, yielding its responses.
+    def begin(self, task: Task) -> None:
+        """Do a task."""
 
-        Closing the generator ends it; so may ``stop``, set in another thread, while it waits.
-        """
+    def stop(self, task: Task) -> None:
+        """See that a task ends soon, whatever comes of it."""
+
+    def curtail(self, seconds: float) -> None:
+        """Leave the tasks so much time to come to an end with what they have."""
+
+    async def close(self) -> None:
+        """End the tasks, and wait for that."""
 
 
 class Here:
-    """Does jobs in this process, in the thread that asks for them."""
+    """Does tasks in threads of this process."""
 
-    def answers(
-        self, job: Job, setup: Setup, stop: threading.Event
-    ) -> Generator[Message, None, None]:
-        """Do a job, yielding its responses; it waits for nothing."""
-        del stop
-        return answers(job, setup)
+    def __init__(self, ended: _Ended) -> None:
+        self._ended = ended
+        self._threads = ThreadPoolExecutor(1024, "sketchmatch-worker")  # no more than are needed
+        self._clocks: dict[Task, Clock | None] = {}
+
+    def begin(self, task: Task) -> None:
+        """Do a task."""
+        self._clocks[task] = None
+        self._threads.submit(self._run, task, asyncio.get_running_loop())
+
+    def stop(self, task: Task) -> None:
+        """See that a task ends at its next step."""
+        task.stopping.set()
+
+    def curtail(self, seconds: float) -> None:
+        """Leave the tasks so much time to come to an end with what they have."""
+        for clock in tuple(self._clocks.values()):
+            if clock is not None:
+                clock.curtail(seconds)
+
+    async def close(self) -> None:
+        """End the tasks, and wait for that."""
+        for task in tuple(self._clocks):
+            self.stop(task)
+        await asyncio.to_thread(self._threads.shutdown)
+
+    def _run(self, task: Task, loop: asyncio.AbstractEventLoop) -> None:
+        error: BaseException | None = None
+
+        def begun(clock: Clock) -> None:
+            self._clocks[task] = clock
+
+        try:
+            with closing(answers(task.order.job(), task.setup, begun)) as work:
+                for response in work:
+                    if task.stopping.is_set():
+                        break
+                    news = bool(flags(response) & Flag.NEWS)
+                    task.log.add(response.SerializeToString(), news=news)
+        except BaseException as raised:
+            error = raised
+        del self._clocks[task]
+        loop.call_soon_threadsafe(self._ended, task, error)
 
 
 class Application:
     """Answers requests of the contract.
 
+    All but :meth:`answers` and what tells of it belongs into one event loop.
+
     Parameters
     ----------
     setup
         What they are answered with.
+    workers
+        How many worker processes wait at least; without any, requests are answered in threads of
+        this process, but for strangers' plugins.
     """
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: Setup, workers: int = 0) -> None:
         self._setup = setup
+        self._kept = workers
         self._began = time.monotonic()
-        self._here, self._children = Here(), Children()
-        self._lock = threading.Lock()
-        self._running = 0
-        self._threads = _threads(setup.limits)
-        self._tasks: set[Task[Message]] = set()
+        self._workers = Workers(workers, self._ended, self._dispatch)
+        self._here = Here(self._ended)
+        self._running: set[Task] = set()
+        self._waiting = FairQueue[Task]()
+        self._typical = _FIRST_GUESS
+        self._stopping = False
+        self._looking: asyncio.Task[None] | None = None
+        self._catalogue: tuple[Setup, ListAlgorithmsResponse] | None = None
 
     @property
     def setup(self) -> Setup:
@@ -80,16 +145,14 @@ class Application:
 
     def change(self, setup: Setup) -> None:
         """Answer with another setup from now on, and admit by its limits."""
-        most = setup.limits.max_concurrent_matches
-        if most != self._setup.limits.max_concurrent_matches:
-            self._threads.shutdown(wait=False)
-            self._threads = _threads(setup.limits)
         self._setup = setup
+        self._workers.change(setup)
+        self._dispatch()
 
     @property
     def idle(self) -> bool:
         """Whether no task is under way."""
-        return not self._tasks
+        return not (self._running or self._waiting)
 
     def answers(self, request: Message) -> Generator[Message, None, None]:
         """Do a request in this thread, yielding its responses; no admission, no limit of size.
@@ -99,103 +162,196 @@ class Application:
         SketchmatchError
             As the engine does, with paths of the request.
         """
-        job, setup = Job(uuid.uuid4().hex, request), self._setup
-        work = self._place(job, setup).answers(job, setup, threading.Event())
-        yield from work
+        return answers(Job(uuid.uuid4().hex, request), self._setup)
 
     @contextmanager
-    def running(self, request: Message) -> Iterator[Task[Message]]:
-        """Admit a request and do it in a thread, until the end of the block.
+    def running(self, kind: str, data: bytes, caller: Caller = Caller()) -> Iterator[Task]:  # noqa: B008
+        """Admit a request and do it, in its turn, until the end of the block.
+
+        Parameters
+        ----------
+        kind, data
+            Name of the message, and the message.
+        caller
+            Who asks.
 
         Raises
         ------
         InvalidInputError
             If it is too large.
         TooBusyError
-            If there is no room for it.
+            If there is no room for it. One that waited in vain is told in the task's log.
+        ServerStoppingError
+            If nothing is begun any more.
         """
         setup = self._setup
-        _check_size(request, setup.limits)
-        task = Task[Message](uuid.uuid4().hex)
-        self._take_place(setup.limits)
-        self._tasks.add(task)
+        if self._stopping:
+            raise ServerStoppingError("the server is about to stop")
+        _check_size(len(data), setup.limits)
+        task = Task(Order(uuid.uuid4().hex, kind, data), setup, caller)
+        self._admit(task)
         try:
-            self._threads.submit(self._run, task, Job(task.id, request), setup)
             yield task
         finally:
-            self._tasks.discard(task)
-            task.stop()
+            if self._waiting.remove(task, caller):
+                task.log.end()
+            elif task in self._running:
+                self._place(task).stop(task)
 
     def algorithms(self) -> ListAlgorithmsResponse:
         """Return what there is to choose from."""
-        return responses.catalogue(self._setup.engine.registry, self._setup.engine.defaults)
+        setup = self._setup
+        if self._catalogue is None or self._catalogue[0] is not setup:
+            listed = responses.catalogue(setup.engine.registry, setup.engine.defaults)
+            self._catalogue = setup, listed
+        return self._catalogue[1]
 
     def info(self) -> GetServerInfoResponse:
         """Return versions and limits."""
         return responses.server_info(self._setup, time.monotonic() - self._began)
 
-    def warm_up(self, unwanted: Callable[[], bool]) -> None:
-        """Compile what the default pipeline needs in this process."""
-        setup = self._setup
-        warm_up(_trusted(setup), setup.engine.defaults, unwanted)
+    async def start(
+        self, say: Callable[[str], None], unwanted: Callable[[], bool] = lambda: False
+    ) -> None:
+        """Get ready: compile or load what the default pipeline needs.
 
-    def warm_up_others(self, unwanted: Callable[[], bool], stop: threading.Event) -> None:
-        """Compile the rest, strangers' algorithms in processes of their own."""
+        Parameters
+        ----------
+        say
+            Called, once, if kernels have to be compiled, which takes long.
+        unwanted
+            Whether nobody waits any more.
+        """
+        setup, silent = self._setup, True
+
+        def compiling() -> None:
+            nonlocal silent
+            if silent:
+                silent = False
+                say(COMPILING)
+
+        self._looking = asyncio.create_task(self._look())
+        if self._kept:
+            self._workers.compiling = compiling
+            await self._workers.start(setup)
+            return
+        with announcing_compilation(say):
+            await asyncio.to_thread(warm_up, _trusted(setup), setup.engine.defaults, unwanted)
+
+    async def warm_up_others(self, unwanted: Callable[[], bool]) -> None:
+        """Compile the rest, strangers' algorithms in workers of their own."""
         setup = self._setup
-        warm_up_others(_trusted(setup), setup.engine.defaults, unwanted)
-        strangers = _strangers(setup)
-        for distribution in sorted({item.distribution for item in strangers}):
-            if unwanted():
+        if not self._kept:
+            await asyncio.to_thread(
+                warm_up_others, _trusted(setup), setup.engine.defaults, unwanted
+            )
+        elif not await asyncio.to_thread(unwanted):
+            with suppress(WorkerLostError):
+                await self._workers.warm_up((), setup)
+        for distribution in sorted({item.distribution for item in setup.strangers}):
+            if await asyncio.to_thread(unwanted):
                 return
-            own = tuple(item for item in strangers if item.distribution == distribution)
+            own = tuple(item for item in setup.strangers if item.distribution == distribution)
             try:
-                self._children.warm_up(own, setup, stop)
+                await self._workers.warm_up(own, setup)
             except Exception:  # it will fail again, and be blamed, when a request asks for it
                 _log.exception("the plugins of %s failed to warm up", distribution)
 
-    def close(self) -> None:
-        """Stop all tasks that are under way and wait for their threads and processes."""
-        for task in tuple(self._tasks):
-            task.stop()
-        self._threads.shutdown()
-        self._children.close()
+    async def drain(self, seconds: float) -> None:
+        """Begin nothing more; what runs ends by itself, or in so many seconds with what it has."""
+        self._stopping = True
+        for task in tuple(self._waiting):
+            self._waiting.remove(task, task.caller)
+            task.log.end(ServerStoppingError("the server is about to stop"))
+        deadline = time.monotonic() + seconds
+        while self._running and time.monotonic() < deadline:
+            await asyncio.sleep(_LOOK)
+        for place in (self._here, self._workers):
+            place.curtail(0.0)
 
-    def _run(self, task: Task[Message], job: Job, setup: Setup) -> None:
-        """Do a job, and tell of it in its task's log; its place is free when this ends."""
-        error: BaseException | None = None
-        try:
-            work = self._place(job, setup).answers(job, setup, task.stopping)
-            with closing(work) as told:
-                for response in told:
-                    if task.stopping.is_set():
-                        break
-                    task.log.add(response, news=_is_progress(response))
-        except BaseException as raised:
-            error = raised
-        finally:
-            with self._lock:
-                self._running -= 1
-            task.log.end(error)
+    async def close(self) -> None:
+        """End all tasks that are under way, and wait for their threads and processes."""
+        self._stopping = True
+        for task in tuple(self._running):
+            self._place(task).stop(task)
+        await self._here.close()
+        await self._workers.close()
+        if self._looking is not None:
+            self._looking.cancel()
 
-    def _place(self, job: Job, setup: Setup) -> Place:
-        """Return where a job is to be done."""
-        if setup.isolation.strangers(algorithms(job, setup)):
-            return self._children
-        return self._here
+    def _admit(self, task: Task) -> None:
+        """Let a task begin or wait; if there is no room, it or the greediest one goes away."""
+        limits = self._setup.limits
+        self._waiting.add(task, task.caller)
+        self._dispatch()
+        if len(self._waiting) <= limits.max_waiting:
+            return
+        crowded = self._waiting.crowd_out(task.caller)
+        assert crowded is not None
+        there_are = f"the server runs {len(self._running)} requests already"
+        waiting = f" and {limits.max_waiting} wait" if limits.max_waiting else ""
+        error = TooBusyError(f"{there_are}{waiting}, which is its limit", self._retry_seconds())
+        if crowded[0] is task:
+            raise error
+        crowded[0].log.end(error)
 
-    def _take_place(self, limits: RequestLimits) -> None:
-        with self._lock:
-            if self._running >= limits.max_concurrent_matches:
-                raise TooBusyError(self._running)
-            self._running += 1
+    def _dispatch(self) -> None:
+        """Begin what waits, as far as there are places."""
+        while self._has_room():
+            task = self._waiting.take(self._fits)
+            if task is None:
+                return
+            self._running.add(task)
+            self._place(task).begin(task)
+
+    def _has_room(self) -> bool:
+        """Whether there is a place: one a worker, and more beside what gives way to it."""
+        short = sum(1 for task in self._running if not (task.long or task.strangers))
+        all_places = len(self._running) < self._setup.limits.max_concurrent_matches
+        return all_places and (not self._kept or short < self._kept)
+
+    def _fits(self, task: Task) -> bool:
+        """Whether a task may have a place: strangers never have all of them."""
+        if not task.strangers:
+            return True
+        theirs = sum(1 for other in self._running if other.strangers)
+        return theirs < self._setup.limits.strangers_places
+
+    def _place(self, task: Task) -> Place:
+        return self._workers if self._kept or task.strangers else self._here
+
+    def _ended(self, task: Task, error: BaseException | None) -> None:
+        """Tell of the end of a task in its log, and give its place to the next."""
+        if isinstance(error, WorkerLostError) and not (task.log.begun or task.again):
+            task.again = True
+            self._workers.begin(task)
+            return
+        self._running.discard(task)
+        taken = time.monotonic() - task.asked
+        self._typical += 0.1 * (min(taken, _LONGEST_RETRY) - self._typical)
+        task.log.end(error)
+        self._dispatch()
+
+    def _retry_seconds(self) -> int:
+        """Return when there is likely to be room: when half of what waits has had its turn."""
+        places = self._setup.limits.max_concurrent_matches
+        turns = math.ceil((1 + len(self._waiting) / 2) / places)
+        return max(1, min(_LONGEST_RETRY, math.ceil(self._typical * turns)))
+
+    async def _look(self) -> None:
+        """See to what nobody else would notice: silence, and too long a wait."""
+        while True:
+            await asyncio.sleep(_LOOK)
+            self._workers.look()
+            now, longest = time.monotonic(), self._setup.limits.max_wait
+            for task in [task for task in self._waiting if now - task.asked > longest]:
+                self._waiting.remove(task, task.caller)
+                problem = f"the request waited {longest:g} s for its turn, which is the limit"
+                task.log.end(TooBusyError(problem, self._retry_seconds()))
 
 
-def _threads(limits: RequestLimits) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(limits.max_concurrent_matches, "sketchmatch-worker")
-
-
-def _check_size(request: Message, limits: RequestLimits) -> None:
-    size, limit = request.ByteSize(), limits.max_request_bytes
+def _check_size(size: int, limits: RequestLimits) -> None:
+    limit = limits.max_request_bytes
     if size > limit:
         raise InvalidInputError(
             Reason.MESSAGE_TOO_LARGE,
@@ -205,14 +361,6 @@ def _check_size(request: Message, limits: RequestLimits) -> None:
         )
 
 
-def _strangers(setup: Setup) -> tuple[Registered, ...]:
-    return setup.isolation.strangers(setup.engine.registry.algorithms)
-
-
 def _trusted(setup: Setup) -> Registry:
     """Return the algorithms that run in this process."""
-    return setup.engine.registry.without(*(item.distribution for item in _strangers(setup)))
-
-
-def _is_progress(response: Message) -> bool:
-    return isinstance(response, MatchResponse) and response.WhichOneof("event") == "progress"
+    return setup.engine.registry.without(*(item.distribution for item in setup.strangers))

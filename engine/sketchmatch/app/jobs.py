@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import closing
 from dataclasses import dataclass
 
@@ -10,7 +10,8 @@ from google.protobuf.message import Message
 
 from sketchmatch.app import requests, responses
 from sketchmatch.app.setup import Setup
-from sketchmatch.errors import InvalidInputError
+from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, ServerStoppingError
+from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.selection import Choice, chosen_algorithms, stage_of
 from sketchmatch.registry import Registered, RegisteredReader
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
@@ -35,8 +36,17 @@ class Job:
     request: Message
 
 
-def answers(job: Job, setup: Setup) -> Generator[Message, None, None]:
+def answers(
+    job: Job, setup: Setup, begun: Callable[[Clock], None] = lambda _: None
+) -> Generator[Message, None, None]:
     """Do a job, yielding its responses; a request is decoded and resolved here alone.
+
+    Parameters
+    ----------
+    job, setup
+        What is to be done, and with what.
+    begun
+        Called with the clock of a match, for whoever may have to curtail it.
 
     Raises
     ------
@@ -45,7 +55,7 @@ def answers(job: Job, setup: Setup) -> Generator[Message, None, None]:
     """
     match job.request:
         case MatchRequest():
-            return _match(job.id, job.request, setup)
+            return _match(job.id, job.request, setup, begun)
         case SegmentRequest():
             return _segment(job.request, setup)
     raise TypeError(f"a {type(job.request).__name__} is no request for work")
@@ -97,16 +107,24 @@ def time_budget(job: Job, setup: Setup) -> float | None:
     return None
 
 
-def _match(name: str, request: MatchRequest, setup: Setup) -> Generator[Message, None, None]:
+def _match(
+    name: str, request: MatchRequest, setup: Setup, begun: Callable[[Clock], None]
+) -> Generator[Message, None, None]:
     engine = setup.engine
     with engine.limited():
         value = requests.match_request(
             request, setup.limits.max_time_budget, engine.registry.readers
         )
-    writer = responses.ResponseWriter(value)
-    with requests.paths_of(request), closing(engine.match(value, name)) as events:
-        for event in events:
-            yield writer.response(event)
+    writer, clock = responses.ResponseWriter(value), Clock(value.time_budget)
+    begun(clock)
+    with requests.paths_of(request), closing(engine.match(value, name, clock)) as events:
+        try:
+            for event in events:
+                yield writer.response(event)
+        except AnswerUnavailableError:
+            if clock.curtailed:
+                raise ServerStoppingError("the server stopped before any answer") from None
+            raise
 
 
 def _segment(request: SegmentRequest, setup: Setup) -> Generator[Message, None, None]:

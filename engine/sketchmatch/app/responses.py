@@ -232,6 +232,8 @@ def server_info(setup: Setup, uptime: float) -> catalog_service_pb2.GetServerInf
         max_objects=setup.engine.limits.max_objects,
         max_concurrent_matches=given.max_concurrent_matches,
     )
+    limits.max_waiting = given.max_waiting
+    limits.max_wait.FromMilliseconds(round(1e3 * given.max_wait))
     if given.max_time_budget is not None:
         limits.max_time_budget.FromMilliseconds(round(1e3 * given.max_time_budget))
     return catalog_service_pb2.GetServerInfoResponse(

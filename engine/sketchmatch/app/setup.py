@@ -25,14 +25,25 @@ class RequestLimits:
     max_request_bytes
         Size of one request. A little more passes the transport, so that the refusal can be clear.
     max_concurrent_matches
-        Matches and segmentations that run at the same time.
+        Matches and segmentations that run at the same time, each in a place of its own.
     max_time_budget
         Seconds that one match may take, or None for no limit.
+    max_waiting
+        Requests that wait for a place.
+    max_wait
+        Seconds that one may wait.
     """
 
     max_request_bytes: int = 64 * 1024 * 1024
     max_concurrent_matches: int = 4 * (os.cpu_count() or 1)
     max_time_budget: float | None = None
+    max_waiting: int = 100
+    max_wait: float = 10.0
+
+    @property
+    def strangers_places(self) -> int:
+        """Places that requests may take which ask for strangers' plugins: half of them."""
+        return max(1, self.max_concurrent_matches // 2)
 
     @property
     def transport_bytes(self) -> int:
@@ -76,8 +87,23 @@ class Setup:
         What requests may ask for.
     isolation
         Which plugins run in processes of their own.
+    strangers, trusted
+        The algorithms and readers that do, and those that do not.
     """
 
     engine: Engine
     limits: RequestLimits = field(default_factory=RequestLimits)
     isolation: Isolation = field(default_factory=Isolation)
+    strangers: tuple[Registered | RegisteredReader, ...] = field(init=False, repr=False)
+    trusted: tuple[Registered | RegisteredReader, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        registry = self.engine.registry
+        offered: tuple[Registered | RegisteredReader, ...] = (
+            *registry.algorithms,
+            *registry.readers,
+        )
+        strangers = self.isolation.strangers(offered)
+        trusted = tuple(item for item in offered if item not in strangers)
+        object.__setattr__(self, "strangers", strangers)
+        object.__setattr__(self, "trusted", trusted)

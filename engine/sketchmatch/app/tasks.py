@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Generic, TypeVar
+
+from sketchmatch.app.jobs import algorithms
+from sketchmatch.app.orders import Order
+from sketchmatch.app.setup import Setup
+from sketchmatch.app.waiting import Caller
 
 __all__ = ["Log", "Task"]
 
@@ -52,6 +58,11 @@ class Log(Generic[_Item]):
         return min(waiting, key=lambda each: each[0], default=None)
 
     @property
+    def begun(self) -> bool:
+        """Whether anything has been told."""
+        return self._count > 0
+
+    @property
     def ended(self) -> bool:
         """Whether there will be no more."""
         return self._ended
@@ -79,24 +90,48 @@ class Log(Generic[_Item]):
             reader()
 
 
-class Task(Generic[_Item]):
-    """One request that was admitted.
+class Task:
+    """One request that was admitted, or waits to be.
+
+    Parameters
+    ----------
+    order
+        The request.
+    setup
+        What it is answered with.
+    caller
+        Who asks.
 
     Attributes
     ----------
-    id
-        A name that no other task of the application has.
+    strangers
+        The algorithms and readers it asks for that run in a process of their own.
     log
-        Its responses.
+        Its responses, as bytes.
     stopping
         Set once nobody wants more of them.
+    asked
+        When it came.
+    again
+        Whether it was begun before, by a worker that was lost.
+    long
+        Whether it has turned out to take long, so that it gives way to others.
     """
 
-    def __init__(self, name: str) -> None:
-        self.id = name
-        self.log = Log[_Item]()
+    def __init__(self, order: Order, setup: Setup, caller: Caller = Caller()) -> None:  # noqa: B008
+        self.order = order
+        self.setup = setup
+        self.caller = caller
+        self.strangers = (
+            setup.isolation.strangers(algorithms(order.outline(), setup)) if setup.strangers else ()
+        )
+        self.log = Log[bytes]()
         self.stopping = threading.Event()
+        self.asked = time.monotonic()
+        self.again = False
+        self.long = False
 
-    def stop(self) -> None:
-        """Ask the task to end; it does at its next step."""
-        self.stopping.set()
+    @property
+    def id(self) -> str:
+        """A name that no other task of the application has."""
+        return self.order.id

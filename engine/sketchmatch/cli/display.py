@@ -62,6 +62,7 @@ _OUTCOMES = {
     match_pb2.OUTCOME_OPTIMAL: "proved optimal",
     match_pb2.OUTCOME_TIME_BUDGET: "stopped by the time budget",
     match_pb2.OUTCOME_ITERATION_LIMIT: "stopped by the iteration limit",
+    match_pb2.OUTCOME_SERVER_STOPPING: "stopped because the server was stopping",
 }
 
 

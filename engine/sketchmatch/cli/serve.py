@@ -38,6 +38,20 @@ def serve(
         int | None,
         typer.Option(help="Requests at the same time; 4 a processor by default."),
     ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            help="Processes that wait for requests at least; 0 to answer in the server's own "
+            "process, slower and with less memory; one a processor by default."
+        ),
+    ] = None,
+    max_waiting: Annotated[
+        int | None, typer.Option(help="Requests that wait for their turn; 100 by default.")
+    ] = None,
+    max_wait: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Longest wait for a turn; 10 by default."),
+    ] = None,
     max_time_budget: Annotated[
         float | None, typer.Option(metavar="SECONDS", help="Longest match; no limit by default.")
     ] = None,
@@ -74,15 +88,15 @@ def serve(
     """Serve the gRPC API until SIGTERM or Ctrl-C.
 
     Where no option says it, the configuration does. SIGHUP reads the configuration again, but for
-    address and grace; requests under way keep the one that they began with. Health is NOT_SERVING
-    until the kernels are compiled or loaded. There is no encryption and no authentication yet:
-    listen on addresses that only trusted programs reach.
+    address, grace and workers; requests under way keep the one that they began with. Health is
+    NOT_SERVING until the kernels are compiled or loaded. There is no encryption and no
+    authentication yet: listen on addresses that only trusted programs reach.
     """
     import asyncio
+    import os
 
+    from sketchmatch.app.forking import prepare
     from sketchmatch.config import load
-    from sketchmatch.server.serve import ServerSettings
-    from sketchmatch.server.serve import serve as serve_forever
 
     flags = {
         "profile": profile,
@@ -91,6 +105,9 @@ def serve(
         "server.grace_seconds": grace,
         "server.max_request_mib": max_request_mib,
         "server.max_matches": max_matches,
+        "server.workers": workers,
+        "server.max_waiting": max_waiting,
+        "server.max_wait_seconds": max_wait,
         "server.max_time_budget_seconds": max_time_budget,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
@@ -99,7 +116,13 @@ def serve(
         "limits.max_objects": max_objects,
     }
     server = load(config, flags).settings.server
-    settings = ServerSettings(server.address, server.grace_seconds)
+    kept = (os.cpu_count() or 1) if server.workers is None else server.workers
+    if kept:
+        prepare()
+    from sketchmatch.server.serve import ServerSettings
+    from sketchmatch.server.serve import serve as serve_forever
+
+    settings = ServerSettings(server.address, server.grace_seconds, kept)
     asyncio.run(serve_forever(lambda: _setup(load(config, flags)), settings, say))
 
 
@@ -120,6 +143,8 @@ def _setup(configuration: Configuration) -> Setup:
         RequestLimits(
             max_request_bytes=server.max_request_mib * _MIB,
             max_concurrent_matches=server.max_matches or RequestLimits.max_concurrent_matches,
+            max_waiting=server.max_waiting,
+            max_wait=server.max_wait_seconds,
             max_time_budget=server.max_time_budget_seconds,
         ),
         Isolation(configuration.trusted, configuration.patience),

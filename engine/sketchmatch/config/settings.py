@@ -141,6 +141,24 @@ class _Server(_Section):
         description="Requests at the same time; when left out, 4 for each processor.",
         examples=[8],
     )
+    workers: int | None = Field(
+        None,
+        ge=0,
+        le=1000,
+        description="Processes that wait for requests at least, more start while more matches run; "
+        "0 to answer in the server's own process, slower and with less memory; when left out, one "
+        "for each processor.",
+        examples=[2],
+    )
+    max_waiting: int = Field(
+        100,
+        ge=0,
+        le=100_000,
+        description="Requests that wait for their turn.",
+    )
+    max_wait_seconds: float = Field(
+        10.0, ge=0, description="How long a request may wait for its turn."
+    )
     max_time_budget_seconds: float | None = Field(
         None,
         ge=0.001,

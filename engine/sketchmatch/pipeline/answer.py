@@ -51,6 +51,8 @@ def answer(
     relations = nearest_relations(comparison.sketch, comparison.sketch_descriptor, matched.tolist())
     rotation, dilation = global_rotation(fmap, table), global_dilation(fmap, table)
     outcome, bound = _proved(found, judged)
+    if outcome is Outcome.TIME_BUDGET and clock.curtailed:
+        outcome = Outcome.SERVER_STOPPING
     sketch, map_ = segmentations
     sides = len(sketch.scene), len(map_.scene)
     says = said(judged.judgement, *sides, swapped, goal.shown)

@@ -26,6 +26,8 @@ class Clock:
     ----------
     seconds
         What the stages took so far.
+    curtailed
+        Whether somebody had less time than the budget.
     """
 
     def __init__(self, budget: float | None = None) -> None:
@@ -34,6 +36,7 @@ class Clock:
         self._started = time.monotonic()
         self._stopped = 0.0
         self._told = -math.inf
+        self.curtailed = False
 
     def elapsed(self) -> float:
         """Return the seconds since the beginning."""
@@ -46,6 +49,11 @@ class Clock:
     def left(self) -> float:
         """Return the seconds that are left; infinite without a budget, and never below 0."""
         return max(0.0, self._budget - self.spent())
+
+    def curtail(self, seconds: float) -> None:
+        """Leave no more than so many seconds from now on; any thread may do so."""
+        if (end := self.spent() + seconds) < self._budget:
+            self._budget, self.curtailed = end, True
 
     def check(self, phase: str) -> None:
         """Go on in a phase that has no answer to give.

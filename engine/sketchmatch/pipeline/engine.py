@@ -60,9 +60,11 @@ class Engine:
         with limited_to(self.limits):
             yield
 
-    def match(self, request: MatchRequest, match_id: str = "") -> Generator[MatchEvent, None, None]:
+    def match(
+        self, request: MatchRequest, match_id: str = "", clock: Clock | None = None
+    ) -> Generator[MatchEvent, None, None]:
         """Match, event by event, as :func:`sketchmatch.pipeline.match.run_match` does."""
-        return run_match(request, self.registry, self.defaults, self.limits, match_id)
+        return run_match(request, self.registry, self.defaults, self.limits, match_id, clock)
 
     def resolve(
         self,

@@ -52,6 +52,7 @@ def run_match(
     defaults: Defaults = UNCONFIGURED,
     limits: SourceLimits | None = None,
     match_id: str = "",
+    clock: Clock | None = None,
 ) -> Generator[MatchEvent, None, None]:
     """Match, yielding Accepted, Segmented, some Progress (at most 20 a second) and Finished.
 
@@ -69,6 +70,9 @@ def run_match(
         How large sources may be; None for those in force.
     match_id
         A name that is unique to the match; one is made where it is empty.
+    clock
+        With the request's time budget, for whoever may have to curtail it; one is made where there
+        is none.
 
     Raises
     ------
@@ -79,7 +83,7 @@ def run_match(
     PluginError
         If a plugin breaks its contract.
     """
-    clock = Clock(request.time_budget)
+    clock = clock or Clock(request.time_budget)
     plan = _planned(request, registry, defaults)
     name = match_id or uuid.uuid4().hex
     return _events(request, plan, registry, limits or source_limits(), name, clock)

@@ -123,7 +123,7 @@ def search(
             obeying = yield from retold(work, _still(so_far))
         share = trial.share * clock.left()
         problem = _problem(comparison, part, obeying, goal, share)
-        run = _searched(part, problem, obeying, searcher, goal, registry, so_far)
+        run = _searched(part, problem, obeying, searcher, goal, registry, clock, so_far)
         found, total = yield from run
         if so_far is not None:
             worse = so_far.best if total.best is found else found
@@ -149,6 +149,7 @@ def _searched(
     searcher: Searcher,
     goal: Goal,
     registry: Registry,
+    clock: Clock,
     so_far: Search | None,
 ) -> Generator[Search, None, tuple[PartSearch, Search]]:
     """Run the searcher on a part until it ends, or its time does.
@@ -173,7 +174,7 @@ def _searched(
                     found = replace(found, outcome=Outcome(stop.value or Outcome.CONVERGED))
                     break
             found = PartSearch(part, told) if obeying is None else obeying.read(told, found)
-            if time.monotonic() > until:
+            if time.monotonic() > until or clock.left() <= 0.0:
                 break
             yield _total(so_far, found, goal.price)
     if obeying is not None:

@@ -8,7 +8,6 @@ import socket
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from threading import Event
 from typing import Any
 
 import grpc
@@ -18,22 +17,21 @@ from grpc_reflection.v1alpha import reflection
 from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
-from sketchmatch.pipeline.warmup import announcing_compilation
 from sketchmatch.server.interceptors import ErrorInterceptor
 from sketchmatch.server.services import CatalogService, MatchService, SceneService
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
     match_service_pb2,
-    match_service_pb2_grpc,
     scene_service_pb2,
-    scene_service_pb2_grpc,
 )
 
 __all__ = ["ServerSettings", "serve"]
 
 _QUIET = 1.0
 _LOOK = 0.05
+_COMING_TO_AN_END = 2.0
+"""Seconds of the grace that are left to matches for coming to an end with what they have."""
 
 _SERVICES = (
     match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name,
@@ -52,10 +50,13 @@ class ServerSettings:
         Host and port to listen on; port 0 picks a free one.
     grace
         Seconds that running matches are given when the server is asked to stop.
+    workers
+        Processes that wait for requests at least; 0 to answer in threads of this process.
     """
 
     address: str = "127.0.0.1:50051"
     grace: float = 5.0
+    workers: int = 0
 
 
 async def serve(
@@ -86,7 +87,7 @@ async def serve(
     InvalidInputError
         If the address cannot be listened on.
     """
-    app = Application(load())
+    app = Application(load(), settings.workers)
     server = grpc.aio.server(
         interceptors=[ErrorInterceptor()],
         options=[
@@ -102,29 +103,28 @@ async def serve(
     port = _listen(server, settings.address)
     await checks.set("", health_pb2.HealthCheckResponse.NOT_SERVING)
     await server.start()
-    stopping, ended = stop or asyncio.Event(), Event()
+    stopping = stop or asyncio.Event()
     reloading = _Reloading(load, app, say)
     _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
     say(f"listening on {_found_at(settings.address, port)}")
     for problem in app.setup.engine.registry.problems:
         say(problem)
     try:
-        with announcing_compilation(say):
-            warming = asyncio.to_thread(app.warm_up, stopping.is_set)
-            await _first(asyncio.ensure_future(warming), stopping)
+        await _first(asyncio.ensure_future(app.start(say, stopping.is_set)), stopping)
         if not stopping.is_set():
             for name in ("", *_SERVICES):
                 await checks.set(name, health_pb2.HealthCheckResponse.SERVING)
             say("serving")
-            others = asyncio.to_thread(app.warm_up_others, _unless_quiet(app, stopping), ended)
+            others = app.warm_up_others(_unless_quiet(app, stopping))
             await _first(asyncio.ensure_future(others), stopping)
         await stopping.wait()
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
-        ended.set()
         await checks.enter_graceful_shutdown()
-        await server.stop(settings.grace)
-        await asyncio.to_thread(app.close)
+        ending = asyncio.ensure_future(server.stop(settings.grace))
+        await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
+        await ending
+        await app.close()
     say("stopped")
 
 
@@ -162,8 +162,7 @@ class _Reloading:
 
 
 def _add_services(server: grpc.aio.Server, app: Application) -> health.aio.HealthServicer:
-    match_service_pb2_grpc.add_MatchServiceServicer_to_server(MatchService(app), server)
-    scene_service_pb2_grpc.add_SceneServiceServicer_to_server(SceneService(app), server)
+    server.add_generic_rpc_handlers((MatchService(app).handler(), SceneService(app).handler()))
     catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), server)
     checks = health.aio.HealthServicer()
     health_pb2_grpc.add_HealthServicer_to_server(checks, server)

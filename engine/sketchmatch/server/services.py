@@ -3,62 +3,67 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from typing import Any, TypeVar
 
 import grpc
-from google.protobuf.message import Message
 
 from sketchmatch.app.application import Application
 from sketchmatch.app.tasks import Log
+from sketchmatch.app.waiting import Caller
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
     match_service_pb2,
-    match_service_pb2_grpc,
     scene_service_pb2,
-    scene_service_pb2_grpc,
 )
 
-__all__ = ["CatalogService", "MatchService", "SceneService", "followed"]
+__all__ = ["CatalogService", "MatchService", "SceneService", "caller_of", "followed"]
+
+_MATCH = match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name
+_SCENE = scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name
 
 _Context = grpc.aio.ServicerContext[Any, Any]
 _Item = TypeVar("_Item")
 
 
-class MatchService(match_service_pb2_grpc.MatchServiceServicer):
-    """Matches, streaming the search while it runs."""
+class MatchService:
+    """Matches, streaming the search while it runs; requests and responses pass as they come."""
 
     def __init__(self, app: Application) -> None:
         self._app = app
 
-    async def Match(  # type: ignore[override]  # noqa: N802
-        self, request: match_service_pb2.MatchRequest, context: _Context
-    ) -> None:
+    async def Match(self, request: bytes, context: _Context) -> None:  # noqa: N802
         """Run a match and pass its events on."""
-        with self._app.running(request) as task:
+        with self._app.running("MatchRequest", request, caller_of(context)) as task:
             async with aclosing(followed(task.log)) as responses:
                 async for response in responses:
                     await context.write(response)
 
+    def handler(self) -> grpc.GenericRpcHandler:
+        """Return what answers the calls of the service."""
+        return _handler(_MATCH, Match=grpc.unary_stream_rpc_method_handler(self.Match))
 
-class SceneService(scene_service_pb2_grpc.SceneServiceServicer):
-    """Finds the objects in one source."""
+
+class SceneService:
+    """Finds the objects in one source; requests and responses pass as they come."""
 
     def __init__(self, app: Application) -> None:
         self._app = app
 
-    async def Segment(  # type: ignore[override]  # noqa: N802
-        self, request: scene_service_pb2.SegmentRequest, context: _Context
-    ) -> Message:
+    async def Segment(self, request: bytes, context: _Context) -> bytes:  # noqa: N802
         """Segment, and return what was found."""
-        del context
-        with self._app.running(request) as task:
+        with self._app.running("SegmentRequest", request, caller_of(context)) as task:
             async with aclosing(followed(task.log)) as told:
                 responses = [response async for response in told]
         # Nobody waits for an answer to a request that was stopped.
-        return responses[0] if responses else scene_service_pb2.SegmentResponse()
+        return responses[0] if responses else b""
+
+    def handler(self) -> grpc.GenericRpcHandler:
+        """Return what answers the calls of the service."""
+        return _handler(_SCENE, Segment=grpc.unary_unary_rpc_method_handler(self.Segment))
 
 
 class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):
@@ -82,12 +87,27 @@ class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):
         return self._app.info()
 
 
+def caller_of(context: _Context) -> Caller:
+    """Return who calls: the host, and the connection from there."""
+    peer = context.peer() or ""
+    return Caller(peer.rpartition(":")[0] or peer, peer)
+
+
+def _handler(service: str, **methods: Any) -> grpc.GenericRpcHandler:
+    return grpc.method_handlers_generic_handler(service, methods)
+
+
 async def followed(log: Log[_Item]) -> AsyncGenerator[_Item, None]:
     """Yield what a log holds and gets, until it ends; raise the error that it ends with."""
     loop, changed, seen = asyncio.get_running_loop(), asyncio.Event(), 0
 
+    here = threading.get_ident()
+
     def wake() -> None:
-        loop.call_soon_threadsafe(changed.set)
+        if threading.get_ident() == here:
+            changed.set()
+        else:
+            loop.call_soon_threadsafe(changed.set)
 
     with log.waking(wake):
         while True:

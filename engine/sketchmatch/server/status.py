@@ -13,8 +13,10 @@ from sketchmatch.errors import (
     InvalidInputError,
     PluginError,
     Reason,
+    ServerStoppingError,
     SketchmatchError,
     TooBusyError,
+    WorkerLostError,
 )
 
 __all__ = ["Refusal", "is_fault", "refusal"]
@@ -43,9 +45,11 @@ def refusal(error: BaseException) -> Refusal:
             detail = error_details_pb2.BadRequest(field_violations=[violation])
             return _refusal(grpc.StatusCode.INVALID_ARGUMENT, error, error.reason, detail)
         case TooBusyError():
-            delay = duration_pb2.Duration(seconds=error.retry_seconds)
-            retry = error_details_pb2.RetryInfo(retry_delay=delay)
+            retry = _retry(error.retry_seconds)
             return _refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, error, error.reason, retry)
+        case ServerStoppingError() | WorkerLostError():
+            retry = _retry(error.retry_seconds)
+            return _refusal(grpc.StatusCode.UNAVAILABLE, error, error.reason, retry)
         case AnswerUnavailableError():
             return _refusal(grpc.StatusCode.DEADLINE_EXCEEDED, error, error.reason)
         case PluginError():
@@ -58,7 +62,12 @@ def refusal(error: BaseException) -> Refusal:
 
 def is_fault(error: BaseException) -> bool:
     """Whether an error is the server's or a plugin's, so that its operator should hear of it."""
-    return isinstance(error, PluginError) or not isinstance(error, SketchmatchError)
+    faults = PluginError | WorkerLostError
+    return isinstance(error, faults) or not isinstance(error, SketchmatchError)
+
+
+def _retry(seconds: int) -> error_details_pb2.RetryInfo:
+    return error_details_pb2.RetryInfo(retry_delay=duration_pb2.Duration(seconds=seconds))
 
 
 def _cut(text: str) -> str:

@@ -422,15 +422,23 @@ class ServerLimits(google.protobuf.message.Message):
     MAX_OBJECTS_FIELD_NUMBER: builtins.int
     MAX_CONCURRENT_MATCHES_FIELD_NUMBER: builtins.int
     MAX_TIME_BUDGET_FIELD_NUMBER: builtins.int
+    MAX_WAITING_FIELD_NUMBER: builtins.int
+    MAX_WAIT_FIELD_NUMBER: builtins.int
     max_request_bytes: builtins.int
     """Largest request in bytes."""
     max_objects: builtins.int
     """Most objects in a scene."""
     max_concurrent_matches: builtins.int
-    """Most matches that run at the same time; more are RESOURCE_EXHAUSTED."""
+    """Most matches that run at the same time; more wait for their turn."""
+    max_waiting: builtins.int
+    """Most requests that wait for their turn; more are RESOURCE_EXHAUSTED."""
     @property
     def max_time_budget(self) -> google.protobuf.duration_pb2.Duration:
         """Longest time budget; a longer one, or none, is cut to it."""
+
+    @property
+    def max_wait(self) -> google.protobuf.duration_pb2.Duration:
+        """How long a request may wait for its turn; then it is RESOURCE_EXHAUSTED."""
 
     def __init__(
         self,
@@ -439,14 +447,18 @@ class ServerLimits(google.protobuf.message.Message):
         max_objects: builtins.int | None = ...,
         max_concurrent_matches: builtins.int | None = ...,
         max_time_budget: google.protobuf.duration_pb2.Duration | None = ...,
+        max_waiting: builtins.int | None = ...,
+        max_wait: google.protobuf.duration_pb2.Duration | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_max_concurrent_matches", b"_max_concurrent_matches", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "max_concurrent_matches", b"max_concurrent_matches", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_time_budget", b"max_time_budget"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_max_concurrent_matches", b"_max_concurrent_matches", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "max_concurrent_matches", b"max_concurrent_matches", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_time_budget", b"max_time_budget"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_max_concurrent_matches", b"_max_concurrent_matches", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "_max_waiting", b"_max_waiting", "max_concurrent_matches", b"max_concurrent_matches", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_time_budget", b"max_time_budget", "max_wait", b"max_wait", "max_waiting", b"max_waiting"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_max_concurrent_matches", b"_max_concurrent_matches", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "_max_waiting", b"_max_waiting", "max_concurrent_matches", b"max_concurrent_matches", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_time_budget", b"max_time_budget", "max_wait", b"max_wait", "max_waiting", b"max_waiting"]) -> None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_max_concurrent_matches", b"_max_concurrent_matches"]) -> typing.Literal["max_concurrent_matches"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_max_objects", b"_max_objects"]) -> typing.Literal["max_objects"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_max_request_bytes", b"_max_request_bytes"]) -> typing.Literal["max_request_bytes"] | None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_max_waiting", b"_max_waiting"]) -> typing.Literal["max_waiting"] | None: ...
 
 global___ServerLimits = ServerLimits

@@ -64,6 +64,14 @@ class _ErrorReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._En
     """INVALID_ARGUMENT: the server's configuration has no profile of this name; the message names
     those there are.
     """
+    ERROR_REASON_SERVER_STOPPING: _ErrorReason.ValueType  # 20
+    """UNAVAILABLE: the server is about to stop. Send the request again after the time in `RetryInfo`,
+    when another one has taken its place.
+    """
+    ERROR_REASON_WORKER_LOST: _ErrorReason.ValueType  # 21
+    """UNAVAILABLE: the process that answered the request has ended. Send the request again after the
+    time in `RetryInfo`.
+    """
 
 class ErrorReason(_ErrorReason, metaclass=_ErrorReasonEnumTypeWrapper):
     """Why a request was refused, for programs. People read the status message.
@@ -120,5 +128,13 @@ ERROR_REASON_INFINITE_FORCE: ErrorReason.ValueType  # 16
 ERROR_REASON_UNKNOWN_PROFILE: ErrorReason.ValueType  # 17
 """INVALID_ARGUMENT: the server's configuration has no profile of this name; the message names
 those there are.
+"""
+ERROR_REASON_SERVER_STOPPING: ErrorReason.ValueType  # 20
+"""UNAVAILABLE: the server is about to stop. Send the request again after the time in `RetryInfo`,
+when another one has taken its place.
+"""
+ERROR_REASON_WORKER_LOST: ErrorReason.ValueType  # 21
+"""UNAVAILABLE: the process that answered the request has ended. Send the request again after the
+time in `RetryInfo`.
 """
 global___ErrorReason = ErrorReason

@@ -83,6 +83,8 @@ class _OutcomeEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._EnumTy
     """The time budget ended; the result is the best map until then."""
     OUTCOME_ITERATION_LIMIT: _Outcome.ValueType  # 4
     """The searcher did all the iterations that its parameters allow."""
+    OUTCOME_SERVER_STOPPING: _Outcome.ValueType  # 5
+    """The server was about to stop; the result is the best map until then."""
 
 class Outcome(_Outcome, metaclass=_OutcomeEnumTypeWrapper):
     """Why a search ended. Each comes with an answer: running out of budget is no error."""
@@ -101,6 +103,8 @@ OUTCOME_TIME_BUDGET: Outcome.ValueType  # 3
 """The time budget ended; the result is the best map until then."""
 OUTCOME_ITERATION_LIMIT: Outcome.ValueType  # 4
 """The searcher did all the iterations that its parameters allow."""
+OUTCOME_SERVER_STOPPING: Outcome.ValueType  # 5
+"""The server was about to stop; the result is the best map until then."""
 global___Outcome = Outcome
 
 @typing.final

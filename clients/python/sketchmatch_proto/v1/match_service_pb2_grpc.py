@@ -46,14 +46,16 @@ class MatchServiceServicer(object):
 
         * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct
         the request; the same one fails again.
-        * `RESOURCE_EXHAUSTED`: the server runs as many matches as it may; send the same request again
-        after the time in `RetryInfo`. Without `RetryInfo` the request is larger than the transport
-        lets through; make it smaller (`GetServerInfo` tells the limit).
+        * `RESOURCE_EXHAUSTED`: as many matches run and wait as may, or this one waited too long for its
+        turn; send the same request again after the time in `RetryInfo`. Without `RetryInfo` the
+        request is larger than the transport lets through; make it smaller (`GetServerInfo` tells the
+        limit).
         * `DEADLINE_EXCEEDED`: the call's deadline passed, or the time budget ended before there was any
         map to return. Allow more time, or choose a faster searcher.
         * `INTERNAL`: an algorithm broke its contract; the message names it and the distribution it is
         from. Choose another algorithm and tell the author.
-        * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+        * `UNAVAILABLE`: the server is starting, draining or away, or lost the process that answered. Wait
+        for health SERVING and the time in `RetryInfo`, if there is one, and send again.
         * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
         * `CANCELLED`: the caller cancelled.
         """

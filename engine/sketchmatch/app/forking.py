@@ -1,0 +1,27 @@
+"""How workers are started: forked from a process that is warm, where forking is sound."""
+
+from __future__ import annotations
+
+import multiprocessing
+import multiprocessing.forkserver
+import sys
+from multiprocessing.context import BaseContext
+
+__all__ = ["forking", "prepare"]
+
+_TEMPLATE = "sketchmatch.app.template"
+
+
+def forking() -> BaseContext:
+    """Return what starts workers."""
+    if sys.platform != "linux":
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([_TEMPLATE])
+    return context
+
+
+def prepare() -> None:
+    """Begin to load what workers need, beside whatever else a server does when it starts."""
+    if forking().get_start_method() == "forkserver":
+        multiprocessing.forkserver.ensure_running()

@@ -1,0 +1,139 @@
+"""Requests as the bytes that they come as, and what can be told of them before they are decoded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from google.protobuf.message import DecodeError, Message
+
+from sketchmatch.app.jobs import Job
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch_proto.v1 import source_pb2
+from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
+from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest
+
+__all__ = ["Order"]
+
+_Request: TypeAlias = type[MatchRequest] | type[SegmentRequest]
+_TYPES: dict[str, _Request] = {
+    kind.DESCRIPTOR.name: kind for kind in (MatchRequest, SegmentRequest)
+}
+_SOURCE = source_pb2.Source.DESCRIPTOR
+_FILE = _SOURCE.fields_by_name["file"].number
+_VARINT, _FIXED64, _MESSAGE, _FIXED32 = 0, 1, 2, 5
+_FIXED = {_FIXED64: 8, _FIXED32: 4}
+
+
+@dataclass(frozen=True)
+class Order:
+    """A request that was admitted, or is to be.
+
+    Attributes
+    ----------
+    id
+        A name that no other order of the application has.
+    kind
+        Name of the message: MatchRequest or SegmentRequest.
+    data
+        The message.
+    """
+
+    id: str
+    kind: str
+    data: bytes
+
+    def job(self) -> Job:
+        """Decode the request.
+
+        Raises
+        ------
+        InvalidInputError
+            If it is not what it should be.
+        """
+        request = _TYPES[self.kind]()
+        try:
+            request.ParseFromString(self.data)
+        except DecodeError:
+            raise InvalidInputError(
+                Reason.INVALID_FIELD,
+                "",
+                f"the request's {len(self.data)} bytes are no {request.DESCRIPTOR.full_name}; "
+                "send what the stubs of the contract serialise",
+            ) from None
+        return Job(self.id, request)
+
+    def outline(self) -> Job:
+        """Decode the request but for sketch and map, of which only files are kept.
+
+        It takes no longer for large requests. What cannot be decoded is as good as empty; that is
+        told where the job is done.
+        """
+        request = _TYPES[self.kind]()
+        try:
+            request.ParseFromString(_outline(self.data, request))
+        except (DecodeError, IndexError, KeyError):
+            request.Clear()
+        return Job(self.id, request)
+
+
+def _outline(data: bytes, request: Message) -> bytes:
+    sources = {field.number for field in request.DESCRIPTOR.fields if field.message_type is _SOURCE}
+    kept = bytearray()
+    for number, wire_type, first, payload, end in _fields(data, 0, len(data)):
+        if number in sources and wire_type == _MESSAGE:
+            inner = _source_outline(data, payload, end)
+            kept += bytes([number << 3 | _MESSAGE]) + _varint_of(len(inner)) + inner
+        else:
+            kept += data[first:end]
+    return bytes(kept)
+
+
+def _source_outline(data: bytes, first: int, end: int) -> bytes:
+    """Return a source with nothing in it, unless it is a file: that is known by its content."""
+    kept = bytearray()
+    for number, wire_type, begin, _, last in _fields(data, first, end):
+        if wire_type == _MESSAGE and number != _FILE:
+            kept += _varint_of(number << 3 | _MESSAGE) + b"\0"
+        else:
+            kept += data[begin:last]
+    return bytes(kept)
+
+
+def _fields(data: bytes, place: int, end: int) -> Iterator[tuple[int, int, int, int, int]]:
+    """Yield number, wire type, and where each field of a message, its payload and its end are."""
+    while place < end:
+        first = place
+        tag, place = _varint(data, place)
+        wire_type, payload = tag & 7, place
+        if wire_type == _VARINT:
+            _, place = _varint(data, place)
+        elif wire_type == _MESSAGE:
+            length, payload = _varint(data, place)
+            place = payload + length
+        else:
+            place += _FIXED[wire_type]
+        if place > end:
+            raise IndexError
+        yield tag >> 3, wire_type, first, payload, place
+
+
+def _varint(data: bytes, place: int) -> tuple[int, int]:
+    value = shift = 0
+    while True:
+        byte = data[place]
+        place += 1
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if byte < 0x80:
+            return value, place
+
+
+def _varint_of(value: int) -> bytes:
+    packed = bytearray()
+    while value >= 0x80:
+        packed.append(value & 0x7F | 0x80)
+        value >>= 7
+    packed.append(value)
+    return bytes(packed)

@@ -1,0 +1,99 @@
+"""Who is next: a queue in which callers take turns."""
+
+from __future__ import annotations
+
+from collections import OrderedDict, deque
+from collections.abc import Callable, Iterator
+from typing import Generic, NamedTuple, TypeVar
+
+__all__ = ["Caller", "FairQueue"]
+
+_Item = TypeVar("_Item")
+
+
+class Caller(NamedTuple):
+    """Who asks.
+
+    Attributes
+    ----------
+    name
+        The caller's name, or the host where it is.
+    connection
+        One of its connections.
+    """
+
+    name: str = ""
+    connection: str = ""
+
+
+class FairQueue(Generic[_Item]):
+    """Items that wait: callers take turns, and so do the connections of each.
+
+    Examples
+    --------
+    >>> queue = FairQueue()
+    >>> for item, name in [("a1", "a"), ("a2", "a"), ("a3", "a"), ("b1", "b")]:
+    ...     queue.add(item, Caller(name))
+    >>> [queue.take() for _ in range(4)]
+    ['a1', 'b1', 'a2', 'a3']
+    """
+
+    def __init__(self) -> None:
+        self._lines: OrderedDict[str, OrderedDict[str, deque[_Item]]] = OrderedDict()
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __iter__(self) -> Iterator[_Item]:
+        for lines in self._lines.values():
+            for line in lines.values():
+                yield from line
+
+    def add(self, item: _Item, caller: Caller) -> None:
+        """Let an item wait behind those of its connection."""
+        lines = self._lines.setdefault(caller.name, OrderedDict())
+        lines.setdefault(caller.connection, deque()).append(item)
+
+    def take(self, fits: Callable[[_Item], bool] = lambda _: True) -> _Item | None:
+        """Take out the item whose turn it is, of those that fit; None if there is none."""
+        for name, lines in self._lines.items():
+            for connection, line in lines.items():
+                for item in line:
+                    if fits(item):
+                        self._lines.move_to_end(name)
+                        lines.move_to_end(connection)
+                        self.remove(item, Caller(name, connection))
+                        return item
+        return None
+
+    def remove(self, item: _Item, caller: Caller) -> bool:
+        """Take out a certain item; return whether it was there."""
+        lines = self._lines.get(caller.name, OrderedDict[str, deque[_Item]]())
+        line = lines.get(caller.connection, deque())
+        if item not in line:
+            return False
+        line.remove(item)
+        if not line:
+            del lines[caller.connection]
+        if not lines:
+            del self._lines[caller.name]
+        return True
+
+    def crowd_out(self, newcomer: Caller) -> tuple[_Item, Caller] | None:
+        """Take out the last item of whoever has most; of equals, of the newcomer."""
+        if not self._lines:
+            return None
+
+        def crowd(name: str) -> tuple[int, bool]:
+            return sum(map(len, self._lines[name].values())), name == newcomer.name
+
+        name = max(self._lines, key=crowd)
+        lines = self._lines[name]
+
+        def length(connection: str) -> tuple[int, bool]:
+            return len(lines[connection]), Caller(name, connection) == newcomer
+
+        caller = Caller(name, max(lines, key=length))
+        item = lines[caller.connection][-1]
+        self.remove(item, caller)
+        return item, caller
