@@ -31,10 +31,15 @@ from sketchmatch.pipeline.selection import Defaults
 from sketchmatch.pipeline.warmup import warm_up, warm_up_others
 from sketchmatch.registry import OWN_DISTRIBUTION, PluginRules, discover
 
-__all__ = ["STOP", "Answer", "Ended", "Errand", "Failed", "Ready", "live"]
+__all__ = ["LEFT_TO_THE_SERVER", "STOP", "Answer", "Ended", "Errand", "Failed", "Ready", "live"]
 
 STOP = "stop"
 """Ends the errand under way."""
+
+LEFT_TO_THE_SERVER = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGHUP", "SIGTERM") if hasattr(signal, name)
+)
+"""Signals that a terminal or an init system sends to a whole group; only the server decides."""
 
 _LOADING = 120.0
 _POLITE = 10
@@ -132,9 +137,17 @@ def _end_unless_alive(patience: float) -> None:
 
 def _step_back() -> None:
     """Leave signals to the server, and processor and memory to it first."""
-    for name in ("SIGINT", "SIGHUP"):
-        if number := getattr(signal, name, None):
-            signal.signal(number, signal.SIG_IGN)
+    own = os.getpid()
+
+    def leave(number: int, _frame: object) -> None:
+        if os.getpid() != own:  # a plugin ends a process that it has forked
+            signal.signal(number, signal.SIG_DFL)
+            os.kill(os.getpid(), number)
+
+    for number in LEFT_TO_THE_SERVER:
+        signal.signal(number, leave if number == signal.SIGTERM else signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, LEFT_TO_THE_SERVER)
     if hasattr(os, "nice"):
         os.nice(_POLITE)
     with suppress(OSError):

@@ -12,17 +12,28 @@ from __future__ import annotations
 
 import math
 import multiprocessing
+import signal
 import threading
 import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from typing import TYPE_CHECKING
 
 from google.protobuf.message import Message
 
-from sketchmatch.app.child import STOP, Answer, Ended, Errand, Failed, Ready, live
+from sketchmatch.app.child import (
+    LEFT_TO_THE_SERVER,
+    STOP,
+    Answer,
+    Ended,
+    Errand,
+    Failed,
+    Ready,
+    live,
+)
 from sketchmatch.app.jobs import Job, algorithms, time_budget
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import PluginError
@@ -187,7 +198,8 @@ class _Child:
             name=f"sketchmatch-plugins-{'-'.join(sorted(distributions))}",
             daemon=True,
         )
-        self._process.start()
+        with _signals_held_back():
+            self._process.start()
         theirs.close()
 
     @property
@@ -277,6 +289,20 @@ class _Child:
         self._process.join()
         ending = _ending(self._process.exitcode)
         return PluginError(f"{watch.culprits} ended its process ({ending}); {_REMEDY}")
+
+
+@contextmanager
+def _signals_held_back() -> Iterator[None]:
+    """Start processes for which signals wait until they say how they take them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # which would let signals through when it starts
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, LEFT_TO_THE_SERVER)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _comes_before_the_budget(response: Message) -> bool:
