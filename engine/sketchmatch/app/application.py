@@ -16,9 +16,10 @@ from google.protobuf.message import Message
 from sketchmatch.app import responses
 from sketchmatch.app.children import Children
 from sketchmatch.app.jobs import Job, algorithms, answers
+from sketchmatch.app.packed import Packed, check_size
 from sketchmatch.app.setup import RequestLimits, Setup
 from sketchmatch.app.tasks import Task
-from sketchmatch.errors import InvalidInputError, Reason, TooBusyError
+from sketchmatch.errors import TooBusyError
 from sketchmatch.pipeline.warmup import warm_up, warm_up_others
 from sketchmatch.registry import Registered, Registry
 from sketchmatch_proto.v1.catalog_service_pb2 import (
@@ -72,6 +73,7 @@ class Application:
         self._running = 0
         self._threads = _threads(setup.limits)
         self._tasks: set[Task[Message]] = set()
+        self._catalogue: tuple[Setup, ListAlgorithmsResponse] | None = None
 
     @property
     def setup(self) -> Setup:
@@ -104,8 +106,10 @@ class Application:
         yield from work
 
     @contextmanager
-    def running(self, request: Message) -> Iterator[Task[Message]]:
+    def running(self, request: Message | Packed) -> Iterator[Task[Message]]:
         """Admit a request and do it in a thread, until the end of the block.
+
+        One that is packed is inflated and decoded there: nothing is spent on it before.
 
         Raises
         ------
@@ -115,20 +119,26 @@ class Application:
             If there is no room for it.
         """
         setup = self._setup
-        _check_size(request, setup.limits)
+        packed = isinstance(request, Packed)
+        size = len(request.data) if packed else request.ByteSize()
+        check_size(size, setup.limits.max_request_bytes)
         task = Task[Message](uuid.uuid4().hex)
         self._take_place(setup.limits)
         self._tasks.add(task)
         try:
-            self._threads.submit(self._run, task, Job(task.id, request), setup)
+            self._threads.submit(self._run, task, request, setup)
             yield task
         finally:
             self._tasks.discard(task)
             task.stop()
 
     def algorithms(self) -> ListAlgorithmsResponse:
-        """Return what there is to choose from."""
-        return responses.catalogue(self._setup.engine.registry, self._setup.engine.defaults)
+        """Return what there is to choose from, put together once for each setup."""
+        setup, kept = self._setup, self._catalogue
+        if kept is None or kept[0] is not setup:
+            engine = setup.engine
+            self._catalogue = kept = (setup, responses.catalogue(engine.registry, engine.defaults))
+        return kept[1]
 
     def info(self) -> GetServerInfoResponse:
         """Return versions and limits."""
@@ -160,10 +170,13 @@ class Application:
         self._threads.shutdown()
         self._children.close()
 
-    def _run(self, task: Task[Message], job: Job, setup: Setup) -> None:
-        """Do a job, and tell of it in its task's log; its place is free when this ends."""
+    def _run(self, task: Task[Message], request: Message | Packed, setup: Setup) -> None:
+        """Do a request, and tell of it in its task's log; its place is free when this ends."""
         error: BaseException | None = None
         try:
+            if isinstance(request, Packed):
+                request = request.opened(setup.limits.max_request_bytes)
+            job = Job(task.id, request)
             work = self._place(job, setup).answers(job, setup, task.stopping)
             with closing(work) as told:
                 for response in told:
@@ -192,17 +205,6 @@ class Application:
 
 def _threads(limits: RequestLimits) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(limits.max_concurrent_matches, "sketchmatch-worker")
-
-
-def _check_size(request: Message, limits: RequestLimits) -> None:
-    size, limit = request.ByteSize(), limits.max_request_bytes
-    if size > limit:
-        raise InvalidInputError(
-            Reason.MESSAGE_TOO_LARGE,
-            "",
-            f"the request has {size} bytes, more than the limit of {limit}; "
-            "send fewer points or a smaller picture",
-        )
 
 
 def _strangers(setup: Setup) -> tuple[Registered, ...]:

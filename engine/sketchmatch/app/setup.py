@@ -28,16 +28,24 @@ class RequestLimits:
         Matches and segmentations that run at the same time.
     max_time_budget
         Seconds that one match may take, or None for no limit.
+    default_time_budget
+        Seconds for a match that does not say how long it may take, or None for the most.
     """
 
     max_request_bytes: int = 64 * 1024 * 1024
     max_concurrent_matches: int = 4 * (os.cpu_count() or 1)
     max_time_budget: float | None = None
+    default_time_budget: float | None = None
+
+    def time_budget(self, asked: float | None) -> float | None:
+        """Return the seconds for a match that asks for so many, or None for no limit."""
+        said = (asked or self.default_time_budget, self.max_time_budget)
+        return min((seconds for seconds in said if seconds is not None), default=None)
 
     @property
     def transport_bytes(self) -> int:
         """Size above which the transport itself refuses a message."""
-        return 4 * self.max_request_bytes
+        return self.max_request_bytes + max(self.max_request_bytes // 8, 1 << 16)
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,13 @@ def serve(
         typer.Option(help="Requests at the same time; 4 a processor by default."),
     ] = None,
     max_time_budget: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Longest match; no limit by default.")
+        float | None, typer.Option(metavar="SECONDS", help="Longest match; 3600 by default.")
+    ] = None,
+    default_time_budget: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS", help="Longest match where a request does not say; 300 by default."
+        ),
     ] = None,
     grace: Annotated[
         float | None,
@@ -92,6 +98,7 @@ def serve(
         "server.max_request_mib": max_request_mib,
         "server.max_matches": max_matches,
         "server.max_time_budget_seconds": max_time_budget,
+        "server.default_time_budget_seconds": default_time_budget,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
         "limits.max_side": max_side,
@@ -121,6 +128,7 @@ def _setup(configuration: Configuration) -> Setup:
             max_request_bytes=server.max_request_mib * _MIB,
             max_concurrent_matches=server.max_matches or RequestLimits.max_concurrent_matches,
             max_time_budget=server.max_time_budget_seconds,
+            default_time_budget=server.default_time_budget_seconds,
         ),
         Isolation(configuration.trusted, configuration.patience),
     )

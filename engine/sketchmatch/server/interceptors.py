@@ -1,16 +1,19 @@
-"""What every call shares: an error becomes a status, and a fault is told to the operator."""
+"""What every call shares: how its request is opened, and what becomes of an error."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Collection
+from functools import partial
 from typing import Any, NoReturn, cast
 
 import grpc
 
+from sketchmatch.app.packed import Packed
+from sketchmatch.errors import InvalidInputError
 from sketchmatch.server.status import is_fault, refusal
 
-__all__ = ["ErrorInterceptor"]
+__all__ = ["ErrorInterceptor", "OpeningInterceptor"]
 
 _OURS = "/sketchmatch."
 _log = logging.getLogger(__name__)
@@ -31,9 +34,66 @@ class ErrorInterceptor(grpc.aio.ServerInterceptor):
         handler = cast(Any, await continuation(handler_call_details))
         # Health and reflection see to themselves.
         if handler is not None and handler_call_details.method.startswith(_OURS):
-            kind = "unary_stream" if handler.response_streaming else "unary_unary"
+            kind = _kind(handler)
             handler = handler._replace(**{kind: _caught(getattr(handler, kind))})
         return cast("grpc.RpcMethodHandler[Any, Any] | None", handler)
+
+
+class OpeningInterceptor(grpc.aio.ServerInterceptor):
+    """Inflates and decodes requests: of some methods later, by what answers them.
+
+    gRPC itself would inflate them before anybody knows of the call, and say of what it cannot
+    decode that nobody knows what happened.
+
+    Parameters
+    ----------
+    later
+        Paths of the methods that are given what came, as :class:`Packed`.
+    limit
+        Returns the bytes that a request may have.
+    """
+
+    def __init__(self, later: Collection[str], limit: Callable[[], int]) -> None:
+        self._later = later
+        self._limit = limit
+
+    async def intercept_service(
+        self,
+        continuation: Callable[
+            [grpc.HandlerCallDetails], Awaitable[grpc.RpcMethodHandler[Any, Any] | None]
+        ],
+        handler_call_details: grpc.HandlerCallDetails,
+    ) -> grpc.RpcMethodHandler[Any, Any] | None:
+        """Return the method's handler, with its requests opened by us."""
+        handler = cast(Any, await continuation(handler_call_details))
+        if handler is None:
+            return None
+        read = partial(Packed, read=handler.request_deserializer)
+        if handler.request_streaming:
+            opened = handler._replace(request_deserializer=lambda data: self._opened(read(data)))
+        else:
+            opened = handler._replace(request_deserializer=read)
+            if handler_call_details.method not in self._later:
+                kind = _kind(handler)
+                opened = opened._replace(**{kind: self._opening(getattr(handler, kind))})
+        return cast("grpc.RpcMethodHandler[Any, Any]", opened)
+
+    def _opened(self, packed: Packed) -> Any:
+        return packed.opened(self._limit())
+
+    def _opening(self, method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
+        async def call(packed: Packed, context: _Context) -> Any:
+            try:
+                request = self._opened(packed)
+            except InvalidInputError as error:
+                await _abort(context, error)
+            return await method(request, context)
+
+        return call
+
+
+def _kind(handler: Any) -> str:
+    return "unary_stream" if handler.response_streaming else "unary_unary"
 
 
 def _caught(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:

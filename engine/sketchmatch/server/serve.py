@@ -19,8 +19,8 @@ from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
 from sketchmatch.pipeline.warmup import announcing_compilation
-from sketchmatch.server.interceptors import ErrorInterceptor
-from sketchmatch.server.services import CatalogService, MatchService, SceneService
+from sketchmatch.server.interceptors import ErrorInterceptor, OpeningInterceptor
+from sketchmatch.server.services import ADMITTED, CatalogService, MatchService, SceneService
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
@@ -32,6 +32,9 @@ from sketchmatch_proto.v1 import (
 
 __all__ = ["ServerSettings", "serve"]
 
+_ALL = 2**31 - 1
+_PING_MS = 10_000
+_IDLE_MS = 600_000
 _QUIET = 1.0
 _LOOK = 0.05
 
@@ -88,10 +91,27 @@ async def serve(
     """
     app = Application(load())
     server = grpc.aio.server(
-        interceptors=[ErrorInterceptor()],
+        interceptors=[
+            OpeningInterceptor(ADMITTED, lambda: app.setup.limits.max_request_bytes),
+            ErrorInterceptor(),
+        ],
         options=[
             ("grpc.max_receive_message_length", app.setup.limits.transport_bytes),
             ("grpc.max_send_message_length", -1),
+            # A few bytes may become very many: they are inflated once there is a place for them.
+            ("grpc.per_message_decompression", 0),
+            # Of many calls at once gRPC would cancel some without a word; we say when to come back.
+            ("grpc.server.max_pending_requests", _ALL),
+            ("grpc.server.max_pending_requests_hard_limit", _ALL),
+            ("grpc.server_max_unrequested_time_in_server", _ALL),
+            # A caller who is frozen or cut off keeps its place for 20 s and no longer.
+            ("grpc.keepalive_time_ms", _PING_MS),
+            ("grpc.keepalive_timeout_ms", _PING_MS),
+            ("grpc.http2.ping_timeout_ms", _PING_MS),
+            ("grpc.keepalive_permit_without_calls", 1),
+            ("grpc.http2.max_pings_without_data", 0),
+            # Who has not called for long connects anew when it does.
+            ("grpc.max_connection_idle_ms", _IDLE_MS),
             # Clients ping every 30 s; by default the server would hang up on them.
             ("grpc.http2.min_ping_interval_without_data_ms", 20_000),
             # Otherwise a second server on the same port would silently take half of the calls.

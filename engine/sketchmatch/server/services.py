@@ -11,6 +11,7 @@ import grpc
 from google.protobuf.message import Message
 
 from sketchmatch.app.application import Application
+from sketchmatch.app.packed import Packed
 from sketchmatch.app.tasks import Log
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
@@ -21,7 +22,16 @@ from sketchmatch_proto.v1 import (
     scene_service_pb2_grpc,
 )
 
-__all__ = ["CatalogService", "MatchService", "SceneService", "followed"]
+__all__ = ["ADMITTED", "CatalogService", "MatchService", "SceneService", "followed"]
+
+ADMITTED = frozenset(
+    f"/{service.full_name}/{method}"
+    for service, method in (
+        (match_service_pb2.DESCRIPTOR.services_by_name["MatchService"], "Match"),
+        (scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"], "Segment"),
+    )
+)
+"""Methods whose requests are opened by the application, once there is a place for them."""
 
 _Context = grpc.aio.ServicerContext[Any, Any]
 _Item = TypeVar("_Item")
@@ -34,7 +44,7 @@ class MatchService(match_service_pb2_grpc.MatchServiceServicer):
         self._app = app
 
     async def Match(  # type: ignore[override]  # noqa: N802
-        self, request: match_service_pb2.MatchRequest, context: _Context
+        self, request: Packed, context: _Context
     ) -> None:
         """Run a match and pass its events on."""
         with self._app.running(request) as task:
@@ -50,7 +60,7 @@ class SceneService(scene_service_pb2_grpc.SceneServiceServicer):
         self._app = app
 
     async def Segment(  # type: ignore[override]  # noqa: N802
-        self, request: scene_service_pb2.SegmentRequest, context: _Context
+        self, request: Packed, context: _Context
     ) -> Message:
         """Segment, and return what was found."""
         del context
