@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["serve"]
 
 _MIB = 1024 * 1024
+_PATIENCE_SECONDS = 30.0
 
 
 def serve(
@@ -81,7 +82,8 @@ def serve(
 
     Where no option says it, the configuration does. SIGHUP reads the configuration again, but for
     address and grace; requests under way keep the one that they began with. Health is NOT_SERVING
-    until the kernels are compiled or loaded. There is no encryption and no authentication yet:
+    until the kernels are compiled or loaded. A server that hangs ends with exit code 70 after
+    30 s: let what starts it start it again. There is no encryption and no authentication yet:
     listen on addresses that only trusted programs reach.
     """
     import asyncio
@@ -106,7 +108,7 @@ def serve(
         "limits.max_objects": max_objects,
     }
     server = load(config, flags).settings.server
-    settings = ServerSettings(server.address, server.grace_seconds)
+    settings = ServerSettings(server.address, server.grace_seconds, _PATIENCE_SECONDS)
     asyncio.run(serve_forever(lambda: _setup(load(config, flags)), settings, say))
 
 

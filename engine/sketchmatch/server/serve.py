@@ -21,6 +21,7 @@ from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
 from sketchmatch.pipeline.warmup import announcing_compilation
 from sketchmatch.server.interceptors import ErrorInterceptor, OpeningInterceptor
 from sketchmatch.server.services import ADMITTED, CatalogService, MatchService, SceneService
+from sketchmatch.server.watchdog import watch
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
@@ -55,10 +56,14 @@ class ServerSettings:
         Host and port to listen on; port 0 picks a free one.
     grace
         Seconds that running matches are given when the server is asked to stop.
+    patience
+        Seconds after which a server that answers nothing ends its process; None for never, which
+        is for servers in a process that does something else.
     """
 
     address: str = "127.0.0.1:50051"
     grace: float = 5.0
+    patience: float | None = None
 
 
 async def serve(
@@ -122,6 +127,7 @@ async def serve(
     port = _listen(server, settings.address)
     await checks.set("", health_pb2.HealthCheckResponse.NOT_SERVING)
     await server.start()
+    unwatch = watch(settings.patience)
     stopping, ended = stop or asyncio.Event(), Event()
     reloading = _Reloading(load, app, say)
     _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
@@ -145,6 +151,7 @@ async def serve(
         await checks.enter_graceful_shutdown()
         await server.stop(settings.grace)
         await asyncio.to_thread(app.close)
+        unwatch()
     say("stopped")
 
 
