@@ -7,7 +7,6 @@ import os
 import queue
 import signal
 import threading
-import traceback
 from collections.abc import Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from pathlib import Path
 
 from google.protobuf.message import Message
 
+from sketchmatch.app.faults import told
 from sketchmatch.app.jobs import Job, answers
 from sketchmatch.app.setup import RequestLimits, Setup
 from sketchmatch.errors import (
@@ -185,7 +185,8 @@ def _messages(
                     yield Answer(response)
         yield Ended()
     except Exception as error:
-        yield Failed(_plain(error), "".join(traceback.format_exception(error)))
+        _, _, where = told(error).partition("\n")
+        yield Failed(_plain(error), where)
 
 
 def _plain(error: Exception) -> SketchmatchError | None:

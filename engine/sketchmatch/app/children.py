@@ -251,7 +251,8 @@ class _Child:
                 case Failed(error, log):
                     self.done = True
                     failure = error or ChildError("a request failed in a child process")
-                    failure.add_note(log)
+                    if log:
+                        failure.add_note(log)
                     raise failure
             if now - heard > watch.patience:
                 raise _silent(watch, f"gave no sign of life for {watch.patience:g} s")

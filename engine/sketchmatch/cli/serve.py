@@ -89,6 +89,7 @@ def serve(
     import asyncio
 
     from sketchmatch.config import load
+    from sketchmatch.server.log import logging_to_standard_error
     from sketchmatch.server.serve import ServerSettings
     from sketchmatch.server.serve import serve as serve_forever
 
@@ -109,7 +110,16 @@ def serve(
     }
     server = load(config, flags).settings.server
     settings = ServerSettings(server.address, server.grace_seconds, _PATIENCE_SECONDS)
-    asyncio.run(serve_forever(lambda: _setup(load(config, flags)), settings, say))
+
+    def setup() -> Setup:
+        configuration = load(config, flags)
+        now = configuration.settings.server
+        if (now.address, now.grace_seconds) != (server.address, server.grace_seconds):
+            say("server.address and server.grace_seconds stay until the server is started anew")
+        return _setup(configuration)
+
+    with logging_to_standard_error():
+        asyncio.run(serve_forever(setup, settings, say))
 
 
 def _setup(configuration: Configuration) -> Setup:

@@ -9,8 +9,10 @@ from typing import Any, NoReturn, cast
 
 import grpc
 
+from sketchmatch.app.faults import told
 from sketchmatch.app.packed import Packed
 from sketchmatch.errors import InvalidInputError
+from sketchmatch.server.calls import note, noted
 from sketchmatch.server.status import is_fault, refusal
 
 __all__ = ["ErrorInterceptor", "OpeningInterceptor"]
@@ -110,6 +112,7 @@ def _caught(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
 
 async def _abort(context: _Context, error: Exception) -> NoReturn:
     if is_fault(error):
-        _log.error("%s", error, exc_info=error)
+        _log.error("%s: %s", noted(), told(error))
     status = refusal(error)
+    note(reason=getattr(error, "reason", type(error).__name__))
     await context.abort(status.code, status.message, status.trailing_metadata)

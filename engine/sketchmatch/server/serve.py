@@ -19,6 +19,7 @@ from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
 from sketchmatch.pipeline.warmup import announcing_compilation
+from sketchmatch.server.calls import CallLogInterceptor
 from sketchmatch.server.interceptors import ErrorInterceptor, OpeningInterceptor
 from sketchmatch.server.services import ADMITTED, CatalogService, MatchService, SceneService
 from sketchmatch.server.watchdog import watch
@@ -97,6 +98,7 @@ async def serve(
     app = Application(load())
     server = grpc.aio.server(
         interceptors=[
+            CallLogInterceptor(),
             OpeningInterceptor(ADMITTED, lambda: app.setup.limits.max_request_bytes),
             ErrorInterceptor(),
         ],

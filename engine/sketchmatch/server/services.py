@@ -13,14 +13,17 @@ from google.protobuf.message import Message
 from sketchmatch.app.application import Application
 from sketchmatch.app.packed import Packed
 from sketchmatch.app.tasks import Log
+from sketchmatch.server.calls import note
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
+    match_pb2,
     match_service_pb2,
     match_service_pb2_grpc,
     scene_service_pb2,
     scene_service_pb2_grpc,
 )
+from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
 __all__ = ["ADMITTED", "CatalogService", "MatchService", "SceneService", "followed"]
 
@@ -48,8 +51,10 @@ class MatchService(match_service_pb2_grpc.MatchServiceServicer):
     ) -> None:
         """Run a match and pass its events on."""
         with self._app.running(request) as task:
+            note(match=task.id)
             async with aclosing(followed(task.log)) as responses:
                 async for response in responses:
+                    _note_event(response)
                     await context.write(response)
 
 
@@ -90,6 +95,19 @@ class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):
         """Tell versions and limits."""
         del request, context
         return self._app.info()
+
+
+def _note_event(response: Message) -> None:
+    """Note what the log tells of a match."""
+    match response.WhichOneof("event") if isinstance(response, MatchResponse) else None:
+        case "accepted":
+            note(searcher=response.accepted.pipeline.searcher.name)
+        case "scenes":
+            sketch, map_ = response.scenes.sketch.objects, response.scenes.map.objects
+            note(objects=f"{len(sketch)}x{len(map_)}")
+        case "result":
+            name = match_pb2.Outcome.Name(response.result.outcome)
+            note(outcome=name.removeprefix("OUTCOME_"))
 
 
 async def followed(log: Log[_Item]) -> AsyncGenerator[_Item, None]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import faulthandler
 import os
+import stat
 import threading
 from collections.abc import Callable
 from contextlib import suppress
@@ -64,6 +65,8 @@ def _end(silent: float) -> None:
     """End the process without asking anybody: any lock may be held by a thread that hangs."""
     sentence = f"sketchmatch: nothing was answered for {silent:g} s; the server ends itself\n"
     with suppress(OSError):
+        if stat.S_ISFIFO(os.fstat(_STANDARD_ERROR).st_mode):
+            os.set_blocking(_STANDARD_ERROR, False)  # nobody may be reading
         os.write(_STANDARD_ERROR, sentence.encode())
         faulthandler.dump_traceback(_STANDARD_ERROR)
     os._exit(HUNG)
