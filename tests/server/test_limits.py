@@ -12,7 +12,7 @@ def assert_serves(client):
 
 
 def test_a_request_more_than_the_server_has_room_for_is_told_when_to_come_again():
-    with serving(max_concurrent_matches=2) as host, Client(host.address) as client:
+    with serving(max_concurrent_matches=2) as host, Client(host.address, retries=0) as client:
         running = [client.events(scene(20), scene(20, 1), **ENDLESS) for _ in range(2)]
         for events in running:
             assert next(events).WhichOneof("event") == "accepted"

@@ -33,7 +33,7 @@ def test_a_caller_that_is_frozen_gives_its_place_back(monkeypatch):
         try:
             assert frozen.stdout.readline() == "accepted\n"
             frozen.send_signal(signal.SIGSTOP)
-            with Client(host.address) as client, within(20.0):
+            with Client(host.address, retries=0) as client, within(20.0):
                 with pytest.raises(ServerBusyError):
                     client.segment(scene(3))
                 when_there_is_room(lambda: client.segment(scene(3)), 60.0)
