@@ -180,3 +180,15 @@ def test_errors_survive_the_way_between_processes():
     assert (copy.reason, copy.field, copy.problem) == (error.reason, error.field, error.problem)
     assert str(copy) == str(error)
     assert str(pickle.loads(pickle.dumps(PluginError("it failed")))) == "it failed"
+
+
+def test_the_catalogue_is_put_together_once_for_each_setup():
+    app = application()
+    first = app.algorithms()
+    assert app.algorithms() is first
+    app.change(Setup(Engine(default_registry())))
+    assert app.algorithms() is app.algorithms()
+    assert {algorithm.name for algorithm in first.algorithms} - {
+        algorithm.name for algorithm in app.algorithms().algorithms
+    } == {"held"}
+    app.close()

@@ -119,8 +119,7 @@ class Application:
             If there is no room for it.
         """
         setup = self._setup
-        packed = isinstance(request, Packed)
-        size = len(request.data) if packed else request.ByteSize()
+        size = len(request.data) if isinstance(request, Packed) else request.ByteSize()
         check_size(size, setup.limits.max_request_bytes)
         task = Task[Message](uuid.uuid4().hex)
         self._take_place(setup.limits)

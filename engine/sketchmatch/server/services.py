@@ -99,7 +99,9 @@ class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):
 
 def _note_event(response: Message) -> None:
     """Note what the log tells of a match."""
-    match response.WhichOneof("event") if isinstance(response, MatchResponse) else None:
+    if not isinstance(response, MatchResponse):
+        return
+    match response.WhichOneof("event"):
         case "accepted":
             note(searcher=response.accepted.pipeline.searcher.name)
         case "scenes":
