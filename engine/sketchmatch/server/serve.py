@@ -35,6 +35,7 @@ from sketchmatch_proto.v1 import (
 __all__ = ["ServerSettings", "serve"]
 
 _ALL = 2**31 - 1
+_MOST_AT_ONCE = 1000
 _PING_MS = 10_000
 _IDLE_MS = 600_000
 _QUIET = 1.0
@@ -111,6 +112,8 @@ async def serve(
             ("grpc.server.max_pending_requests", _ALL),
             ("grpc.server.max_pending_requests_hard_limit", _ALL),
             ("grpc.server_max_unrequested_time_in_server", _ALL),
+            # What waits costs memory: of one connection the rest waits with the caller.
+            ("grpc.max_concurrent_streams", _MOST_AT_ONCE),
             # A caller who is frozen or cut off keeps its place for 20 s and no longer.
             ("grpc.keepalive_time_ms", _PING_MS),
             ("grpc.keepalive_timeout_ms", _PING_MS),
