@@ -13,6 +13,7 @@ from sketchmatch.pipeline.guard import blaming
 from sketchmatch_client import Client, InvalidRequestError, ServerFailedError, sources
 from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsRequest
 from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceStub
+from tests.pace import wait_until
 from tests.processes import COMMAND, server
 from tests.server.harness import ENDLESS, registry_with, scene, serving
 from tests.server.misbehaving import RaisingSegmenter
@@ -38,11 +39,18 @@ def test_each_call_has_a_line_with_time_caller_match_and_how_it_ended():
         running.wait_for("Segment code=INVALID_ARGUMENT .* reason=TOO_FEW_OBJECTS$")
         client.algorithms()
         running.wait_for(f"ListAlgorithms code=OK .* {CALLER}$")
-        events = client.events(scene(20), scene(20, 1), **ENDLESS)
-        next(events)
-        events.close()
-        running.wait_for("Match code=CANCELLED ")
+        for _ in range(5):
+            events = client.events(scene(20), scene(20, 1), **ENDLESS)
+            next(events)
+            events.close()
+        wait_until(lambda: [*map(is_of_a_match, running.said)].count(True) == 7, "no line")
+        codes = [line.split()[3] for line in running.said if is_of_a_match(line)]
+        assert codes == ["code=OK", "code=INVALID_ARGUMENT", *["code=CANCELLED"] * 5]
         assert not any("Health" in line for line in running.said)
+
+
+def is_of_a_match(line):
+    return " INFO Match " in line
 
 
 def test_of_a_plugins_fault_the_log_has_its_lines_and_none_of_ours(caplog):

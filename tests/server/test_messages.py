@@ -11,6 +11,8 @@ from google.protobuf import descriptor_pool
 from google.rpc import error_details_pb2, status_pb2
 from grpc_health.v1 import health_pb2
 from grpc_reflection.v1alpha import reflection_pb2
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from sketchmatch_client import Client, match_request, segment_request
 from sketchmatch_proto.v1 import catalog_service_pb2, match_service_pb2, scene_service_pb2
@@ -73,12 +75,36 @@ def test_health_and_reflection_read_compressed_requests_too(address, compression
 
 
 @pytest.mark.parametrize("data", [CUT_OFF, gzip.compress(CUT_OFF), b"\x1f\x8b", b"\x78\x9cjunk"])
-@pytest.mark.parametrize("path", [*OURS, HEALTH])
+@pytest.mark.parametrize("path", [*OURS, HEALTH, REFLECTION])
 def test_what_cannot_be_decoded_is_an_invalid_argument(address, path, data):
     code, sentence, reason = refused(address, path, data)
     assert code is grpc.StatusCode.INVALID_ARGUMENT
     assert sentence.startswith("the request cannot be decoded; send the message")
     assert reason == "INVALID_FIELD"
+
+
+@given(
+    path=st.sampled_from([*OURS, HEALTH, REFLECTION]),
+    like=st.sampled_from([*OURS.values()]),
+    cut=st.tuples(st.integers(0, 200), st.integers(0, 20)),
+    put=st.binary(max_size=8),
+    pack=st.sampled_from([bytes, bytes, gzip.compress, zlib.compress]),
+)
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_whatever_the_bytes_they_are_answered_or_are_the_callers_fault(
+    address, path, like, cut, put, pack
+):
+    (first, count), data = cut, like.SerializeToString()
+    code = grpc.StatusCode.OK
+    try:
+        sent(address, path, pack(data[:first] + put + data[first + count :]))
+    except grpc.RpcError as error:
+        code = error.code()
+    assert code in (
+        grpc.StatusCode.OK,
+        grpc.StatusCode.INVALID_ARGUMENT,
+        grpc.StatusCode.NOT_FOUND,  # of health, for a service that there is not
+    )
 
 
 def test_a_compressed_request_that_is_cut_off_is_not_taken_for_a_shorter_one(address):
@@ -89,7 +115,7 @@ def test_a_compressed_request_that_is_cut_off_is_not_taken_for_a_shorter_one(add
 
 
 @pytest.mark.parametrize("compression", COMPRESSED)
-@pytest.mark.parametrize("path", [*OURS, HEALTH])
+@pytest.mark.parametrize("path", [*OURS, HEALTH, REFLECTION])
 def test_what_explodes_is_refused_at_the_limit(path, compression):
     explosive = b"\x0a" + varint(20 * MIB) + bytes(20 * MIB)
     with serving(max_request_bytes=100_000, warm=False) as host:

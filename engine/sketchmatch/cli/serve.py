@@ -109,7 +109,7 @@ def serve(
         "limits.max_objects": max_objects,
     }
     server = load(config, flags).settings.server
-    settings = ServerSettings(server.address, server.grace_seconds, _PATIENCE_SECONDS)
+    settings = ServerSettings(server.address, server.grace_seconds, patience=_PATIENCE_SECONDS)
 
     def setup() -> Setup:
         configuration = load(config, flags)

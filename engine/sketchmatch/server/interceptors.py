@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable, Collection
+from collections.abc import AsyncIterable, AsyncIterator, Awaitable, Callable, Collection
 from functools import partial
 from typing import Any, NoReturn, cast
 
@@ -71,31 +71,40 @@ class OpeningInterceptor(grpc.aio.ServerInterceptor):
         if handler is None:
             return None
         read = partial(Packed, read=handler.request_deserializer)
-        if handler.request_streaming:
-            opened = handler._replace(request_deserializer=lambda data: self._opened(read(data)))
-        else:
-            opened = handler._replace(request_deserializer=read)
-            if handler_call_details.method not in self._later:
-                kind = _kind(handler)
-                opened = opened._replace(**{kind: self._opening(getattr(handler, kind))})
-        return cast("grpc.RpcMethodHandler[Any, Any]", opened)
+        handler = handler._replace(request_deserializer=read)
+        if handler_call_details.method not in self._later:
+            kind = _kind(handler)
+            opening = self._opening_each if handler.request_streaming else self._opening
+            handler = handler._replace(**{kind: opening(getattr(handler, kind))})
+        return cast("grpc.RpcMethodHandler[Any, Any]", handler)
 
-    def _opened(self, packed: Packed) -> Any:
-        return packed.opened(self._limit())
+    async def _opened(self, packed: Packed, context: _Context) -> Any:
+        try:
+            return packed.opened(self._limit())
+        except InvalidInputError as error:
+            await _abort(context, error)
 
     def _opening(self, method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
         async def call(packed: Packed, context: _Context) -> Any:
-            try:
-                request = self._opened(packed)
-            except InvalidInputError as error:
-                await _abort(context, error)
-            return await method(request, context)
+            return await method(await self._opened(packed, context), context)
+
+        return call
+
+    def _opening_each(self, method: Callable[[Any, _Context], AsyncIterable[Any]]) -> Any:
+        """Return the same for a stream of requests that is answered by a stream."""
+
+        async def call(requests: AsyncIterable[Packed], context: _Context) -> AsyncIterator[Any]:
+            opened = (await self._opened(packed, context) async for packed in requests)
+            async for response in method(opened, context):
+                yield response
 
         return call
 
 
 def _kind(handler: Any) -> str:
-    return "unary_stream" if handler.response_streaming else "unary_unary"
+    asked = "stream" if handler.request_streaming else "unary"
+    answered = "stream" if handler.response_streaming else "unary"
+    return f"{asked}_{answered}"
 
 
 def _caught(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
@@ -103,7 +112,7 @@ def _caught(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
         try:
             return await method(request, context)
         except grpc.aio.InternalError:
-            return None  # nobody is left to write to: the caller has gone
+            raise  # nobody is left to write to
         except Exception as error:
             await _abort(context, error)
 
