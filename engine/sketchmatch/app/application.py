@@ -28,7 +28,7 @@ from sketchmatch_proto.v1.catalog_service_pb2 import (
 )
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
-__all__ = ["Application", "Place"]
+__all__ = ["Application", "Place", "is_progress"]
 
 _log = logging.getLogger(__name__)
 
@@ -181,7 +181,7 @@ class Application:
                 for response in told:
                     if task.stopping.is_set():
                         break
-                    task.log.add(response, news=_is_progress(response))
+                    task.log.add(response, news=is_progress(response))
         except BaseException as raised:
             error = raised
         finally:
@@ -215,5 +215,6 @@ def _trusted(setup: Setup) -> Registry:
     return setup.engine.registry.without(*(item.distribution for item in _strangers(setup)))
 
 
-def _is_progress(response: Message) -> bool:
+def is_progress(response: Message) -> bool:
+    """Whether a response is news alone, of which the latest says all."""
     return isinstance(response, MatchResponse) and response.WhichOneof("event") == "progress"

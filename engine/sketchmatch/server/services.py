@@ -10,10 +10,11 @@ from typing import Any, TypeVar
 import grpc
 from google.protobuf.message import Message
 
-from sketchmatch.app.application import Application
+from sketchmatch.app.application import Application, is_progress
 from sketchmatch.app.packed import Packed
 from sketchmatch.app.tasks import Log
 from sketchmatch.server.calls import note
+from sketchmatch.server.pacing import Pacing
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
@@ -52,10 +53,12 @@ class MatchService(match_service_pb2_grpc.MatchServiceServicer):
         """Run a match and pass its events on."""
         with self._app.running(request) as task:
             note(match=task.id)
+            pacing = Pacing()
             async with aclosing(followed(task.log)) as responses:
                 async for response in responses:
                     _note_event(response)
-                    await context.write(response)
+                    if not is_progress(response) or pacing.is_due():
+                        await context.write(response)
 
 
 class SceneService(scene_service_pb2_grpc.SceneServiceServicer):
