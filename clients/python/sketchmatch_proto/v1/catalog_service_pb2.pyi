@@ -430,7 +430,7 @@ class ServerLimits(google.protobuf.message.Message):
     """Most matches that run at the same time; more are RESOURCE_EXHAUSTED."""
     @property
     def max_time_budget(self) -> google.protobuf.duration_pb2.Duration:
-        """Longest time budget; a longer one, or none, is cut to it."""
+        """Longest time budget; a longer one is cut to it."""
 
     def __init__(
         self,
