@@ -84,4 +84,4 @@ def _inflated(data: bytes, limit: int) -> bytes:
             f"the request has more than {limit} bytes once it is inflated, which is the limit; "
             "send fewer points or a smaller picture",
         )
-    return inflated if stream.eof else data
+    return inflated if stream.eof and not stream.unused_data else data
