@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import faulthandler
 import os
+import signal
 import stat
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 __all__ = ["HUNG", "watch"]
 
@@ -16,6 +17,7 @@ HUNG = 70
 """Exit code of a process that was ended because it no longer answered."""
 
 _TICK_SECONDS = 0.5
+_TURN_SECONDS = 4.0
 _STANDARD_ERROR = 2
 
 
@@ -24,7 +26,8 @@ def watch(patience: float | None) -> Callable[[], None]:
 
     If the loop does nothing, the process ends with the exit code :data:`HUNG` and says where each
     of its threads is. The time that counts is the watching thread's own: a process that was frozen
-    or had no processor for a while is spared.
+    or had no processor for a while is spared. Where one thread keeps all others from running, as an
+    endless regular expression does, the system ends the process by SIGPROF after about as long.
 
     Parameters
     ----------
@@ -41,15 +44,40 @@ def watch(patience: float | None) -> Callable[[], None]:
 def _look(loop: asyncio.AbstractEventLoop, over: threading.Event, patience: float) -> None:
     alive, silent = threading.Event(), 0.0
     alive.set()
-    while not over.wait(_TICK_SECONDS):
-        if not alive.is_set():
-            silent += _TICK_SECONDS
-        elif _asks(loop, alive):
-            silent = 0.0
-        else:
-            return
-        if silent >= patience:
-            _end(silent)
+    with _ended_by_the_system(patience) as put_off:
+        while not over.wait(_TICK_SECONDS):
+            put_off()
+            if not alive.is_set():
+                silent += _TICK_SECONDS
+            elif _asks(loop, alive):
+                silent = 0.0
+            else:
+                return
+            if silent >= patience:
+                _end(silent)
+
+
+@contextmanager
+def _ended_by_the_system(patience: float) -> Iterator[Callable[[], None]]:
+    """Have the process ended where no Python runs any more, unless that is put off again and again.
+
+    The time is the processors': a process that is frozen uses none. Threads that compute without
+    Python use it too, while this one waits for its turn.
+    """
+    if not hasattr(faulthandler, "register") or signal.getsignal(signal.SIGPROF) != signal.SIG_DFL:
+        yield lambda: None
+        return
+    seconds = patience + _TURN_SECONDS * (os.cpu_count() or 1)
+    faulthandler.register(signal.SIGPROF, chain=True)
+
+    def put_off() -> None:
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+
+    try:
+        yield put_off
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        faulthandler.unregister(signal.SIGPROF)
 
 
 def _asks(loop: asyncio.AbstractEventLoop, alive: threading.Event) -> bool:
