@@ -14,6 +14,7 @@ from grpc_reflection.v1alpha import reflection_pb2
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from sketchmatch.server.services import ADMITTED
 from sketchmatch_client import Client, match_request, segment_request
 from sketchmatch_proto.v1 import catalog_service_pb2, match_service_pb2, scene_service_pb2
 from tests.processes import server
@@ -122,7 +123,8 @@ def test_what_explodes_is_refused_at_the_limit(path, compression):
     with serving(max_request_bytes=100_000, warm=False) as host:
         code, sentence, reason = refused(host.address, path, explosive, compression)
     assert code is grpc.StatusCode.INVALID_ARGUMENT
-    assert sentence.startswith("the request has more than 100000 bytes once it is inflated")
+    limit = 100_000 if path in ADMITTED else 65_536
+    assert sentence.startswith(f"the request has more than {limit} bytes once it is inflated")
     assert reason == "MESSAGE_TOO_LARGE"
 
 

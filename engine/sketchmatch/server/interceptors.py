@@ -18,6 +18,7 @@ from sketchmatch.server.status import is_fault, refusal
 __all__ = ["ErrorInterceptor", "OpeningInterceptor"]
 
 _OURS = "/sketchmatch."
+_SHORT_BYTES = 65_536
 _log = logging.getLogger(__name__)
 _Context = grpc.aio.ServicerContext[Any, Any]
 
@@ -50,14 +51,12 @@ class OpeningInterceptor(grpc.aio.ServerInterceptor):
     Parameters
     ----------
     later
-        Paths of the methods that are given what came, as :class:`Packed`.
-    limit
-        Returns the bytes that a request may have.
+        Paths of the methods that are given what came, as :class:`Packed`. What others are asked is
+        short, and opened for anybody.
     """
 
-    def __init__(self, later: Collection[str], limit: Callable[[], int]) -> None:
+    def __init__(self, later: Collection[str]) -> None:
         self._later = later
-        self._limit = limit
 
     async def intercept_service(
         self,
@@ -74,31 +73,34 @@ class OpeningInterceptor(grpc.aio.ServerInterceptor):
         handler = handler._replace(request_deserializer=read)
         if handler_call_details.method not in self._later:
             kind = _kind(handler)
-            opening = self._opening_each if handler.request_streaming else self._opening
+            opening = _opening_each if handler.request_streaming else _opening
             handler = handler._replace(**{kind: opening(getattr(handler, kind))})
         return cast("grpc.RpcMethodHandler[Any, Any]", handler)
 
-    async def _opened(self, packed: Packed, context: _Context) -> Any:
-        try:
-            return packed.opened(self._limit())
-        except InvalidInputError as error:
-            await _abort(context, error)
 
-    def _opening(self, method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
-        async def call(packed: Packed, context: _Context) -> Any:
-            return await method(await self._opened(packed, context), context)
+def _opening(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
+    async def call(packed: Packed, context: _Context) -> Any:
+        return await method(await _opened(packed, context), context)
 
-        return call
+    return call
 
-    def _opening_each(self, method: Callable[[Any, _Context], AsyncIterable[Any]]) -> Any:
-        """Return the same for a stream of requests that is answered by a stream."""
 
-        async def call(requests: AsyncIterable[Packed], context: _Context) -> AsyncIterator[Any]:
-            opened = (await self._opened(packed, context) async for packed in requests)
-            async for response in method(opened, context):
-                yield response
+def _opening_each(method: Callable[[Any, _Context], AsyncIterable[Any]]) -> Any:
+    """Return the same for a stream of requests that is answered by a stream."""
 
-        return call
+    async def call(requests: AsyncIterable[Packed], context: _Context) -> AsyncIterator[Any]:
+        opened = (await _opened(packed, context) async for packed in requests)
+        async for response in method(opened, context):
+            yield response
+
+    return call
+
+
+async def _opened(packed: Packed, context: _Context) -> Any:
+    try:
+        return packed.opened(_SHORT_BYTES)
+    except InvalidInputError as error:
+        await _abort(context, error)
 
 
 def _kind(handler: Any) -> str:

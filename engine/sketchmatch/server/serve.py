@@ -100,7 +100,7 @@ async def serve(
     server = grpc.aio.server(
         interceptors=[
             CallLogInterceptor(),
-            OpeningInterceptor(ADMITTED, lambda: app.setup.limits.max_request_bytes),
+            OpeningInterceptor(ADMITTED),
             ErrorInterceptor(),
         ],
         options=[
