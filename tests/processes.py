@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -71,13 +72,14 @@ def assert_all_end(pids: list[int]) -> None:
 class Server:
     """A ``sketchmatch serve`` process and what it says on standard error."""
 
-    def __init__(self, *arguments: str) -> None:
+    def __init__(self, *arguments: str, **options: Any) -> None:
         self.said: list[str] = []
         self.process = subprocess.Popen(
             [*COMMAND, "serve", "--address", "127.0.0.1:0", *arguments],
             stderr=subprocess.PIPE,
             text=True,
             encoding="utf-8",
+            **options,
         )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -160,9 +162,9 @@ class Terminal:
 
 
 @contextmanager
-def server(*arguments: str) -> Iterator[Server]:
+def server(*arguments: str, **options: Any) -> Iterator[Server]:
     """Run a server process until the end of the block; it serves when the block begins."""
-    running = Server(*arguments)
+    running = Server(*arguments, **options)
     try:
         running.wait_for("serving$")
         yield running

@@ -297,7 +297,7 @@ async def test_an_error_is_what_the_log_ends_with(app):
 )
 def test_whose_algorithms_are_asked_for_is_told_without_decoding_anything(request_, named):
     order = Order("", request_.DESCRIPTOR.name, request_.SerializeToString())
-    for job in (Job("", request_), order.outline()):
+    for job in (Job("", request_), order.outline(1_000_000)):
         assert {item.name for item in algorithms(job, setup())} == named
 
 

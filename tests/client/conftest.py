@@ -12,15 +12,15 @@ def server():
         yield fake
 
 
-def call_sync(address, method, *arguments, **options):
-    with Client(address, timeout=60) as client:
+def call_sync(address, method, *arguments, retries=0, **options):
+    with Client(address, timeout=60, retries=retries) as client:
         answer = getattr(client, method)(*arguments, **options)
         return list(answer) if method == "events" else answer
 
 
-def call_async(address, method, *arguments, **options):
+def call_async(address, method, *arguments, retries=0, **options):
     async def answer():
-        async with AsyncClient(address, timeout=60) as client:
+        async with AsyncClient(address, timeout=60, retries=retries) as client:
             answer = getattr(client, method)(*arguments, **options)
             return [event async for event in answer] if method == "events" else await answer
 

@@ -59,12 +59,16 @@ class FakeServer(
         )
         self.info = catalog_service_pb2.GetServerInfoResponse(api_version="sketchmatch.v1")
         self.error: status_pb2.Status | None = None
+        self.fails = 1_000_000  # times
+        self.breaks_off = False
         self.health = health.HealthServicer()
 
     def Match(self, request, context):
         context.add_callback(self.cancelled.set)
         self._take(request, context)
         yield from self.events
+        if self.breaks_off:
+            context.abort(grpc.StatusCode.UNAVAILABLE, "away")
         while self.endless and context.is_active():
             yield EVENTS[2]
             time.sleep(0.01)
@@ -93,7 +97,7 @@ class FakeServer(
 
     def _take(self, request, context) -> None:
         self.requests.append(request)
-        if self.error:
+        if self.error and len(self.requests) <= self.fails:
             (code,) = (code for code in grpc.StatusCode if code.value[0] == self.error.code)
             packed = self.error.SerializeToString() if self.error.details else None
             context.set_trailing_metadata([("grpc-status-details-bin", packed)] if packed else [])

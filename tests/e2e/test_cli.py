@@ -24,6 +24,7 @@ from tests import processes
 from tests.pace import within
 from tests.processes import Terminal
 from tests.processes import sketchmatch as run
+from tests.server.harness import scene
 
 ROOM = (LIVING_ROOM_SKETCH, LIVING_ROOM_MAP)
 LONG = (
@@ -520,8 +521,11 @@ def test_plugins_reference_writes_the_page_of_any_distribution(strangers):
 @pytest.mark.slow
 def test_serve_takes_its_limits_from_options():
     limits = ("--max-request-mib", "2", "--max-matches", "3", "--max-time-budget", "1.5")
-    with processes.server(*limits) as running, Client(running.address) as client:
+    default = ("--default-time-budget", "1.25")
+    with processes.server(*limits, *default) as running, Client(running.address) as client:
         said = client.server_info().limits
+        accepted = next(client.events(scene(3), scene(3)))
+    assert accepted.accepted.time_budget.ToTimedelta().total_seconds() == 1.25
     assert said.max_request_bytes == 2 * 1024**2
     assert said.max_concurrent_matches == 3
     assert said.max_time_budget.ToTimedelta().total_seconds() == 1.5

@@ -3,9 +3,11 @@
 import multiprocessing
 import os
 import re
+import signal
 import statistics
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
@@ -305,6 +307,28 @@ def test_no_process_outlives_a_server_that_is_killed(site, tmp_path, monkeypatch
         running.process.kill()
         running.process.wait(10)
         assert_all_end(children)
+
+
+def test_a_signal_to_the_whole_group_lets_strangers_matches_end_within_the_grace(site, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", os.fspath(site), prepend=os.pathsep)
+    monkeypatch.setenv("PYTHONPATH", os.fspath(Path.cwd()), prepend=os.pathsep)
+    asked = {"searcher": "guessing", "params": {"searcher": {"tries": 200, "pause": 0.01}}}
+    with (
+        server("--grace", "60", process_group=0) as running,
+        Client(running.address) as connected,
+        ThreadPoolExecutor(2) as threads,
+    ):
+        searching = connected.events(scene(4), scene(4), **asked)
+        while not next(searching).progress.HasField("confidence"):
+            pass
+        before = set(children_of(running.process.pid))
+        starting = threads.submit(connected.match, scene(4), scene(4), **asked)
+        wait_until(lambda: set(children_of(running.process.pid)) - before, "no process starts")
+        os.killpg(running.process.pid, signal.SIGTERM)
+        ends = [*searching][-1], starting.result(60)
+        assert running.end() == 0
+    assert ends[0].WhichOneof("event") == "result"
+    assert ends[1].result.search_note.startswith("process ")
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ def assert_serves(client):
 
 def test_a_request_more_than_the_server_has_room_for_is_told_when_to_come_again():
     full = {"max_concurrent_matches": 2, "max_waiting": 0}
-    with serving(**full) as host, Client(host.address) as client:
+    with serving(**full) as host, Client(host.address, retries=0) as client:
         running = [client.events(scene(20), scene(20, 1), **ENDLESS) for _ in range(2)]
         for events in running:
             assert next(events).WhichOneof("event") == "accepted"
@@ -47,7 +47,7 @@ def test_a_request_above_the_limit_is_refused_with_the_remedy(method):
 def test_a_request_that_even_the_transport_refuses_is_a_clear_error_too():
     with serving(max_request_bytes=2_000) as host, Client(host.address) as client:
         with pytest.raises(InvalidRequestError, match="larger than the server at") as raised:
-            client.segment(scene(3, labels=["x" * 5_000] * 3))
+            client.segment(scene(3, labels=["x" * 30_000] * 3))
         assert raised.value.reason == "MESSAGE_TOO_LARGE"
         assert "make it smaller" in str(raised.value)
         assert_serves(client)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import AsyncGenerator, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
 from contextlib import aclosing
 from functools import cached_property
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, Unpack, cast
+from typing import TYPE_CHECKING, Any, Self, TypeVar, Unpack, cast
 
 import grpc
 import grpc.aio
@@ -27,9 +27,11 @@ from sketchmatch_client._channel import (
 )
 from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, tell_progress
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
+from sketchmatch_client._retry import Attempts, checked_retries
 from sketchmatch_client.errors import (
     DeadlineExceededError,
     ServerUnavailableError,
+    SketchmatchError,
     translated_errors,
 )
 from sketchmatch_proto.v1.catalog_service_pb2 import (
@@ -52,6 +54,8 @@ if TYPE_CHECKING:  # these exist for type checkers alone
 
 __all__ = ["AsyncClient"]
 
+_Answer = TypeVar("_Answer")
+
 
 class AsyncClient:
     """As :class:`Client`, for asyncio; close it, or use it in an ``async with`` statement.
@@ -60,7 +64,7 @@ class AsyncClient:
 
     Parameters
     ----------
-    address, credentials, timeout, options
+    address, credentials, timeout, retries, options
         As for :class:`Client`.
 
     Raises
@@ -75,12 +79,14 @@ class AsyncClient:
         *,
         credentials: grpc.ChannelCredentials | None = None,
         timeout: float | None = None,
+        retries: int = 3,
         options: ChannelOptions = (),
     ) -> None:
         check_address(address, credentials is not None)
         self._address = address
         self._credentials = credentials
         self._timeout = limit_of(timeout)
+        self._retries = checked_retries(retries)
         self._options = channel_options(address, options)
 
     async def __aenter__(self) -> Self:
@@ -142,20 +148,19 @@ class AsyncClient:
         """Find the objects of one source, without a match; see :meth:`Client.segment`."""
         request = segment_request(source, segmenter, params, profile)
         stub = cast("SceneServiceAsyncStub", SceneServiceStub(self._channel))
-        with translated_errors(self._address):
-            return await stub.Segment(request, timeout=self._limit(timeout))
+        return await self._asked(lambda limit: stub.Segment(request, timeout=limit), timeout)
 
     async def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""
         stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
-        with translated_errors(self._address):
-            return await stub.ListAlgorithms(ListAlgorithmsRequest(), timeout=self._limit(timeout))
+        request = ListAlgorithmsRequest()
+        return await self._asked(lambda limit: stub.ListAlgorithms(request, timeout=limit), timeout)
 
     async def server_info(self, *, timeout: float | None = None) -> GetServerInfoResponse:
         """Return the server's versions and limits."""
         stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
-        with translated_errors(self._address):
-            return await stub.GetServerInfo(GetServerInfoRequest(), timeout=self._limit(timeout))
+        request = GetServerInfoRequest()
+        return await self._asked(lambda limit: stub.GetServerInfo(request, timeout=limit), timeout)
 
     async def wait_until_serving(self, timeout: float = 60.0) -> None:
         """Wait until the server is up and warm; see :meth:`Client.wait_until_serving`."""
@@ -177,13 +182,38 @@ class AsyncClient:
         self, request: MatchRequest, limit: float | None
     ) -> AsyncGenerator[MatchResponse, None]:
         stub = cast("MatchServiceAsyncStub", MatchServiceStub(self._channel))
-        with translated_errors(self._address):
-            call = stub.Match(request, timeout=limit)
+        attempts, told = Attempts(self._retries, limit), False
+        while True:
             try:
-                async for event in call:
-                    yield event
-            finally:
-                call.cancel()
+                with translated_errors(self._address):
+                    call = stub.Match(request, timeout=attempts.limit)
+                    try:
+                        async for event in call:
+                            told = True
+                            yield event
+                    finally:
+                        call.cancel()
+                return
+            except SketchmatchError as error:
+                pause = None if told else attempts.pause_after(error)
+                if pause is None:
+                    raise
+            await asyncio.sleep(pause)
+
+    async def _asked(
+        self, call: Callable[[float | None], Awaitable[_Answer]], timeout: float | None
+    ) -> _Answer:
+        """Return what a call returns that is given the seconds it may take, perhaps made again."""
+        attempts = Attempts(self._retries, self._limit(timeout))
+        while True:
+            try:
+                with translated_errors(self._address):
+                    return await call(attempts.limit)
+            except SketchmatchError as error:
+                pause = attempts.pause_after(error)
+                if pause is None:
+                    raise
+            await asyncio.sleep(pause)
 
     async def _is_serving(self, timeout: float | None) -> bool:
         check: grpc.aio.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(

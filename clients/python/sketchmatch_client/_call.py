@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from threading import RLock
+from threading import Event, RLock
 from types import TracebackType
 from typing import Any, Protocol, Self
 
 from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, tell_progress
+from sketchmatch_client._retry import Attempts
 from sketchmatch_client.errors import CallCancelledError, SketchmatchError, translated_errors
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
@@ -30,9 +31,15 @@ class MatchCall(Generator[MatchResponse, None, None]):
     goes through the events; :meth:`cancel` and :meth:`close` may be called from any other.
     """
 
-    def __init__(self, begin: Callable[[], _Stream], address: str) -> None:
+    def __init__(
+        self, begin: Callable[[float | None], _Stream], address: str, begun: Callable[[], Attempts]
+    ) -> None:
         self._begin = begin
         self._address = address
+        self._begun = begun
+        self._attempts: Attempts | None = None
+        self._told = False
+        self._over = Event()
         self._lock = RLock()  # a handler of signals may cancel, too
         self._call: _Stream | None = None
         self._collector = MatchCollector(None)
@@ -86,6 +93,7 @@ class MatchCall(Generator[MatchResponse, None, None]):
             raise
         if event is None:
             raise StopIteration
+        self._told = True
         self._collector.add(event)
         return event
 
@@ -107,13 +115,15 @@ class MatchCall(Generator[MatchResponse, None, None]):
 
     def _next(self) -> MatchResponse | None:
         """Return the next event, or None at the end."""
-        call, event = self._started(), None
-        if call is not None:
+        event = None
+        while (call := self._started()) is not None:
             try:
                 with translated_errors(self._address):
                     event = next(call, None)
+                break
             except SketchmatchError as error:
-                self._end(error)
+                if not self._starts_again(error):
+                    self._end(error)
         if event is None:
             self._end()
             if self._error is not None:
@@ -123,14 +133,29 @@ class MatchCall(Generator[MatchResponse, None, None]):
     def _started(self) -> _Stream | None:
         """Return the call, made where there was none; None if the match has ended."""
         with self._lock:
+            if self._attempts is None:
+                self._attempts = self._begun()
             if self._call is None and not self._ended:
-                self._call = self._begin()
+                self._call = self._begin(self._attempts.limit)
             return None if self._ended else self._call
+
+    def _starts_again(self, error: SketchmatchError) -> bool:
+        """Wait for the next attempt; False if there is none, as after the first event."""
+        if self._told or self._attempts is None:
+            return False
+        pause = self._attempts.pause_after(error)
+        if pause is None:
+            return False
+        self._over.wait(pause)
+        with self._lock:
+            self._call = None
+        return True
 
     def _end(self, error: SketchmatchError | None = None) -> None:
         """Come to the end, unless it was reached; the error is for whoever asks for more."""
         with self._lock:
             if not self._ended:
                 self._ended, self._error = True, error
+                self._over.set()
                 if self._call is not None:
                     self._call.cancel()

@@ -37,6 +37,7 @@ _OPTIONS: ChannelOptions = (
     # A robot's link may vanish without a word: find out within 40 s, and reconnect soon.
     ("grpc.keepalive_time_ms", 30_000),
     ("grpc.keepalive_timeout_ms", 10_000),
+    ("grpc.http2.ping_timeout_ms", 10_000),
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.max_reconnect_backoff_ms", 5_000),
 )

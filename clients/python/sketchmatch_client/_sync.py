@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import TracebackType
-from typing import Any, Self, Unpack
+from typing import Any, Self, TypeVar, Unpack
 
 import grpc
 
@@ -24,9 +24,11 @@ from sketchmatch_client._channel import (
 )
 from sketchmatch_client._match import Match, ProgressCallback
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
+from sketchmatch_client._retry import Attempts, checked_retries
 from sketchmatch_client.errors import (
     DeadlineExceededError,
     ServerUnavailableError,
+    SketchmatchError,
     translated_errors,
 )
 from sketchmatch_proto.v1.catalog_service_pb2 import (
@@ -42,6 +44,8 @@ from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceStub
 from sketchmatch_proto.v1.source_pb2 import Source
 
 __all__ = ["Client"]
+
+_Answer = TypeVar("_Answer")
 
 
 class Client:
@@ -61,6 +65,10 @@ class Client:
     timeout
         Seconds that a call may take where the call itself does not say. None or infinity: no
         limit.
+    retries
+        How often a request is sent again where the server is not available or has no room, after a
+        pause that the server asks for or that grows from 0.1 s. The timeout is for all attempts
+        together, and a match that has begun is not sent again.
     options
         Channel options of gRPC, beside or instead of this package's own.
 
@@ -76,11 +84,13 @@ class Client:
         *,
         credentials: grpc.ChannelCredentials | None = None,
         timeout: float | None = None,
+        retries: int = 3,
         options: ChannelOptions = (),
     ) -> None:
         check_address(address, credentials is not None)
         self._address = address
         self._timeout = limit_of(timeout)
+        self._retries = checked_retries(retries)
         chosen = channel_options(address, options)
         self._channel = (
             grpc.insecure_channel(address, chosen)
@@ -159,7 +169,11 @@ class Client:
         """
         request, limit = match_request(sketch, map, **options), self._limit(timeout)
         stub = MatchServiceStub(self._channel)
-        return MatchCall(lambda: stub.Match(request, timeout=limit), self._address)
+        return MatchCall(
+            lambda seconds: stub.Match(request, timeout=seconds),
+            self._address,
+            lambda: Attempts(self._retries, limit),
+        )
 
     def segment(
         self,
@@ -191,22 +205,18 @@ class Client:
             The scene, warnings, and the segmenter as it ran.
         """
         request = segment_request(source, segmenter, params, profile)
-        with translated_errors(self._address):
-            return SceneServiceStub(self._channel).Segment(request, timeout=self._limit(timeout))
+        stub = SceneServiceStub(self._channel)
+        return self._asked(lambda limit: stub.Segment(request, timeout=limit), timeout)
 
     def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""
-        with translated_errors(self._address):
-            return CatalogServiceStub(self._channel).ListAlgorithms(
-                ListAlgorithmsRequest(), timeout=self._limit(timeout)
-            )
+        stub, request = CatalogServiceStub(self._channel), ListAlgorithmsRequest()
+        return self._asked(lambda limit: stub.ListAlgorithms(request, timeout=limit), timeout)
 
     def server_info(self, *, timeout: float | None = None) -> GetServerInfoResponse:
         """Return the server's versions and limits."""
-        with translated_errors(self._address):
-            return CatalogServiceStub(self._channel).GetServerInfo(
-                GetServerInfoRequest(), timeout=self._limit(timeout)
-            )
+        stub, request = CatalogServiceStub(self._channel), GetServerInfoRequest()
+        return self._asked(lambda limit: stub.GetServerInfo(request, timeout=limit), timeout)
 
     def wait_until_serving(self, timeout: float = 60.0) -> None:
         """Wait until the server is up and warm.
@@ -228,6 +238,19 @@ class Client:
             if time.monotonic() >= deadline:
                 raise never_served(self._address, timeout)
             time.sleep(HEALTH_POLL_SECONDS)
+
+    def _asked(self, call: Callable[[float | None], _Answer], timeout: float | None) -> _Answer:
+        """Return what a call returns that is given the seconds it may take, perhaps made again."""
+        attempts = Attempts(self._retries, self._limit(timeout))
+        while True:
+            try:
+                with translated_errors(self._address):
+                    return call(attempts.limit)
+            except SketchmatchError as error:
+                pause = attempts.pause_after(error)
+                if pause is None:
+                    raise
+            time.sleep(pause)
 
     def _is_serving(self, timeout: float | None) -> bool:
         check: grpc.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(CHECK_HEALTH)

@@ -18,18 +18,13 @@ from sketchmatch.app import responses
 from sketchmatch.app.frames import Flag
 from sketchmatch.app.jobs import Job, answers
 from sketchmatch.app.orders import Order
-from sketchmatch.app.setup import RequestLimits, Setup
+from sketchmatch.app.packed import check_size
+from sketchmatch.app.setup import Setup
 from sketchmatch.app.tasks import Task
 from sketchmatch.app.waiting import Caller, FairQueue
 from sketchmatch.app.worker import flags
 from sketchmatch.app.workers import Workers
-from sketchmatch.errors import (
-    InvalidInputError,
-    Reason,
-    ServerStoppingError,
-    TooBusyError,
-    WorkerLostError,
-)
+from sketchmatch.errors import ServerStoppingError, TooBusyError, WorkerLostError
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.warmup import COMPILING, announcing_compilation, warm_up, warm_up_others
 from sketchmatch.registry import Registry
@@ -99,7 +94,7 @@ class Here:
             self._clocks[task] = clock
 
         try:
-            with closing(answers(task.order.job(), task.setup, begun)) as work:
+            with closing(answers(_job(task), task.setup, begun)) as work:
                 for response in work:
                     if task.stopping.is_set():
                         break
@@ -187,7 +182,7 @@ class Application:
         setup = self._setup
         if self._stopping:
             raise ServerStoppingError("the server is about to stop")
-        _check_size(len(data), setup.limits)
+        check_size(len(data), setup.limits.max_request_bytes)
         task = Task(Order(uuid.uuid4().hex, kind, data), setup, caller)
         self._admit(task)
         try:
@@ -199,7 +194,7 @@ class Application:
                 self._place(task).stop(task)
 
     def algorithms(self) -> ListAlgorithmsResponse:
-        """Return what there is to choose from."""
+        """Return what there is to choose from, put together once for each setup."""
         setup = self._setup
         if self._catalogue is None or self._catalogue[0] is not setup:
             listed = responses.catalogue(setup.engine.registry, setup.engine.defaults)
@@ -350,15 +345,8 @@ class Application:
                 task.log.end(TooBusyError(problem, self._retry_seconds()))
 
 
-def _check_size(size: int, limits: RequestLimits) -> None:
-    limit = limits.max_request_bytes
-    if size > limit:
-        raise InvalidInputError(
-            Reason.MESSAGE_TOO_LARGE,
-            "",
-            f"the request has {size} bytes, more than the limit of {limit}; "
-            "send fewer points or a smaller picture",
-        )
+def _job(task: Task) -> Job:
+    return task.order.job(task.setup.limits.max_request_bytes)
 
 
 def _trusted(setup: Setup) -> Registry:

@@ -103,7 +103,7 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
 def time_budget(job: Job, setup: Setup) -> float | None:
     """Return the seconds that a job may take, or None for no limit."""
     if isinstance(job.request, MatchRequest):
-        return requests.time_budget(job.request, setup.limits.max_time_budget)
+        return requests.time_budget(job.request, setup.limits)
     return None
 
 
@@ -112,9 +112,7 @@ def _match(
 ) -> Generator[Message, None, None]:
     engine = setup.engine
     with engine.limited():
-        value = requests.match_request(
-            request, setup.limits.max_time_budget, engine.registry.readers
-        )
+        value = requests.match_request(request, setup.limits, engine.registry.readers)
     writer, clock = responses.ResponseWriter(value), Clock(value.time_budget)
     begun(clock)
     with requests.paths_of(request), closing(engine.match(value, name, clock)) as events:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from google.protobuf.message import DecodeError, Message
 
 from sketchmatch.app.jobs import Job
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.app.packed import Packed, inflated
 from sketchmatch_proto.v1 import source_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest
@@ -37,42 +37,42 @@ class Order:
     kind
         Name of the message: MatchRequest or SegmentRequest.
     data
-        The message.
+        The message, perhaps compressed.
     """
 
     id: str
     kind: str
     data: bytes
 
-    def job(self) -> Job:
-        """Decode the request.
+    def job(self, limit: int) -> Job:
+        """Inflate and decode the request.
+
+        Parameters
+        ----------
+        limit
+            Bytes that it may have.
 
         Raises
         ------
         InvalidInputError
             If it is not what it should be.
         """
-        request = _TYPES[self.kind]()
-        try:
-            request.ParseFromString(self.data)
-        except DecodeError:
-            raise InvalidInputError(
-                Reason.INVALID_FIELD,
-                "",
-                f"the request's {len(self.data)} bytes are no {request.DESCRIPTOR.full_name}; "
-                "send what the stubs of the contract serialise",
-            ) from None
-        return Job(self.id, request)
+        return Job(self.id, Packed(self.data, _TYPES[self.kind].FromString).opened(limit))
 
-    def outline(self) -> Job:
+    def outline(self, limit: int) -> Job:
         """Decode the request but for sketch and map, of which only files are kept.
 
-        It takes no longer for large requests. What cannot be decoded is as good as empty; that is
-        told where the job is done.
+        It takes no longer for large requests, unless they are compressed. What cannot be decoded is
+        as good as empty; that is told where the job is done.
+
+        Raises
+        ------
+        InvalidInputError
+            If it has more bytes than the limit.
         """
         request = _TYPES[self.kind]()
         try:
-            request.ParseFromString(_outline(self.data, request))
+            request.ParseFromString(_outline(inflated(self.data, limit), request))
         except (DecodeError, IndexError, KeyError):
             request.Clear()
         return Job(self.id, request)

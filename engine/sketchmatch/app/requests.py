@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from google.protobuf import struct_pb2
 
+from sketchmatch.app.setup import RequestLimits
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io.files import FileKind, decode_file, kind_of_file
 from sketchmatch.io.images import decode_image
@@ -65,10 +65,10 @@ _TYPES: dict[str, type[Source]] = {
 
 def match_request(
     request: match_service_pb2.MatchRequest,
-    max_time_budget: float | None,
+    limits: RequestLimits,
     readers: Sequence[RegisteredReader] = (),
 ) -> MatchRequest:
-    """Read a request to match; ``readers`` are those of plugins.
+    """Read a request to match, within some limits; ``readers`` are those of plugins.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def match_request(
         map=source(request.map, "map", request.HasField("map"), readers),
         selection=selection(request),
         seed=request.seed,
-        time_budget=time_budget(request, max_time_budget),
+        time_budget=time_budget(request, limits),
         weights=_weights(request.weights) if request.HasField("weights") else None,
         profile=request.pipeline.profile,
         pins=tuple(_pin(pin, f"pins[{k}]") for k, pin in enumerate(request.pins)),
@@ -168,9 +168,7 @@ def file_kind(message: source_pb2.Source, readers: Sequence[RegisteredReader]) -
         return None
 
 
-def time_budget(
-    request: match_service_pb2.MatchRequest, max_time_budget: float | None
-) -> float | None:
+def time_budget(request: match_service_pb2.MatchRequest, limits: RequestLimits) -> float | None:
     """Read how many seconds a match may take, or None for no limit.
 
     Raises
@@ -179,7 +177,7 @@ def time_budget(
         If it is no time.
     """
     if not request.HasField("time_budget"):
-        return max_time_budget
+        return limits.time_budget(None)
     seconds = request.time_budget.seconds + request.time_budget.nanos / 1e9
     if seconds <= 0:
         raise InvalidInputError(
@@ -187,7 +185,7 @@ def time_budget(
             "time_budget",
             f"is {seconds:g} s; give a positive time or none at all",
         )
-    return min(seconds, max_time_budget or math.inf)
+    return limits.time_budget(seconds)
 
 
 @contextmanager

@@ -32,6 +32,8 @@ class RequestLimits:
         Requests that wait for a place.
     max_wait
         Seconds that one may wait.
+    default_time_budget
+        Seconds for a match that does not say how long it may take, or None for the most.
     """
 
     max_request_bytes: int = 64 * 1024 * 1024
@@ -45,10 +47,17 @@ class RequestLimits:
         """Places that requests may take which ask for strangers' plugins: half of them."""
         return max(1, self.max_concurrent_matches // 2)
 
+    default_time_budget: float | None = None
+
+    def time_budget(self, asked: float | None) -> float | None:
+        """Return the seconds for a match that asks for so many, or None for no limit."""
+        said = (asked or self.default_time_budget, self.max_time_budget)
+        return min((seconds for seconds in said if seconds is not None), default=None)
+
     @property
     def transport_bytes(self) -> int:
         """Size above which the transport itself refuses a message."""
-        return 4 * self.max_request_bytes
+        return self.max_request_bytes + max(self.max_request_bytes // 8, 1 << 16)
 
 
 @dataclass(frozen=True)

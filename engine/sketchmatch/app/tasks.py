@@ -123,7 +123,11 @@ class Task:
         self.setup = setup
         self.caller = caller
         self.strangers = (
-            setup.isolation.strangers(algorithms(order.outline(), setup)) if setup.strangers else ()
+            setup.isolation.strangers(
+                algorithms(order.outline(setup.limits.max_request_bytes), setup)
+            )
+            if setup.strangers
+            else ()
         )
         self.log = Log[bytes]()
         self.stopping = threading.Event()

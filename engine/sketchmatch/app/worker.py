@@ -9,7 +9,6 @@ import queue
 import signal
 import struct
 import threading
-import traceback
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from socket import socket
 
 from google.protobuf.message import Message
 
+from sketchmatch.app.faults import told
 from sketchmatch.app.frames import Flag, Frames, Says, failure, frame
 from sketchmatch.app.jobs import answers
 from sketchmatch.app.orders import Order
@@ -133,8 +133,8 @@ class _Worker:
             try:
                 self._do(kind, content)
             except Exception as error:
-                log = "".join(traceback.format_exception(error))
-                self.say(Says.FAILED, failure(error, log))
+                _, _, where = told(error).partition("\n")
+                self.say(Says.FAILED, failure(error, where))
             else:
                 self.say(Says.ENDED)
 
@@ -163,8 +163,9 @@ class _Worker:
             self._warm_up_others()
             return
         order: Order = pickle.loads(content)
+        job = order.job(self._setup.limits.max_request_bytes)
         try:
-            with closing(answers(order.job(), self._setup, self._begun)) as responses:
+            with closing(answers(job, self._setup, self._begun)) as responses:
                 for response in responses:
                     if self._stop.is_set():
                         break
@@ -200,9 +201,16 @@ def _end_unless_alive(patience: float) -> None:
 
 def leave_signals_to_the_server() -> None:
     """Heed none: a group of processes gets them all, and the server alone says who ends when."""
+    own = os.getpid()
+
+    def leave(number: int, _frame: object) -> None:
+        if os.getpid() != own:  # a plugin ends a process that it has forked
+            signal.signal(number, signal.SIG_DFL)
+            os.kill(os.getpid(), number)
+
     for name in ("SIGINT", "SIGHUP", "SIGTERM"):
         if number := getattr(signal, name, None):
-            signal.signal(number, signal.SIG_IGN)
+            signal.signal(number, leave if name == "SIGTERM" else signal.SIG_IGN)
 
 
 def _go_first_where_memory_is_short() -> None:

@@ -385,7 +385,8 @@ class _Worker(asyncio.Protocol):
             case Says.FAILED:
                 error, log = failure_of(content)
                 failed: BaseException = error or WorkerError("a request failed in a worker process")
-                failed.add_note(log)
+                if log:
+                    failed.add_note(log)
                 self._end(failed)
 
     def _end(self, error: BaseException | None) -> None:
@@ -430,7 +431,7 @@ class _Worker(asyncio.Protocol):
         if not self._strangers:
             return None
         try:
-            return time_budget(task.order.outline(), task.setup)
+            return time_budget(task.order.outline(task.setup.limits.max_request_bytes), task.setup)
         except InvalidInputError:
             return None
 

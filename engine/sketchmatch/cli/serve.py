@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["serve"]
 
 _MIB = 1024 * 1024
+_PATIENCE_SECONDS = 30.0
 
 
 def serve(
@@ -53,7 +54,13 @@ def serve(
         typer.Option(metavar="SECONDS", help="Longest wait for a turn; 10 by default."),
     ] = None,
     max_time_budget: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Longest match; no limit by default.")
+        float | None, typer.Option(metavar="SECONDS", help="Longest match; 3600 by default.")
+    ] = None,
+    default_time_budget: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS", help="Longest match where a request does not say; 300 by default."
+        ),
     ] = None,
     grace: Annotated[
         float | None,
@@ -89,8 +96,9 @@ def serve(
 
     Where no option says it, the configuration does. SIGHUP reads the configuration again, but for
     address, grace and workers; requests under way keep the one that they began with. Health is
-    NOT_SERVING until the kernels are compiled or loaded. There is no encryption and no
-    authentication yet: listen on addresses that only trusted programs reach.
+    NOT_SERVING until the kernels are compiled or loaded. A server that hangs ends with exit code 70
+    after 30 s: let what starts it start it again. There is no encryption and no authentication yet:
+    listen on addresses that only trusted programs reach.
     """
     import asyncio
     import os
@@ -109,6 +117,7 @@ def serve(
         "server.max_waiting": max_waiting,
         "server.max_wait_seconds": max_wait,
         "server.max_time_budget_seconds": max_time_budget,
+        "server.default_time_budget_seconds": default_time_budget,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
         "limits.max_side": max_side,
@@ -119,11 +128,27 @@ def serve(
     kept = (os.cpu_count() or 1) if server.workers is None else server.workers
     if kept:
         prepare()
+    from sketchmatch.server.log import logging_to_standard_error
     from sketchmatch.server.serve import ServerSettings
     from sketchmatch.server.serve import serve as serve_forever
 
-    settings = ServerSettings(server.address, server.grace_seconds, kept)
-    asyncio.run(serve_forever(lambda: _setup(load(config, flags)), settings, say))
+    settings = ServerSettings(
+        server.address, server.grace_seconds, kept, patience=_PATIENCE_SECONDS
+    )
+
+    def setup() -> Setup:
+        configuration = load(config, flags)
+        now = configuration.settings.server
+        kept_ones = (server.address, server.grace_seconds, server.workers)
+        if (now.address, now.grace_seconds, now.workers) != kept_ones:
+            say(
+                "server.address, server.grace_seconds and server.workers stay until the server is "
+                "started anew"
+            )
+        return _setup(configuration)
+
+    with logging_to_standard_error():
+        asyncio.run(serve_forever(setup, settings, say))
 
 
 def _setup(configuration: Configuration) -> Setup:
@@ -146,6 +171,7 @@ def _setup(configuration: Configuration) -> Setup:
             max_waiting=server.max_waiting,
             max_wait=server.max_wait_seconds,
             max_time_budget=server.max_time_budget_seconds,
+            default_time_budget=server.default_time_budget_seconds,
         ),
         Isolation(configuration.trusted, configuration.patience),
     )

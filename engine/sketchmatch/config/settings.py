@@ -159,11 +159,11 @@ class _Server(_Section):
     max_wait_seconds: float = Field(
         10.0, ge=0, description="How long a request may wait for its turn."
     )
-    max_time_budget_seconds: float | None = Field(
-        None,
-        ge=0.001,
-        description="Longest match; no limit, when left out.",
-        examples=[60.0],
+    max_time_budget_seconds: float = Field(
+        3600.0, ge=0.001, description="Longest match; one that asks for more is cut to it."
+    )
+    default_time_budget_seconds: float = Field(
+        300.0, ge=0.001, description="Longest match where the request does not say."
     )
 
 

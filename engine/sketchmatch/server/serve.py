@@ -17,8 +17,10 @@ from grpc_reflection.v1alpha import reflection
 from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
-from sketchmatch.server.interceptors import ErrorInterceptor
+from sketchmatch.server.calls import CallLogInterceptor
+from sketchmatch.server.interceptors import ErrorInterceptor, OpeningInterceptor
 from sketchmatch.server.services import CatalogService, MatchService, SceneService
+from sketchmatch.server.watchdog import watch
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
@@ -28,6 +30,10 @@ from sketchmatch_proto.v1 import (
 
 __all__ = ["ServerSettings", "serve"]
 
+_ALL = 2**31 - 1
+_MOST_AT_ONCE = 1000
+_PING_MS = 10_000
+_IDLE_MS = 600_000
 _QUIET = 1.0
 _LOOK = 0.05
 _COMING_TO_AN_END = 2.0
@@ -52,11 +58,15 @@ class ServerSettings:
         Seconds that running matches are given when the server is asked to stop.
     workers
         Processes that wait for requests at least; 0 to answer in threads of this process.
+    patience
+        Seconds after which a server that answers nothing ends its process; None for never, which
+        is for servers in a process that does something else.
     """
 
     address: str = "127.0.0.1:50051"
     grace: float = 5.0
     workers: int = 0
+    patience: float | None = None
 
 
 async def serve(
@@ -89,10 +99,30 @@ async def serve(
     """
     app = Application(load(), settings.workers)
     server = grpc.aio.server(
-        interceptors=[ErrorInterceptor()],
+        interceptors=[
+            CallLogInterceptor(),
+            OpeningInterceptor(),
+            ErrorInterceptor(),
+        ],
         options=[
             ("grpc.max_receive_message_length", app.setup.limits.transport_bytes),
             ("grpc.max_send_message_length", -1),
+            # A few bytes may become very many: they are inflated once there is a place for them.
+            ("grpc.per_message_decompression", 0),
+            # Of many calls at once gRPC would cancel some without a word; we say when to come back.
+            ("grpc.server.max_pending_requests", _ALL),
+            ("grpc.server.max_pending_requests_hard_limit", _ALL),
+            ("grpc.server_max_unrequested_time_in_server", _ALL),
+            # What waits costs memory: of one connection the rest waits with the caller.
+            ("grpc.max_concurrent_streams", _MOST_AT_ONCE),
+            # A caller who is frozen or cut off keeps its place for 20 s and no longer.
+            ("grpc.keepalive_time_ms", _PING_MS),
+            ("grpc.keepalive_timeout_ms", _PING_MS),
+            ("grpc.http2.ping_timeout_ms", _PING_MS),
+            ("grpc.keepalive_permit_without_calls", 1),
+            ("grpc.http2.max_pings_without_data", 0),
+            # Who has not called for long connects anew when it does.
+            ("grpc.max_connection_idle_ms", _IDLE_MS),
             # Clients ping every 30 s; by default the server would hang up on them.
             ("grpc.http2.min_ping_interval_without_data_ms", 20_000),
             # Otherwise a second server on the same port would silently take half of the calls.
@@ -103,6 +133,7 @@ async def serve(
     port = _listen(server, settings.address)
     await checks.set("", health_pb2.HealthCheckResponse.NOT_SERVING)
     await server.start()
+    unwatch = watch(settings.patience)
     stopping = stop or asyncio.Event()
     reloading = _Reloading(load, app, say)
     _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
@@ -125,6 +156,7 @@ async def serve(
         await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
         await ending
         await app.close()
+        unwatch()
     say("stopped")
 
 

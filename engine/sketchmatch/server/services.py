@@ -13,18 +13,26 @@ import grpc
 from sketchmatch.app.application import Application
 from sketchmatch.app.tasks import Log
 from sketchmatch.app.waiting import Caller
+from sketchmatch.server.calls import note
+from sketchmatch.server.pacing import Pacing
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
+    match_pb2,
     match_service_pb2,
     scene_service_pb2,
 )
+from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
 __all__ = ["CatalogService", "MatchService", "SceneService", "caller_of", "followed"]
 
 _MATCH = match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name
 _SCENE = scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name
 
+_LENGTH_DELIMITED = 2
+_PROGRESS = bytes(
+    [MatchResponse.DESCRIPTOR.fields_by_name["progress"].number << 3 | _LENGTH_DELIMITED]
+)
 _Context = grpc.aio.ServicerContext[Any, Any]
 _Item = TypeVar("_Item")
 
@@ -38,8 +46,14 @@ class MatchService:
     async def Match(self, request: bytes, context: _Context) -> None:  # noqa: N802
         """Run a match and pass its events on."""
         with self._app.running("MatchRequest", request, caller_of(context)) as task:
+            note(match=task.id)
+            pacing = Pacing()
             async with aclosing(followed(task.log)) as responses:
                 async for response in responses:
+                    if not _is_progress(response):
+                        _note_event(response)
+                    elif not pacing.is_due():
+                        continue
                     await context.write(response)
 
     def handler(self) -> grpc.GenericRpcHandler:
@@ -91,6 +105,25 @@ def caller_of(context: _Context) -> Caller:
     """Return who calls: the host, and the connection from there."""
     peer = context.peer() or ""
     return Caller(peer.rpartition(":")[0] or peer, peer)
+
+
+def _is_progress(response: bytes) -> bool:
+    """Whether an encoded event is progress; it has no other field."""
+    return response[:1] == _PROGRESS
+
+
+def _note_event(response: bytes) -> None:
+    """Note what the log tells of a match."""
+    event = MatchResponse.FromString(response)
+    match event.WhichOneof("event"):
+        case "accepted":
+            note(searcher=event.accepted.pipeline.searcher.name)
+        case "scenes":
+            sketch, map_ = event.scenes.sketch.objects, event.scenes.map.objects
+            note(objects=f"{len(sketch)}x{len(map_)}")
+        case "result":
+            name = match_pb2.Outcome.Name(event.result.outcome)
+            note(outcome=name.removeprefix("OUTCOME_"))
 
 
 def _handler(service: str, **methods: Any) -> grpc.GenericRpcHandler:

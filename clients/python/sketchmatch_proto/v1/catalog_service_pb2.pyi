@@ -434,7 +434,7 @@ class ServerLimits(google.protobuf.message.Message):
     """Most requests that wait for their turn; more are RESOURCE_EXHAUSTED."""
     @property
     def max_time_budget(self) -> google.protobuf.duration_pb2.Duration:
-        """Longest time budget; a longer one, or none, is cut to it."""
+        """Longest time budget; a longer one is cut to it."""
 
     @property
     def max_wait(self) -> google.protobuf.duration_pb2.Duration:

@@ -27,7 +27,7 @@ class _ErrorReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._En
     ERROR_REASON_MISSING_FIELD: _ErrorReason.ValueType  # 1
     """INVALID_ARGUMENT: a required field is not set."""
     ERROR_REASON_INVALID_FIELD: _ErrorReason.ValueType  # 2
-    """INVALID_ARGUMENT: a field has a value that it cannot have."""
+    """INVALID_ARGUMENT: a field has a value that it cannot have, or the bytes are no such message."""
     ERROR_REASON_INVALID_POLYGON: _ErrorReason.ValueType  # 3
     """INVALID_ARGUMENT: a polygon crosses itself, has no area or is not finite."""
     ERROR_REASON_INVALID_STROKE: _ErrorReason.ValueType  # 4
@@ -92,7 +92,7 @@ ERROR_REASON_UNSPECIFIED: ErrorReason.ValueType  # 0
 ERROR_REASON_MISSING_FIELD: ErrorReason.ValueType  # 1
 """INVALID_ARGUMENT: a required field is not set."""
 ERROR_REASON_INVALID_FIELD: ErrorReason.ValueType  # 2
-"""INVALID_ARGUMENT: a field has a value that it cannot have."""
+"""INVALID_ARGUMENT: a field has a value that it cannot have, or the bytes are no such message."""
 ERROR_REASON_INVALID_POLYGON: ErrorReason.ValueType  # 3
 """INVALID_ARGUMENT: a polygon crosses itself, has no area or is not finite."""
 ERROR_REASON_INVALID_STROKE: ErrorReason.ValueType  # 4

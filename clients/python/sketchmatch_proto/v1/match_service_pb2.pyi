@@ -66,7 +66,7 @@ class MatchRequest(google.protobuf.message.Message):
     @property
     def time_budget(self) -> google.protobuf.duration_pb2.Duration:
         """How long the match may take, more than 0, beside `PHASE_COMPILE`. The best map until then is the
-        result, with `OUTCOME_TIME_BUDGET`. Absent: as long as the server allows.
+        result, with `OUTCOME_TIME_BUDGET`. Absent: the server's default.
         """
 
     @property
@@ -208,7 +208,7 @@ class MatchResponse(google.protobuf.message.Message):
 
     @property
     def progress(self) -> sketchmatch_proto.v1.match_pb2.MatchProgress:
-        """The best so far. At most 20 a second."""
+        """The best so far. At most 20 a second, and fewer later: after 20 s, one a second."""
 
     @property
     def result(self) -> sketchmatch_proto.v1.match_pb2.MatchResult:

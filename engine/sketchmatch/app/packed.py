@@ -1,0 +1,94 @@
+"""Requests as they come over a wire: perhaps compressed, and not decoded yet."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from google.protobuf.message import DecodeError, Message
+
+from sketchmatch.errors import InvalidInputError, Reason
+
+__all__ = ["Packed", "check_size", "inflated"]
+
+# How gzip and zlib begin. No message of ours does: their first byte would be a field's number and
+# kind, 3 with a kind that there is not, or 15 as a number, which no request has.
+_COMPRESSED = (b"\x1f\x8b", b"\x78\x01", b"\x78\x5e", b"\x78\x9c", b"\x78\xda")
+_ANY_HEADER = zlib.MAX_WBITS | 32
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A request of which nothing is known but how long it is.
+
+    Attributes
+    ----------
+    data
+        What came.
+    read
+        Decodes it.
+    """
+
+    data: bytes
+    read: Callable[[bytes], Message]
+
+    def opened(self, limit: int) -> Message:
+        """Return the message.
+
+        Parameters
+        ----------
+        limit
+            Bytes that it may have, before and after it is inflated; no more are spent on it.
+
+        Raises
+        ------
+        InvalidInputError
+            If it is larger, or no such message.
+        """
+        try:
+            return self.read(inflated(self.data, limit))
+        except DecodeError:
+            raise InvalidInputError(
+                Reason.INVALID_FIELD,
+                "",
+                "the request cannot be decoded; send the message that the contract names, encoded "
+                "by code that protoc generates from it",
+            ) from None
+
+
+def check_size(size: int, limit: int) -> None:
+    """Refuse a request of more bytes than the limit."""
+    if size > limit:
+        raise InvalidInputError(
+            Reason.MESSAGE_TOO_LARGE,
+            "",
+            f"the request has {size} bytes, more than the limit of {limit}; "
+            "send fewer points or a smaller picture",
+        )
+
+
+def inflated(data: bytes, limit: int) -> bytes:
+    """Return what came as it was before it was compressed, if it was.
+
+    Raises
+    ------
+    InvalidInputError
+        If it has more bytes than the limit, before or after; no more are spent on it.
+    """
+    check_size(len(data), limit)
+    if not data.startswith(_COMPRESSED):
+        return data
+    stream = zlib.decompressobj(_ANY_HEADER)
+    try:
+        whole = stream.decompress(data, limit + 1)
+    except zlib.error:
+        return data  # which is no message, as the caller will be told
+    if len(whole) > limit:
+        raise InvalidInputError(
+            Reason.MESSAGE_TOO_LARGE,
+            "",
+            f"the request has more than {limit} bytes once it is inflated, which is the limit; "
+            "send fewer points or a smaller picture",
+        )
+    return whole if stream.eof and not stream.unused_data else data

@@ -1,0 +1,76 @@
+"""One line in the log for each call: which, whose, how it ended and what it was about."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable
+from contextvars import ContextVar
+from typing import Any, cast
+from urllib.parse import unquote
+
+import grpc
+
+__all__ = ["CallLogInterceptor", "note", "noted"]
+
+_OURS = "/sketchmatch."
+_log = logging.getLogger(__name__)
+_facts: ContextVar[dict[str, object]] = ContextVar("facts")
+_Context = grpc.aio.ServicerContext[Any, Any]
+
+
+def note(**facts: object) -> None:
+    """Have something told in the line of the call under way."""
+    _facts.get({}).update(facts)
+
+
+def noted() -> str:
+    """Return what is known of the call under way so far, as a log tells it."""
+    return " ".join(f"{name}={value}" for name, value in _facts.get({}).items())
+
+
+class CallLogInterceptor(grpc.aio.ServerInterceptor):
+    """Writes the lines; health and reflection, which others poll, have none."""
+
+    async def intercept_service(
+        self,
+        continuation: Callable[
+            [grpc.HandlerCallDetails], Awaitable[grpc.RpcMethodHandler[Any, Any] | None]
+        ],
+        handler_call_details: grpc.HandlerCallDetails,
+    ) -> grpc.RpcMethodHandler[Any, Any] | None:
+        """Return the method's handler, with its calls told of."""
+        handler = cast(Any, await continuation(handler_call_details))
+        path = handler_call_details.method
+        if handler is not None and path.startswith(_OURS):
+            kind = "unary_stream" if handler.response_streaming else "unary_unary"
+            method = _told(getattr(handler, kind), path.rpartition("/")[2])
+            handler = handler._replace(**{kind: method})
+        return cast("grpc.RpcMethodHandler[Any, Any] | None", handler)
+
+
+def _told(method: Callable[[Any, _Context], Awaitable[Any]], name: str) -> Any:
+    async def call(request: Any, context: _Context) -> Any:
+        began, cancelled = time.monotonic(), False
+        _facts.set({"caller": unquote(context.peer())})
+        try:
+            return await method(request, context)
+        except asyncio.CancelledError:
+            cancelled = True
+            raise
+        except grpc.aio.InternalError:
+            cancelled = True  # nobody is left to write to: the caller has gone
+            return None
+        finally:
+            code = "CANCELLED" if cancelled else _code(context)
+            seconds = time.monotonic() - began
+            _log.info("%s code=%s seconds=%.3f %s", name, code, seconds, noted())
+
+    return call
+
+
+def _code(context: _Context) -> str:
+    """Return the name of the status that a call was given, which gRPC keeps as a number."""
+    number: Any = context.code()
+    return next(code.name for code in grpc.StatusCode if number in (code, code.value[0], None))

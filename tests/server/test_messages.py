@@ -1,0 +1,170 @@
+"""Requests as bytes: compressed, exploding, cut off and broken ones, on every method."""
+
+import gzip
+import re
+import zlib
+from pathlib import Path
+
+import grpc
+import pytest
+from google.protobuf import descriptor_pool
+from google.rpc import error_details_pb2, status_pb2
+from grpc_health.v1 import health_pb2
+from grpc_reflection.v1alpha import reflection_pb2
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from sketchmatch_client import Client, match_request, segment_request
+from sketchmatch_proto.v1 import catalog_service_pb2, match_service_pb2, scene_service_pb2
+from tests.processes import server
+from tests.server.harness import ENDLESS, scene, serving
+
+OURS = {
+    "/sketchmatch.v1.MatchService/Match": match_request(scene(3), scene(3)),
+    "/sketchmatch.v1.SceneService/Segment": segment_request(scene(3), None, None, None),
+    "/sketchmatch.v1.CatalogService/ListAlgorithms": catalog_service_pb2.ListAlgorithmsRequest(),
+    "/sketchmatch.v1.CatalogService/GetServerInfo": catalog_service_pb2.GetServerInfoRequest(),
+}
+ADMITTED = [*OURS][:2]
+"""They are opened once there is a place for them."""
+
+HEALTH = "/grpc.health.v1.Health/Check"
+REFLECTION = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"
+MIB = 1 << 20
+COMPRESSED = [grpc.Compression.Gzip, grpc.Compression.Deflate]
+# Field 1 is said to have 127 bytes, and has one.
+CUT_OFF = b"\x0a\x7f\x0a"
+
+
+def sent(address, path, data, compression=grpc.Compression.NoCompression):
+    """Send bytes to a method, and return those that are answered."""
+    options = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1)]
+    with grpc.insecure_channel(address, options) as channel:
+        if path == REFLECTION:
+            call = channel.stream_stream(path)(iter([data]), timeout=60, compression=compression)
+        else:
+            call = channel.unary_stream(path)(data, timeout=60, compression=compression)
+        return list(call)
+
+
+def refused(address, path, data, compression=grpc.Compression.NoCompression):
+    """Return code, sentence and reason with which bytes are refused."""
+    with pytest.raises(grpc.RpcError) as raised:
+        sent(address, path, data, compression)
+    packed = dict(raised.value.trailing_metadata()).get("grpc-status-details-bin", b"")
+    info = error_details_pb2.ErrorInfo()
+    for detail in status_pb2.Status.FromString(packed).details:
+        if detail.Is(info.DESCRIPTOR):
+            detail.Unpack(info)
+    return raised.value.code(), raised.value.details(), info.reason
+
+
+@pytest.mark.parametrize("compression", COMPRESSED)
+@pytest.mark.parametrize("path", OURS)
+def test_compressed_requests_are_answered(address, path, compression):
+    plain = OURS[path].SerializeToString()
+    assert len(sent(address, path, plain, compression)) == len(sent(address, path, plain))
+
+
+@pytest.mark.parametrize("compression", COMPRESSED)
+def test_health_and_reflection_read_compressed_requests_too(address, compression):
+    service = health_pb2.HealthCheckRequest(service="sketchmatch.v1.CatalogService")
+    healthy = health_pb2.HealthCheckResponse(status="SERVING").SerializeToString()
+    assert sent(address, HEALTH, service.SerializeToString(), compression) == [healthy]
+    asked = reflection_pb2.ServerReflectionRequest(file_containing_symbol="x" * 200)
+    (answer,) = sent(address, REFLECTION, asked.SerializeToString(), compression)
+    told = reflection_pb2.ServerReflectionResponse.FromString(answer)
+    assert told.original_request == asked
+
+
+@pytest.mark.parametrize("data", [CUT_OFF, gzip.compress(CUT_OFF), b"\x1f\x8b", b"\x78\x9cjunk"])
+@pytest.mark.parametrize("path", [*OURS, HEALTH, REFLECTION])
+def test_what_cannot_be_decoded_is_an_invalid_argument(address, path, data):
+    code, sentence, reason = refused(address, path, data)
+    assert code is grpc.StatusCode.INVALID_ARGUMENT
+    assert sentence.startswith("the request cannot be decoded; send the message")
+    assert reason == "INVALID_FIELD"
+
+
+@given(
+    path=st.sampled_from([*OURS, HEALTH, REFLECTION]),
+    like=st.sampled_from([*OURS.values()]),
+    cut=st.tuples(st.integers(0, 200), st.integers(0, 20)),
+    put=st.binary(max_size=8),
+    pack=st.sampled_from([bytes, bytes, gzip.compress, zlib.compress]),
+)
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_whatever_the_bytes_they_are_answered_or_are_the_callers_fault(
+    address, path, like, cut, put, pack
+):
+    (first, count), data = cut, like.SerializeToString()
+    code = grpc.StatusCode.OK
+    try:
+        sent(address, path, pack(data[:first] + put + data[first + count :]))
+    except grpc.RpcError as error:
+        code = error.code()
+    assert code in (
+        grpc.StatusCode.OK,
+        grpc.StatusCode.INVALID_ARGUMENT,
+        grpc.StatusCode.NOT_FOUND,  # of health, for a service that there is not
+    )
+
+
+def test_a_compressed_request_that_is_cut_off_or_goes_on_is_not_taken_for_a_shorter_one(address):
+    whole = gzip.compress(OURS["/sketchmatch.v1.MatchService/Match"].SerializeToString())
+    assert len(sent(address, "/sketchmatch.v1.MatchService/Match", whole)) > 2
+    for broken in (whole[:-9], whole + b"more", whole + whole):
+        code, _, _ = refused(address, "/sketchmatch.v1.MatchService/Match", broken)
+        assert code is grpc.StatusCode.INVALID_ARGUMENT
+
+
+@pytest.mark.parametrize("compression", COMPRESSED)
+@pytest.mark.parametrize("path", [*OURS, HEALTH, REFLECTION])
+def test_what_explodes_is_refused_at_the_limit(path, compression):
+    explosive = b"\x0a" + varint(20 * MIB) + bytes(20 * MIB)
+    with serving(max_request_bytes=100_000, warm=False) as host:
+        code, sentence, reason = refused(host.address, path, explosive, compression)
+    assert code is grpc.StatusCode.INVALID_ARGUMENT
+    limit = 100_000 if path in ADMITTED else 65_536
+    assert sentence.startswith(f"the request has more than {limit} bytes once it is inflated")
+    assert reason == "MESSAGE_TOO_LARGE"
+
+
+def varint(number):
+    digits = bytearray()
+    while number > 127:
+        digits.append(number & 127 | 128)
+        number >>= 7
+    return bytes([*digits, number])
+
+
+def peak_mib(pid):
+    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    return int(re.search(r"VmHWM:\s+(\d+)", status)[1]) / 1024
+
+
+def test_nothing_is_inflated_for_which_there_is_no_place():
+    explosive = zlib.compress(b"\x0a" + varint(60 * MIB) + bytes(60 * MIB))
+    assert len(explosive) < MIB
+    path = "/sketchmatch.v1.MatchService/Match"
+    with server("--max-matches", "1") as running, Client(running.address) as client:
+        events = client.events(scene(8), scene(8, 1), **ENDLESS, time_budget=60)
+        while not next(events).progress.HasField("confidence"):
+            pass
+        before = peak_mib(running.process.pid)
+        for _ in range(6):
+            assert refused(running.address, path, explosive)[0] is (
+                grpc.StatusCode.RESOURCE_EXHAUSTED
+            )
+        assert peak_mib(running.process.pid) - before < 40
+        events.close()
+
+
+@pytest.mark.parametrize(
+    "file", [match_service_pb2, scene_service_pb2, catalog_service_pb2, health_pb2, reflection_pb2]
+)
+def test_no_request_can_begin_as_what_is_compressed_does(file):
+    for service in file.DESCRIPTOR.services_by_name.values():
+        for method in service.methods:
+            request = descriptor_pool.Default().FindMessageTypeByName(method.input_type.full_name)
+            assert 15 not in request.fields_by_number
