@@ -15,6 +15,7 @@ from typing import Any, Self
 __all__ = [
     "AnswerUnavailableError",
     "InvalidInputError",
+    "NotAuthenticatedError",
     "PluginError",
     "Reason",
     "SketchmatchError",
@@ -66,6 +67,7 @@ class Reason(StrEnum):
     PLUGIN_FAILED = "PLUGIN_FAILED"
     INFINITE_FORCE = "INFINITE_FORCE"
     UNKNOWN_PROFILE = "UNKNOWN_PROFILE"
+    NOT_AUTHENTICATED = "NOT_AUTHENTICATED"
 
 
 class SketchmatchError(Exception):
@@ -116,6 +118,12 @@ class AnswerUnavailableError(SketchmatchError):
     """The time budget ended before there was any answer to give."""
 
     reason = Reason.TIME_BUDGET_EXHAUSTED
+
+
+class NotAuthenticatedError(SketchmatchError):
+    """The caller does not show who it is; the sentence never quotes what it shows instead."""
+
+    reason = Reason.NOT_AUTHENTICATED
 
 
 class PluginError(SketchmatchError):

@@ -50,6 +50,7 @@ class FakeServer(
     def __init__(self) -> None:
         self.address = ""
         self.requests: list[Message] = []
+        self.authorizations: list[str | None] = []
         self.events = EVENTS
         self.endless = False
         self.cancelled = Event()
@@ -93,6 +94,7 @@ class FakeServer(
 
     def _take(self, request, context) -> None:
         self.requests.append(request)
+        self.authorizations.append(dict(context.invocation_metadata()).get("authorization"))
         if self.error:
             (code,) = (code for code in grpc.StatusCode if code.value[0] == self.error.code)
             packed = self.error.SerializeToString() if self.error.details else None

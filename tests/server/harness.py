@@ -101,9 +101,9 @@ def serving(
 
 
 @contextmanager
-def hosting(setup: Setup, warm: bool = True, grace: float = 0.0) -> Iterator[Host]:
-    """Run a server with a setup."""
-    host = Host(setup, ServerSettings("127.0.0.1:0", grace))
+def hosting(setup: Setup, warm: bool = True, grace: float = 0.0, **settings: Any) -> Iterator[Host]:
+    """Run a server with a setup, and settings beside its address."""
+    host = Host(setup, ServerSettings("127.0.0.1:0", grace, **settings))
     try:
         host.wait_until_listening()
         if warm:

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any, Self, Unpack, cast
 import grpc
 import grpc.aio
 
+from sketchmatch_client._access import AccessOptions, access_to
 from sketchmatch_client._channel import (
     CHECK_HEALTH,
     HEALTH_POLL_SECONDS,
     SERVING,
     ChannelOptions,
     channel_options,
-    check_address,
     limit_of,
     never_served,
     within,
@@ -60,7 +60,7 @@ class AsyncClient:
 
     Parameters
     ----------
-    address, credentials, timeout, options
+    address, credentials, timeout, options, **access
         As for :class:`Client`.
 
     Raises
@@ -76,10 +76,12 @@ class AsyncClient:
         credentials: grpc.ChannelCredentials | None = None,
         timeout: float | None = None,
         options: ChannelOptions = (),
+        **access: Unpack[AccessOptions],
     ) -> None:
-        check_address(address, credentials is not None)
+        way_in = access_to(address, credentials, access)
         self._address = address
-        self._credentials = credentials
+        self._credentials = way_in.credentials
+        self._metadata = way_in.metadata
         self._timeout = limit_of(timeout)
         self._options = channel_options(address, options)
 
@@ -143,19 +145,25 @@ class AsyncClient:
         request = segment_request(source, segmenter, params, profile)
         stub = cast("SceneServiceAsyncStub", SceneServiceStub(self._channel))
         with translated_errors(self._address):
-            return await stub.Segment(request, timeout=self._limit(timeout))
+            return await stub.Segment(
+                request, timeout=self._limit(timeout), metadata=self._metadata
+            )
 
     async def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""
         stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
         with translated_errors(self._address):
-            return await stub.ListAlgorithms(ListAlgorithmsRequest(), timeout=self._limit(timeout))
+            return await stub.ListAlgorithms(
+                ListAlgorithmsRequest(), timeout=self._limit(timeout), metadata=self._metadata
+            )
 
     async def server_info(self, *, timeout: float | None = None) -> GetServerInfoResponse:
         """Return the server's versions and limits."""
         stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
         with translated_errors(self._address):
-            return await stub.GetServerInfo(GetServerInfoRequest(), timeout=self._limit(timeout))
+            return await stub.GetServerInfo(
+                GetServerInfoRequest(), timeout=self._limit(timeout), metadata=self._metadata
+            )
 
     async def wait_until_serving(self, timeout: float = 60.0) -> None:
         """Wait until the server is up and warm; see :meth:`Client.wait_until_serving`."""
@@ -178,7 +186,7 @@ class AsyncClient:
     ) -> AsyncGenerator[MatchResponse, None]:
         stub = cast("MatchServiceAsyncStub", MatchServiceStub(self._channel))
         with translated_errors(self._address):
-            call = stub.Match(request, timeout=limit)
+            call = stub.Match(request, timeout=limit, metadata=self._metadata)
             try:
                 async for event in call:
                     yield event

@@ -19,6 +19,7 @@ __all__ = [
     "ChannelOptions",
     "channel_options",
     "check_address",
+    "is_here",
     "limit_of",
     "never_served",
     "within",
@@ -66,7 +67,7 @@ _THIS_MACHINE = {"localhost", "localhost.localdomain", "ip6-localhost", "ip6-loo
 
 def channel_options(address: str, given: ChannelOptions) -> ChannelOptions:
     """Return the options of a channel to a server; those that are given win."""
-    return _OPTIONS + (_DIRECT if _is_here(address) else ()) + given
+    return _OPTIONS + (_DIRECT if is_here(address) else ()) + given
 
 
 def check_address(address: str, encrypted: bool) -> None:
@@ -130,7 +131,7 @@ def never_served(address: str, seconds: float) -> ServerUnavailableError:
     )
 
 
-def _is_here(address: str) -> bool:
+def is_here(address: str) -> bool:
     """Whether an address is one of this very machine."""
     if address.startswith(_WITHIN_MACHINE):
         return True

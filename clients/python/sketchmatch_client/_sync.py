@@ -10,6 +10,7 @@ from typing import Any, Self, Unpack
 
 import grpc
 
+from sketchmatch_client._access import AccessOptions, access_to
 from sketchmatch_client._call import MatchCall
 from sketchmatch_client._channel import (
     CHECK_HEALTH,
@@ -17,7 +18,6 @@ from sketchmatch_client._channel import (
     SERVING,
     ChannelOptions,
     channel_options,
-    check_address,
     limit_of,
     never_served,
     within,
@@ -57,12 +57,15 @@ class Client:
         names them, e.g. ``"unix:/run/sketchmatch.sock"``. Proxies that the environment names
         are not asked for what is on this machine.
     credentials
-        TLS credentials, e.g. ``grpc.ssl_channel_credentials()``. None: no encryption.
+        Credentials of gRPC's own making, in place of what ``access`` says of encryption.
     timeout
         Seconds that a call may take where the call itself does not say. None or infinity: no
         limit.
     options
         Channel options of gRPC, beside or instead of this package's own.
+    **access
+        How to get in, by encryption, certificates and a token: :class:`AccessOptions`. What is
+        left out, the environment may say: ``SKETCHMATCH_TOKEN`` is ``token``, and so on.
 
     Raises
     ------
@@ -77,15 +80,17 @@ class Client:
         credentials: grpc.ChannelCredentials | None = None,
         timeout: float | None = None,
         options: ChannelOptions = (),
+        **access: Unpack[AccessOptions],
     ) -> None:
-        check_address(address, credentials is not None)
+        way_in = access_to(address, credentials, access)
         self._address = address
+        self._metadata = way_in.metadata
         self._timeout = limit_of(timeout)
         chosen = channel_options(address, options)
         self._channel = (
             grpc.insecure_channel(address, chosen)
-            if credentials is None
-            else grpc.secure_channel(address, credentials, chosen)
+            if way_in.credentials is None
+            else grpc.secure_channel(address, way_in.credentials, chosen)
         )
 
     def __enter__(self) -> Self:
@@ -159,7 +164,9 @@ class Client:
         """
         request, limit = match_request(sketch, map, **options), self._limit(timeout)
         stub = MatchServiceStub(self._channel)
-        return MatchCall(lambda: stub.Match(request, timeout=limit), self._address)
+        return MatchCall(
+            lambda: stub.Match(request, timeout=limit, metadata=self._metadata), self._address
+        )
 
     def segment(
         self,
@@ -192,20 +199,22 @@ class Client:
         """
         request = segment_request(source, segmenter, params, profile)
         with translated_errors(self._address):
-            return SceneServiceStub(self._channel).Segment(request, timeout=self._limit(timeout))
+            return SceneServiceStub(self._channel).Segment(
+                request, timeout=self._limit(timeout), metadata=self._metadata
+            )
 
     def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""
         with translated_errors(self._address):
             return CatalogServiceStub(self._channel).ListAlgorithms(
-                ListAlgorithmsRequest(), timeout=self._limit(timeout)
+                ListAlgorithmsRequest(), timeout=self._limit(timeout), metadata=self._metadata
             )
 
     def server_info(self, *, timeout: float | None = None) -> GetServerInfoResponse:
         """Return the server's versions and limits."""
         with translated_errors(self._address):
             return CatalogServiceStub(self._channel).GetServerInfo(
-                GetServerInfoRequest(), timeout=self._limit(timeout)
+                GetServerInfoRequest(), timeout=self._limit(timeout), metadata=self._metadata
             )
 
     def wait_until_serving(self, timeout: float = 60.0) -> None:

@@ -104,8 +104,15 @@ class Application:
         yield from work
 
     @contextmanager
-    def running(self, request: Message) -> Iterator[Task[Message]]:
+    def running(self, request: Message, caller: str = "") -> Iterator[Task[Message]]:
         """Admit a request and do it in a thread, until the end of the block.
+
+        Parameters
+        ----------
+        request
+            A message of the contract that wants work.
+        caller
+            The name of who asks; empty where nobody has names.
 
         Raises
         ------
@@ -116,7 +123,7 @@ class Application:
         """
         setup = self._setup
         _check_size(request, setup.limits)
-        task = Task[Message](uuid.uuid4().hex)
+        task = Task[Message](uuid.uuid4().hex, caller)
         self._take_place(setup.limits)
         self._tasks.add(task)
         try:

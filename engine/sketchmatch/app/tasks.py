@@ -86,14 +86,17 @@ class Task(Generic[_Item]):
     ----------
     id
         A name that no other task of the application has.
+    caller
+        The name of who asked for it; empty where nobody has names.
     log
         Its responses.
     stopping
         Set once nobody wants more of them.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, caller: str = "") -> None:
         self.id = name
+        self.caller = caller
         self.log = Log[_Item]()
         self.stopping = threading.Event()
 

@@ -147,6 +147,32 @@ class _Server(_Section):
         description="Longest match; no limit, when left out.",
         examples=[60.0],
     )
+    tls_certificate: str | None = Field(
+        None,
+        description="PEM file of the server's certificate, with those between it and the "
+        "authority's; no encryption, when left out.",
+        examples=["server.pem"],
+    )
+    tls_key: str | None = Field(
+        None, description="PEM file of the certificate's private key.", examples=["server.key"]
+    )
+    tls_client_ca: str | None = Field(
+        None,
+        description="PEM file of the authorities of which each client must show a certificate; "
+        "clients show none, when left out.",
+        examples=["clients-ca.pem"],
+    )
+    tokens: str | None = Field(
+        None,
+        description="File of the tokens of which each call must show one, as `sketchmatch tokens "
+        "add` writes it; calls need none, when left out.",
+        examples=["tokens"],
+    )
+    insecure: bool = Field(
+        False,
+        description="Listen where other machines reach the server though strangers may call then, "
+        "or read along.",
+    )
 
 
 class _Limits(_Section):

@@ -8,6 +8,7 @@ import socket
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Event
 from typing import Any
 
@@ -17,10 +18,15 @@ from grpc_reflection.v1alpha import reflection
 
 from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
+from sketchmatch.config.addresses import is_of_this_machine
 from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
 from sketchmatch.pipeline.warmup import announcing_compilation
+from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.interceptors import ErrorInterceptor
 from sketchmatch.server.services import CatalogService, MatchService, SceneService
+from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
+from sketchmatch.server.tokens import read_tokens
+from sketchmatch.server.watched import Watched
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
@@ -52,10 +58,20 @@ class ServerSettings:
         Host and port to listen on; port 0 picks a free one.
     grace
         Seconds that running matches are given when the server is asked to stop.
+    tls
+        The files of certificates; None: no encryption.
+    tokens
+        The file of the tokens of which each call must show one; None: calls need none.
+    insecure
+        Whether to listen where other machines reach the server though that lets strangers in, or
+        read along.
     """
 
     address: str = "127.0.0.1:50051"
     grace: float = 5.0
+    tls: TlsFiles | None = None
+    tokens: Path | None = None
+    insecure: bool = False
 
 
 async def serve(
@@ -84,11 +100,14 @@ async def serve(
     SketchmatchError
         If there is no setup to begin with.
     InvalidInputError
-        If the address cannot be listened on.
+        If the address cannot be listened on, or must not without naming callers, or a file of
+        certificates or tokens is of no use.
     """
+    lacking = _refuse_strangers(settings)
+    files = _Files(settings, say)
     app = Application(load())
     server = grpc.aio.server(
-        interceptors=[ErrorInterceptor()],
+        interceptors=[*files.interceptors, ErrorInterceptor()],
         options=[
             ("grpc.max_receive_message_length", app.setup.limits.transport_bytes),
             ("grpc.max_send_message_length", -1),
@@ -99,13 +118,15 @@ async def serve(
         ],
     )
     checks = _add_services(server, app)
-    port = _listen(server, settings.address)
+    port = _listen(server, settings.address, files.credentials)
     await checks.set("", health_pb2.HealthCheckResponse.NOT_SERVING)
     await server.start()
     stopping, ended = stop or asyncio.Event(), Event()
-    reloading = _Reloading(load, app, say)
+    reloading = _Reloading(load, app, files, say)
     _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
     say(f"listening on {_found_at(settings.address, port)}")
+    if lacking:
+        say(f"insecure: whoever reaches this address {lacking}")
     for problem in app.setup.engine.registry.problems:
         say(problem)
     try:
@@ -128,6 +149,33 @@ async def serve(
     say("stopped")
 
 
+class _Files:
+    """What tells friends from strangers, kept in files."""
+
+    def __init__(self, settings: ServerSettings, say: Callable[[str], None]) -> None:
+        self._pems = None if settings.tls is None else watched_pems(settings.tls, say)
+        path = settings.tokens
+        self._tokens = (
+            None if path is None else Watched("the tokens", [path], lambda: read_tokens(path), say)
+        )
+
+    @property
+    def credentials(self) -> grpc.ServerCredentials | None:
+        """What encrypts; None for nothing."""
+        return None if self._pems is None else server_credentials(self._pems)
+
+    @property
+    def interceptors(self) -> list[CallerInterceptor]:
+        """What asks for tokens, if anything does."""
+        return [] if self._tokens is None else [CallerInterceptor(self._tokens)]
+
+    def look(self) -> None:
+        """Read again now what has changed."""
+        for watched in (self._pems, self._tokens):
+            if watched is not None:
+                watched.look()
+
+
 class _Reloading:
     """Exchanges the setup, one load at a time."""
 
@@ -135,10 +183,12 @@ class _Reloading:
         self,
         load: Callable[[], Setup],
         app: Application,
+        files: _Files,
         say: Callable[[str], None],
     ) -> None:
         self._load = load
         self._app = app
+        self._files = files
         self._say = say
         self._one_at_a_time = asyncio.Lock()
         self._tasks: set[asyncio.Task[None]] = set()
@@ -150,6 +200,7 @@ class _Reloading:
 
     async def _reload(self) -> None:
         async with self._one_at_a_time:
+            await asyncio.to_thread(self._files.look)
             try:
                 setup = await asyncio.to_thread(self._load)
             except SketchmatchError as error:
@@ -173,10 +224,52 @@ def _add_services(server: grpc.aio.Server, app: Application) -> health.aio.Healt
     return checks
 
 
-def _listen(server: grpc.aio.Server, address: str) -> int:
+def _refuse_strangers(settings: ServerSettings) -> str:
+    """Refuse to let strangers in from other machines; return what they can do where that is meant.
+
+    Raises
+    ------
+    InvalidInputError
+        If they could, and nobody said so.
+    """
+    if is_of_this_machine(settings.address):
+        return ""
+    knows_callers = settings.tokens or (settings.tls and settings.tls.client_ca)
+    faults = [
+        *([] if knows_callers else ["may call"]),
+        *(
+            []
+            if settings.tls
+            else ["can read along, tokens too" if settings.tokens else "can read along"]
+        ),
+    ]
+    lacking = " and ".join(faults)
+    if lacking and not settings.insecure:
+        remedies = [
+            *([] if settings.tls else ["--tls-certificate and --tls-key"]),
+            *([] if knows_callers else ["--tokens or --tls-client-ca"]),
+        ]
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "address",
+            f"{settings.address!r} is reached from other machines, and whoever does {lacking}; "
+            f"give {', and '.join(remedies)}, listen on 127.0.0.1, or say --insecure if that is "
+            "meant",
+        )
+    return lacking
+
+
+def _listen(
+    server: grpc.aio.Server, address: str, credentials: grpc.ServerCredentials | None
+) -> int:
     local = address.startswith("unix")
     try:
-        port = 0 if _is_taken(address) else server.add_insecure_port(address)
+        if _is_taken(address):
+            port = 0
+        elif credentials is None:
+            port = server.add_insecure_port(address)
+        else:
+            port = server.add_secure_port(address, credentials)
     except RuntimeError:
         port = 0
     if port == 0:

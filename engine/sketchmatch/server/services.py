@@ -12,6 +12,7 @@ from google.protobuf.message import Message
 
 from sketchmatch.app.application import Application
 from sketchmatch.app.tasks import Log
+from sketchmatch.server.callers import caller_of
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
@@ -37,7 +38,7 @@ class MatchService(match_service_pb2_grpc.MatchServiceServicer):
         self, request: match_service_pb2.MatchRequest, context: _Context
     ) -> None:
         """Run a match and pass its events on."""
-        with self._app.running(request) as task:
+        with self._app.running(request, caller_of(context)) as task:
             async with aclosing(followed(task.log)) as responses:
                 async for response in responses:
                     await context.write(response)
@@ -53,8 +54,7 @@ class SceneService(scene_service_pb2_grpc.SceneServiceServicer):
         self, request: scene_service_pb2.SegmentRequest, context: _Context
     ) -> Message:
         """Segment, and return what was found."""
-        del context
-        with self._app.running(request) as task:
+        with self._app.running(request, caller_of(context)) as task:
             async with aclosing(followed(task.log)) as told:
                 responses = [response async for response in told]
         # Nobody waits for an answer to a request that was stopped.

@@ -11,6 +11,7 @@ from google.rpc import code_pb2, error_details_pb2, status_pb2
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
+    NotAuthenticatedError,
     PluginError,
     Reason,
     SketchmatchError,
@@ -48,6 +49,8 @@ def refusal(error: BaseException) -> Refusal:
             return _refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, error, error.reason, retry)
         case AnswerUnavailableError():
             return _refusal(grpc.StatusCode.DEADLINE_EXCEEDED, error, error.reason)
+        case NotAuthenticatedError():
+            return _refusal(grpc.StatusCode.UNAUTHENTICATED, error, error.reason)
         case PluginError():
             return _refusal(grpc.StatusCode.INTERNAL, error, error.reason)
     return Refusal(

@@ -64,6 +64,8 @@ class _ErrorReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._En
     """INVALID_ARGUMENT: the server's configuration has no profile of this name; the message names
     those there are.
     """
+    ERROR_REASON_NOT_AUTHENTICATED: _ErrorReason.ValueType  # 18
+    """UNAUTHENTICATED: the call carries no token, or none that the server knows."""
 
 class ErrorReason(_ErrorReason, metaclass=_ErrorReasonEnumTypeWrapper):
     """Why a request was refused, for programs. People read the status message.
@@ -121,4 +123,6 @@ ERROR_REASON_UNKNOWN_PROFILE: ErrorReason.ValueType  # 17
 """INVALID_ARGUMENT: the server's configuration has no profile of this name; the message names
 those there are.
 """
+ERROR_REASON_NOT_AUTHENTICATED: ErrorReason.ValueType  # 18
+"""UNAUTHENTICATED: the call carries no token, or none that the server knows."""
 global___ErrorReason = ErrorReason
