@@ -40,13 +40,14 @@ class Host:
     gRPC's asyncio serves several loops in one process, but not one that closes.
     """
 
-    def __init__(self, setup: Setup, settings: ServerSettings) -> None:
+    def __init__(self, setup: Setup | Callable[[], Setup], settings: ServerSettings) -> None:
         self.said: list[str] = []
         self.address = ""
         self.serving = threading.Event()
         self._listening = threading.Event()
         self._stop = asyncio.Event()
-        self._end = in_loop(serve(lambda: setup, settings, self._say, self._stop))
+        load = setup if callable(setup) else lambda: setup
+        self._end = in_loop(serve(load, settings, self._say, self._stop))
         self._end.add_done_callback(lambda _: self._listening.set())
 
     def wait_until_listening(self) -> None:

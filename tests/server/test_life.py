@@ -13,7 +13,7 @@ from sketchmatch.pipeline.selection import Choice, Defaults
 from sketchmatch.pipeline.warmup import warm_up
 from sketchmatch.registry import default_registry
 from sketchmatch.server import serve
-from sketchmatch_client import Client, ServerUnavailableError
+from sketchmatch_client import Client, InvalidRequestError, ServerUnavailableError
 from sketchmatch_client.errors import CallCancelledError
 from sketchmatch_proto.v1 import catalog_service_pb2
 from tests.pace import wait_until, within
@@ -46,6 +46,22 @@ def test_health_is_not_serving_until_the_default_kernels_are_warm():
         with Client(host.address) as client:
             client.wait_until_serving(5)
         assert [health(host.address, name) for name in ("", *SERVICES)] == ["SERVING"] * 4
+
+
+def test_an_algorithm_is_ready_once_its_kernels_are_and_not_before(monkeypatch):
+    monkeypatch.setattr(serve, "_QUIET", 0.0)
+    warm_up(default_registry())
+    SlowToWarm.may_finish.clear()
+    with serving(SlowToWarm, Exploding) as host, Client(host.address) as client:
+        assert client.is_serving("searcher/align")
+        assert client.is_serving("judge/posterior")
+        assert not client.is_serving("searcher/slow-to-warm")
+        SlowToWarm.may_finish.set()
+        wait_until(lambda: client.is_serving("searcher/slow-to-warm"), "it is never ready")
+        wait_until(lambda: client.is_serving("searcher/nn"), "the others are never ready")
+        assert not client.is_serving("searcher/exploding")
+        with pytest.raises(InvalidRequestError, match=r"^name is 'searcher/esm', which"):
+            client.is_serving("searcher/esm")
 
 
 def test_a_server_that_is_stopped_while_it_warms_up_stops():

@@ -9,7 +9,7 @@ from typing import NoReturn, TypedDict, cast
 
 import grpc
 
-from sketchmatch_client._channel import check_address, is_here
+from sketchmatch_client._channel import ChannelOptions, check_address, is_here
 from sketchmatch_client.errors import InvalidRequestError
 
 __all__ = ["Access", "AccessOptions", "Pem", "access_to"]
@@ -34,6 +34,8 @@ class AccessOptions(TypedDict, total=False):
         The authorities to trust instead of these.
     certificate, key
         To be shown to the server: they say who calls.
+    server_name
+        The name that the server's certificate is for, where it is not the one in the address.
     """
 
     token: str | None
@@ -42,6 +44,7 @@ class AccessOptions(TypedDict, total=False):
     root_certificates: Pem | None
     certificate: Pem | None
     key: Pem | None
+    server_name: str | None
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ class Access:
     """What a channel and its calls need to be let in."""
 
     credentials: grpc.ChannelCredentials | None = None
+    options: ChannelOptions = ()
     metadata: tuple[tuple[str, str], ...] = field(default=(), repr=False)
 
 
@@ -107,15 +111,17 @@ def access_to(
             if options.get(name) is not None:
                 _Said(name, name, "").refuse("is said by credentials already; drop one of the two")
     check_address(address, credentials is not None)
+    other = _said("server_name", options)
+    named: ChannelOptions = (("grpc.ssl_target_name_override", other.value),) if other else ()
     said, token = _token(options)
     if said is None:
-        return Access(credentials)
+        return Access(credentials, named)
     if credentials is None and not is_here(address):
         said.refuse(
             f"would go to {address} without encryption, for others to read; give the certificates "
             "of the server's authority (root_certificates), or encrypt (tls)"
         )
-    return Access(credentials, (("authorization", f"Bearer {token}"),))
+    return Access(credentials, named, (("authorization", f"Bearer {token}"),))
 
 
 def _credentials(options: AccessOptions) -> grpc.ChannelCredentials | None:

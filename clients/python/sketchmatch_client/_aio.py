@@ -21,8 +21,10 @@ from sketchmatch_client._channel import (
     SERVING,
     ChannelOptions,
     channel_options,
+    health_request,
     limit_of,
     never_served,
+    no_such_part,
     within,
 )
 from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, tell_progress
@@ -83,7 +85,7 @@ class AsyncClient:
         self._credentials = way_in.credentials
         self._metadata = way_in.metadata
         self._timeout = limit_of(timeout)
-        self._options = channel_options(address, options)
+        self._options = channel_options(address, way_in.options + options)
 
     async def __aenter__(self) -> Self:
         return self
@@ -165,11 +167,25 @@ class AsyncClient:
                 GetServerInfoRequest(), timeout=self._limit(timeout), metadata=self._metadata
             )
 
+    async def is_serving(self, name: str = "", *, timeout: float | None = None) -> bool:
+        """Return whether the server, or a part of it, is warm; see :meth:`Client.is_serving`."""
+        check: grpc.aio.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(
+            CHECK_HEALTH
+        )
+        with translated_errors(self._address):
+            try:
+                answer = await check(health_request(name), timeout=self._limit(timeout))
+            except grpc.RpcError as error:
+                if error.code() is grpc.StatusCode.NOT_FOUND:
+                    raise no_such_part(name) from error
+                raise
+        return answer == SERVING
+
     async def wait_until_serving(self, timeout: float = 60.0) -> None:
         """Wait until the server is up and warm; see :meth:`Client.wait_until_serving`."""
         limit = limit_of(timeout)
         deadline = time.monotonic() + (math.inf if limit is None else limit)
-        while not await self._is_serving(within(deadline, time.monotonic())):
+        while not await self._serves_by(within(deadline, time.monotonic())):
             if time.monotonic() >= deadline:
                 raise never_served(self._address, timeout)
             await asyncio.sleep(HEALTH_POLL_SECONDS)
@@ -193,13 +209,9 @@ class AsyncClient:
             finally:
                 call.cancel()
 
-    async def _is_serving(self, timeout: float | None) -> bool:
-        check: grpc.aio.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(
-            CHECK_HEALTH
-        )
+    async def _serves_by(self, timeout: float | None) -> bool:
         try:
-            with translated_errors(self._address):
-                return await check(b"", timeout=timeout) == SERVING
+            return await self.is_serving(timeout=math.inf if timeout is None else timeout)
         except (ServerUnavailableError, DeadlineExceededError):
             return False
 

@@ -18,8 +18,10 @@ from sketchmatch_client._channel import (
     SERVING,
     ChannelOptions,
     channel_options,
+    health_request,
     limit_of,
     never_served,
+    no_such_part,
     within,
 )
 from sketchmatch_client._match import Match, ProgressCallback
@@ -86,7 +88,7 @@ class Client:
         self._address = address
         self._metadata = way_in.metadata
         self._timeout = limit_of(timeout)
-        chosen = channel_options(address, options)
+        chosen = channel_options(address, way_in.options + options)
         self._channel = (
             grpc.insecure_channel(address, chosen)
             if way_in.credentials is None
@@ -217,6 +219,35 @@ class Client:
                 GetServerInfoRequest(), timeout=self._limit(timeout), metadata=self._metadata
             )
 
+    def is_serving(self, name: str = "", *, timeout: float | None = None) -> bool:
+        """Return whether the server, or a part of it, is up and warm.
+
+        Parameters
+        ----------
+        name
+            The part: a service, as in ``"sketchmatch.v1.MatchService"``, or an algorithm, as in
+            ``"searcher/easm"``, which is warm once its kernels are compiled. The whole server when
+            left out, which is warm once the default algorithms are.
+        timeout
+            Seconds after which the call fails.
+
+        Raises
+        ------
+        InvalidRequestError
+            If the server has no such part.
+        ServerUnavailableError
+            If nobody answers.
+        """
+        check: grpc.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(CHECK_HEALTH)
+        with translated_errors(self._address):
+            try:
+                answer = check(health_request(name), timeout=self._limit(timeout))
+            except grpc.RpcError as error:
+                if error.code() is grpc.StatusCode.NOT_FOUND:
+                    raise no_such_part(name) from error
+                raise
+        return answer == SERVING
+
     def wait_until_serving(self, timeout: float = 60.0) -> None:
         """Wait until the server is up and warm.
 
@@ -233,16 +264,14 @@ class Client:
         """
         limit = limit_of(timeout)
         deadline = time.monotonic() + (math.inf if limit is None else limit)
-        while not self._is_serving(within(deadline, time.monotonic())):
+        while not self._serves_by(within(deadline, time.monotonic())):
             if time.monotonic() >= deadline:
                 raise never_served(self._address, timeout)
             time.sleep(HEALTH_POLL_SECONDS)
 
-    def _is_serving(self, timeout: float | None) -> bool:
-        check: grpc.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(CHECK_HEALTH)
+    def _serves_by(self, timeout: float | None) -> bool:
         try:
-            with translated_errors(self._address):
-                return check(b"", timeout=timeout) == SERVING
+            return self.is_serving(timeout=math.inf if timeout is None else timeout)
         except (ServerUnavailableError, DeadlineExceededError):
             return False
 

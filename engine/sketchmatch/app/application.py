@@ -141,15 +141,20 @@ class Application:
         """Return versions and limits."""
         return responses.server_info(self._setup, time.monotonic() - self._began)
 
-    def warm_up(self, unwanted: Callable[[], bool]) -> None:
-        """Compile what the default pipeline needs in this process."""
+    def warm_up(self, unwanted: Callable[[], bool], warm: Callable[[Registered], None]) -> None:
+        """Compile what the default pipeline needs in this process, telling of what is warm."""
         setup = self._setup
-        warm_up(_trusted(setup), setup.engine.defaults, unwanted)
+        warm_up(_trusted(setup), setup.engine.defaults, unwanted, warm)
 
-    def warm_up_others(self, unwanted: Callable[[], bool], stop: threading.Event) -> None:
+    def warm_up_others(
+        self,
+        unwanted: Callable[[], bool],
+        stop: threading.Event,
+        warm: Callable[[Registered], None],
+    ) -> None:
         """Compile the rest, strangers' algorithms in processes of their own."""
         setup = self._setup
-        warm_up_others(_trusted(setup), setup.engine.defaults, unwanted)
+        warm_up_others(_trusted(setup), setup.engine.defaults, unwanted, warm)
         strangers = _strangers(setup)
         for distribution in sorted({item.distribution for item in strangers}):
             if unwanted():
@@ -159,6 +164,9 @@ class Application:
                 self._children.warm_up(own, setup, stop)
             except Exception:  # it will fail again, and be blamed, when a request asks for it
                 _log.exception("the plugins of %s failed to warm up", distribution)
+            else:
+                for item in own:
+                    warm(item)
 
     def close(self) -> None:
         """Stop all tasks that are under way and wait for their threads and processes."""

@@ -29,7 +29,7 @@ from sketchmatch_proto.v1.source_pb2 import Source
 if TYPE_CHECKING:
     from sketchmatch.app.application import Application
 
-__all__ = ["Answerer", "answerer", "client_of"]
+__all__ = ["Answerer", "answerer", "client_of", "naming"]
 
 
 class Answerer(Protocol):
@@ -102,13 +102,26 @@ def client_of(address: str, named: str, access: Access) -> Client:
     InvalidInputError
         If one of them is of no use.
     """
-    try:
+    with naming({"address": named, **{name: _option(name) for name in vars(access)}}):
         return Client(address, **vars(access))
+
+
+@contextmanager
+def naming(typed: Mapping[str, str]) -> Iterator[None]:
+    """Give errors about what a client was given the names by which it was typed.
+
+    Raises
+    ------
+    InvalidInputError
+        In place of the client's own error.
+    """
+    try:
+        yield
     except InvalidRequestError as error:
+        if error.field not in typed:
+            raise
         problem = str(error).removeprefix(f"{error.field} ")
-        typed = {"address": named, **{name: _option(name) for name in vars(access)}}
-        field = typed.get(error.field, error.field)
-        raise InvalidInputError(Reason.INVALID_FIELD, field, problem) from None
+        raise InvalidInputError(Reason.INVALID_FIELD, typed[error.field], problem) from None
 
 
 def _refuse_access(access: Access) -> None:

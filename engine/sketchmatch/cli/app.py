@@ -17,6 +17,7 @@ from sketchmatch.cli import (
     config,
     demo,
     describe,
+    health,
     interrupts,
     match,
     output,
@@ -24,6 +25,7 @@ from sketchmatch.cli import (
     relate,
     segment,
     serve,
+    status,
     tokens,
 )
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError
@@ -42,6 +44,8 @@ app.command("segment")(segment.segment)
 app.command("describe")(describe.describe)
 app.command("relate")(relate.relate)
 app.command("serve")(serve.serve)
+app.command("health")(health.health)
+app.command("status")(status.status)
 app.command("demo")(demo.demo)
 app.add_typer(plugins.app, name="plugins")
 app.add_typer(config.app, name="config")

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Access",
+    "Address",
     "Config",
     "Exclusions",
     "FormerMapSegmenter",
@@ -36,6 +37,7 @@ __all__ = [
     "Settings",
     "SketchSegmenter",
     "Synonyms",
+    "Timeout",
     "Verbose",
     "asking",
     "parse_pairs",
@@ -48,6 +50,14 @@ __all__ = [
     "say_renamed",
 ]
 
+Address = Annotated[
+    str,
+    typer.Argument(metavar="ADDRESS", help="HOST:PORT or unix:PATH of the server."),
+]
+Timeout = Annotated[
+    float,
+    typer.Option("--timeout", metavar="SECONDS", min=0.001, help="How long to wait for an answer."),
+]
 Server = Annotated[
     str | None,
     typer.Option(
@@ -144,7 +154,7 @@ class Access:
 
     Attributes
     ----------
-    token_file, root_certificates, certificate, key, tls
+    token_file, tls, root_certificates, certificate, key, server_name
         As the client takes them.
     """
 
@@ -169,6 +179,13 @@ class Access:
     ] = None
     key: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Private key of the certificate, in PEM.")
+    ] = None
+    server_name: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="What the server's certificate is for, where that is not in the address.",
+        ),
     ] = None
 
 

@@ -6,14 +6,14 @@ import asyncio
 import signal
 import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 from typing import Any
 
 import grpc
-from grpc_health.v1 import health, health_pb2, health_pb2_grpc
+from grpc_health.v1 import health, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
 from sketchmatch.app.application import Application
@@ -23,6 +23,7 @@ from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
 from sketchmatch.pipeline.warmup import announcing_compilation
 from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.interceptors import ErrorInterceptor
+from sketchmatch.server.readiness import Readiness
 from sketchmatch.server.services import CatalogService, MatchService, SceneService
 from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
 from sketchmatch.server.tokens import read_tokens
@@ -117,12 +118,25 @@ async def serve(
             ("grpc.so_reuseport", 0),
         ],
     )
-    checks = _add_services(server, app)
+    readiness = Readiness(_SERVICES)
+    _add_services(server, app, readiness)
     port = _listen(server, settings.address, files.credentials)
-    await checks.set("", health_pb2.HealthCheckResponse.NOT_SERVING)
+    await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
     stopping, ended = stop or asyncio.Event(), Event()
-    reloading = _Reloading(load, app, files, say)
+    unwanted = _unless_quiet(app, stopping)
+
+    async def warm_up() -> None:
+        await asyncio.to_thread(app.warm_up, stopping.is_set, readiness.ready)
+
+    async def warm_up_others() -> None:
+        await asyncio.to_thread(app.warm_up_others, unwanted, ended, readiness.ready)
+
+    async def warm_up_again() -> None:
+        await warm_up()
+        await warm_up_others()
+
+    reloading = _Reloading(load, app, files, readiness, say, warm_up_again)
     _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
     say(f"listening on {_found_at(settings.address, port)}")
     if lacking:
@@ -131,19 +145,16 @@ async def serve(
         say(problem)
     try:
         with announcing_compilation(say):
-            warming = asyncio.to_thread(app.warm_up, stopping.is_set)
-            await _first(asyncio.ensure_future(warming), stopping)
+            await _first(asyncio.ensure_future(warm_up()), stopping)
         if not stopping.is_set():
-            for name in ("", *_SERVICES):
-                await checks.set(name, health_pb2.HealthCheckResponse.SERVING)
+            await readiness.serve()
             say("serving")
-            others = asyncio.to_thread(app.warm_up_others, _unless_quiet(app, stopping), ended)
-            await _first(asyncio.ensure_future(others), stopping)
+            await _first(asyncio.ensure_future(warm_up_others()), stopping)
         await stopping.wait()
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
         ended.set()
-        await checks.enter_graceful_shutdown()
+        await readiness.servicer.enter_graceful_shutdown()
         await server.stop(settings.grace)
         await asyncio.to_thread(app.close)
     say("stopped")
@@ -184,12 +195,16 @@ class _Reloading:
         load: Callable[[], Setup],
         app: Application,
         files: _Files,
+        readiness: Readiness,
         say: Callable[[str], None],
+        warm_up: Callable[[], Awaitable[None]],
     ) -> None:
         self._load = load
         self._app = app
         self._files = files
+        self._readiness = readiness
         self._say = say
+        self._warm_up = warm_up
         self._one_at_a_time = asyncio.Lock()
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -207,21 +222,21 @@ class _Reloading:
                 self._say(f"the configuration stays as it is: {error}")
                 return
             self._app.change(setup)
+            await self._readiness.know(setup.engine.registry.algorithms)
             for problem in setup.engine.registry.problems:
                 self._say(problem)
             self._say("the configuration is reloaded")
+        await self._warm_up()
 
 
-def _add_services(server: grpc.aio.Server, app: Application) -> health.aio.HealthServicer:
+def _add_services(server: grpc.aio.Server, app: Application, readiness: Readiness) -> None:
     match_service_pb2_grpc.add_MatchServiceServicer_to_server(MatchService(app), server)
     scene_service_pb2_grpc.add_SceneServiceServicer_to_server(SceneService(app), server)
     catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), server)
-    checks = health.aio.HealthServicer()
-    health_pb2_grpc.add_HealthServicer_to_server(checks, server)
+    health_pb2_grpc.add_HealthServicer_to_server(readiness.servicer, server)
     reflection.enable_server_reflection(
         (*_SERVICES, health.SERVICE_NAME, reflection.SERVICE_NAME), server
     )
-    return checks
 
 
 def _refuse_strangers(settings: ServerSettings) -> str:
