@@ -94,6 +94,13 @@ def serve(
             "read along.",
         ),
     ] = False,
+    metrics_address: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Tell metrics, as Prometheus reads them, and probes over HTTP here.",
+        ),
+    ] = None,
     strict_plugins: Annotated[
         bool,
         typer.Option(
@@ -104,9 +111,9 @@ def serve(
     """Serve the gRPC API until SIGTERM or Ctrl-C.
 
     Where no option says it, the configuration does. SIGHUP reads the configuration again, but for
-    address, grace and the names of files of certificates and tokens; what is in these is read again
-    whenever it changes. Requests under way keep what they began with. Health is NOT_SERVING until
-    the kernels are compiled or loaded.
+    addresses, grace and the names of files of certificates and tokens; what is in these is read
+    again whenever it changes. Requests under way keep what they began with. Health is NOT_SERVING
+    until the kernels are compiled or loaded.
     """
     import asyncio
 
@@ -126,6 +133,7 @@ def serve(
         "server.tls_client_ca": tls_client_ca,
         "server.tokens": tokens,
         "server.insecure": insecure or None,
+        "server.metrics_address": metrics_address,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
         "limits.max_side": max_side,
@@ -162,6 +170,7 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
         else None,
         Path(server.tokens) if server.tokens else None,
         server.insecure,
+        server.metrics_address,
     )
 
 

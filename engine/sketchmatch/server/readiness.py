@@ -34,6 +34,15 @@ class Readiness:
         self._algorithms: set[str] = set()
         self._ready: set[str] = set()
 
+    @property
+    def serving(self) -> bool:
+        """Whether requests are answered."""
+        return _WHOLE in self._ready
+
+    def states(self) -> dict[str, bool]:
+        """Return whether each algorithm is ready."""
+        return {name: name in self._ready for name in sorted(self._algorithms)}
+
     async def know(self, algorithms: Iterable[Registered]) -> None:
         """Know these algorithms from now on, and no others; what was ready stays so."""
         names = {_name(item) for item in algorithms}
@@ -50,6 +59,11 @@ class Readiness:
         self._ready.add(_WHOLE)
         for name in (_WHOLE, *self._services):
             await self.servicer.set(name, _Status.SERVING)
+
+    async def drain(self) -> None:
+        """Say that no more requests are taken, whatever is said later."""
+        self._ready.discard(_WHOLE)
+        await self.servicer.enter_graceful_shutdown()
 
     def ready(self, item: Registered) -> None:
         """Say that an algorithm's kernels are there; it may be called from any thread."""

@@ -16,6 +16,7 @@ import grpc
 from grpc_health.v1 import health, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
+import sketchmatch
 from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
 from sketchmatch.config.addresses import is_of_this_machine
@@ -23,6 +24,8 @@ from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
 from sketchmatch.pipeline.warmup import announcing_compilation
 from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.interceptors import ErrorInterceptor
+from sketchmatch.server.metrics import Metric, Metrics, MetricsInterceptor
+from sketchmatch.server.monitor import Monitor
 from sketchmatch.server.readiness import Readiness
 from sketchmatch.server.services import CatalogService, MatchService, SceneService
 from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
@@ -49,6 +52,14 @@ _SERVICES = (
 )
 
 
+_METHODS = tuple(
+    f"/{service.full_name}/{method.name}"
+    for file in (match_service_pb2, scene_service_pb2, catalog_service_pb2)
+    for service in file.DESCRIPTOR.services_by_name.values()
+    for method in service.methods
+)
+
+
 @dataclass(frozen=True)
 class ServerSettings:
     """How to serve; what cannot be exchanged while the server runs.
@@ -66,6 +77,8 @@ class ServerSettings:
     insecure
         Whether to listen where other machines reach the server though that lets strangers in, or
         read along.
+    metrics_address
+        Host and port for metrics and probes over HTTP; None for none.
     """
 
     address: str = "127.0.0.1:50051"
@@ -73,6 +86,7 @@ class ServerSettings:
     tls: TlsFiles | None = None
     tokens: Path | None = None
     insecure: bool = False
+    metrics_address: str | None = None
 
 
 async def serve(
@@ -107,8 +121,9 @@ async def serve(
     lacking = _refuse_strangers(settings)
     files = _Files(settings, say)
     app = Application(load())
+    metrics = Metrics(_METHODS)
     server = grpc.aio.server(
-        interceptors=[*files.interceptors, ErrorInterceptor()],
+        interceptors=[MetricsInterceptor(metrics), *files.interceptors, ErrorInterceptor()],
         options=[
             ("grpc.max_receive_message_length", app.setup.limits.transport_bytes),
             ("grpc.max_send_message_length", -1),
@@ -120,6 +135,12 @@ async def serve(
     )
     readiness = Readiness(_SERVICES)
     _add_services(server, app, readiness)
+    _watch(metrics, app, files, readiness)
+    monitor = (
+        Monitor(settings.metrics_address, metrics, lambda: readiness.serving)
+        if settings.metrics_address
+        else None
+    )
     port = _listen(server, settings.address, files.credentials)
     await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
@@ -139,6 +160,8 @@ async def serve(
     reloading = _Reloading(load, app, files, readiness, say, warm_up_again)
     _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
     say(f"listening on {_found_at(settings.address, port)}")
+    if monitor:
+        say(f"metrics are at http://{monitor.address}/metrics")
     if lacking:
         say(f"insecure: whoever reaches this address {lacking}")
     for problem in app.setup.engine.registry.problems:
@@ -154,9 +177,11 @@ async def serve(
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
         ended.set()
-        await readiness.servicer.enter_graceful_shutdown()
+        await readiness.drain()
         await server.stop(settings.grace)
         await asyncio.to_thread(app.close)
+        if monitor:
+            await asyncio.to_thread(monitor.close)
     say("stopped")
 
 
@@ -179,6 +204,10 @@ class _Files:
     def interceptors(self) -> list[CallerInterceptor]:
         """What asks for tokens, if anything does."""
         return [] if self._tokens is None else [CallerInterceptor(self._tokens)]
+
+    def expiry(self) -> dict[tuple[str, ...], float]:
+        """Return when the certificate expires, as metrics have it."""
+        return {} if self._pems is None else {(): self._pems.value.expires}
 
     def look(self) -> None:
         """Read again now what has changed."""
@@ -227,6 +256,30 @@ class _Reloading:
                 self._say(problem)
             self._say("the configuration is reloaded")
         await self._warm_up()
+
+
+def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readiness) -> None:
+    """Have metrics tell how things are, beside what happened."""
+    metrics.watch(
+        Metric("sketchmatch_build_info", "What serves.", ("version",)),
+        lambda: {(sketchmatch.__version__,): 1.0},
+    )
+    metrics.watch(
+        Metric("sketchmatch_serving", "Whether requests are answered."),
+        lambda: {(): float(readiness.serving)},
+    )
+    metrics.watch(
+        Metric("sketchmatch_algorithm_ready", "Whether kernels are compiled.", ("algorithm",)),
+        lambda: {(name,): float(ready) for name, ready in readiness.states().items()},
+    )
+    metrics.watch(
+        Metric("sketchmatch_requests_limit", "Requests that may run at the same time."),
+        lambda: {(): float(app.setup.limits.max_concurrent_matches)},
+    )
+    metrics.watch(
+        Metric("sketchmatch_certificate_expires_timestamp_seconds", "When the certificate does."),
+        files.expiry,
+    )
 
 
 def _add_services(server: grpc.aio.Server, app: Application, readiness: Readiness) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ssl
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 import grpc
@@ -42,6 +43,11 @@ class Pems:
     certificate: bytes
     key: bytes
     client_ca: bytes | None
+
+    @property
+    def expires(self) -> float:
+        """When the server's certificate does, in seconds since 1970."""
+        return _not_after(ssl.PEM_cert_to_DER_cert(_first_block(self.certificate)))
 
     @property
     def configuration(self) -> grpc.ServerCertificateConfiguration:
@@ -118,6 +124,39 @@ def _check(files: TlsFiles) -> None:
         except ssl.SSLError:
             problem = "holds no certificate in PEM; give those of the authorities of clients"
             raise InvalidInputError(Reason.INVALID_FILE, str(files.client_ca), problem) from None
+
+
+def _first_block(pem: bytes) -> str:
+    """Return the first certificate in PEM: the server's own, before those of authorities."""
+    text = pem.decode("ascii", "replace")
+    begin = text.index(ssl.PEM_HEADER)
+    return text[begin : text.index(ssl.PEM_FOOTER, begin) + len(ssl.PEM_FOOTER)]
+
+
+def _not_after(der: bytes) -> float:
+    """Return until when a certificate is good (RFC 5280, 4.1): Python's own ssl does not tell."""
+    _, certificate = next(_fields(der))
+    _, signed = next(_fields(certificate))
+    fields = [field for field in _fields(signed) if field[0] != _VERSION]
+    validity = fields[3][1]  # after serial number, algorithm and issuer
+    _, (kind, text) = _fields(validity)
+    form = "%y%m%d%H%M%SZ" if kind == _UTC_TIME else "%Y%m%d%H%M%SZ"
+    return datetime.strptime(text.decode("ascii"), form).replace(tzinfo=UTC).timestamp()
+
+
+_VERSION, _UTC_TIME = 0xA0, 0x17
+
+
+def _fields(der: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield the tag and the content of each field of a DER sequence."""
+    at = 0
+    while at < len(der):
+        tag, size, at = der[at], der[at + 1], at + 2
+        if size >= 0x80:
+            digits = size - 0x80
+            size, at = int.from_bytes(der[at : at + digits]), at + digits
+        yield tag, der[at : at + size]
+        at += size
 
 
 class _EncryptedError(Exception):
