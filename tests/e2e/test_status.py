@@ -2,6 +2,8 @@
 
 import json
 import re
+import threading
+from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
@@ -27,6 +29,51 @@ def test_health_of_nobody_is_exit_code_3_and_a_line(command_line):
     done = command_line("health", "127.0.0.1:1")
     assert (done.returncode, done.stdout) == (3, "")
     assert done.stderr.startswith("sketchmatch: the sketchmatch server at 127.0.0.1:1 is not avail")
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.fixture
+def probed():
+    """Yield what says whether it is ready, and its address over HTTP."""
+    answers = {"/readyz": 200}
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(answers.get(self.path, 404))
+            self.end_headers()
+
+        def log_message(self, *_):
+            pass
+
+    with HTTPServer(("127.0.0.1", 0), Handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield answers, f"http://127.0.0.1:{server.server_address[1]}"
+        server.shutdown()
+        thread.join()
+
+
+def test_health_may_be_asked_over_http_without_certificates_and_proxies(
+    command_line, probed, monkeypatch
+):
+    answers, address = probed
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")
+    monkeypatch.setenv("SKETCHMATCH_ROOT_CERTIFICATES", "away")
+    done = command_line("health", address)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "SERVING\n", "")
+    answers["/readyz"] = 503
+    done = command_line("health", f"{address}/")
+    assert (done.returncode, done.stdout, done.stderr) == (3, "NOT_SERVING\n", "")
+    done = command_line("health", address, "--of", "searcher/easm")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("sketchmatch: --of is not told over HTTP; ")
+
+
+@pytest.mark.parametrize("address", ["http://127.0.0.1:1", "http://", "http://[:1", "http://a b"])
+def test_a_probe_that_nobody_answers_is_exit_code_3_and_a_line(command_line, address):
+    done = command_line("health", address)
+    assert (done.returncode, done.stdout) == (3, "")
+    assert done.stderr.startswith(f"sketchmatch: nobody tells at {address} whether the server")
     assert len(done.stderr.splitlines()) == 1
 
 

@@ -1,4 +1,6 @@
+import os
 import signal
+import socket
 import time
 
 import pytest
@@ -150,6 +152,26 @@ def test_the_server_tells_its_version_and_limits():
     assert info.limits.max_concurrent_matches == 3
     assert info.limits.max_request_bytes == 64 * 1024**2
     assert info.limits.max_time_budget.ToTimedelta().total_seconds() == 2.5
+
+
+@pytest.mark.parametrize("named", ["{folder}/notify", "@sketchmatch-{number}"])
+def test_systemd_is_told_when_the_server_serves_and_when_it_stops(tmp_path, monkeypatch, named):
+    address = named.format(folder=tmp_path, number=os.getpid())
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as link:
+        link.bind(address.replace("@", "\0"))
+        link.settimeout(100)
+        monkeypatch.setenv("NOTIFY_SOCKET", address)
+        with serving(warm=False) as host:
+            assert link.recv(100) == b"READY=1"
+            assert "serving" in host.said
+        assert link.recv(100) == b"STOPPING=1"
+
+
+def test_a_systemd_that_does_not_listen_stops_nobody(monkeypatch, tmp_path):
+    for address in (str(tmp_path / "away"), "nonsense", ""):
+        monkeypatch.setenv("NOTIFY_SOCKET", address)
+        with serving() as host:
+            assert "serving" in host.said
 
 
 @pytest.mark.slow

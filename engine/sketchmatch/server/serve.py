@@ -26,6 +26,7 @@ from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.interceptors import ErrorInterceptor
 from sketchmatch.server.metrics import Metric, Metrics, MetricsInterceptor
 from sketchmatch.server.monitor import Monitor
+from sketchmatch.server.notify import notify
 from sketchmatch.server.readiness import Readiness
 from sketchmatch.server.services import CatalogService, MatchService, SceneService
 from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
@@ -172,8 +173,10 @@ async def serve(
         if not stopping.is_set():
             await readiness.serve()
             say("serving")
+            notify("READY=1")
             await _first(asyncio.ensure_future(warm_up_others()), stopping)
         await stopping.wait()
+        notify("STOPPING=1")
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
         ended.set()
