@@ -82,11 +82,32 @@ def test_the_image_does_not_start_for_strangers(monkeypatch, tmp_path):
     assert "is reached from other machines, and whoever does may call" in done.stderr
 
 
-@pytest.mark.slow
-def test_what_the_image_compiles_is_all_that_a_server_needs(tmp_path, monkeypatch):
-    code = re.search(r'python -c "(.*?)"$', DOCKERFILE, re.S | re.M)[1].replace("\\\n", "")
+@pytest.fixture
+def image(monkeypatch, tmp_path):
+    """Take the variables of the image that say how kernels are compiled and kept."""
+    variables = dict(
+        re.findall(r'(NUMBA_CPU_\w+)="?([^\s"]*)', DOCKERFILE.rpartition("\nFROM ")[2])
+    )
+    cpu = re.search(r"^ARG CPU=(\S+)", DOCKERFILE, re.M)[1]
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value.replace("${CPU}", cpu))
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setenv("NUMBA_CPU_NAME", re.search(r"^ARG CPU=(\S+)", DOCKERFILE, re.M)[1])
+    return cpu
+
+
+def test_the_images_machine_code_is_for_no_processor_in_particular(image):
+    code = (
+        "from numba.core.registry import cpu_target\n"
+        "print(*map(repr, cpu_target.target_context.codegen().magic_tuple()[1:]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == f"{image!r} ''"
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("image")
+def test_what_the_image_compiles_is_all_that_a_server_needs(tmp_path):
+    code = re.search(r'python -c "(.*?)"$', DOCKERFILE, re.S | re.M)[1].replace("\\\n", "")
     subprocess.run([sys.executable, "-c", code], check=True, timeout=500)
     compiled = sorted(path.name for path in tmp_path.iterdir())
     assert compiled

@@ -3,11 +3,13 @@
 import importlib.util
 import re
 import socket
+import ssl
 import subprocess
 import time
 import urllib.error
 import urllib.request
 from contextlib import contextmanager
+from datetime import datetime
 
 import grpc
 import pytest
@@ -19,7 +21,7 @@ from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.selection import UNCONFIGURED
 from sketchmatch.server import monitor, serve
 from sketchmatch.server.metrics import Counter, Histogram, Metric, Metrics
-from sketchmatch.server.tls import TlsFiles
+from sketchmatch.server.tls import Pems, TlsFiles, watched_pems
 from sketchmatch.server.tokens import new_token
 from sketchmatch_client import Client, InvalidRequestError, SketchmatchError
 from tests.certificates import Authority
@@ -27,6 +29,9 @@ from tests.pace import wait_until
 from tests.server.harness import ENDLESS, hosting, in_loop, registry_with, scene
 from tests.server.probes import Exploding
 from tests.tools import require
+
+EMPTY = f"{ssl.PEM_HEADER}\nMAA=\n{ssl.PEM_FOOTER}\n".encode()
+"""A certificate in PEM with nothing in it."""
 
 
 @contextmanager
@@ -161,16 +166,19 @@ def test_it_is_told_how_things_are(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize("days", [1, 9_000, 30_000])  # these two before and after 2050
 def test_a_certificate_says_until_when_it_is_good_as_openssl_says_it(tmp_path, days):
-    from datetime import datetime
-
-    from sketchmatch.server.tls import watched_pems
-
     pair = Authority(tmp_path, "ours").issue("localhost", days=days)
     command = ["openssl", "x509", "-noout", "-enddate", "-dateopt", "iso_8601", "-in"]
     told = subprocess.run([*command, pair.certificate], capture_output=True, text=True, check=True)
     until = datetime.fromisoformat(told.stdout.strip().removeprefix("notAfter="))
     found = watched_pems(TlsFiles(pair.certificate, pair.key), print).value
-    assert found.expires == until.timestamp()
+    assert found.expires == until
+
+
+@pytest.mark.parametrize("pem", [b"", b"-----BEGIN TRUSTED CERTIFICATE-----", EMPTY])
+def test_a_certificate_of_another_form_has_no_known_end_and_stops_nobody(pem):
+    found = Pems(pem, b"", None)
+    assert found.expires is None
+    assert "nobody can tell" in found.validity
 
 
 # Telling ----------------------------------------------------------------------------------------

@@ -152,7 +152,10 @@ def _translated(error: grpc.RpcError, address: str) -> SketchmatchError:
 
 
 # What gRPC says of a link that did not come about; it has no status for that.
-_UNTRUSTED = re.compile(r"CERTIFICATE_VERIFY_FAILED:? ?(?P<why>[^:]*)|Hostname Verification Check")
+_UNTRUSTED = re.compile(
+    r"CERTIFICATE_VERIFY_FAILED:? ?(?P<why>[^:]*)"
+    r"|Hostname Verification Check|Peer name .* is not in peer"
+)
 _REMEDIES = {
     "WRONG_VERSION_NUMBER": "it does not encrypt: ask it without certificates and tls",
     "Socket closed": "it ends links at once, as one does that wants encryption or a certificate of "

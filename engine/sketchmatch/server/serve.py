@@ -210,7 +210,8 @@ class _Files:
 
     def expiry(self) -> dict[tuple[str, ...], float]:
         """Return when the certificate expires, as metrics have it."""
-        return {} if self._pems is None else {(): self._pems.value.expires}
+        expires = None if self._pems is None else self._pems.value.expires
+        return {} if expires is None else {(): expires.timestamp()}
 
     def look(self) -> None:
         """Read again now what has changed."""

@@ -45,9 +45,23 @@ class Pems:
     client_ca: bytes | None
 
     @property
-    def expires(self) -> float:
-        """When the server's certificate does, in seconds since 1970."""
-        return _not_after(ssl.PEM_cert_to_DER_cert(_first_block(self.certificate)))
+    def expires(self) -> datetime | None:
+        """When the server's certificate does; None where that cannot be read."""
+        try:
+            return _not_after(ssl.PEM_cert_to_DER_cert(_first_block(self.certificate)))
+        except (ValueError, IndexError, StopIteration):
+            return None
+
+    @property
+    def validity(self) -> str:
+        """Until when it is good, for people."""
+        expires = self.expires
+        if expires is None:
+            return "nobody can tell until when the server's certificate is good"
+        if expires < datetime.now(UTC):
+            problem = f"the server's certificate has expired on {expires:%Y-%m-%d}"
+            return f"{problem}: no client trusts it; renew it"
+        return f"the server's certificate is good until {expires:%Y-%m-%d}"
 
     @property
     def configuration(self) -> grpc.ServerCertificateConfiguration:
@@ -58,7 +72,7 @@ class Pems:
 
 
 def watched_pems(files: TlsFiles, say: Callable[[str], None]) -> Watched[Pems]:
-    """Return what is in the files, whenever they change.
+    """Return what is in the files, whenever they change, and say until when that is good.
 
     Raises
     ------
@@ -66,7 +80,9 @@ def watched_pems(files: TlsFiles, say: Callable[[str], None]) -> Watched[Pems]:
         If a file cannot be used.
     """
     paths = [files.certificate, files.key, *([files.client_ca] if files.client_ca else [])]
-    return Watched("the certificates", paths, lambda: _read(files), say)
+    pems = Watched("the certificates", paths, lambda: _read(files), say, lambda pems: pems.validity)
+    say(pems.value.validity)
+    return pems
 
 
 def server_credentials(pems: Watched[Pems]) -> grpc.ServerCredentials:
@@ -133,7 +149,7 @@ def _first_block(pem: bytes) -> str:
     return text[begin : text.index(ssl.PEM_FOOTER, begin) + len(ssl.PEM_FOOTER)]
 
 
-def _not_after(der: bytes) -> float:
+def _not_after(der: bytes) -> datetime:
     """Return until when a certificate is good (RFC 5280, 4.1): Python's own ssl does not tell."""
     _, certificate = next(_fields(der))
     _, signed = next(_fields(certificate))
@@ -141,7 +157,7 @@ def _not_after(der: bytes) -> float:
     validity = fields[3][1]  # after serial number, algorithm and issuer
     _, (kind, text) = _fields(validity)
     form = "%y%m%d%H%M%SZ" if kind == _UTC_TIME else "%Y%m%d%H%M%SZ"
-    return datetime.strptime(text.decode("ascii"), form).replace(tzinfo=UTC).timestamp()
+    return datetime.strptime(text.decode("ascii"), form).replace(tzinfo=UTC)
 
 
 _VERSION, _UTC_TIME = 0xA0, 0x17

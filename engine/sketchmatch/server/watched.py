@@ -34,6 +34,8 @@ class Watched(Generic[_Value]):
         Returns what they say.
     say
         Called with a sentence when they have changed.
+    known
+        Returns what else to say of the new value.
 
     Raises
     ------
@@ -47,8 +49,10 @@ class Watched(Generic[_Value]):
         paths: Sequence[Path],
         read: Callable[[], _Value],
         say: Callable[[str], None],
+        known: Callable[[_Value], str] = lambda _: "",
     ) -> None:
-        self._what, self._paths, self._read, self._say = what, tuple(paths), read, say
+        self._what, self._paths, self._read = what, tuple(paths), read
+        self._say, self._known = say, known
         self._lock = threading.Lock()
         self._state, self._value = _state(self._paths), read()
         self._looked = time.monotonic()
@@ -74,7 +78,8 @@ class Watched(Generic[_Value]):
             except InvalidInputError as error:
                 self._say(f"{self._what} stay as they were: {error}")
                 return
-        self._say(f"{self._what} are read again")
+        more = self._known(self._value)
+        self._say(f"{self._what} are read again{'; ' if more else ''}{more}")
 
 
 def content_of(path: Path, what: str, setting: str) -> bytes:
