@@ -146,12 +146,11 @@ async def serve(
     await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
     stopping, ended = stop or asyncio.Event(), Event()
-    unwanted = _unless_quiet(app, stopping)
-
     async def warm_up() -> None:
         await asyncio.to_thread(app.warm_up, stopping.is_set, readiness.ready)
 
     async def warm_up_others() -> None:
+        unwanted = _unless_quiet(app, stopping)
         await asyncio.to_thread(app.warm_up_others, unwanted, ended, readiness.ready)
 
     async def warm_up_again() -> None:
