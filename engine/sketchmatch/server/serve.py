@@ -146,6 +146,7 @@ async def serve(
     await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
     stopping, ended = stop or asyncio.Event(), Event()
+
     async def warm_up() -> None:
         await asyncio.to_thread(app.warm_up, stopping.is_set, readiness.ready)
 
