@@ -88,11 +88,6 @@ def ask(request):
     return plainly if request.param == "sync" else in_a_loop
 
 
-def at(host: Host) -> str:
-    """Return a server's address by the name that its certificate is for."""
-    return host.address.replace("127.0.0.1", "localhost")
-
-
 # Friends ----------------------------------------------------------------------------------------
 
 
@@ -100,11 +95,11 @@ def test_every_call_of_both_clients_is_answered_over_tls_to_whom_shows_a_token(
     ask, guarded, ours, robot
 ):
     access = {"root_certificates": ours.certificate, "token": robot[0]}
-    ask(at(guarded), "wait_until_serving", **access)
-    assert ask(at(guarded), "server_info", **access).api_version == "sketchmatch.v1"
-    assert ask(at(guarded), "algorithms", **access).algorithms
-    assert len(ask(at(guarded), "segment", scene(3), **access).scene.objects) == 3
-    match = ask(at(guarded), "match", scene(4), scene(4), **access)
+    ask(guarded.address, "wait_until_serving", **access)
+    assert ask(guarded.address, "server_info", **access).api_version == "sketchmatch.v1"
+    assert ask(guarded.address, "algorithms", **access).algorithms
+    assert len(ask(guarded.address, "segment", scene(3), **access).scene.objects) == 3
+    match = ask(guarded.address, "match", scene(4), scene(4), **access)
     assert match.object_map == {0: 0, 1: 1, 2: 2, 3: 3}
 
 
@@ -115,7 +110,7 @@ def test_the_golden_request_has_the_same_answer_with_tls_and_a_token_as_without(
     answers = []
     with (
         grpc.insecure_channel(address) as plain,
-        grpc.secure_channel(at(guarded), grpc.ssl_channel_credentials(roots)) as encrypted,
+        grpc.secure_channel(guarded.address, grpc.ssl_channel_credentials(roots)) as encrypted,
     ):
         for channel in (plain, encrypted):
             metadata = (("authorization", f"Bearer {robot[0]}"),)
@@ -133,7 +128,7 @@ def test_the_golden_request_has_the_same_answer_with_tls_and_a_token_as_without(
 
 def test_credentials_of_grpcs_own_and_tokens_go_together(guarded, ours, robot):
     credentials = grpc.ssl_channel_credentials(ours.certificate.read_bytes())
-    with Client(at(guarded), credentials=credentials, token=robot[0]) as client:
+    with Client(guarded.address, credentials=credentials, token=robot[0]) as client:
         assert client.server_info().version
 
 
@@ -159,8 +154,8 @@ def test_the_application_knows_its_caller_by_the_name_of_the_token(
 ):
     with recorded(monkeypatch) as callers:
         access = {"root_certificates": ours.certificate, "token": robot[0]}
-        ask(at(guarded), "match", scene(3), scene(3), **access)
-        ask(at(guarded), "segment", scene(3), **access)
+        ask(guarded.address, "match", scene(3), scene(3), **access)
+        ask(guarded.address, "segment", scene(3), **access)
     assert callers == ["robot-7", "robot-7"]
 
 
@@ -179,7 +174,7 @@ def test_with_mutual_tls_a_caller_is_who_the_certificate_names(
     mutual = TlsFiles(tls.certificate, tls.key, others.certificate)
     access = {"certificate": robots.certificate, "key": robots.key.read_bytes()}
     with recorded(monkeypatch) as callers, hosting(SETUP, tls=mutual) as host:
-        ask(at(host), "segment", scene(3), root_certificates=ours.certificate, **access)
+        ask(host.address, "segment", scene(3), root_certificates=ours.certificate, **access)
     assert callers == [caller]
 
 
@@ -195,11 +190,11 @@ def test_with_both_a_caller_needs_both_and_is_who_the_token_names(
         recorded(monkeypatch) as callers,
         hosting(SETUP, tls=mutual, tokens=tmp_path / "tokens") as host,
     ):
-        ask(at(host), "segment", scene(3), token=robot[0], **shown, **roots)
+        ask(host.address, "segment", scene(3), token=robot[0], **shown, **roots)
         with pytest.raises(NotAuthenticatedError):
-            ask(at(host), "segment", scene(3), **shown, **roots)
+            ask(host.address, "segment", scene(3), **shown, **roots)
         with pytest.raises(ServerUnavailableError):
-            ask(at(host), "segment", scene(3), token=robot[0], **roots)
+            ask(host.address, "segment", scene(3), token=robot[0], **roots)
     assert callers == ["robot-7"]
 
 
@@ -216,7 +211,7 @@ def status_of(host, authority, *authorizations, method="/sketchmatch.v1.MatchSer
     """Return what comes of a call with some metadata by hand, and an unreadable message."""
     credentials = grpc.ssl_channel_credentials(authority.certificate.read_bytes())
     metadata = [("authorization", each) for each in authorizations]
-    with grpc.secure_channel(at(host), credentials) as channel:
+    with grpc.secure_channel(host.address, credentials) as channel:
         if method.endswith("Match"):
             call = channel.unary_stream(method)(b"", timeout=30, metadata=metadata)
             try:
@@ -254,7 +249,7 @@ def test_no_method_answers_without_a_token(guarded, ours, method):
 
 def test_health_is_anybodys(guarded, ours):
     credentials = grpc.ssl_channel_credentials(ours.certificate.read_bytes())
-    with grpc.secure_channel(at(guarded), credentials) as channel:
+    with grpc.secure_channel(guarded.address, credentials) as channel:
         answer = health_pb2_grpc.HealthStub(channel).Check(health_pb2.HealthCheckRequest())
     assert answer.status == health_pb2.HealthCheckResponse.SERVING
 
@@ -298,13 +293,13 @@ def test_another_form_of_authorization_is_refused(guarded, ours, robot, authoriz
 def test_a_refusal_has_a_reason_for_programs_and_a_remedy_for_people(ask, guarded, ours, robot):
     wrong = wrong_tokens(robot[0])["another secret"]
     with pytest.raises(NotAuthenticatedError) as caught:
-        ask(at(guarded), "server_info", root_certificates=ours.certificate, token=wrong)
+        ask(guarded.address, "server_info", root_certificates=ours.certificate, token=wrong)
     assert caught.value.reason == "NOT_AUTHENTICATED"
     assert str(caught.value) == (
         "the token is none that this server knows; ask its operator for another"
     )
     with pytest.raises(NotAuthenticatedError, match="the call carries none; give the client"):
-        ask(at(guarded), "server_info", root_certificates=ours.certificate)
+        ask(guarded.address, "server_info", root_certificates=ours.certificate)
 
 
 def test_a_strangers_message_is_not_even_received(guarded, ours, monkeypatch):
@@ -314,7 +309,7 @@ def test_a_strangers_message_is_not_even_received(guarded, ours, monkeypatch):
     # More than the transport takes: a server that read it would say so.
     message = bytes(300 * 1024**2)
     options = [("grpc.max_send_message_length", -1)]
-    with grpc.secure_channel(at(guarded), credentials, options) as channel:
+    with grpc.secure_channel(guarded.address, credentials, options) as channel:
         call = channel.unary_stream("/sketchmatch.v1.MatchService/Match")(message, timeout=60)
         with pytest.raises(grpc.RpcError) as caught:
             list(call)
@@ -324,12 +319,12 @@ def test_a_strangers_message_is_not_even_received(guarded, ours, monkeypatch):
 
 def test_a_server_of_another_authority_is_not_trusted(ask, guarded, others, robot):
     with pytest.raises(NotAuthenticatedError, match="cannot be trusted"):
-        ask(at(guarded), "server_info", root_certificates=others.certificate, token=robot[0])
+        ask(guarded.address, "server_info", root_certificates=others.certificate, token=robot[0])
 
 
 def test_waiting_for_a_server_that_is_not_trusted_ends_at_once(ask, guarded, others):
     with pytest.raises(NotAuthenticatedError, match="cannot be trusted"):
-        ask(at(guarded), "wait_until_serving", root_certificates=others.certificate)
+        ask(guarded.address, "wait_until_serving", root_certificates=others.certificate)
 
 
 def test_a_certificate_for_another_name_is_not_trusted_unless_the_name_is_said(ask, ours):
@@ -337,14 +332,14 @@ def test_a_certificate_for_another_name_is_not_trusted_unless_the_name_is_said(a
     files = TlsFiles(pair.certificate, pair.key)
     way_in = {"root_certificates": ours.certificate}
     with hosting(SETUP, tls=files) as host:
-        assert ask(at(host), "server_info", server_name="elsewhere.example", **way_in).version
+        assert ask(host.address, "server_info", server_name="elsewhere.example", **way_in).version
         with pytest.raises(NotAuthenticatedError, match="it is for another name"):
-            ask(at(host), "server_info", **way_in)
+            ask(host.address, "server_info", **way_in)
 
 
 def test_plaintext_on_a_port_with_tls_is_told_what_may_be_wanted(ask, guarded, robot):
     with pytest.raises(ServerUnavailableError, match="wants encryption") as caught:
-        ask(at(guarded), "server_info", token=robot[0])
+        ask(guarded.address, "server_info", token=robot[0])
     assert robot[0] not in str(caught.value)
 
 
@@ -359,10 +354,10 @@ def test_a_client_without_a_certificate_of_the_right_authority_gets_nowhere(ask,
     roots = {"root_certificates": ours.certificate}
     with hosting(SETUP, tls=mutual) as host:
         with pytest.raises(ServerUnavailableError, match="a certificate of the client"):
-            ask(at(host), "server_info", **roots)
+            ask(host.address, "server_info", **roots)
         with pytest.raises(ServerUnavailableError, match="a certificate of the client"):
             ask(
-                at(host),
+                host.address,
                 "server_info",
                 certificate=stranger.certificate,
                 key=stranger.key,
@@ -379,18 +374,18 @@ def test_an_expired_certificate_is_replaced_while_a_match_runs_on(ours):
     access = {"root_certificates": ours.certificate, "timeout": 60}
     with (
         hosting(SETUP, tls=TlsFiles(shown.certificate, shown.key)) as host,
-        Client(at(host), **access) as early,
+        Client(host.address, **access) as early,
     ):
         events = early.events(scene(8), scene(8, 1), searcher="easm", time_budget=3.0)
         assert next(events).HasField("accepted")
         shown.replace(expired)
         with (
-            Client(at(host), **access) as client,
+            Client(host.address, **access) as client,
             pytest.raises(NotAuthenticatedError, match="expired"),
         ):
             client.server_info()
         shown.replace(fresh)
-        with Client(at(host), **access) as client:
+        with Client(host.address, **access) as client:
             assert client.server_info().version
         assert kinds(list(events))[-1] == "result"
         assert early.server_info().version
@@ -408,7 +403,7 @@ def test_a_certificate_without_its_key_leaves_the_former_pair_and_is_told_once(o
     with hosting(SETUP, tls=TlsFiles(shown.certificate, shown.key)) as host:
         shown.certificate.write_bytes(fresh.certificate.read_bytes())
         for _ in range(3):
-            with Client(at(host), root_certificates=ours.certificate) as client:
+            with Client(host.address, root_certificates=ours.certificate) as client:
                 assert client.server_info().version
     (told,) = (line for line in host.said if "stay as they were" in line)
     assert "is not the key of the certificate" in told
@@ -420,8 +415,8 @@ def test_tokens_change_while_the_server_runs(ours, tls, robot, tmp_path):
     access = {"root_certificates": ours.certificate}
     with (
         hosting(SETUP, tls=tls, tokens=file) as host,
-        Client(at(host), token=token, **access) as old,
-        Client(at(host), token=other, **access) as new,
+        Client(host.address, token=token, **access) as old,
+        Client(host.address, token=other, **access) as new,
     ):
         assert old.server_info().version
         with pytest.raises(NotAuthenticatedError):
@@ -453,9 +448,8 @@ def test_a_reload_says_what_it_read_again(ours, robot, tmp_path):
         running.process.send_signal(signal.SIGHUP)
         running.wait_for("the configuration is reloaded")
         again = [line for line in running.said if "read again" in line]
-        port = running.address.rpartition(":")[2]
         with (
-            Client(f"localhost:{port}", root_certificates=ours.certificate, token=robot[0]) as old,
+            Client(running.address, root_certificates=ours.certificate, token=robot[0]) as old,
             pytest.raises(NotAuthenticatedError),
         ):
             old.server_info()

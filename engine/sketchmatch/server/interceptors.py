@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 from typing import Any, NoReturn, cast
@@ -41,7 +42,8 @@ def _caught(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
         try:
             return await method(request, context)
         except grpc.aio.InternalError:
-            return None  # nobody is left to write to: the caller has gone
+            # Nobody is left to write to: the caller has gone.
+            raise asyncio.CancelledError from None
         except Exception as error:
             await _abort(context, error)
 

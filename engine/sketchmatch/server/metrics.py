@@ -244,11 +244,10 @@ class MetricsInterceptor(grpc.aio.ServerInterceptor):
         async def call(request: Any, context: Any) -> Any:
             began = time.monotonic()
             code = "UNKNOWN"
-            writing = _Writing(context, metrics)
             metrics.began(method)
             try:
-                answer = await behaviour(request, writing)
-                code = _gone(context) if writing.in_vain else "OK"
+                answer = await behaviour(request, _Writing(context, metrics))
+                code = "OK"
                 return answer
             except asyncio.CancelledError:
                 code = _gone(context)
@@ -269,17 +268,12 @@ class _Writing:
     def __init__(self, context: Any, metrics: Metrics) -> None:
         self._context, self._metrics = context, metrics
         self._accepted = MatchAccepted()
-        self.in_vain = False
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._context, name)
 
     async def write(self, response: Any) -> None:
-        try:
-            await self._context.write(response)
-        except grpc.aio.InternalError:  # the caller has gone
-            self.in_vain = True
-            raise
+        await self._context.write(response)
         if isinstance(response, MatchResponse):
             if response.HasField("accepted"):
                 self._accepted = response.accepted

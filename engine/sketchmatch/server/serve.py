@@ -6,7 +6,7 @@ import asyncio
 import signal
 import socket
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
@@ -137,28 +137,14 @@ async def serve(
     readiness = Readiness(_SERVICES)
     _add_services(server, app, readiness)
     _watch(metrics, app, files, readiness)
-    monitor = (
-        Monitor(settings.metrics_address, metrics, lambda: readiness.serving)
-        if settings.metrics_address
-        else None
-    )
+    told_at = settings.metrics_address
+    monitor = Monitor(told_at, metrics, lambda: readiness.serving) if told_at else None
     port = _listen(server, settings.address, files.credentials)
     await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
-    stopping, ended = stop or asyncio.Event(), Event()
-
-    async def warm_up() -> None:
-        await asyncio.to_thread(app.warm_up, stopping.is_set, readiness.ready)
-
-    async def warm_up_others() -> None:
-        unwanted = _unless_quiet(app, stopping)
-        await asyncio.to_thread(app.warm_up_others, unwanted, ended, readiness.ready)
-
-    async def warm_up_again() -> None:
-        await warm_up()
-        await warm_up_others()
-
-    reloading = _Reloading(load, app, files, readiness, say, warm_up_again)
+    stopping = stop or asyncio.Event()
+    warming = _Warming(app, readiness, stopping)
+    reloading = _Reloading(load, app, files, readiness, say, warming)
     _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
     say(f"listening on {_found_at(settings.address, port)}")
     if monitor:
@@ -169,17 +155,17 @@ async def serve(
         say(problem)
     try:
         with announcing_compilation(say):
-            await _first(asyncio.ensure_future(warm_up()), stopping)
+            await _first(asyncio.ensure_future(warming.begin()), stopping)
         if not stopping.is_set():
             await readiness.serve()
             say("serving")
             notify("READY=1")
-            await _first(asyncio.ensure_future(warm_up_others()), stopping)
+            await _first(asyncio.ensure_future(warming.go_on()), stopping)
         await stopping.wait()
         notify("STOPPING=1")
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
-        ended.set()
+        warming.ended.set()
         await readiness.drain()
         await server.stop(settings.grace)
         await asyncio.to_thread(app.close)
@@ -220,6 +206,25 @@ class _Files:
                 watched.look()
 
 
+class _Warming:
+    """Compiles what requests need, in threads, and says what is ready."""
+
+    def __init__(self, app: Application, readiness: Readiness, stopping: asyncio.Event) -> None:
+        self._app, self._readiness, self._stopping = app, readiness, stopping
+        self.ended = Event()
+
+    async def begin(self) -> None:
+        """Compile what the default pipeline needs."""
+        await asyncio.to_thread(self._app.warm_up, self._stopping.is_set, self._readiness.ready)
+
+    async def go_on(self) -> None:
+        """Compile the rest, while no request is under way."""
+        unwanted = _unless_quiet(self._app, self._stopping)
+        await asyncio.to_thread(
+            self._app.warm_up_others, unwanted, self.ended, self._readiness.ready
+        )
+
+
 class _Reloading:
     """Exchanges the setup, one load at a time."""
 
@@ -230,14 +235,14 @@ class _Reloading:
         files: _Files,
         readiness: Readiness,
         say: Callable[[str], None],
-        warm_up: Callable[[], Awaitable[None]],
+        warming: _Warming,
     ) -> None:
         self._load = load
         self._app = app
         self._files = files
         self._readiness = readiness
         self._say = say
-        self._warm_up = warm_up
+        self._warming = warming
         self._one_at_a_time = asyncio.Lock()
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -259,7 +264,8 @@ class _Reloading:
             for problem in setup.engine.registry.problems:
                 self._say(problem)
             self._say("the configuration is reloaded")
-        await self._warm_up()
+        await self._warming.begin()
+        await self._warming.go_on()
 
 
 def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readiness) -> None:
