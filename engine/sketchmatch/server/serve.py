@@ -137,9 +137,9 @@ async def serve(
     readiness = Readiness(_SERVICES)
     _add_services(server, app, readiness)
     _watch(metrics, app, files, readiness)
+    port = _listen(server, settings.address, files.credentials)
     told_at = settings.metrics_address
     monitor = Monitor(told_at, metrics, lambda: readiness.serving) if told_at else None
-    port = _listen(server, settings.address, files.credentials)
     await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
     stopping = stop or asyncio.Event()
