@@ -249,7 +249,7 @@ class MetricsInterceptor(grpc.aio.ServerInterceptor):
                 answer = await behaviour(request, _Writing(context, metrics))
                 code = "OK"
                 return answer
-            except asyncio.CancelledError:
+            except (asyncio.CancelledError, grpc.aio.InternalError):
                 code = _gone(context)
                 raise
             except BaseException:  # what aborts a call is no Exception
