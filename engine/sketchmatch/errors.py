@@ -15,6 +15,7 @@ from typing import Any, Self
 __all__ = [
     "AnswerUnavailableError",
     "InvalidInputError",
+    "NotAuthenticatedError",
     "PluginError",
     "Reason",
     "ServerStoppingError",
@@ -70,6 +71,7 @@ class Reason(StrEnum):
     UNKNOWN_PROFILE = "UNKNOWN_PROFILE"
     SERVER_STOPPING = "SERVER_STOPPING"
     WORKER_LOST = "WORKER_LOST"
+    NOT_AUTHENTICATED = "NOT_AUTHENTICATED"
 
 
 class SketchmatchError(Exception):
@@ -120,6 +122,12 @@ class AnswerUnavailableError(SketchmatchError):
     """The time budget ended before there was any answer to give."""
 
     reason = Reason.TIME_BUDGET_EXHAUSTED
+
+
+class NotAuthenticatedError(SketchmatchError):
+    """The caller does not show who it is; the sentence never quotes what it shows instead."""
+
+    reason = Reason.NOT_AUTHENTICATED
 
 
 class PluginError(SketchmatchError):

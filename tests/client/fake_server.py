@@ -50,6 +50,7 @@ class FakeServer(
     def __init__(self) -> None:
         self.address = ""
         self.requests: list[Message] = []
+        self.authorizations: list[str | None] = []
         self.events = EVENTS
         self.endless = False
         self.cancelled = Event()
@@ -97,6 +98,7 @@ class FakeServer(
 
     def _take(self, request, context) -> None:
         self.requests.append(request)
+        self.authorizations.append(dict(context.invocation_metadata()).get("authorization"))
         if self.error and len(self.requests) <= self.fails:
             (code,) = (code for code in grpc.StatusCode if code.value[0] == self.error.code)
             packed = self.error.SerializeToString() if self.error.details else None

@@ -7,6 +7,7 @@ from threading import Timer
 
 import grpc
 import pytest
+from grpc_health.v1 import health_pb2
 
 from sketchmatch_client import AsyncClient, Client, ServerUnavailableError, sources
 from sketchmatch_client.errors import (
@@ -270,6 +271,19 @@ class TestOtherCalls:
 class TestWaitUntilServing:
     def test_returns_when_it_serves(self, call, server):
         call(server.address, "wait_until_serving")
+
+    def test_says_whether_a_part_serves(self, call, server):
+        server.health.set("searcher/easm", health_pb2.HealthCheckResponse.NOT_SERVING)
+        assert call(server.address, "is_serving") is True
+        assert call(server.address, "is_serving", "searcher/easm") is False
+        for name in ("searcher/esm", "ζ" * 100):
+            with pytest.raises(InvalidRequestError, match="which the server does not have") as no:
+                call(server.address, "is_serving", name)
+            assert no.value.field == "name"
+
+    def test_asks_an_absent_server_in_vain(self, call, nobody):
+        with pytest.raises(ServerUnavailableError):
+            call(nobody, "is_serving")
 
     def test_waits_while_kernels_compile(self, call, server):
         server.set_health("NOT_SERVING")

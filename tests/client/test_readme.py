@@ -4,7 +4,7 @@ from threading import Thread
 
 import pytest
 
-from sketchmatch_client import CallCancelledError, Client, MatchOptions, sources
+from sketchmatch_client import AccessOptions, CallCancelledError, Client, MatchOptions, sources
 from tests.client.fake_server import EVENTS
 from tests.tools import ROOT
 
@@ -16,8 +16,10 @@ EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 def test_the_examples_run(example, server, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "room.yaml").write_text("image: room.pgm\n", encoding="utf-8")
-    for name in ("room.pgm", "sketch.png", "ca.pem"):
+    for name in ("room.pgm", "sketch.png"):
         (tmp_path / name).write_bytes(b"")
+    (tmp_path / "ca.pem").write_text("-----BEGIN CERTIFICATE-----\n", encoding="utf-8")
+    (tmp_path / "robot-7.token").write_text("robot-7.secret\n", encoding="utf-8")
     exec(example.replace("localhost:50051", server.address), {})
 
 
@@ -42,6 +44,13 @@ def test_a_button_stops_a_match(server):
         exec(example, names)
     assert names["match"] is None
     assert server.cancelled.wait(5)
+
+
+def test_every_way_into_a_server_is_listed():
+    table = README.partition("| argument | variable |")[2].partition("\n\n")[0]
+    for name in AccessOptions.__annotations__:
+        assert f"`{name}`" in table
+        assert f"`SKETCHMATCH_{name.upper()}`" in table
 
 
 def test_every_option_is_listed():

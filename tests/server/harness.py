@@ -40,13 +40,14 @@ class Host:
     gRPC's asyncio serves several loops in one process, but not one that closes.
     """
 
-    def __init__(self, setup: Setup, settings: ServerSettings) -> None:
+    def __init__(self, setup: Setup | Callable[[], Setup], settings: ServerSettings) -> None:
         self.said: list[str] = []
         self.address = ""
         self.serving = threading.Event()
         self._listening = threading.Event()
         self._stop = asyncio.Event()
-        self._end = in_loop(serve(lambda: setup, settings, self._say, self._stop))
+        load = setup if callable(setup) else lambda: setup
+        self._end = in_loop(serve(load, settings, self._say, self._stop))
         self._end.add_done_callback(lambda _: self._listening.set())
 
     def wait_until_listening(self) -> None:
@@ -101,11 +102,9 @@ def serving(
 
 
 @contextmanager
-def hosting(
-    setup: Setup, warm: bool = True, grace: float = 0.0, workers: int = 0
-) -> Iterator[Host]:
-    """Run a server with a setup."""
-    host = Host(setup, ServerSettings("127.0.0.1:0", grace, workers))
+def hosting(setup: Setup, warm: bool = True, grace: float = 0.0, **settings: Any) -> Iterator[Host]:
+    """Run a server with a setup, and settings beside its address."""
+    host = Host(setup, ServerSettings("127.0.0.1:0", grace, **settings))
     try:
         host.wait_until_listening()
         if warm:

@@ -1,4 +1,6 @@
+import os
 import signal
+import socket
 import time
 
 import pytest
@@ -13,7 +15,7 @@ from sketchmatch.pipeline.selection import Choice, Defaults
 from sketchmatch.pipeline.warmup import warm_up
 from sketchmatch.registry import default_registry
 from sketchmatch.server import serve
-from sketchmatch_client import Client, ServerUnavailableError
+from sketchmatch_client import Client, InvalidRequestError, ServerUnavailableError
 from sketchmatch_client.errors import CallCancelledError
 from sketchmatch_proto.v1 import catalog_service_pb2
 from sketchmatch_proto.v1.match_pb2 import OUTCOME_SERVER_STOPPING
@@ -47,6 +49,22 @@ def test_health_is_not_serving_until_the_default_kernels_are_warm():
         with Client(host.address) as client:
             client.wait_until_serving(5)
         assert [health(host.address, name) for name in ("", *SERVICES)] == ["SERVING"] * 4
+
+
+def test_an_algorithm_is_ready_once_its_kernels_are_and_not_before(monkeypatch):
+    monkeypatch.setattr(serve, "_QUIET", 0.0)
+    warm_up(default_registry())
+    SlowToWarm.may_finish.clear()
+    with serving(SlowToWarm, Exploding) as host, Client(host.address) as client:
+        assert client.is_serving("searcher/align")
+        assert client.is_serving("judge/posterior")
+        assert not client.is_serving("searcher/slow-to-warm")
+        SlowToWarm.may_finish.set()
+        wait_until(lambda: client.is_serving("searcher/slow-to-warm"), "it is never ready")
+        wait_until(lambda: client.is_serving("searcher/nn"), "the others are never ready")
+        assert not client.is_serving("searcher/exploding")
+        with pytest.raises(InvalidRequestError, match=r"^name is 'searcher/esm', which"):
+            client.is_serving("searcher/esm")
 
 
 def test_a_server_that_is_stopped_while_it_warms_up_stops():
@@ -135,6 +153,26 @@ def test_the_server_tells_its_version_and_limits():
     assert info.limits.max_concurrent_matches == 3
     assert info.limits.max_request_bytes == 64 * 1024**2
     assert info.limits.max_time_budget.ToTimedelta().total_seconds() == 2.5
+
+
+@pytest.mark.parametrize("named", ["{folder}/notify", "@sketchmatch-{number}"])
+def test_systemd_is_told_when_the_server_serves_and_when_it_stops(tmp_path, monkeypatch, named):
+    address = named.format(folder=tmp_path, number=os.getpid())
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as link:
+        link.bind(address.replace("@", "\0"))
+        link.settimeout(100)
+        monkeypatch.setenv("NOTIFY_SOCKET", address)
+        with serving(warm=False) as host:
+            assert link.recv(100) == b"READY=1"
+            assert "serving" in host.said
+        assert link.recv(100) == b"STOPPING=1"
+
+
+def test_a_systemd_that_does_not_listen_stops_nobody(monkeypatch, tmp_path):
+    for address in (str(tmp_path / "away"), "nonsense", ""):
+        monkeypatch.setenv("NOTIFY_SOCKET", address)
+        with serving() as host:
+            assert "serving" in host.said
 
 
 @pytest.mark.slow

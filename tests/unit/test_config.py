@@ -18,6 +18,7 @@ from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import Choice, resolve
 from sketchmatch.registry import Kind, PluginStatus, Registry, default_registry
+from sketchmatch_client import AccessOptions
 from tests.tools import ROOT
 
 SCENE = Scene.from_polygons(
@@ -107,6 +108,12 @@ def test_a_named_file_that_is_missing_is_refused(monkeypatch):
     )
     monkeypatch.setenv("SKETCHMATCH_CONFIG", "gone.toml")
     assert str(refused(load)).startswith("SKETCHMATCH_CONFIG names gone.toml, which does not exist")
+
+
+def test_what_the_client_reads_is_no_setting_of_ours(monkeypatch):
+    for name in AccessOptions.__annotations__:
+        monkeypatch.setenv(f"SKETCHMATCH_{name.upper()}", "text")
+    assert load() == builtin()
 
 
 @pytest.mark.parametrize(

@@ -106,6 +106,8 @@ def test_every_file_that_the_documents_link_to_exists():
         "clients/python/README.md",
         "proto/README.md",
         "plugins/README.md",
+        "engine/RUNNING.md",
+        "SECURITY.md",
     ):
         document = ROOT / name
         links = re.findall(r"\]\((?!https?:|#)([^)#]+)", document.read_text(encoding="utf-8"))

@@ -5,6 +5,7 @@ makes sketches and maps to hand to them.
 """
 
 from sketchmatch_client import sources
+from sketchmatch_client._access import AccessOptions
 from sketchmatch_client._aio import AsyncClient
 from sketchmatch_client._call import MatchCall
 from sketchmatch_client._match import Match, MatchCollector, Progress
@@ -24,6 +25,7 @@ from sketchmatch_client.errors import (
 )
 
 __all__ = [
+    "AccessOptions",
     "AsyncClient",
     "CallCancelledError",
     "Client",

@@ -14,15 +14,17 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, Unpack, cast
 import grpc
 import grpc.aio
 
+from sketchmatch_client._access import AccessOptions, access_to
 from sketchmatch_client._channel import (
     CHECK_HEALTH,
     HEALTH_POLL_SECONDS,
     SERVING,
     ChannelOptions,
     channel_options,
-    check_address,
+    health_request,
     limit_of,
     never_served,
+    no_such_part,
     within,
 )
 from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, tell_progress
@@ -64,7 +66,7 @@ class AsyncClient:
 
     Parameters
     ----------
-    address, credentials, timeout, retries, options
+    address, credentials, timeout, retries, options, **access
         As for :class:`Client`.
 
     Raises
@@ -81,13 +83,15 @@ class AsyncClient:
         timeout: float | None = None,
         retries: int = 3,
         options: ChannelOptions = (),
+        **access: Unpack[AccessOptions],
     ) -> None:
-        check_address(address, credentials is not None)
+        way_in = access_to(address, credentials, access)
         self._address = address
-        self._credentials = credentials
+        self._credentials = way_in.credentials
+        self._metadata = way_in.metadata
         self._timeout = limit_of(timeout)
         self._retries = checked_retries(retries)
-        self._options = channel_options(address, options)
+        self._options = channel_options(address, way_in.options + options)
 
     async def __aenter__(self) -> Self:
         return self
@@ -148,25 +152,47 @@ class AsyncClient:
         """Find the objects of one source, without a match; see :meth:`Client.segment`."""
         request = segment_request(source, segmenter, params, profile)
         stub = cast("SceneServiceAsyncStub", SceneServiceStub(self._channel))
-        return await self._asked(lambda limit: stub.Segment(request, timeout=limit), timeout)
+        return await self._asked(
+            lambda limit: stub.Segment(request, timeout=limit, metadata=self._metadata), timeout
+        )
 
     async def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""
         stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
         request = ListAlgorithmsRequest()
-        return await self._asked(lambda limit: stub.ListAlgorithms(request, timeout=limit), timeout)
+        return await self._asked(
+            lambda limit: stub.ListAlgorithms(request, timeout=limit, metadata=self._metadata),
+            timeout,
+        )
 
     async def server_info(self, *, timeout: float | None = None) -> GetServerInfoResponse:
         """Return the server's versions and limits."""
         stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
         request = GetServerInfoRequest()
-        return await self._asked(lambda limit: stub.GetServerInfo(request, timeout=limit), timeout)
+        return await self._asked(
+            lambda limit: stub.GetServerInfo(request, timeout=limit, metadata=self._metadata),
+            timeout,
+        )
+
+    async def is_serving(self, name: str = "", *, timeout: float | None = None) -> bool:
+        """Return whether the server, or a part of it, is warm; see :meth:`Client.is_serving`."""
+        check: grpc.aio.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(
+            CHECK_HEALTH
+        )
+        with translated_errors(self._address):
+            try:
+                answer = await check(health_request(name), timeout=self._limit(timeout))
+            except grpc.RpcError as error:
+                if error.code() is grpc.StatusCode.NOT_FOUND:
+                    raise no_such_part(name) from error
+                raise
+        return answer == SERVING
 
     async def wait_until_serving(self, timeout: float = 60.0) -> None:
         """Wait until the server is up and warm; see :meth:`Client.wait_until_serving`."""
         limit = limit_of(timeout)
         deadline = time.monotonic() + (math.inf if limit is None else limit)
-        while not await self._is_serving(within(deadline, time.monotonic())):
+        while not await self._serves_by(within(deadline, time.monotonic())):
             if time.monotonic() >= deadline:
                 raise never_served(self._address, timeout)
             await asyncio.sleep(HEALTH_POLL_SECONDS)
@@ -186,7 +212,7 @@ class AsyncClient:
         while True:
             try:
                 with translated_errors(self._address):
-                    call = stub.Match(request, timeout=attempts.limit)
+                    call = stub.Match(request, timeout=attempts.limit, metadata=self._metadata)
                     try:
                         async for event in call:
                             told = True
@@ -215,13 +241,9 @@ class AsyncClient:
                     raise
             await asyncio.sleep(pause)
 
-    async def _is_serving(self, timeout: float | None) -> bool:
-        check: grpc.aio.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(
-            CHECK_HEALTH
-        )
+    async def _serves_by(self, timeout: float | None) -> bool:
         try:
-            with translated_errors(self._address):
-                return await check(b"", timeout=timeout) == SERVING
+            return await self.is_serving(timeout=math.inf if timeout is None else timeout)
         except (ServerUnavailableError, DeadlineExceededError):
             return False
 

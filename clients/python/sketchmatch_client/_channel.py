@@ -19,8 +19,11 @@ __all__ = [
     "ChannelOptions",
     "channel_options",
     "check_address",
+    "health_request",
+    "is_here",
     "limit_of",
     "never_served",
+    "no_such_part",
     "within",
 ]
 
@@ -44,10 +47,11 @@ _OPTIONS: ChannelOptions = (
 # No proxy, whatever http_proxy says, leads to where the client itself is.
 _DIRECT: ChannelOptions = (("grpc.enable_http_proxy", 0),)
 
-# The standard health service, by hand: its request for the whole server is the empty message,
-# and a response is one enum (field 1). This saves a dependency.
+# The standard health service, by hand: its request is one text, its response one enum (both field
+# 1). This saves a dependency.
 CHECK_HEALTH = "/grpc.health.v1.Health/Check"
 SERVING = b"\x08\x01"
+_LONGEST_NAME = 127
 HEALTH_POLL_SECONDS = 0.05
 
 # gRPC fails at once where the deadline is further away than its clock can tell.
@@ -67,7 +71,7 @@ _THIS_MACHINE = {"localhost", "localhost.localdomain", "ip6-localhost", "ip6-loo
 
 def channel_options(address: str, given: ChannelOptions) -> ChannelOptions:
     """Return the options of a channel to a server; those that are given win."""
-    return _OPTIONS + (_DIRECT if _is_here(address) else ()) + given
+    return _OPTIONS + (_DIRECT if is_here(address) else ()) + given
 
 
 def check_address(address: str, encrypted: bool) -> None:
@@ -97,6 +101,30 @@ def check_address(address: str, encrypted: bool) -> None:
     port = parts["port"] or "1"
     if len(port) > _DIGITS or not 0 < int(port) < 1 << 16:
         raise _refused(address, "give a port from 1 to 65535")
+
+
+def health_request(name: str) -> bytes:
+    """Return the message that asks whether something of a name serves; empty for the whole server.
+
+    Raises
+    ------
+    InvalidRequestError
+        If no server has the name.
+    """
+    text = name.encode("utf-8", "replace")
+    if len(text) > _LONGEST_NAME:
+        raise no_such_part(name)
+    return b"\x0a" + bytes([len(text)]) + text if text else b""
+
+
+def no_such_part(name: str) -> InvalidRequestError:
+    """Return the error of a name that a server does not know."""
+    return InvalidRequestError(
+        f"name is {reprlib.repr(name)}, which the server does not have; name a service, as in "
+        "sketchmatch.v1.MatchService, or an algorithm, as in searcher/easm",
+        "INVALID_FIELD",
+        "name",
+    )
 
 
 def limit_of(timeout: float | None) -> float | None:
@@ -131,7 +159,7 @@ def never_served(address: str, seconds: float) -> ServerUnavailableError:
     )
 
 
-def _is_here(address: str) -> bool:
+def is_here(address: str) -> bool:
     """Whether an address is one of this very machine."""
     if address.startswith(_WITHIN_MACHINE):
         return True

@@ -10,6 +10,7 @@ from typing import Any, Self, TypeVar, Unpack
 
 import grpc
 
+from sketchmatch_client._access import AccessOptions, access_to
 from sketchmatch_client._call import MatchCall
 from sketchmatch_client._channel import (
     CHECK_HEALTH,
@@ -17,9 +18,10 @@ from sketchmatch_client._channel import (
     SERVING,
     ChannelOptions,
     channel_options,
-    check_address,
+    health_request,
     limit_of,
     never_served,
+    no_such_part,
     within,
 )
 from sketchmatch_client._match import Match, ProgressCallback
@@ -61,7 +63,7 @@ class Client:
         names them, e.g. ``"unix:/run/sketchmatch.sock"``. Proxies that the environment names
         are not asked for what is on this machine.
     credentials
-        TLS credentials, e.g. ``grpc.ssl_channel_credentials()``. None: no encryption.
+        Credentials of gRPC's own making, in place of what ``access`` says of encryption.
     timeout
         Seconds that a call may take where the call itself does not say. None or infinity: no
         limit.
@@ -71,6 +73,9 @@ class Client:
         together, and a match that has begun is not sent again.
     options
         Channel options of gRPC, beside or instead of this package's own.
+    **access
+        How to get in, by encryption, certificates and a token: :class:`AccessOptions`. What is
+        left out, the environment may say: ``SKETCHMATCH_TOKEN`` is ``token``, and so on.
 
     Raises
     ------
@@ -86,16 +91,18 @@ class Client:
         timeout: float | None = None,
         retries: int = 3,
         options: ChannelOptions = (),
+        **access: Unpack[AccessOptions],
     ) -> None:
-        check_address(address, credentials is not None)
+        way_in = access_to(address, credentials, access)
         self._address = address
+        self._metadata = way_in.metadata
         self._timeout = limit_of(timeout)
         self._retries = checked_retries(retries)
-        chosen = channel_options(address, options)
+        chosen = channel_options(address, way_in.options + options)
         self._channel = (
             grpc.insecure_channel(address, chosen)
-            if credentials is None
-            else grpc.secure_channel(address, credentials, chosen)
+            if way_in.credentials is None
+            else grpc.secure_channel(address, way_in.credentials, chosen)
         )
 
     def __enter__(self) -> Self:
@@ -170,7 +177,7 @@ class Client:
         request, limit = match_request(sketch, map, **options), self._limit(timeout)
         stub = MatchServiceStub(self._channel)
         return MatchCall(
-            lambda seconds: stub.Match(request, timeout=seconds),
+            lambda seconds: stub.Match(request, timeout=seconds, metadata=self._metadata),
             self._address,
             lambda: Attempts(self._retries, limit),
         )
@@ -206,17 +213,54 @@ class Client:
         """
         request = segment_request(source, segmenter, params, profile)
         stub = SceneServiceStub(self._channel)
-        return self._asked(lambda limit: stub.Segment(request, timeout=limit), timeout)
+        return self._asked(
+            lambda limit: stub.Segment(request, timeout=limit, metadata=self._metadata), timeout
+        )
 
     def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""
         stub, request = CatalogServiceStub(self._channel), ListAlgorithmsRequest()
-        return self._asked(lambda limit: stub.ListAlgorithms(request, timeout=limit), timeout)
+        return self._asked(
+            lambda limit: stub.ListAlgorithms(request, timeout=limit, metadata=self._metadata),
+            timeout,
+        )
 
     def server_info(self, *, timeout: float | None = None) -> GetServerInfoResponse:
         """Return the server's versions and limits."""
         stub, request = CatalogServiceStub(self._channel), GetServerInfoRequest()
-        return self._asked(lambda limit: stub.GetServerInfo(request, timeout=limit), timeout)
+        return self._asked(
+            lambda limit: stub.GetServerInfo(request, timeout=limit, metadata=self._metadata),
+            timeout,
+        )
+
+    def is_serving(self, name: str = "", *, timeout: float | None = None) -> bool:
+        """Return whether the server, or a part of it, is up and warm.
+
+        Parameters
+        ----------
+        name
+            The part: a service, as in ``"sketchmatch.v1.MatchService"``, or an algorithm, as in
+            ``"searcher/easm"``, which is warm once its kernels are compiled. The whole server when
+            left out, which is warm once the default algorithms are.
+        timeout
+            Seconds after which the call fails.
+
+        Raises
+        ------
+        InvalidRequestError
+            If the server has no such part.
+        ServerUnavailableError
+            If nobody answers.
+        """
+        check: grpc.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(CHECK_HEALTH)
+        with translated_errors(self._address):
+            try:
+                answer = check(health_request(name), timeout=self._limit(timeout))
+            except grpc.RpcError as error:
+                if error.code() is grpc.StatusCode.NOT_FOUND:
+                    raise no_such_part(name) from error
+                raise
+        return answer == SERVING
 
     def wait_until_serving(self, timeout: float = 60.0) -> None:
         """Wait until the server is up and warm.
@@ -234,7 +278,7 @@ class Client:
         """
         limit = limit_of(timeout)
         deadline = time.monotonic() + (math.inf if limit is None else limit)
-        while not self._is_serving(within(deadline, time.monotonic())):
+        while not self._serves_by(within(deadline, time.monotonic())):
             if time.monotonic() >= deadline:
                 raise never_served(self._address, timeout)
             time.sleep(HEALTH_POLL_SECONDS)
@@ -252,11 +296,9 @@ class Client:
                     raise
             time.sleep(pause)
 
-    def _is_serving(self, timeout: float | None) -> bool:
-        check: grpc.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(CHECK_HEALTH)
+    def _serves_by(self, timeout: float | None) -> bool:
         try:
-            with translated_errors(self._address):
-                return check(b"", timeout=timeout) == SERVING
+            return self.is_serving(timeout=math.inf if timeout is None else timeout)
         except (ServerUnavailableError, DeadlineExceededError):
             return False
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -88,7 +89,7 @@ class DeadlineExceededError(SketchmatchError):
 
 
 class NotAuthenticatedError(SketchmatchError):
-    """The server wants credentials, or others than the client has."""
+    """Server or client does not trust the other: give another token, or other certificates."""
 
 
 class NotSupportedError(SketchmatchError):
@@ -143,13 +144,37 @@ def _translated(error: grpc.RpcError, address: str) -> SketchmatchError:
         case grpc.StatusCode.RESOURCE_EXHAUSTED:
             return ServerBusyError(message, reason, _retry_after(details))
         case grpc.StatusCode.UNAVAILABLE:
-            problem = f"the sketchmatch server at {address} is not available"
-            remedy = "start it, or check the address"
-            return ServerUnavailableError(f"{problem}; {remedy} ({message})", reason)
+            return _unavailable(message, reason, address)
         case grpc.StatusCode.DEADLINE_EXCEEDED:
             late = f"the server at {address} did not answer within the timeout; allow more time"
             return DeadlineExceededError(message if reason else late, reason)
     return _OTHERS.get(code, ServerFailedError)(message, reason)
+
+
+# What gRPC says of a link that did not come about; it has no status for that.
+_UNTRUSTED = re.compile(
+    r"CERTIFICATE_VERIFY_FAILED:? ?(?P<why>[^:]*)"
+    r"|Hostname Verification Check|Peer name .* is not in peer"
+)
+_REMEDIES = {
+    "WRONG_VERSION_NUMBER": "it does not encrypt: ask it without certificates and tls",
+    "Socket closed": "it ends links at once, as one does that wants encryption or a certificate of "
+    "the client; else start it, or check the address",
+}
+
+
+def _unavailable(message: str, reason: str, address: str) -> SketchmatchError:
+    if untrusted := _UNTRUSTED.search(message):
+        why = (untrusted["why"] or "").strip() or "it is for another name"
+        return NotAuthenticatedError(
+            f"the certificate of the server at {address} cannot be trusted ({why}); give the "
+            "root_certificates of its authority and a name that it is for, or have it renewed",
+            reason,
+        )
+    signs = (remedy for sign, remedy in _REMEDIES.items() if sign in message)
+    remedy = next(signs, "start it, or check the address")
+    problem = f"the sketchmatch server at {address} is not available"
+    return ServerUnavailableError(f"{problem}; {remedy} ({message})", reason)
 
 
 def _details(error: grpc.RpcError) -> status_pb2.Status:

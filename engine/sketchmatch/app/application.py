@@ -26,8 +26,14 @@ from sketchmatch.app.worker import flags
 from sketchmatch.app.workers import Workers
 from sketchmatch.errors import ServerStoppingError, TooBusyError, WorkerLostError
 from sketchmatch.pipeline.clock import Clock
-from sketchmatch.pipeline.warmup import COMPILING, announcing_compilation, warm_up, warm_up_others
-from sketchmatch.registry import Registry
+from sketchmatch.pipeline.warmup import (
+    COMPILING,
+    announcing_compilation,
+    default_algorithms,
+    warm_up,
+    warm_up_others,
+)
+from sketchmatch.registry import Registered, Registry
 from sketchmatch_proto.v1.catalog_service_pb2 import (
     GetServerInfoResponse,
     ListAlgorithmsResponse,
@@ -170,6 +176,13 @@ class Application:
         caller
             Who asks.
 
+        Parameters
+        ----------
+        request
+            A message of the contract that wants work.
+        caller
+            The name of who asks; empty where nobody has names.
+
         Raises
         ------
         InvalidInputError
@@ -206,7 +219,10 @@ class Application:
         return responses.server_info(self._setup, time.monotonic() - self._began)
 
     async def start(
-        self, say: Callable[[str], None], unwanted: Callable[[], bool] = lambda: False
+        self,
+        say: Callable[[str], None],
+        unwanted: Callable[[], bool] = lambda: False,
+        warm: Callable[[Registered], None] = lambda _: None,
     ) -> None:
         """Get ready: compile or load what the default pipeline needs.
 
@@ -216,8 +232,10 @@ class Application:
             Called, once, if kernels have to be compiled, which takes long.
         unwanted
             Whether nobody waits any more.
+        warm
+            Called with each algorithm that is ready, from any thread.
         """
-        setup, silent = self._setup, True
+        silent = True
 
         def compiling() -> None:
             nonlocal silent
@@ -228,21 +246,34 @@ class Application:
         self._looking = asyncio.create_task(self._look())
         if self._kept:
             self._workers.compiling = compiling
-            await self._workers.start(setup)
-            return
+            await self._workers.start(self._setup)
         with announcing_compilation(say):
-            await asyncio.to_thread(warm_up, _trusted(setup), setup.engine.defaults, unwanted)
+            await self.warm_up(unwanted, warm)
 
-    async def warm_up_others(self, unwanted: Callable[[], bool]) -> None:
+    async def warm_up(
+        self, unwanted: Callable[[], bool], warm: Callable[[Registered], None]
+    ) -> None:
+        """Compile what the default pipeline needs, which workers have when they are started."""
+        registry, defaults = _trusted(self._setup), self._setup.engine.defaults
+        if self._kept:
+            for item in default_algorithms(registry, defaults):
+                warm(item)
+        else:
+            await asyncio.to_thread(warm_up, registry, defaults, unwanted, warm)
+
+    async def warm_up_others(
+        self, unwanted: Callable[[], bool], warm: Callable[[Registered], None]
+    ) -> None:
         """Compile the rest, strangers' algorithms in workers of their own."""
         setup = self._setup
+        registry, defaults = _trusted(setup), setup.engine.defaults
         if not self._kept:
-            await asyncio.to_thread(
-                warm_up_others, _trusted(setup), setup.engine.defaults, unwanted
-            )
+            await asyncio.to_thread(warm_up_others, registry, defaults, unwanted, warm)
         elif not await asyncio.to_thread(unwanted):
             with suppress(WorkerLostError):
                 await self._workers.warm_up((), setup)
+                for algorithm in registry.algorithms:
+                    warm(algorithm)
         for distribution in sorted({item.distribution for item in setup.strangers}):
             if await asyncio.to_thread(unwanted):
                 return
@@ -251,6 +282,10 @@ class Application:
                 await self._workers.warm_up(own, setup)
             except Exception:  # it will fail again, and be blamed, when a request asks for it
                 _log.exception("the plugins of %s failed to warm up", distribution)
+            else:
+                for item in own:
+                    if isinstance(item, Registered):
+                        warm(item)
 
     async def drain(self, seconds: float) -> None:
         """Begin nothing more; what runs ends by itself, or in so many seconds with what it has."""

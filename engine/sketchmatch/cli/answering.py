@@ -10,7 +10,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Unpack, cast
 
-from sketchmatch.cli.options import say
+from sketchmatch.cli.options import Access, say
 from sketchmatch.config import load, open_engine
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model.limits import limited_to
@@ -29,7 +29,7 @@ from sketchmatch_proto.v1.source_pb2 import Source
 if TYPE_CHECKING:
     from sketchmatch.app.application import Application
 
-__all__ = ["Answerer", "answerer"]
+__all__ = ["Answerer", "answerer", "client_of", "naming"]
 
 
 class Answerer(Protocol):
@@ -58,14 +58,25 @@ class Answerer(Protocol):
 
 
 @contextmanager
-def answerer(server: str | None, config: Path | None) -> Iterator[Answerer]:
-    """Yield the server at an address, or this process; files may be as large as it says."""
+def answerer(
+    server: str | None,
+    config: Path | None,
+    access: Access = Access(),  # noqa: B008
+) -> Iterator[Answerer]:
+    """Yield the server at an address, or this process; files may be as large as it says.
+
+    Raises
+    ------
+    InvalidInputError
+        If the configuration, or how to get in at the server, is of no use.
+    """
     configuration = load(config)
     with limited_to(configuration.limits):
         if server is not None:
-            with _client(server) as client:
+            with client_of(server, "--server", access) as client:
                 yield client
         else:
+            _refuse_access(access)
             from sketchmatch.app.application import Application
             from sketchmatch.app.setup import Isolation, Setup
 
@@ -74,12 +85,54 @@ def answerer(server: str | None, config: Path | None) -> Iterator[Answerer]:
             yield _Here(Application(Setup(engine, isolation=everybody)))
 
 
-def _client(address: str) -> Client:
+def client_of(address: str, named: str, access: Access) -> Client:
+    """Return a client of the server at an address; its errors name what was typed.
+
+    Parameters
+    ----------
+    address
+        Of the server.
+    named
+        What the address is called on the command line.
+    access
+        How to get in.
+
+    Raises
+    ------
+    InvalidInputError
+        If one of them is of no use.
+    """
+    with naming({"address": named, **{name: _option(name) for name in vars(access)}}):
+        return Client(address, **vars(access))
+
+
+@contextmanager
+def naming(typed: Mapping[str, str]) -> Iterator[None]:
+    """Give errors about what a client was given the names by which it was typed.
+
+    Raises
+    ------
+    InvalidInputError
+        In place of the client's own error.
+    """
     try:
-        return Client(address)
+        yield
     except InvalidRequestError as error:
+        if error.field not in typed:
+            raise
         problem = str(error).removeprefix(f"{error.field} ")
-        raise InvalidInputError(Reason.INVALID_FIELD, "--server", problem) from None
+        raise InvalidInputError(Reason.INVALID_FIELD, typed[error.field], problem) from None
+
+
+def _refuse_access(access: Access) -> None:
+    for name, value in vars(access).items():
+        if value is not None:
+            problem = "is for a server, and none is asked; give --server, or drop it"
+            raise InvalidInputError(Reason.INVALID_FIELD, _option(name), problem)
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 class _Here:

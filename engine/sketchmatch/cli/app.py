@@ -17,6 +17,7 @@ from sketchmatch.cli import (
     config,
     demo,
     describe,
+    health,
     interrupts,
     match,
     output,
@@ -24,6 +25,8 @@ from sketchmatch.cli import (
     relate,
     segment,
     serve,
+    status,
+    tokens,
 )
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError
 
@@ -41,9 +44,12 @@ app.command("segment")(segment.segment)
 app.command("describe")(describe.describe)
 app.command("relate")(relate.relate)
 app.command("serve")(serve.serve)
+app.command("health")(health.health)
+app.command("status")(status.status)
 app.command("demo")(demo.demo)
 app.add_typer(plugins.app, name="plugins")
 app.add_typer(config.app, name="config")
+app.add_typer(tokens.app, name="tokens")
 
 
 class ExitCode(IntEnum):
@@ -55,6 +61,7 @@ class ExitCode(IntEnum):
     SERVER_UNAVAILABLE = 3
     NO_ANSWER_IN_TIME = 4
     ALGORITHM_FAILED = 5
+    NOT_AUTHENTICATED = 6
     INTERRUPTED = 130
 
 
@@ -123,6 +130,7 @@ def _exit_code(error: Exception) -> ExitCode:
         client.DeadlineExceededError: ExitCode.NO_ANSWER_IN_TIME,
         client.ServerUnavailableError: ExitCode.SERVER_UNAVAILABLE,
         client.ServerBusyError: ExitCode.SERVER_UNAVAILABLE,
+        client.NotAuthenticatedError: ExitCode.NOT_AUTHENTICATED,
         client.SketchmatchError: ExitCode.ALGORITHM_FAILED,
     }
     return next(

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from sketchmatch.cli.options import say
+from sketchmatch.cli.options import Access, say
 from sketchmatch.cli.output import answering, clean, tell
 
 __all__ = ["demo"]
@@ -42,7 +42,7 @@ def demo(
         from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 
         pictures.check_path(overlay)
-        with answerer(_address(server), None) as asked:
+        with answerer(_address(server), None, Access(tls=False)) as asked:
             sources = source_of(LIVING_ROOM_SKETCH), source_of(LIVING_ROOM_MAP)
             answer = display.watch(asked.events(*sources, seed=seed))
     metres = in_metres(sources[1])
@@ -55,6 +55,9 @@ def demo(
 def _server() -> Iterator[subprocess.Popen[str]]:
     """Run a server in a process of its own."""
     command = [sys.executable, "-m", "sketchmatch", "serve", "--address", "127.0.0.1:0"]
+    # Whatever the configuration says of strangers: it is of this machine, and not for long.
+    for option in ("--tls-certificate", "--tls-key", "--tls-client-ca", "--tokens"):
+        command += [option, ""]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, encoding="utf-8")
     try:
         yield process
@@ -75,7 +78,7 @@ def _address(process: subprocess.Popen[str]) -> str:
         tell(f"[server] {clean(line.rstrip())}")
         if found := re.search(r"listening on (\S+)", line):
             threading.Thread(target=_pass_on, args=(process,), daemon=True).start()
-            with Client(found[1]) as client:
+            with Client(found[1], tls=False, token="") as client:
                 client.wait_until_serving(_START_SECONDS)
             return found[1]
     raise RuntimeError("the server ended before it listened")

@@ -19,6 +19,7 @@ __all__ = ["match"]
 
 
 @answering
+@options.asking
 def match(
     sketch: Annotated[
         Path,
@@ -38,6 +39,7 @@ def match(
         ),
     ],
     server: options.Server = None,
+    access: options.Access = options.Access(),  # noqa: B008
     config: options.Config = None,
     profile: options.Profile = "",
     searcher: Annotated[str | None, typer.Option(help="Searcher.")] = None,
@@ -118,7 +120,11 @@ def match(
         "profile": profile,
     }
     named = options.pins_as_typed(list(known))
-    with places.places_in(sketch=sketch, map=map_), named, answerer(server, config) as asked:
+    with (
+        places.places_in(sketch=sketch, map=map_),
+        named,
+        answerer(server, config, access) as asked,
+    ):
         sources = source_of(sketch, "sketch"), source_of(map_, "map")
         answer = display.watch(asked.events(*sources, **chosen))
     metres = in_metres(sources[1])

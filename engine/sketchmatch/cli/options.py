@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -17,6 +20,8 @@ if TYPE_CHECKING:
     from sketchmatch_client import Pin
 
 __all__ = [
+    "Access",
+    "Address",
     "Config",
     "Exclusions",
     "FormerMapSegmenter",
@@ -32,7 +37,9 @@ __all__ = [
     "Settings",
     "SketchSegmenter",
     "Synonyms",
+    "Timeout",
     "Verbose",
+    "asking",
     "parse_pairs",
     "parse_pins",
     "parse_settings",
@@ -43,6 +50,14 @@ __all__ = [
     "say_renamed",
 ]
 
+Address = Annotated[
+    str,
+    typer.Argument(metavar="ADDRESS", help="HOST:PORT or unix:PATH of the server."),
+]
+Timeout = Annotated[
+    float,
+    typer.Option("--timeout", metavar="SECONDS", min=0.001, help="How long to wait for an answer."),
+]
 Server = Annotated[
     str | None,
     typer.Option(
@@ -128,6 +143,69 @@ Verbose = Annotated[
         "--verbose", "-v", help="Tell all that was noted in the files, not one note of each kind."
     ),
 ]
+
+
+_Value = TypeVar("_Value")
+
+
+@dataclass(frozen=True)
+class Access:
+    """How a command gets in at a server; what is left out, the environment may say.
+
+    Attributes
+    ----------
+    token_file, tls, root_certificates, certificate, key, server_name
+        As the client takes them.
+    """
+
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="The token to show to the server; or say SKETCHMATCH_TOKEN."
+        ),
+    ] = None
+    tls: Annotated[
+        bool | None,
+        typer.Option("--tls/--no-tls", help="Encrypt, as certificates do.", show_default=False),
+    ] = None
+    root_certificates: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Authorities to trust for the server's certificate, in PEM."
+        ),
+    ] = None
+    certificate: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Certificate to show to the server, in PEM.")
+    ] = None
+    key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Private key of the certificate, in PEM.")
+    ] = None
+    server_name: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="What the server's certificate is for, where that is not in the address.",
+        ),
+    ] = None
+
+
+def asking(command: Callable[..., _Value]) -> Callable[..., _Value]:
+    """Give a command that asks a server the options of getting in; it takes them as ``access``."""
+    own = inspect.signature(command, eval_str=True)
+    ways = inspect.signature(Access, eval_str=True)
+
+    @functools.wraps(command)
+    def run(*arguments: Any, **options: Any) -> _Value:
+        access = Access(**{name: options.pop(name, None) for name in ways.parameters})
+        return command(*arguments, access=access, **options)
+
+    parameters = []
+    for parameter in own.parameters.values():
+        added = ways.parameters.values() if parameter.name == "access" else (parameter,)
+        parameters += [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in added]
+    run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
+    return run
 
 
 def parse_settings(

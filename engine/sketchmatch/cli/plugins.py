@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sketchmatch.cli import new, output
-from sketchmatch.cli.options import Config, Json, Server, refuse_config
+from sketchmatch.cli.options import Access, Config, Json, Server, asking, refuse_config
 from sketchmatch.cli.output import answering
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 
@@ -37,8 +37,13 @@ def plugins() -> None:
 
 @app.command("list")
 @answering
+@asking
 def list_(
-    kind: _Kind = "", server: Server = None, config: Config = None, json: Json = False
+    kind: _Kind = "",
+    server: Server = None,
+    access: Access = Access(),  # noqa: B008
+    config: Config = None,
+    json: Json = False,
 ) -> None:
     """List the algorithms, the profiles, what became of each plugin, and the readers of files.
 
@@ -46,7 +51,7 @@ def list_(
     """
     from sketchmatch.cli import listing
 
-    found = _catalogue(kind, server, config)
+    found = _catalogue(kind, server, access, config)
     if json:
         output.write_message(found)
     else:
@@ -55,17 +60,19 @@ def list_(
 
 @app.command("show")
 @answering
+@asking
 def show(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of an algorithm.")],
     kind: _Kind = "",
     server: Server = None,
+    access: Access = Access(),  # noqa: B008
     config: Config = None,
     json: Json = False,
 ) -> None:
     """Describe one algorithm: what it does, its source, and its parameters."""
     from sketchmatch.cli import listing
 
-    item = _named(_catalogue(kind, server, config), name, kind)
+    item = _named(_catalogue(kind, server, access, config), name, kind)
     if json:
         output.write_message(item)
     else:
@@ -121,7 +128,9 @@ def reference(
     output.write(reference.page(responses.catalogue(discover()), distribution))
 
 
-def _catalogue(kind: str, server: str | None, config: Path | None) -> ListAlgorithmsResponse:
+def _catalogue(
+    kind: str, server: str | None, access: Access, config: Path | None
+) -> ListAlgorithmsResponse:
     """Return what there is here or on a server, of one kind or of all."""
     from sketchmatch.cli import catalogue
 
@@ -131,7 +140,7 @@ def _catalogue(kind: str, server: str | None, config: Path | None) -> ListAlgori
             "--kind",
             f"is {quoted(kind)}; choose one of: {', '.join(catalogue.KINDS)}",
         )
-    found = _everything(server, config)
+    found = _everything(server, access, config)
     if kind:
         kept = [item for item in found.algorithms if catalogue.kind(item) == kind]
         del found.algorithms[:]
@@ -139,11 +148,11 @@ def _catalogue(kind: str, server: str | None, config: Path | None) -> ListAlgori
     return found
 
 
-def _everything(server: str | None, config: Path | None) -> ListAlgorithmsResponse:
+def _everything(server: str | None, access: Access, config: Path | None) -> ListAlgorithmsResponse:
     from sketchmatch.cli.answering import answerer
 
     refuse_config(config, server)
-    with answerer(server, config) as asked:
+    with answerer(server, config, access) as asked:
         return asked.algorithms()
 
 

@@ -14,11 +14,13 @@ __all__ = ["segment"]
 
 
 @answering
+@options.asking
 def segment(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="A sketch or a map, as `match` takes them.")
     ],
     server: options.Server = None,
+    access: options.Access = options.Access(),  # noqa: B008
     config: options.Config = None,
     profile: options.Profile = "",
     segmenter: Annotated[str, typer.Option(help="Segmenter; the file's kind decides.")] = "",
@@ -47,7 +49,7 @@ def segment(
     if out is not None:
         scene_files.check_scene_path(out, "--out")
     parameters = options.parse_settings(settings, ("segmenter",)).get("segmenter", {})
-    with places.places_in(source=file), answerer(server, config) as asked:
+    with places.places_in(source=file), answerer(server, config, access) as asked:
         source = source_of(file)
         found = asked.segment(source, segmenter=segmenter, params=parameters, profile=profile)
     if overlay is not None:

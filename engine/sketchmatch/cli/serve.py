@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,6 +12,7 @@ from sketchmatch.cli.options import Config, say
 if TYPE_CHECKING:
     from sketchmatch.app.setup import Setup
     from sketchmatch.config import Configuration
+    from sketchmatch.server.serve import ServerSettings
 
 __all__ = ["serve"]
 
@@ -85,6 +87,41 @@ def serve(
     max_objects: Annotated[
         int | None, typer.Option(help="Objects of a scene; 1000 by default.")
     ] = None,
+    tls_certificate: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Certificate to show to clients, in PEM: encrypt."),
+    ] = None,
+    tls_key: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Private key of the certificate, in PEM.")
+    ] = None,
+    tls_client_ca: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE", help="Authorities of which clients must show a certificate, in PEM."
+        ),
+    ] = None,
+    tokens: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="Tokens of which calls must show one, as `sketchmatch tokens add` writes them.",
+        ),
+    ] = None,
+    insecure: Annotated[
+        bool,
+        typer.Option(
+            "--insecure",
+            help="Listen where other machines reach the server though strangers may call then, or "
+            "read along.",
+        ),
+    ] = False,
+    metrics_address: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Tell metrics, as Prometheus reads them, and probes over HTTP here.",
+        ),
+    ] = None,
     strict_plugins: Annotated[
         bool,
         typer.Option(
@@ -95,13 +132,12 @@ def serve(
     """Serve the gRPC API until SIGTERM or Ctrl-C.
 
     Where no option says it, the configuration does. SIGHUP reads the configuration again, but for
-    address, grace and workers; requests under way keep the one that they began with. Health is
+    addresses, grace, workers and the names of files of certificates and tokens; what is in these is
+    read again whenever it changes. Requests under way keep what they began with. Health is
     NOT_SERVING until the kernels are compiled or loaded. A server that hangs ends with exit code 70
-    after 30 s: let what starts it start it again. There is no encryption and no authentication yet:
-    listen on addresses that only trusted programs reach.
+    after 30 s: let what starts it start it again.
     """
     import asyncio
-    import os
 
     from sketchmatch.app.forking import prepare
     from sketchmatch.config import load
@@ -118,37 +154,69 @@ def serve(
         "server.max_wait_seconds": max_wait,
         "server.max_time_budget_seconds": max_time_budget,
         "server.default_time_budget_seconds": default_time_budget,
+        "server.tls_certificate": tls_certificate,
+        "server.tls_key": tls_key,
+        "server.tls_client_ca": tls_client_ca,
+        "server.tokens": tokens,
+        "server.insecure": insecure or None,
+        "server.metrics_address": metrics_address,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
         "limits.max_side": max_side,
         "limits.max_vertices": max_vertices,
         "limits.max_objects": max_objects,
     }
-    server = load(config, flags).settings.server
-    kept = (os.cpu_count() or 1) if server.workers is None else server.workers
-    if kept:
+    settings = _server_settings(load(config, flags))
+    if settings.workers:
         prepare()
     from sketchmatch.server.log import logging_to_standard_error
-    from sketchmatch.server.serve import ServerSettings
     from sketchmatch.server.serve import serve as serve_forever
-
-    settings = ServerSettings(
-        server.address, server.grace_seconds, kept, patience=_PATIENCE_SECONDS
-    )
 
     def setup() -> Setup:
         configuration = load(config, flags)
-        now = configuration.settings.server
-        kept_ones = (server.address, server.grace_seconds, server.workers)
-        if (now.address, now.grace_seconds, now.workers) != kept_ones:
+        if _server_settings(configuration) != settings:
             say(
-                "server.address, server.grace_seconds and server.workers stay until the server is "
-                "started anew"
+                "addresses, server.grace_seconds, server.workers and the names of files stay until "
+                "the server is started anew"
             )
         return _setup(configuration)
 
     with logging_to_standard_error():
         asyncio.run(serve_forever(setup, settings, say))
+
+
+def _server_settings(configuration: Configuration) -> ServerSettings:
+    """Return how to serve."""
+    import os
+
+    from sketchmatch.errors import InvalidInputError, Reason
+    from sketchmatch.server.serve import ServerSettings
+    from sketchmatch.server.tls import TlsFiles
+
+    server = configuration.settings.server
+    files = (server.tls_certificate, server.tls_key)
+    authorities = server.tls_client_ca
+    if (any(files) or authorities) and not all(files):
+        given = "tls_client_ca" if not any(files) else "tls_key" if files[1] else "tls_certificate"
+        lacking = "tls_certificate" if not files[0] else "tls_key"
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            f"server.{given}",
+            f"is set without server.{lacking}; give --tls-certificate and --tls-key together",
+        )
+    certificate, key = files
+    return ServerSettings(
+        server.address,
+        server.grace_seconds,
+        (os.cpu_count() or 1) if server.workers is None else server.workers,
+        _PATIENCE_SECONDS,
+        TlsFiles(Path(certificate), Path(key), Path(authorities) if authorities else None)
+        if certificate and key
+        else None,
+        Path(server.tokens) if server.tokens else None,
+        server.insecure,
+        server.metrics_address,
+    )
 
 
 def _setup(configuration: Configuration) -> Setup:

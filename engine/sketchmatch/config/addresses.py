@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from ipaddress import ip_address
 
-__all__ = ["address_fault"]
+__all__ = ["address_fault", "is_of_this_machine", "network_fault"]
 
 _LOCAL = re.compile(r"unix(?:-abstract)?:(.*)", re.S)
 _URL = re.compile(r"[a-z][a-z0-9+.-]*://", re.I)
@@ -30,7 +31,25 @@ def address_fault(address: str) -> str:
     """
     if local := _LOCAL.fullmatch(address):
         return _file_fault(local[1])
-    return _network_fault(address)
+    return network_fault(address)
+
+
+def is_of_this_machine(address: str) -> bool:
+    """Whether only programs of this machine reach an address.
+
+    Examples
+    --------
+    >>> is_of_this_machine("127.0.0.1:50051"), is_of_this_machine("0.0.0.0:50051")
+    (True, False)
+    """
+    if _LOCAL.fullmatch(address):
+        return True
+    host = address.rpartition(":")[0].strip("[]").lower()
+    try:
+        number = ip_address(host)
+    except ValueError:
+        return host == "localhost"
+    return (getattr(number, "ipv4_mapped", None) or number).is_loopback
 
 
 def _file_fault(path: str) -> str:
@@ -41,7 +60,8 @@ def _file_fault(path: str) -> str:
     return ""
 
 
-def _network_fault(address: str) -> str:
+def network_fault(address: str) -> str:
+    """Return what a host and a port should be and are not, as :func:`address_fault` does."""
     host, colon, port = address.rpartition(":")
     bracketed = host.startswith("[") and host.endswith("]")
     numbered = port.isascii() and port.isdecimal() and len(port) <= _DIGITS

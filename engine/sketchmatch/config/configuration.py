@@ -334,7 +334,7 @@ def _known(path: tuple[str, ...], place: str) -> str:
     near = [(*above, key) for key in get_close_matches(last, keys, 1)]
     if not near:
         dotted = {".".join(known): known for known in static_paths()}
-        near = [dotted[found] for found in get_close_matches(".".join(path), dotted, 1, 0.7)]
+        near = [dotted[found] for found in get_close_matches(".".join(path), dotted, 1, 0.75)]
     if not near:
         return f"{'.'.join(above) or 'a configuration'} has: {', '.join(keys)}"
     variable = place.startswith("SKETCHMATCH_")

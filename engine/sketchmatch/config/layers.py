@@ -37,7 +37,16 @@ __all__ = [
 FILE_NAME = "sketchmatch.toml"
 _PREFIX = "SKETCHMATCH_"
 _NAMING_FILE = "SKETCHMATCH_CONFIG"
-_NO_SETTINGS = (_NAMING_FILE, "SKETCHMATCH_DEBUG")
+_OF_CLIENTS = (
+    "TLS",
+    "TOKEN",
+    "TOKEN_FILE",
+    "ROOT_CERTIFICATES",
+    "CERTIFICATE",
+    "KEY",
+    "SERVER_NAME",
+)
+_NO_SETTINGS = (_NAMING_FILE, "SKETCHMATCH_DEBUG", *(f"{_PREFIX}{name}" for name in _OF_CLIENTS))
 _SECTION = "__"
 _OWN_ALONE = PluginRules.of(allow=())
 _BUILTIN = Path(__file__).with_name("builtin.toml")

@@ -13,7 +13,7 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 
-from sketchmatch.config.addresses import address_fault
+from sketchmatch.config.addresses import address_fault, network_fault
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
 from sketchmatch.pipeline.selection import STAGES
@@ -41,6 +41,12 @@ def _weighing(weights: tuple[float, ...]) -> tuple[float, ...]:
 
 def _listening(address: str) -> str:
     if fault := address_fault(address):
+        raise ValueError(fault)
+    return address
+
+
+def _watched(address: str | None) -> str | None:
+    if address and (fault := network_fault(address)):
         raise ValueError(fault)
     return address
 
@@ -164,6 +170,38 @@ class _Server(_Section):
     )
     default_time_budget_seconds: float = Field(
         300.0, ge=0.001, description="Longest match where the request does not say."
+    )
+    tls_certificate: str | None = Field(
+        None,
+        description="PEM file of the server's certificate, with those between it and the "
+        "authority's; no encryption, when left out.",
+        examples=["server.pem"],
+    )
+    tls_key: str | None = Field(
+        None, description="PEM file of the certificate's private key.", examples=["server.key"]
+    )
+    tls_client_ca: str | None = Field(
+        None,
+        description="PEM file of the authorities of which each client must show a certificate; "
+        "clients show none, when left out.",
+        examples=["clients-ca.pem"],
+    )
+    tokens: str | None = Field(
+        None,
+        description="File of the tokens of which each call must show one, as `sketchmatch tokens "
+        "add` writes it; calls need none, when left out.",
+        examples=["tokens"],
+    )
+    metrics_address: Annotated[str | None, AfterValidator(_watched)] = Field(
+        None,
+        description="Host and port for Prometheus' /metrics and the probes /livez and /readyz over "
+        "HTTP; none, when left out.",
+        examples=["127.0.0.1:9464"],
+    )
+    insecure: bool = Field(
+        False,
+        description="Listen where other machines reach the server though strangers may call then, "
+        "or read along.",
     )
 
 

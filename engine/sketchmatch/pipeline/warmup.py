@@ -70,6 +70,7 @@ def warm_up(
     registry: Registry,
     defaults: Defaults = UNCONFIGURED,
     unwanted: Callable[[], bool] = lambda: False,
+    warm: Callable[[Registered], None] = lambda _: None,
 ) -> None:
     """Load the kernels of what requests use that choose nothing, or compile them.
 
@@ -81,28 +82,35 @@ def warm_up(
         What the configuration chooses.
     unwanted
         Asked before each algorithm; once it says so, the rest is left out.
+    warm
+        Called with each algorithm whose kernels are there.
     """
     _load(None)
-    _warm_up([item for item, default in _split(registry, defaults) if default], unwanted)
+    _warm_up(default_algorithms(registry, defaults), unwanted, warm)
 
 
 def warm_up_others(
     registry: Registry,
     defaults: Defaults = UNCONFIGURED,
     unwanted: Callable[[], bool] = lambda: False,
+    warm: Callable[[Registered], None] = lambda _: None,
 ) -> None:
     """Load or compile the kernels of the algorithms that :func:`warm_up` leaves out."""
-    _warm_up([item for item, default in _split(registry, defaults) if not default], unwanted)
+    chosen = default_algorithms(registry, defaults)
+    _warm_up([item for item in registry.algorithms if item not in chosen], unwanted, warm)
 
 
-def _split(registry: Registry, defaults: Defaults) -> Iterator[tuple[Registered, bool]]:
-    """Yield each algorithm, and whether requests use it that choose nothing."""
+def default_algorithms(registry: Registry, defaults: Defaults) -> list[Registered]:
+    """Return the algorithms that requests use which choose nothing."""
     names = default_names(registry, defaults)
-    for item in registry.algorithms:
-        yield item, item.name in names[item.kind]
+    return [item for item in registry.algorithms if item.name in names[item.kind]]
 
 
-def _warm_up(algorithms: Iterable[Registered], unwanted: Callable[[], bool]) -> None:
+def _warm_up(
+    algorithms: Iterable[Registered],
+    unwanted: Callable[[], bool],
+    warm: Callable[[Registered], None],
+) -> None:
     for item in algorithms:
         if unwanted():
             return
@@ -110,6 +118,8 @@ def _warm_up(algorithms: Iterable[Registered], unwanted: Callable[[], bool]) -> 
             _load(item.algorithm)
         except Exception:  # a plugin may raise anything; it will fail again when it is asked for
             _log.exception("%s failed to warm up", item.origin)
+        else:
+            warm(item)
 
 
 def _load(algorithm: type[Algorithm] | None) -> None:

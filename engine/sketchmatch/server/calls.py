@@ -44,7 +44,9 @@ class CallLogInterceptor(grpc.aio.ServerInterceptor):
         handler = cast(Any, await continuation(handler_call_details))
         path = handler_call_details.method
         if handler is not None and path.startswith(_OURS):
-            kind = "unary_stream" if handler.response_streaming else "unary_unary"
+            # A caller without a token is refused before it has sent a request.
+            asked = "stream" if handler.request_streaming else "unary"
+            kind = f"{asked}_{'stream' if handler.response_streaming else 'unary'}"
             method = _told(getattr(handler, kind), path.rpartition("/")[2])
             handler = handler._replace(**{kind: method})
         return cast("grpc.RpcMethodHandler[Any, Any] | None", handler)
@@ -59,9 +61,6 @@ def _told(method: Callable[[Any, _Context], Awaitable[Any]], name: str) -> Any:
         except asyncio.CancelledError:
             cancelled = True
             raise
-        except grpc.aio.InternalError:
-            cancelled = True  # nobody is left to write to: the caller has gone
-            return None
         finally:
             code = "CANCELLED" if cancelled else _code(context)
             seconds = time.monotonic() - began

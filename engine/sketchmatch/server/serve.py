@@ -8,19 +8,30 @@ import socket
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import grpc
-from grpc_health.v1 import health, health_pb2, health_pb2_grpc
+from grpc_health.v1 import health, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
+import sketchmatch
 from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
+from sketchmatch.config.addresses import is_of_this_machine
 from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
+from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.calls import CallLogInterceptor
 from sketchmatch.server.interceptors import ErrorInterceptor, OpeningInterceptor
+from sketchmatch.server.metrics import Metric, Metrics, MetricsInterceptor
+from sketchmatch.server.monitor import Monitor
+from sketchmatch.server.notify import notify
+from sketchmatch.server.readiness import Readiness
 from sketchmatch.server.services import CatalogService, MatchService, SceneService
+from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
+from sketchmatch.server.tokens import read_tokens
 from sketchmatch.server.watchdog import watch
+from sketchmatch.server.watched import Watched
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     catalog_service_pb2_grpc,
@@ -46,6 +57,14 @@ _SERVICES = (
 )
 
 
+_METHODS = tuple(
+    f"/{service.full_name}/{method.name}"
+    for file in (match_service_pb2, scene_service_pb2, catalog_service_pb2)
+    for service in file.DESCRIPTOR.services_by_name.values()
+    for method in service.methods
+)
+
+
 @dataclass(frozen=True)
 class ServerSettings:
     """How to serve; what cannot be exchanged while the server runs.
@@ -61,12 +80,25 @@ class ServerSettings:
     patience
         Seconds after which a server that answers nothing ends its process; None for never, which
         is for servers in a process that does something else.
+    tls
+        The files of certificates; None: no encryption.
+    tokens
+        The file of the tokens of which each call must show one; None: calls need none.
+    insecure
+        Whether to listen where other machines reach the server though that lets strangers in, or
+        read along.
+    metrics_address
+        Host and port for metrics and probes over HTTP; None for none.
     """
 
     address: str = "127.0.0.1:50051"
     grace: float = 5.0
     workers: int = 0
     patience: float | None = None
+    tls: TlsFiles | None = None
+    tokens: Path | None = None
+    insecure: bool = False
+    metrics_address: str | None = None
 
 
 async def serve(
@@ -95,12 +127,18 @@ async def serve(
     SketchmatchError
         If there is no setup to begin with.
     InvalidInputError
-        If the address cannot be listened on.
+        If the address cannot be listened on, or must not without naming callers, or a file of
+        certificates or tokens is of no use.
     """
+    lacking = _refuse_strangers(settings)
+    files = _Files(settings, say)
     app = Application(load(), settings.workers)
+    metrics = Metrics(_METHODS)
     server = grpc.aio.server(
         interceptors=[
+            MetricsInterceptor(metrics),
             CallLogInterceptor(),
+            *files.interceptors,
             OpeningInterceptor(),
             ErrorInterceptor(),
         ],
@@ -129,35 +167,99 @@ async def serve(
             ("grpc.so_reuseport", 0),
         ],
     )
-    checks = _add_services(server, app)
-    port = _listen(server, settings.address)
-    await checks.set("", health_pb2.HealthCheckResponse.NOT_SERVING)
+    readiness = Readiness(_SERVICES)
+    _add_services(server, app, readiness, metrics)
+    _watch(metrics, app, files, readiness)
+    port = _listen(server, settings.address, files.credentials)
+    told_at = settings.metrics_address
+    monitor = Monitor(told_at, metrics, lambda: readiness.serving) if told_at else None
+    await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
     unwatch = watch(settings.patience)
     stopping = stop or asyncio.Event()
-    reloading = _Reloading(load, app, say)
+    warming = _Warming(app, readiness, stopping)
+    reloading = _Reloading(load, app, files, readiness, say, warming)
     _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
     say(f"listening on {_found_at(settings.address, port)}")
+    if monitor:
+        say(f"metrics are at http://{monitor.address}/metrics")
+    if lacking:
+        say(f"insecure: whoever reaches this address {lacking}")
     for problem in app.setup.engine.registry.problems:
         say(problem)
     try:
-        await _first(asyncio.ensure_future(app.start(say, stopping.is_set)), stopping)
+        await _first(asyncio.ensure_future(warming.begin(say)), stopping)
         if not stopping.is_set():
-            for name in ("", *_SERVICES):
-                await checks.set(name, health_pb2.HealthCheckResponse.SERVING)
+            await readiness.serve()
             say("serving")
-            others = app.warm_up_others(_unless_quiet(app, stopping))
-            await _first(asyncio.ensure_future(others), stopping)
+            notify("READY=1")
+            await _first(asyncio.ensure_future(warming.go_on()), stopping)
         await stopping.wait()
+        notify("STOPPING=1")
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
-        await checks.enter_graceful_shutdown()
+        await readiness.drain()
         ending = asyncio.ensure_future(server.stop(settings.grace))
         await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
         await ending
         await app.close()
+        if monitor:
+            await asyncio.to_thread(monitor.close)
         unwatch()
     say("stopped")
+
+
+class _Files:
+    """What tells friends from strangers, kept in files."""
+
+    def __init__(self, settings: ServerSettings, say: Callable[[str], None]) -> None:
+        self._pems = None if settings.tls is None else watched_pems(settings.tls, say)
+        path = settings.tokens
+        self._tokens = (
+            None if path is None else Watched("the tokens", [path], lambda: read_tokens(path), say)
+        )
+
+    @property
+    def credentials(self) -> grpc.ServerCredentials | None:
+        """What encrypts; None for nothing."""
+        return None if self._pems is None else server_credentials(self._pems)
+
+    @property
+    def interceptors(self) -> list[CallerInterceptor]:
+        """What asks for tokens, if anything does."""
+        return [] if self._tokens is None else [CallerInterceptor(self._tokens)]
+
+    def expiry(self) -> dict[tuple[str, ...], float]:
+        """Return when the certificate expires, as metrics have it."""
+        expires = None if self._pems is None else self._pems.value.expires
+        return {} if expires is None else {(): expires.timestamp()}
+
+    def look(self) -> None:
+        """Read again now what has changed."""
+        for watched in (self._pems, self._tokens):
+            if watched is not None:
+                watched.look()
+
+
+class _Warming:
+    """Has compiled what requests need, and says what is ready."""
+
+    def __init__(self, app: Application, readiness: Readiness, stopping: asyncio.Event) -> None:
+        self._app, self._readiness, self._stopping = app, readiness, stopping
+
+    async def begin(self, say: Callable[[str], None]) -> None:
+        """Compile what the default pipeline needs."""
+        await self._app.start(say, self._stopping.is_set, self._readiness.ready)
+
+    async def again(self) -> None:
+        """Compile what another setup needs."""
+        await self._app.warm_up(self._stopping.is_set, self._readiness.ready)
+        await self.go_on()
+
+    async def go_on(self) -> None:
+        """Compile the rest, while no request is under way."""
+        unwanted = _unless_quiet(self._app, self._stopping)
+        await self._app.warm_up_others(unwanted, self._readiness.ready)
 
 
 class _Reloading:
@@ -167,11 +269,17 @@ class _Reloading:
         self,
         load: Callable[[], Setup],
         app: Application,
+        files: _Files,
+        readiness: Readiness,
         say: Callable[[str], None],
+        warming: _Warming,
     ) -> None:
         self._load = load
         self._app = app
+        self._files = files
+        self._readiness = readiness
         self._say = say
+        self._warming = warming
         self._one_at_a_time = asyncio.Lock()
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -182,32 +290,102 @@ class _Reloading:
 
     async def _reload(self) -> None:
         async with self._one_at_a_time:
+            await asyncio.to_thread(self._files.look)
             try:
                 setup = await asyncio.to_thread(self._load)
             except SketchmatchError as error:
                 self._say(f"the configuration stays as it is: {error}")
                 return
             self._app.change(setup)
+            await self._readiness.know(setup.engine.registry.algorithms)
             for problem in setup.engine.registry.problems:
                 self._say(problem)
             self._say("the configuration is reloaded")
+        await self._warming.again()
 
 
-def _add_services(server: grpc.aio.Server, app: Application) -> health.aio.HealthServicer:
-    server.add_generic_rpc_handlers((MatchService(app).handler(), SceneService(app).handler()))
+def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readiness) -> None:
+    """Have metrics tell how things are, beside what happened."""
+    metrics.watch(
+        Metric("sketchmatch_build_info", "What serves.", ("version",)),
+        lambda: {(sketchmatch.__version__,): 1.0},
+    )
+    metrics.watch(
+        Metric("sketchmatch_serving", "Whether requests are answered."),
+        lambda: {(): float(readiness.serving)},
+    )
+    metrics.watch(
+        Metric("sketchmatch_algorithm_ready", "Whether kernels are compiled.", ("algorithm",)),
+        lambda: {(name,): float(ready) for name, ready in readiness.states().items()},
+    )
+    metrics.watch(
+        Metric("sketchmatch_requests_limit", "Requests that may run at the same time."),
+        lambda: {(): float(app.setup.limits.max_concurrent_matches)},
+    )
+    metrics.watch(
+        Metric("sketchmatch_certificate_expires_timestamp_seconds", "When the certificate does."),
+        files.expiry,
+    )
+
+
+def _add_services(
+    server: grpc.aio.Server, app: Application, readiness: Readiness, metrics: Metrics
+) -> None:
+    matching, scenes = MatchService(app, metrics.matched), SceneService(app)
+    server.add_generic_rpc_handlers((matching.handler(), scenes.handler()))
     catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), server)
-    checks = health.aio.HealthServicer()
-    health_pb2_grpc.add_HealthServicer_to_server(checks, server)
+    health_pb2_grpc.add_HealthServicer_to_server(readiness.servicer, server)
     reflection.enable_server_reflection(
         (*_SERVICES, health.SERVICE_NAME, reflection.SERVICE_NAME), server
     )
-    return checks
 
 
-def _listen(server: grpc.aio.Server, address: str) -> int:
+def _refuse_strangers(settings: ServerSettings) -> str:
+    """Refuse to let strangers in from other machines; return what they can do where that is meant.
+
+    Raises
+    ------
+    InvalidInputError
+        If they could, and nobody said so.
+    """
+    if is_of_this_machine(settings.address):
+        return ""
+    knows_callers = settings.tokens or (settings.tls and settings.tls.client_ca)
+    faults = [
+        *([] if knows_callers else ["may call"]),
+        *(
+            []
+            if settings.tls
+            else ["can read along, tokens too" if settings.tokens else "can read along"]
+        ),
+    ]
+    lacking = " and ".join(faults)
+    if lacking and not settings.insecure:
+        remedies = [
+            *([] if settings.tls else ["--tls-certificate and --tls-key"]),
+            *([] if knows_callers else ["--tokens or --tls-client-ca"]),
+        ]
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "address",
+            f"{settings.address!r} is reached from other machines, and whoever does {lacking}; "
+            f"give {', and '.join(remedies)}, listen on 127.0.0.1, or say --insecure if that is "
+            "meant",
+        )
+    return lacking
+
+
+def _listen(
+    server: grpc.aio.Server, address: str, credentials: grpc.ServerCredentials | None
+) -> int:
     local = address.startswith("unix")
     try:
-        port = 0 if _is_taken(address) else server.add_insecure_port(address)
+        if _is_taken(address):
+            port = 0
+        elif credentials is None:
+            port = server.add_insecure_port(address)
+        else:
+            port = server.add_secure_port(address, credentials)
     except RuntimeError:
         port = 0
     if port == 0:

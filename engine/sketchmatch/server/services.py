@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Callable
 from contextlib import aclosing
 from typing import Any, TypeVar
 
@@ -13,6 +13,7 @@ import grpc
 from sketchmatch.app.application import Application
 from sketchmatch.app.tasks import Log
 from sketchmatch.app.waiting import Caller
+from sketchmatch.server.callers import caller_of
 from sketchmatch.server.calls import note
 from sketchmatch.server.pacing import Pacing
 from sketchmatch_proto.v1 import (
@@ -22,9 +23,10 @@ from sketchmatch_proto.v1 import (
     match_service_pb2,
     scene_service_pb2,
 )
+from sketchmatch_proto.v1.match_pb2 import MatchAccepted, MatchResult
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
-__all__ = ["CatalogService", "MatchService", "SceneService", "caller_of", "followed"]
+__all__ = ["CatalogService", "MatchService", "SceneService", "followed"]
 
 _MATCH = match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name
 _SCENE = scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name
@@ -40,21 +42,32 @@ _Item = TypeVar("_Item")
 class MatchService:
     """Matches, streaming the search while it runs; requests and responses pass as they come."""
 
-    def __init__(self, app: Application) -> None:
+    def __init__(
+        self,
+        app: Application,
+        matched: Callable[[MatchAccepted, MatchResult], None] = lambda *_: None,
+    ) -> None:
         self._app = app
+        self._matched = matched
 
     async def Match(self, request: bytes, context: _Context) -> None:  # noqa: N802
         """Run a match and pass its events on."""
-        with self._app.running("MatchRequest", request, caller_of(context)) as task:
+        with self._app.running("MatchRequest", request, _caller(context)) as task:
             note(match=task.id)
-            pacing = Pacing()
+            pacing, accepted = Pacing(), MatchAccepted()
             async with aclosing(followed(task.log)) as responses:
                 async for response in responses:
-                    if not _is_progress(response):
-                        _note_event(response)
-                    elif not pacing.is_due():
+                    if _is_progress(response):
+                        if pacing.is_due():
+                            await context.write(response)
                         continue
                     await context.write(response)
+                    event = MatchResponse.FromString(response)
+                    _note_event(event)
+                    if event.HasField("accepted"):
+                        accepted = event.accepted
+                    elif event.HasField("result"):
+                        self._matched(accepted, event.result)
 
     def handler(self) -> grpc.GenericRpcHandler:
         """Return what answers the calls of the service."""
@@ -69,7 +82,7 @@ class SceneService:
 
     async def Segment(self, request: bytes, context: _Context) -> bytes:  # noqa: N802
         """Segment, and return what was found."""
-        with self._app.running("SegmentRequest", request, caller_of(context)) as task:
+        with self._app.running("SegmentRequest", request, _caller(context)) as task:
             async with aclosing(followed(task.log)) as told:
                 responses = [response async for response in told]
         # Nobody waits for an answer to a request that was stopped.
@@ -101,10 +114,12 @@ class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):
         return self._app.info()
 
 
-def caller_of(context: _Context) -> Caller:
-    """Return who calls: the host, and the connection from there."""
-    peer = context.peer() or ""
-    return Caller(peer.rpartition(":")[0] or peer, peer)
+def _caller(context: _Context) -> Caller:
+    """Return who calls, by name or else by host, and the connection."""
+    peer, name = context.peer() or "", caller_of(context)
+    if name:
+        note(caller=name)
+    return Caller(name or peer.rpartition(":")[0] or peer, peer)
 
 
 def _is_progress(response: bytes) -> bool:
@@ -112,9 +127,8 @@ def _is_progress(response: bytes) -> bool:
     return response[:1] == _PROGRESS
 
 
-def _note_event(response: bytes) -> None:
+def _note_event(event: MatchResponse) -> None:
     """Note what the log tells of a match."""
-    event = MatchResponse.FromString(response)
     match event.WhichOneof("event"):
         case "accepted":
             note(searcher=event.accepted.pipeline.searcher.name)

@@ -11,6 +11,7 @@ from google.rpc import code_pb2, error_details_pb2, status_pb2
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
+    NotAuthenticatedError,
     PluginError,
     Reason,
     ServerStoppingError,
@@ -24,6 +25,16 @@ __all__ = ["Refusal", "is_fault", "refusal"]
 _DOMAIN = "sketchmatch"
 # All of a refusal travels in trailers, for which gRPC has 8 KiB.
 _LONGEST = 500
+
+
+_CODES: dict[type[SketchmatchError], grpc.StatusCode] = {
+    TooBusyError: grpc.StatusCode.RESOURCE_EXHAUSTED,
+    ServerStoppingError: grpc.StatusCode.UNAVAILABLE,
+    WorkerLostError: grpc.StatusCode.UNAVAILABLE,
+    AnswerUnavailableError: grpc.StatusCode.DEADLINE_EXCEEDED,
+    NotAuthenticatedError: grpc.StatusCode.UNAUTHENTICATED,
+    PluginError: grpc.StatusCode.INTERNAL,
+}
 
 
 @dataclass(frozen=True)
@@ -44,16 +55,12 @@ def refusal(error: BaseException) -> Refusal:
             )
             detail = error_details_pb2.BadRequest(field_violations=[violation])
             return _refusal(grpc.StatusCode.INVALID_ARGUMENT, error, error.reason, detail)
-        case TooBusyError():
-            retry = _retry(error.retry_seconds)
-            return _refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, error, error.reason, retry)
-        case ServerStoppingError() | WorkerLostError():
-            retry = _retry(error.retry_seconds)
-            return _refusal(grpc.StatusCode.UNAVAILABLE, error, error.reason, retry)
-        case AnswerUnavailableError():
-            return _refusal(grpc.StatusCode.DEADLINE_EXCEEDED, error, error.reason)
-        case PluginError():
-            return _refusal(grpc.StatusCode.INTERNAL, error, error.reason)
+        case TooBusyError() | ServerStoppingError() | WorkerLostError():
+            delay = duration_pb2.Duration(seconds=error.retry_seconds)
+            retry = error_details_pb2.RetryInfo(retry_delay=delay)
+            return _refusal(_CODES[type(error)], error, error.reason, retry)
+        case AnswerUnavailableError() | NotAuthenticatedError() | PluginError():
+            return _refusal(_CODES[type(error)], error, error.reason)
     return Refusal(
         grpc.StatusCode.INTERNAL,
         "the server failed in a way nobody foresaw; its log has the details, please report them",
@@ -64,10 +71,6 @@ def is_fault(error: BaseException) -> bool:
     """Whether an error is the server's or a plugin's, so that its operator should hear of it."""
     faults = PluginError | WorkerLostError
     return isinstance(error, faults) or not isinstance(error, SketchmatchError)
-
-
-def _retry(seconds: int) -> error_details_pb2.RetryInfo:
-    return error_details_pb2.RetryInfo(retry_delay=duration_pb2.Duration(seconds=seconds))
 
 
 def _cut(text: str) -> str:

@@ -64,6 +64,8 @@ class _ErrorReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._En
     """INVALID_ARGUMENT: the server's configuration has no profile of this name; the message names
     those there are.
     """
+    ERROR_REASON_NOT_AUTHENTICATED: _ErrorReason.ValueType  # 18
+    """UNAUTHENTICATED: the call carries no token, or none that the server knows."""
     ERROR_REASON_SERVER_STOPPING: _ErrorReason.ValueType  # 20
     """UNAVAILABLE: the server is about to stop. Send the request again after the time in `RetryInfo`,
     when another one has taken its place.
@@ -129,6 +131,8 @@ ERROR_REASON_UNKNOWN_PROFILE: ErrorReason.ValueType  # 17
 """INVALID_ARGUMENT: the server's configuration has no profile of this name; the message names
 those there are.
 """
+ERROR_REASON_NOT_AUTHENTICATED: ErrorReason.ValueType  # 18
+"""UNAUTHENTICATED: the call carries no token, or none that the server knows."""
 ERROR_REASON_SERVER_STOPPING: ErrorReason.ValueType  # 20
 """UNAVAILABLE: the server is about to stop. Send the request again after the time in `RetryInfo`,
 when another one has taken its place.

@@ -1,0 +1,77 @@
+"""``sketchmatch health``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from sketchmatch.cli import options, output
+from sketchmatch.cli.output import answering
+from sketchmatch.errors import InvalidInputError, Reason
+
+__all__ = ["health"]
+
+
+@answering
+@options.asking
+def health(
+    address: Annotated[
+        str,
+        typer.Argument(
+            metavar="ADDRESS",
+            help="HOST:PORT or unix:PATH of the server, or http://HOST:PORT where it tells its "
+            "metrics, which needs no certificate.",
+        ),
+    ],
+    access: options.Access = options.Access(),  # noqa: B008
+    of: Annotated[
+        str,
+        typer.Option(
+            "--of",
+            metavar="NAME",
+            help="Ask of a service, as in sketchmatch.v1.MatchService, or an algorithm, as in "
+            "searcher/easm.",
+        ),
+    ] = "",
+    timeout: options.Timeout = 5.0,
+) -> None:
+    """Say whether a server serves: the exit code is 0 if it does, and 3 otherwise.
+
+    It needs no token, and is made for containers and scripts; `sketchmatch status` tells more.
+    """
+    from sketchmatch.cli.app import ExitCode
+
+    if address.startswith("http://"):
+        serving = _is_ready(address, of, timeout)
+    else:
+        from sketchmatch.cli.answering import client_of, naming
+
+        with client_of(address, "ADDRESS", access) as client, naming({"name": "--of"}):
+            serving = client.is_serving(of, timeout=timeout)
+    output.write_line("SERVING" if serving else "NOT_SERVING")
+    if not serving:
+        raise typer.Exit(ExitCode.SERVER_UNAVAILABLE)
+
+
+def _is_ready(address: str, of: str, timeout: float) -> bool:
+    """Return whether the probe over HTTP says so."""
+    from http.client import HTTPException
+    from urllib.error import HTTPError
+    from urllib.request import ProxyHandler, build_opener
+
+    from sketchmatch_client import ServerUnavailableError
+
+    if of:
+        problem = "is not told over HTTP; give HOST:PORT of the server itself"
+        raise InvalidInputError(Reason.INVALID_FIELD, "--of", problem)
+    try:
+        # No proxy leads to where a probe is.
+        with build_opener(ProxyHandler({})).open(f"{address.rstrip('/')}/readyz", timeout=timeout):
+            return True
+    except HTTPError as error:
+        with error:
+            return False
+    except (OSError, HTTPException, ValueError) as error:
+        problem = f"nobody tells at {address} whether the server serves ({error})"
+        raise ServerUnavailableError(f"{problem}; start it with --metrics-address") from None

@@ -1,0 +1,77 @@
+"""Which names health knows, and which of them are ready."""
+
+import asyncio
+
+import pytest
+from grpc_health.v1 import health_pb2
+
+from sketchmatch.app.setup import Isolation, Setup
+from sketchmatch.pipeline.engine import Engine
+from sketchmatch.pipeline.selection import UNCONFIGURED
+from sketchmatch.registry import default_registry
+from sketchmatch.server import serve
+from sketchmatch.server.readiness import Readiness
+from sketchmatch_client import Client, InvalidRequestError
+from tests.pace import wait_until
+from tests.server.harness import hosting, in_loop, registry_with
+from tests.server.probes import SlowToWarm
+
+ALGORITHMS = {f"{item.kind}/{item.name}": item for item in default_registry().algorithms}
+EASM, ALIGN, NN = (ALGORITHMS[f"searcher/{name}"] for name in ("easm", "align", "nn"))
+
+
+async def told(readiness, *names):
+    await asyncio.sleep(0.01)  # what another thread said is on its way
+    return [
+        health_pb2.HealthCheckResponse.ServingStatus.Name(
+            (
+                await readiness.servicer.Check(
+                    health_pb2.HealthCheckRequest(service=name), context=None
+                )
+            ).status
+        )
+        for name in names
+    ]
+
+
+def test_what_a_new_configuration_keeps_stays_ready_and_what_it_drops_is_unknown():
+    async def life():
+        readiness = Readiness(["a.Service"])
+        await readiness.know([EASM, ALIGN])
+        assert await told(readiness, "", "searcher/easm") == ["NOT_SERVING"] * 2
+        readiness.ready(EASM)
+        readiness.ready(ALIGN)
+        assert await told(readiness, "", "searcher/easm") == ["NOT_SERVING", "SERVING"]
+        await readiness.serve()
+        assert await told(readiness, "", "a.Service") == ["SERVING"] * 2
+        await readiness.know([EASM, NN])
+        names = ("", "searcher/easm", "searcher/nn", "searcher/align")
+        states = ["SERVING", "SERVING", "NOT_SERVING", "SERVICE_UNKNOWN"]
+        assert await told(readiness, *names) == states
+        readiness.ready(ALIGN)  # of which nobody knows any longer
+        assert await told(readiness, "searcher/align") == ["SERVICE_UNKNOWN"]
+        await readiness.know([EASM, NN, ALIGN])
+        assert await told(readiness, "searcher/align") == ["SERVING"]
+
+    asyncio.run(life())
+
+
+def test_after_a_reload_what_is_new_gets_ready_too(monkeypatch):
+    monkeypatch.setattr(serve, "_QUIET", 0.0)
+    actions, registries = {}, [default_registry(), registry_with(SlowToWarm)]
+    monkeypatch.setattr(serve, "_on_signals", actions.update)
+    SlowToWarm.may_finish.set()
+
+    def load():
+        return Setup(Engine(registries.pop(0), UNCONFIGURED), isolation=Isolation(frozenset("*")))
+
+    async def reload():
+        actions["SIGHUP"]()
+
+    with hosting(load) as host, Client(host.address) as client:
+        with pytest.raises(InvalidRequestError):
+            client.is_serving("searcher/slow-to-warm")
+        in_loop(reload()).result()
+        wait_until(lambda: "the configuration is reloaded" in host.said, "it is not reloaded")
+        wait_until(lambda: client.is_serving("searcher/slow-to-warm"), "it is never ready")
+        assert client.is_serving("searcher/align")
