@@ -59,9 +59,6 @@ def _told(method: Callable[[Any, _Context], Awaitable[Any]], name: str) -> Any:
         except asyncio.CancelledError:
             cancelled = True
             raise
-        except grpc.aio.InternalError:
-            cancelled = True  # nobody is left to write to: the caller has gone
-            return None
         finally:
             code = "CANCELLED" if cancelled else _code(context)
             seconds = time.monotonic() - began

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import AsyncIterable, AsyncIterator, Awaitable, Callable, Collection
 from functools import partial
@@ -114,7 +115,8 @@ def _caught(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
         try:
             return await method(request, context)
         except grpc.aio.InternalError:
-            raise  # nobody is left to write to
+            # Nobody is left to write to. To end as if all were well would be to write.
+            raise asyncio.CancelledError from None
         except Exception as error:
             await _abort(context, error)
 
