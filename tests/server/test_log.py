@@ -1,5 +1,7 @@
 """What a server tells its operator: a line a call, and of a plugin's fault the plugin's lines."""
 
+import asyncio
+import random
 import re
 import signal
 import subprocess
@@ -10,7 +12,14 @@ import pytest
 from sketchmatch.app.faults import told
 from sketchmatch.errors import PluginError
 from sketchmatch.pipeline.guard import blaming
-from sketchmatch_client import Client, InvalidRequestError, ServerFailedError, sources
+from sketchmatch_client import (
+    AsyncClient,
+    Client,
+    InvalidRequestError,
+    ServerBusyError,
+    ServerFailedError,
+    sources,
+)
 from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsRequest
 from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceStub
 from tests.pace import wait_until
@@ -47,6 +56,25 @@ def test_each_call_has_a_line_with_time_caller_match_and_how_it_ended():
         codes = [line.split()[3] for line in running.said if is_of_a_match(line)]
         assert codes == ["code=OK", "code=INVALID_ARGUMENT", *["code=CANCELLED"] * 5]
         assert not any("Health" in line for line in running.said)
+
+
+def test_callers_who_leave_at_any_moment_leave_no_error_in_the_log():
+    async def leaves(client, rng):
+        for _ in range(25):
+            match = asyncio.create_task(client.match(scene(12), scene(12, 1), **ENDLESS))
+            await asyncio.sleep(rng.uniform(0.0, 0.15))
+            match.cancel()
+            with pytest.raises((asyncio.CancelledError, ServerBusyError)):
+                await match
+
+    async def all_of_them(address):
+        async with AsyncClient(address, retries=0) as client:
+            await asyncio.gather(*(leaves(client, random.Random(k)) for k in range(6)))
+
+    with server() as running:
+        asyncio.run(all_of_them(running.address))
+        wait_until(lambda: [*map(is_of_a_match, running.said)].count(True) >= 75, "no lines")
+    assert not [line for line in running.said if " ERROR " in line]
 
 
 def is_of_a_match(line):

@@ -103,7 +103,7 @@ def _caught(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
         try:
             return await method(request, context)
         except grpc.aio.InternalError:
-            # Nobody is left to write to: the caller has gone.
+            # Nobody is left to write to. To end as if all were well would be to write.
             raise asyncio.CancelledError from None
         except Exception as error:
             await _abort(context, error)
