@@ -34,7 +34,7 @@ from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 __all__ = ["SECONDS", "WorkerSetup", "flags", "leave_signals_to_the_server", "live"]
 
 SECONDS = struct.Struct("!d")
-"""How time is told: the patience with which a warm-up is awaited, or what is left of a match."""
+"""How it is told what is left of a match."""
 
 _LOADING = 120.0
 _POLITE = 10
@@ -94,6 +94,7 @@ class _Worker:
         self._told: queue.SimpleQueue[tuple[int, bytes]] = queue.SimpleQueue()
         self._stop = threading.Event()
         self._clock: Clock | None = None
+        self._curtailed: float | None = None
         self._setup: Setup
         self._patience: float | None = None
 
@@ -143,10 +144,12 @@ class _Worker:
             case Says.STOP:
                 self._stop.set()
             case Says.CURTAIL:
+                (self._curtailed,) = SECONDS.unpack(content)
                 if (clock := self._clock) is not None:
-                    clock.curtail(*SECONDS.unpack(content))
+                    clock.curtail(self._curtailed)
             case Says.ORDER | Says.WARM:
                 self._stop.clear()
+                self._curtailed = None
                 self._told.put((kind, content))
             case _:
                 self._told.put((kind, content))
@@ -174,6 +177,8 @@ class _Worker:
 
     def _begun(self, clock: Clock) -> None:
         self._clock = clock
+        if self._curtailed is not None:  # while the request was decoded
+            clock.curtail(self._curtailed)
 
     def _warm_up_others(self) -> None:
         """Compile what requests may ask for, last of all that there is to do."""

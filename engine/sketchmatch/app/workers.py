@@ -26,7 +26,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from sketchmatch.app.forking import forking
+from sketchmatch.app.forking import forking, renew
 from sketchmatch.app.frames import Flag, Frames, Says, failure_of, frame
 from sketchmatch.app.jobs import time_budget
 from sketchmatch.app.setup import Setup
@@ -103,6 +103,8 @@ class Workers:
         self._own = _own(setup)
         first = self._new(self._own, ())
         await first.start(setup)
+        if first.compiled:
+            renew()
         others = [self._new(self._own, ()) for _ in range(self._kept - 1)]
         await asyncio.gather(*(each.start(setup) for each in others))
 
@@ -225,6 +227,8 @@ class _Worker(asyncio.Protocol):
         self.key = key
         self.since = math.inf
         """When it was last given something or ended it."""
+        self.compiled = False
+        """Whether some kernels were not in the cache."""
         self._workers = workers
         self._strangers = strangers
         self._process: SpawnProcess | None = None
@@ -256,18 +260,12 @@ class _Worker(asyncio.Protocol):
         if self._killed:
             raise self._blame("was not wanted any more")
         ours, theirs = socket.socketpair()
-        names = tuple(sorted(name for name, _ in self.key))
-        self._process = cast(
-            "SpawnProcess",
-            forking().Process(  # type: ignore[attr-defined]
-                target=live,
-                args=(theirs, names, bool(self._strangers)),
-                name="-".join(("sketchmatch-worker", *names)),
-                daemon=True,
-            ),
-        )
-        with theirs:
-            await asyncio.to_thread(self._process.start)
+        try:
+            with theirs:
+                await asyncio.to_thread(self._fork, theirs)
+        except (OSError, EOFError) as error:
+            ours.close()
+            raise WorkerLostError(f"no worker could be started ({_said(error)})") from error
         loop = asyncio.get_running_loop()
         self._transport, _ = await loop.create_connection(lambda: self, sock=ours)
         if self._killed:
@@ -278,6 +276,25 @@ class _Worker(asyncio.Protocol):
         patience = _STARTING + (setup.isolation.patience if self._strangers else 0.0)
         await self._answered(patience, "did not load in its own process")
         self.since = time.monotonic()
+
+    def _fork(self, theirs: socket.socket) -> None:
+        """Start the process; once more if what it is forked from has died and is replaced."""
+        for last in (False, True):
+            names = tuple(sorted(name for name, _ in self.key))
+            process = forking().Process(  # type: ignore[attr-defined]
+                target=live,
+                args=(theirs, names, bool(self._strangers)),
+                name="-".join(("sketchmatch-worker", *names)),
+                daemon=True,
+            )
+            try:
+                process.start()
+            except (OSError, EOFError):
+                if last:
+                    raise
+            else:
+                self._process = process
+                return
 
     async def warm_up(self) -> None:
         """Compile what requests may ask for."""
@@ -377,6 +394,7 @@ class _Worker(asyncio.Protocol):
             return
         match kind:
             case Says.COMPILING:
+                self.compiled = True
                 self._workers.compiling()
             case Says.READY:
                 self._answer(None)
@@ -492,6 +510,10 @@ def _culprits(strangers: _Strangers) -> str:
         distributions = sorted({item.distribution for item in strangers})
         return f"an algorithm of {' or '.join(distributions)}"
     return " or ".join(dict.fromkeys(item.origin for item in strangers))
+
+
+def _said(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"
 
 
 def _ending(code: int | None) -> str:
