@@ -14,8 +14,8 @@ import pytest
 from grpc import insecure_channel
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 
+from sketchmatch.app import workers
 from sketchmatch.app.setup import RequestLimits, Setup
-from sketchmatch.app.workers import Workers
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import default_registry
 from sketchmatch_client import (
@@ -37,9 +37,9 @@ def limits(**given):
 
 
 @contextmanager
-def working(workers=2, **given):
+def working(kept=2, **given):
     """Run a server with workers, and yield its address."""
-    with hosting(Setup(Engine(default_registry()), limits(**given)), workers=workers) as host:
+    with hosting(Setup(Engine(default_registry()), limits(**given)), workers=kept) as host:
         yield host.address
 
 
@@ -121,20 +121,21 @@ def test_workers_that_are_killed_while_they_wait_are_replaced_without_a_word():
 
 
 def test_a_task_that_its_worker_had_not_begun_to_tell_of_is_done_by_another():
-    """Where the first worker is lost at once, the second one answers."""
-    begun, original = [], Workers.begin
+    given, original = [], workers._Worker.begin
 
-    def begin(workers, task):
-        original(workers, task)
-        begun.append(task.id)
-        if len(begun) == 1:
-            workers._doing[task]._process.kill()
+    def begin(worker, task):
+        given.append((task.id, worker))
+        if len(given) == 1:
+            worker._process.kill()
+            worker._process.join()
+        original(worker, task)
 
-    with pytest.MonkeyPatch.context() as patch, working() as address, Client(address) as client:
-        patch.setattr(Workers, "begin", begin)
+    with working() as address, Client(address) as client, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(workers._Worker, "begin", begin)
         assert len(client.match(scene(5), scene(5)).object_map) == 5
-    assert len(begun) == 2
-    assert begun[0] == begun[1]
+    (first, lost), (again, other) = given
+    assert first == again
+    assert lost is not other
 
 
 def test_what_is_stopped_and_does_not_heed_it_loses_its_process_and_frees_its_place():
@@ -262,10 +263,10 @@ def test_a_process_group_that_is_told_to_end_comes_to_an_end_as_its_server_does(
 def test_no_worker_outlives_a_server_that_is_killed():
     with server("--workers", "2") as running, Client(running.address) as client:
         events = searching(client)
-        workers = children_of(running.process.pid)
-        assert len(workers) >= 3
+        processes = children_of(running.process.pid)
+        assert len(processes) >= 3
         running.process.kill()
         running.process.wait(10)
-        wait_until(lambda: not any(map(is_alive, workers)), "a process outlives its server")
+        wait_until(lambda: not any(map(is_alive, processes)), "a process outlives its server")
         with pytest.raises(ServerUnavailableError):
             list(events)

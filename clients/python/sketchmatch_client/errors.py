@@ -61,19 +61,15 @@ class InvalidRequestError(SketchmatchError, ValueError):
         self.field = field
 
 
-class ServerUnavailableError(SketchmatchError):
-    """No server answers, or it is starting or stopping; wait until it serves and send again."""
-
-
-class ServerBusyError(SketchmatchError):
-    """The server has no room for the request now.
+class _RetryableError(SketchmatchError):
+    """The same request may succeed later.
 
     Parameters
     ----------
     message
         One sentence.
     reason
-        What it has no room for.
+        Why it does not now.
     retry_after
         Seconds after which to send the same request again, or None where the server did not say.
     """
@@ -81,6 +77,17 @@ class ServerBusyError(SketchmatchError):
     def __init__(self, message: str, reason: str = "", retry_after: float | None = None) -> None:
         super().__init__(message, reason)
         self.retry_after = retry_after
+
+
+class ServerUnavailableError(_RetryableError):
+    """No server answers, it is starting or stopping, or it lost the process that answered.
+
+    Wait until it serves, and ``retry_after`` seconds if it said so, and send again.
+    """
+
+
+class ServerBusyError(_RetryableError):
+    """The server has no room for the request now; send again after ``retry_after`` seconds."""
 
 
 class DeadlineExceededError(SketchmatchError):
@@ -145,7 +152,10 @@ def _translated(error: grpc.RpcError, address: str) -> SketchmatchError:
         case grpc.StatusCode.UNAVAILABLE:
             problem = f"the sketchmatch server at {address} is not available"
             remedy = "start it, or check the address"
-            return ServerUnavailableError(f"{problem}; {remedy} ({message})", reason)
+            away = f"{problem}; {remedy} ({message})"
+            return ServerUnavailableError(
+                message if reason else away, reason, _retry_after(details)
+            )
         case grpc.StatusCode.DEADLINE_EXCEEDED:
             late = f"the server at {address} did not answer within the timeout; allow more time"
             return DeadlineExceededError(message if reason else late, reason)

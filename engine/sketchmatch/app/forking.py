@@ -32,7 +32,7 @@ def prepare() -> None:
 
 def renew() -> None:
     """Fork workers from a new process from now on, which finds what was compiled meanwhile."""
-    server = multiprocessing.forkserver._forkserver  # type: ignore[attr-defined]
+    server = multiprocessing.forkserver._forkserver
     pid: int | None = getattr(server, "_forkserver_pid", None)
     if pid is not None:
         with suppress(OSError):
