@@ -152,10 +152,8 @@ def _translated(error: grpc.RpcError, address: str) -> SketchmatchError:
         case grpc.StatusCode.UNAVAILABLE:
             problem = f"the sketchmatch server at {address} is not available"
             remedy = "start it, or check the address"
-            away = f"{problem}; {remedy} ({message})"
-            return ServerUnavailableError(
-                message if reason else away, reason, _retry_after(details)
-            )
+            message = message if reason else f"{problem}; {remedy} ({message})"
+            return ServerUnavailableError(message, reason, _retry_after(details))
         case grpc.StatusCode.DEADLINE_EXCEEDED:
             late = f"the server at {address} did not answer within the timeout; allow more time"
             return DeadlineExceededError(message if reason else late, reason)

@@ -12,6 +12,7 @@ import threading
 import traceback
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from socket import socket
 
@@ -31,7 +32,14 @@ from sketchmatch.registry import OWN_DISTRIBUTION, PluginRules, Registry, discov
 from sketchmatch_proto.v1 import match_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
-__all__ = ["SECONDS", "WorkerSetup", "flags", "leave_signals_to_the_server", "live"]
+__all__ = [
+    "SECONDS",
+    "WorkerSetup",
+    "flags",
+    "leave_signals_to_the_server",
+    "live",
+    "registry_of",
+]
 
 SECONDS = struct.Struct("!d")
 """How it is told what is left of a match."""
@@ -120,7 +128,7 @@ class _Worker:
     def work(self) -> None:
         """Do what the server says, one after the other."""
         _, content = self._told.get()
-        registry = discover(rules=PluginRules.of(allow=self._distributions))
+        registry = registry_of(self._distributions)
         self._set_up(content, registry)
         warm_up(registry, self._setup.engine.defaults)
         self.say(Says.READY)
@@ -187,6 +195,12 @@ class _Worker:
         engine = self._setup.engine
         own = () if self._distributions == () else (OWN_DISTRIBUTION,)
         warm_up_others(engine.registry.without(*own), engine.defaults, self._stop.is_set)
+
+
+@cache
+def registry_of(distributions: tuple[str, ...]) -> Registry:
+    """Return what some distributions offer, and the engine's own."""
+    return discover(rules=PluginRules.of(allow=distributions))
 
 
 def flags(response: Message) -> int:

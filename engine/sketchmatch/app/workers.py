@@ -49,7 +49,7 @@ _OVERTIME = 2.0
 _STARTING = 60.0
 _WARMING = 120.0
 _IDLE_SECONDS = 30.0
-_LONG_PROCESSOR, _LONG = 0.25, 1.0
+_LONG_PROCESSOR, _LONG = 0.1, 0.5
 """Seconds of processor time, or of any, after which a request gives way to those that may be short.
 
 Those that may be short are done one a processor: more would only hold each other up.
@@ -412,8 +412,8 @@ class _Worker(asyncio.Protocol):
             self._answer(error)
             return
         self.since = time.monotonic()
-        if task.long and not self._strangers:
-            self.kill()  # nothing gives it its priority back
+        if task.long:
+            self._step_forward()
         self._workers.done(task, None if task.stopping.is_set() else error)
 
     def _answer(self, error: BaseException | None) -> None:
@@ -475,16 +475,26 @@ class _Worker(asyncio.Protocol):
             return 0.0
 
     def _give_way(self) -> None:
-        """Let the processor go to others first: a nice process is one, thread by thread, here."""
+        """Let the processor go to others first."""
+        with suppress(OSError):
+            self._set_niceness(_GIVES_WAY)
+
+    def _step_forward(self) -> None:
+        """Take that back where the system allows it; else another worker comes in its place."""
+        try:
+            self._set_niceness(os.getpriority(os.PRIO_PROCESS, 0))
+        except OSError:
+            self.kill()
+
+    def _set_niceness(self, value: int) -> None:
+        """Set that of each thread: here, only these have one."""
         assert self._process is not None
-        assert self._process.pid is not None
         if self._strangers or not hasattr(os, "setpriority"):
             return
         folder = Path(f"/proc/{self._process.pid}/task")
-        with suppress(OSError):
-            threads = [int(thread.name) for thread in folder.iterdir()] if folder.is_dir() else []
-            for thread in threads or [self._process.pid]:
-                os.setpriority(os.PRIO_PROCESS, thread, _GIVES_WAY)
+        threads = [int(thread.name) for thread in folder.iterdir()] if folder.is_dir() else []
+        for thread in threads or [self._process.pid or 0]:
+            os.setpriority(os.PRIO_PROCESS, thread, value)
 
 
 def _own(setup: Setup) -> _Key:
