@@ -10,6 +10,7 @@ from sketchmatch_client import (
     Pin,
     ServerBusyError,
     ServerFailedError,
+    ServerUnavailableError,
     SketchmatchError,
     sources,
 )
@@ -221,6 +222,12 @@ class TestStatuses:
         assert type(error) is ServerBusyError
         assert error.reason == "LIMIT_EXCEEDED"
         assert error.retry_after == 1.0
+
+    @pytest.mark.parametrize("error", ["unavailable"], indirect=True)
+    def test_a_server_that_lost_a_worker_says_when_to_send_again(self, error):
+        assert type(error) is ServerUnavailableError
+        assert error.reason == "WORKER_LOST"
+        assert error.retry_after == 2.0
 
     @pytest.mark.parametrize("error", ["deadline_exceeded"], indirect=True)
     def test_a_time_budget_that_was_too_short_keeps_the_servers_sentence(self, error):

@@ -16,7 +16,7 @@ from sketchmatch.errors import InvalidInputError
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.selection import UNCONFIGURED
 from sketchmatch.registry import default_registry
-from sketchmatch.server import watched
+from sketchmatch.server import services, watched
 from sketchmatch.server.serve import ServerSettings
 from sketchmatch.server.tls import TlsFiles
 from sketchmatch.server.tokens import new_token
@@ -139,13 +139,13 @@ def test_the_word_bearer_is_read_in_any_case(guarded, ours, robot):
 @contextmanager
 def recorded(monkeypatch):
     """Yield the callers whose requests are taken."""
-    callers, running = [], Application.running
+    callers, known = [], services.caller_of
 
-    def recording(app, request, caller=""):
-        callers.append(caller)
-        return running(app, request, caller)
+    def recording(context):
+        callers.append(known(context))
+        return callers[-1]
 
-    monkeypatch.setattr(Application, "running", recording)
+    monkeypatch.setattr(services, "caller_of", recording)
     yield callers
 
 

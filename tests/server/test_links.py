@@ -30,7 +30,7 @@ with Client(sys.argv[1]) as client:
 
 def test_a_caller_that_is_frozen_gives_its_place_back(monkeypatch):
     monkeypatch.setattr(serve, "_PING_MS", 400)
-    with serving(max_concurrent_matches=1, max_time_budget=600.0) as host:
+    with serving(max_concurrent_matches=1, max_waiting=0, max_time_budget=600.0) as host:
         frozen = subprocess.Popen(
             [sys.executable, "-c", ONE_THAT_WAITS, host.address], stdout=subprocess.PIPE, text=True
         )

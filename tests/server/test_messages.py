@@ -153,7 +153,10 @@ def test_nothing_is_inflated_for_which_there_is_no_place():
     explosive = zlib.compress(b"\x0a" + varint(60 * MIB) + bytes(60 * MIB))
     assert len(explosive) < MIB
     path = "/sketchmatch.v1.MatchService/Match"
-    with server("--max-matches", "1") as running, Client(running.address) as client:
+    with (
+        server("--max-matches", "1", "--max-waiting", "0") as running,
+        Client(running.address) as client,
+    ):
         events = client.events(scene(8), scene(8, 1), **ENDLESS, time_budget=60)
         while not next(events).progress.HasField("confidence"):
             pass

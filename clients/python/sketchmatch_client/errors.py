@@ -62,19 +62,15 @@ class InvalidRequestError(SketchmatchError, ValueError):
         self.field = field
 
 
-class ServerUnavailableError(SketchmatchError):
-    """No server answers, or it is starting or stopping; wait until it serves and send again."""
-
-
-class ServerBusyError(SketchmatchError):
-    """The server has no room for the request now.
+class _RetryableError(SketchmatchError):
+    """The same request may succeed later.
 
     Parameters
     ----------
     message
         One sentence.
     reason
-        What it has no room for.
+        Why it does not now.
     retry_after
         Seconds after which to send the same request again, or None where the server did not say.
     """
@@ -82,6 +78,17 @@ class ServerBusyError(SketchmatchError):
     def __init__(self, message: str, reason: str = "", retry_after: float | None = None) -> None:
         super().__init__(message, reason)
         self.retry_after = retry_after
+
+
+class ServerUnavailableError(_RetryableError):
+    """No server answers, it is starting or stopping, or it lost the process that answered.
+
+    Wait until it serves, and ``retry_after`` seconds if it said so, and send again.
+    """
+
+
+class ServerBusyError(_RetryableError):
+    """The server has no room for the request now; send again after ``retry_after`` seconds."""
 
 
 class DeadlineExceededError(SketchmatchError):
@@ -144,7 +151,8 @@ def _translated(error: grpc.RpcError, address: str) -> SketchmatchError:
         case grpc.StatusCode.RESOURCE_EXHAUSTED:
             return ServerBusyError(message, reason, _retry_after(details))
         case grpc.StatusCode.UNAVAILABLE:
-            return _unavailable(message, reason, address)
+            told = ServerUnavailableError(message, reason, _retry_after(details))
+            return told if reason else _unavailable(message, address)
         case grpc.StatusCode.DEADLINE_EXCEEDED:
             late = f"the server at {address} did not answer within the timeout; allow more time"
             return DeadlineExceededError(message if reason else late, reason)
@@ -163,18 +171,17 @@ _REMEDIES = {
 }
 
 
-def _unavailable(message: str, reason: str, address: str) -> SketchmatchError:
+def _unavailable(message: str, address: str) -> SketchmatchError:
     if untrusted := _UNTRUSTED.search(message):
         why = (untrusted["why"] or "").strip() or "it is for another name"
         return NotAuthenticatedError(
             f"the certificate of the server at {address} cannot be trusted ({why}); give the "
-            "root_certificates of its authority and a name that it is for, or have it renewed",
-            reason,
+            "root_certificates of its authority and a name that it is for, or have it renewed"
         )
     signs = (remedy for sign, remedy in _REMEDIES.items() if sign in message)
     remedy = next(signs, "start it, or check the address")
     problem = f"the sketchmatch server at {address} is not available"
-    return ServerUnavailableError(f"{problem}; {remedy} ({message})", reason)
+    return ServerUnavailableError(f"{problem}; {remedy} ({message})")
 
 
 def _details(error: grpc.RpcError) -> status_pb2.Status:

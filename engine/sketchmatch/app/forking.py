@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import multiprocessing
 import multiprocessing.forkserver
+import os
+import signal
 import sys
+from contextlib import suppress
 from multiprocessing.context import BaseContext
 
-__all__ = ["forking", "prepare"]
+__all__ = ["forking", "prepare", "renew"]
 
 _TEMPLATE = "sketchmatch.app.template"
 
@@ -25,3 +28,12 @@ def prepare() -> None:
     """Begin to load what workers need, beside whatever else a server does when it starts."""
     if forking().get_start_method() == "forkserver":
         multiprocessing.forkserver.ensure_running()
+
+
+def renew() -> None:
+    """Fork workers from a new process from now on, which finds what was compiled meanwhile."""
+    server = multiprocessing.forkserver._forkserver
+    pid: int | None = getattr(server, "_forkserver_pid", None)
+    if pid is not None:
+        with suppress(OSError):
+            os.kill(pid, signal.SIGKILL)  # it is started anew when it is needed

@@ -8,6 +8,10 @@ from __future__ import annotations
 import gc
 import logging
 import os
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sketchmatch.registry import Registry
 
 __all__: list[str] = []
 
@@ -25,19 +29,38 @@ def _load() -> None:
     # Before NumPy is imported: workers share the processors, and its threads would wait for them.
     for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    from sketchmatch.app.worker import leave_signals_to_the_server
+    from sketchmatch.app.worker import heed_no_signals, registry_of
     from sketchmatch.kernels._jit import on_compile
     from sketchmatch.pipeline.warmup import warm_up
-    from sketchmatch.registry import PluginRules, discover
 
-    leave_signals_to_the_server()
+    heed_no_signals()
     try:
         with on_compile(_refuse):
-            warm_up(discover(rules=PluginRules.of(allow=())))
+            registry = registry_of(())
+            warm_up(registry)
+            _rehearse(registry)
     except _NotCompiledError:
         return
     except Exception:
         logging.getLogger(__name__).exception("workers will load what they need themselves")
+
+
+def _rehearse(registry: Registry) -> None:
+    """Match once, since much else is loaded when it is first used."""
+    from sketchmatch.app.jobs import Job, answers
+    from sketchmatch.app.setup import Setup
+    from sketchmatch.pipeline.engine import Engine
+    from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
+    from sketchmatch_proto.v1.source_pb2 import LabelledPolygon, Point, PolygonSet, Ring, Source
+
+    corners = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+    polygons = [
+        LabelledPolygon(rings=[Ring(points=[Point(x=x + at, y=y + at**2) for x, y in corners])])
+        for at in (0.0, 3.0, 5.0, 8.0)
+    ]
+    source = Source(polygon_set=PolygonSet(polygons=polygons))
+    for _ in answers(Job("", MatchRequest(sketch=source, map=source)), Setup(Engine(registry))):
+        pass
 
 
 _load()

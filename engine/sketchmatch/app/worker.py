@@ -11,6 +11,7 @@ import struct
 import threading
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from socket import socket
 
@@ -31,10 +32,17 @@ from sketchmatch.registry import OWN_DISTRIBUTION, PluginRules, Registry, discov
 from sketchmatch_proto.v1 import match_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
-__all__ = ["SECONDS", "WorkerSetup", "flags", "leave_signals_to_the_server", "live"]
+__all__ = [
+    "SECONDS",
+    "WorkerSetup",
+    "flags",
+    "leave_signals_to_the_server",
+    "live",
+    "registry_of",
+]
 
 SECONDS = struct.Struct("!d")
-"""How time is told: the patience with which a warm-up is awaited, or what is left of a match."""
+"""How it is told what is left of a match."""
 
 _LOADING = 120.0
 _POLITE = 10
@@ -94,6 +102,7 @@ class _Worker:
         self._told: queue.SimpleQueue[tuple[int, bytes]] = queue.SimpleQueue()
         self._stop = threading.Event()
         self._clock: Clock | None = None
+        self._curtailed: float | None = None
         self._setup: Setup
         self._patience: float | None = None
 
@@ -119,7 +128,7 @@ class _Worker:
     def work(self) -> None:
         """Do what the server says, one after the other."""
         _, content = self._told.get()
-        registry = discover(rules=PluginRules.of(allow=self._distributions))
+        registry = registry_of(self._distributions)
         self._set_up(content, registry)
         warm_up(registry, self._setup.engine.defaults)
         self.say(Says.READY)
@@ -143,10 +152,12 @@ class _Worker:
             case Says.STOP:
                 self._stop.set()
             case Says.CURTAIL:
+                (self._curtailed,) = SECONDS.unpack(content)
                 if (clock := self._clock) is not None:
-                    clock.curtail(*SECONDS.unpack(content))
+                    clock.curtail(self._curtailed)
             case Says.ORDER | Says.WARM:
                 self._stop.clear()
+                self._curtailed = None
                 self._told.put((kind, content))
             case _:
                 self._told.put((kind, content))
@@ -175,6 +186,8 @@ class _Worker:
 
     def _begun(self, clock: Clock) -> None:
         self._clock = clock
+        if self._curtailed is not None:  # while the request was decoded
+            clock.curtail(self._curtailed)
 
     def _warm_up_others(self) -> None:
         """Compile what requests may ask for, last of all that there is to do."""
@@ -183,6 +196,12 @@ class _Worker:
         engine = self._setup.engine
         own = () if self._distributions == () else (OWN_DISTRIBUTION,)
         warm_up_others(engine.registry.without(*own), engine.defaults, self._stop.is_set)
+
+
+@cache
+def registry_of(distributions: tuple[str, ...]) -> Registry:
+    """Return what some distributions offer, and the engine's own."""
+    return discover(rules=PluginRules.of(allow=distributions))
 
 
 def flags(response: Message) -> int:
@@ -199,8 +218,15 @@ def _end_unless_alive(patience: float) -> None:
     faulthandler.dump_traceback_later(2.0 * patience, exit=True)
 
 
+def heed_no_signals() -> None:
+    """Ignore what a terminal or an init system sends to a whole group of processes."""
+    for name in ("SIGINT", "SIGHUP", "SIGTERM"):
+        if number := getattr(signal, name, None):
+            signal.signal(number, signal.SIG_IGN)
+
+
 def leave_signals_to_the_server() -> None:
-    """Heed none: a group of processes gets them all, and the server alone says who ends when."""
+    """Heed none, as :func:`heed_no_signals`, but in processes that a plugin starts."""
     own = os.getpid()
 
     def leave(number: int, _frame: object) -> None:
@@ -208,9 +234,8 @@ def leave_signals_to_the_server() -> None:
             signal.signal(number, signal.SIG_DFL)
             os.kill(os.getpid(), number)
 
-    for name in ("SIGINT", "SIGHUP", "SIGTERM"):
-        if number := getattr(signal, name, None):
-            signal.signal(number, leave if name == "SIGTERM" else signal.SIG_IGN)
+    heed_no_signals()
+    signal.signal(signal.SIGTERM, leave)
 
 
 def _go_first_where_memory_is_short() -> None:

@@ -26,7 +26,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from sketchmatch.app.forking import forking
+from sketchmatch.app.forking import forking, renew
 from sketchmatch.app.frames import Flag, Frames, Says, failure_of, frame
 from sketchmatch.app.jobs import time_budget
 from sketchmatch.app.setup import Setup
@@ -49,7 +49,7 @@ _OVERTIME = 2.0
 _STARTING = 60.0
 _WARMING = 120.0
 _IDLE_SECONDS = 30.0
-_LONG_PROCESSOR, _LONG = 0.25, 1.0
+_LONG_PROCESSOR, _LONG = 0.1, 0.5
 """Seconds of processor time, or of any, after which a request gives way to those that may be short.
 
 Those that may be short are done one a processor: more would only hold each other up.
@@ -103,6 +103,8 @@ class Workers:
         self._own = _own(setup)
         first = self._new(self._own, ())
         await first.start(setup)
+        if first.compiled:
+            renew()
         others = [self._new(self._own, ()) for _ in range(self._kept - 1)]
         await asyncio.gather(*(each.start(setup) for each in others))
 
@@ -225,6 +227,8 @@ class _Worker(asyncio.Protocol):
         self.key = key
         self.since = math.inf
         """When it was last given something or ended it."""
+        self.compiled = False
+        """Whether some kernels were not in the cache."""
         self._workers = workers
         self._strangers = strangers
         self._process: SpawnProcess | None = None
@@ -256,18 +260,12 @@ class _Worker(asyncio.Protocol):
         if self._killed:
             raise self._blame("was not wanted any more")
         ours, theirs = socket.socketpair()
-        names = tuple(sorted(name for name, _ in self.key))
-        self._process = cast(
-            "SpawnProcess",
-            forking().Process(  # type: ignore[attr-defined]
-                target=live,
-                args=(theirs, names, bool(self._strangers)),
-                name="-".join(("sketchmatch-worker", *names)),
-                daemon=True,
-            ),
-        )
-        with theirs:
-            await asyncio.to_thread(self._process.start)
+        try:
+            with theirs:
+                await asyncio.to_thread(self._fork, theirs)
+        except (OSError, EOFError) as error:
+            ours.close()
+            raise WorkerLostError(f"no worker could be started ({_said(error)})") from error
         loop = asyncio.get_running_loop()
         self._transport, _ = await loop.create_connection(lambda: self, sock=ours)
         if self._killed:
@@ -278,6 +276,25 @@ class _Worker(asyncio.Protocol):
         patience = _STARTING + (setup.isolation.patience if self._strangers else 0.0)
         await self._answered(patience, "did not load in its own process")
         self.since = time.monotonic()
+
+    def _fork(self, theirs: socket.socket) -> None:
+        """Start the process; once more if what it is forked from has died and is replaced."""
+        for last in (False, True):
+            names = tuple(sorted(name for name, _ in self.key))
+            process = forking().Process(  # type: ignore[attr-defined]
+                target=live,
+                args=(theirs, names, bool(self._strangers)),
+                name="-".join(("sketchmatch-worker", *names)),
+                daemon=True,
+            )
+            try:
+                process.start()
+            except (OSError, EOFError):
+                if last:
+                    raise
+            else:
+                self._process = process
+                return
 
     async def warm_up(self) -> None:
         """Compile what requests may ask for."""
@@ -377,6 +394,7 @@ class _Worker(asyncio.Protocol):
             return
         match kind:
             case Says.COMPILING:
+                self.compiled = True
                 self._workers.compiling()
             case Says.READY:
                 self._answer(None)
@@ -395,8 +413,8 @@ class _Worker(asyncio.Protocol):
             self._answer(error)
             return
         self.since = time.monotonic()
-        if task.long and not self._strangers:
-            self.kill()  # nothing gives it its priority back
+        if task.long:
+            self._step_forward()
         self._workers.done(task, None if task.stopping.is_set() else error)
 
     def _answer(self, error: BaseException | None) -> None:
@@ -458,16 +476,26 @@ class _Worker(asyncio.Protocol):
             return 0.0
 
     def _give_way(self) -> None:
-        """Let the processor go to others first: a nice process is one, thread by thread, here."""
+        """Let the processor go to others first."""
+        with suppress(OSError):
+            self._set_niceness(_GIVES_WAY)
+
+    def _step_forward(self) -> None:
+        """Take that back where the system allows it; else another worker comes in its place."""
+        try:
+            self._set_niceness(os.getpriority(os.PRIO_PROCESS, 0))
+        except OSError:
+            self.kill()
+
+    def _set_niceness(self, value: int) -> None:
+        """Set that of each thread: here, only these have one."""
         assert self._process is not None
-        assert self._process.pid is not None
         if self._strangers or not hasattr(os, "setpriority"):
             return
         folder = Path(f"/proc/{self._process.pid}/task")
-        with suppress(OSError):
-            threads = [int(thread.name) for thread in folder.iterdir()] if folder.is_dir() else []
-            for thread in threads or [self._process.pid]:
-                os.setpriority(os.PRIO_PROCESS, thread, _GIVES_WAY)
+        threads = [int(thread.name) for thread in folder.iterdir()] if folder.is_dir() else []
+        for thread in threads or [self._process.pid or 0]:
+            os.setpriority(os.PRIO_PROCESS, thread, value)
 
 
 def _own(setup: Setup) -> _Key:
@@ -493,6 +521,10 @@ def _culprits(strangers: _Strangers) -> str:
         distributions = sorted({item.distribution for item in strangers})
         return f"an algorithm of {' or '.join(distributions)}"
     return " or ".join(dict.fromkeys(item.origin for item in strangers))
+
+
+def _said(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"
 
 
 def _ending(code: int | None) -> str:

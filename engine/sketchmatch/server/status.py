@@ -69,8 +69,7 @@ def refusal(error: BaseException) -> Refusal:
 
 def is_fault(error: BaseException) -> bool:
     """Whether an error is the server's or a plugin's, so that its operator should hear of it."""
-    faults = PluginError | WorkerLostError
-    return isinstance(error, faults) or not isinstance(error, SketchmatchError)
+    return isinstance(error, PluginError) or not isinstance(error, SketchmatchError)
 
 
 def _cut(text: str) -> str:
