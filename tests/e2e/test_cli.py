@@ -384,8 +384,9 @@ def test_plugins_show_is_what_the_catalogue_says_of_one(command_line, where):
     assert lines[:2] == [["kind", "segmenter"], ["name", "rooms"]]
     assert ["reads", "occupancy_grid", "map_server_map"] in lines
     assert next(line for line in lines if line[:2] == ["parameter", "door_width"]) == [
-        *("parameter", "door_width", "number", "1.2", "> 0, ≤ 100", "m"),
-        "Passages up to this wide are doorways.",
+        *("parameter", "door_width", "number | null", "null", "> 0, ≤ 100", "m"),
+        "Passages up to this wide are doorways; when left out half the width of the map's typical "
+        "room, but at most 2.1 m.",
     ]
 
 

@@ -23,31 +23,51 @@ from sketchmatch_builtin.segmenters._cells import (
     outline,
     reading_order,
 )
-from sketchmatch_builtin.segmenters._doorways import divided
+from sketchmatch_builtin.segmenters._doorways import divided, doorway
 from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of
 
 __all__ = ["RoomSegmenter"]
 
 _MOST_HOLES = 1000
 
+# In metres: no doorway is wider, unless a parameter says so.
+_WIDEST = 2.1
+
 
 class RoomSegmenter(Segmenter):
     """Takes as objects the rooms: free space, cut where it is narrow.
 
     Where a disc as wide as a door does not fit, free space is cut [1]_; what is left is a room or
-    part of one, and what was cut away goes to the nearest, of several to the largest. Parts that
-    are joined by a passage nearly as wide as the wider of them are one room, so that a corridor
-    stays whole. Things that stand free in a room and are no longer than ``furniture`` neither cut
+    part of one, and what was cut away goes to the nearest, of several to the largest. How wide that
+    is the map itself says: three times the mean distance of free cells to the nearest wall, which
+    is half the width of a square room. Parts that are joined by a passage nearly as wide as the
+    wider of them are one room, so that a corridor stays whole. Rays of a laser through glass and
+    the insides of cupboards' outlines are no rooms. Things that stand free in a room and are no longer than ``furniture`` neither cut
     it nor are holes in it; longer ones are holes. Unknown and occupied cells otherwise belong to no
     room, and two rooms are always at least a cell apart. A turned map has the same rooms, turned.
 
     Rooms come in reading order: by their highest point from the top down, then from the left.
     One that the map's file names, with the type ``room`` and a place in it, has that name.
 
+    Notes
+    -----
+    On ten of the twenty floors of [1]_, each empty and with furniture, 496 of 560 rooms marked by
+    hand are found, and of the 532 from 0.3 m² on 93 %: a room shares more than half of what both
+    cover. It was tuned on every second building by name, where 284 of 322 are found; on the others
+    212 of 238. Recall and precision as [1]_ measures them, how much of a room and of a segment the
+    largest overlap is, are 98.1 and 97.7 % empty, 91.8 and 97.8 % with furniture, without the rooms
+    below 0.3 m². Of all twenty floors these figures are quoted from it: morphological 98.1 and
+    88.5 %, 84.6 and 90.5 %; distance transform 96.9 and 88.4 %, 76.1 and 88.4 %; Voronoi 95.0 and
+    94.8 %, 86.6 and 94.5 %; feature-based 89.2 and 90.4 %, 85.1 and 87.1 %. Neither its other ten
+    floors nor its smallest rooms are in ours. MAORIS [2]_ reports 0.98 by Matthews' coefficient, on
+    empty floors, which was not measured here.
+
     References
     ----------
     .. [1] R. Bormann, F. Jordan, W. Li, J. Hampp, M. Hägele, "Room segmentation: survey,
        implementation, and analysis", ICRA 2016: morphological and distance transform segmentation.
+    .. [2] M. Mielle, M. Magnusson, A. J. Lilienthal, "A method to segment maps from different
+       modalities using free space layout: MAORIS, map of ripples segmentation", ICRA 2018.
 
     Examples
     --------
@@ -70,11 +90,14 @@ class RoomSegmenter(Segmenter):
     class Params(FreeSpaceParams):
         """What is free, how wide doorways are, and what is too small to be a room."""
 
-        door_width: float = Field(
-            1.2,
+        door_width: float | None = Field(
+            None,
             gt=0.0,
             le=100.0,
-            description="Passages up to this wide are doorways.",
+            description=(
+                "Passages up to this wide are doorways; when left out half the width of the map's "
+                "typical room, but at most 2.1 m."
+            ),
             json_schema_extra={"unit": "m"},
         )
         min_area: float = Field(
@@ -113,14 +136,16 @@ class RoomSegmenter(Segmenter):
         free, (left, below) = free_cells(source, params)
         least = max(params.min_area / cell**2, 1.0)
         inside = _furnished(free, params.furniture / cell)
-        rooms = divided(inside, params.door_width / cell, least)
+        width = params.door_width
+        door = doorway(inside, _WIDEST / cell) if width is None else width / cell
+        rooms = divided(inside, door, least)
         most = source_limits().max_objects
         outlines = [
             _polygon(mask, (x + left, y + below))
             for mask, (x, y) in components(rooms, least, most, "raise min_area")
         ]
         if len(outlines) < 2:
-            raise _too_few(len(outlines), params)
+            raise _too_few(len(outlines), params, door * cell)
         tolerance = TOLERANCE if params.tolerance is None else params.tolerance / cell
         outlines = sorted(_simplified(outlines, tolerance), key=reading_order)
         rooms_in_map = [[in_map(ring, source) for ring in _rings(room)] for room in outlines]
@@ -135,14 +160,19 @@ class RoomSegmenter(Segmenter):
 
 def _furnished(free: Mask, longest: float) -> Mask:
     """Return free cells together with the things, no longer than so many cells, among them."""
-    things = cv2.copyMakeBorder(1 - free, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(1,))
-    _, labels, statistics, _ = cv2.connectedComponentsWithStats(things, connectivity=8)
-    sides = statistics[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
-    small = sides <= longest
+    # What an outline of a thing encloses is of the thing.
+    things = (1 - free) | _small(free, longest, 4)
+    framed = cv2.copyMakeBorder(things, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(1,))
+    return np.asarray(_small(framed, longest, 8)[1:-1, 1:-1] | free)
+
+
+def _small(mask: Mask, longest: float, connectivity: int) -> Mask:
+    """Return a mask's components whose sides are at most so long, without that at its corner."""
+    _, labels, statistics, _ = cv2.connectedComponentsWithStats(mask, connectivity=connectivity)
+    small = statistics[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1) <= longest
     # What lies outside the map is no thing, however small the map is.
-    small[labels[0, 0]] = False
-    small[0] = True
-    return np.asarray(small[labels[1:-1, 1:-1]], dtype=np.uint8)
+    small[[0, labels[0, 0]]] = False
+    return np.asarray(small[labels], dtype=np.uint8)
 
 
 def _polygon(mask: Mask, corner: tuple[int, int]) -> shapely.Polygon:
@@ -193,11 +223,11 @@ def _rings(room: shapely.Polygon) -> list[FloatArray]:
     return [shapely.get_coordinates(ring) for ring in (room.exterior, *room.interiors)]
 
 
-def _too_few(found: int, params: RoomSegmenter.Params) -> InvalidInputError:
+def _too_few(found: int, params: RoomSegmenter.Params, door: float) -> InvalidInputError:
     return InvalidInputError(
         Reason.TOO_FEW_OBJECTS,
         "cells",
         f"has {'no room' if not found else 'only one room'} of at least {params.min_area:g} m² "
-        f"when cut at passages of up to {params.door_width:g} m, and a match needs two; give a "
+        f"when cut at passages of up to {door:.2g} m, and a match needs two; give a "
         "map with several rooms, raise door_width or lower min_area",
     )
