@@ -209,8 +209,8 @@ def test_segmenters_are_chosen_by_the_names_of_their_stages(command_line, where)
     done = command_line("match", *ROOM, *where, "--map-segmenter", "strokes")
     assert done.returncode == ExitCode.INVALID_INPUT
     assert "map_segmenter.name is 'strokes', which cannot read" in done.stderr
-    done = command_line("match", *ROOM, *where, "--sketch-segmenter", "rooms")
-    assert "sketch_segmenter.name is 'rooms', which cannot read" in done.stderr
+    done = command_line("match", *ROOM, *where, "--sketch-segmenter", "image")
+    assert "sketch_segmenter.name is 'image', which cannot read" in done.stderr
 
 
 @pytest.mark.parametrize("command", ["match", "relate"])
@@ -384,7 +384,7 @@ def test_plugins_show_is_what_the_catalogue_says_of_one(command_line, where):
     assert lines[:2] == [["kind", "segmenter"], ["name", "rooms"]]
     assert ["reads", "occupancy_grid", "map_server_map"] in lines
     assert next(line for line in lines if line[:2] == ["parameter", "door_width"]) == [
-        *("parameter", "door_width", "number | null", "null", "> 0, ≤ 100", "m"),
+        *("parameter", "door_width", "number | null", "null", "> 0, ≤ 10000", "m"),
         "Passages up to this wide are doorways; when left out half the width of the map's typical "
         "room, but at most 2.1 m.",
     ]

@@ -136,7 +136,7 @@ def test_a_corridor_that_narrows_a_little_stays_whole():
 def test_the_width_of_doorways_is_found_from_the_map(size):
     """Whole and at half its size, where a door of 0.45 m is as wide beside its rooms."""
     assert len(segmented(floor(), cell=CELL * size, min_area=2.0 * size**2).scene) == 7
-    with pytest.raises(InvalidInputError, match="passages of up to 0.3 m"):
+    with pytest.raises(InvalidInputError, match=r"passages of up to 0\.3 m"):
         segmented(floor(), cell=CELL * size, door_width=0.3)
 
 

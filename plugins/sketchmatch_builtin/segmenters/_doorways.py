@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +84,7 @@ def _bodies(free: Mask, width: _Widths, radius: float) -> _Labels:
     distance = cv2.distanceTransform(1 - cores, cv2.DIST_L2, cv2.DIST_MASK_5)
     nearest = _nearest(_numbered(cores, 8)[0])
     # A core's disc is free, so that within it the nearest core lies on this side of all walls.
-    nearest[(distance > radius - 0.5) | (free == 0)] = 0
+    nearest[(distance > math.floor(radius)) | (free == 0)] = 0
     return nearest
 
 
