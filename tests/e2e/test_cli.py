@@ -382,7 +382,8 @@ def test_plugins_show_is_what_the_catalogue_says_of_one(command_line, where):
     done = command_line("plugins", "show", "rooms", *where)
     lines = [line.split("\t") for line in done.stdout.splitlines()]
     assert lines[:2] == [["kind", "segmenter"], ["name", "rooms"]]
-    assert ["reads", "occupancy_grid", "map_server_map"] in lines
+    sources = ["occupancy_grid", "map_server_map", "stroke_set", "polygon_set", "image"]
+    assert ["reads", *sources] in lines
     assert next(line for line in lines if line[:2] == ["parameter", "door_width"]) == [
         *("parameter", "door_width", "number | null", "null", "> 0, ≤ 10000", "m"),
         "Passages up to this wide are doorways; when left out half the width of the map's typical "

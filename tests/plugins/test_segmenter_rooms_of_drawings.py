@@ -1,5 +1,7 @@
 """The segmenter of rooms on drawn floor plans: strokes, polygons and pictures."""
 
+import itertools
+
 import cv2
 import numpy as np
 import pytest
@@ -111,7 +113,7 @@ def test_polygons_are_walls():
     boxes = [
         [(x - 0.1, y - 0.1), (u + 0.1, y - 0.1), (u + 0.1, v + 0.1), (x - 0.1, v + 0.1)]
         for line in WALLS
-        for (a, b), (c, d) in zip(line, line[1:], strict=False)
+        for (a, b), (c, d) in itertools.pairwise(line)
         for x, u, y, v in [(min(a, c), max(a, c), min(b, d), max(b, d))]
     ]
     polygons = PolygonSet(tuple(LabelledPolygon((np.array(box, float),)) for box in boxes))

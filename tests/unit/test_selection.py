@@ -185,6 +185,7 @@ def test_levels_are_laid_over_each_other_as_the_oracle_does(chosen, parameters):
 
 
 MAPS = Defaults({"map_segmenter": Choice("occupancy-grid", {"region_share": 0.5})})
+ROOMS = {"map_segmenter": Choice("rooms", {"min_area": 2.0})}
 
 
 def test_a_configured_segmenter_is_used_for_the_sources_that_it_reads():
@@ -248,7 +249,7 @@ def test_a_profile_of_no_use_is_refused_and_says_why():
 
 
 def test_the_algorithms_of_a_request_are_told_without_setting_them_up():
-    defaults = Defaults({"searcher": Choice("easm", {"no": "such parameter"}), **MAPS.pipeline})
+    defaults = Defaults({"searcher": Choice("easm", {"no": "such parameter"}), **ROOMS})
     found = chosen_algorithms(
         default_registry(),
         {"map_segmenter": Choice(), "searcher": Choice(), "histogram": Choice("hybrid")},
@@ -261,7 +262,7 @@ def test_the_algorithms_of_a_request_are_told_without_setting_them_up():
 def test_the_catalogue_knows_what_holds_where_a_request_says_nothing():
     registry = default_registry()
     defaults = Defaults(
-        {"searcher": Choice("easm", {"patience": 9}), **MAPS.pipeline},
+        {"searcher": Choice("easm", {"patience": 9}), **ROOMS},
         {Kind.SEARCHER: {"easm": {"population": 7}, "nn": {"seed_points": 5}}},
     )
     names = default_names(registry, defaults)

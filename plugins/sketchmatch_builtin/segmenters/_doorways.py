@@ -184,7 +184,8 @@ def _near(mask: NDArray[np.bool_], reach: float) -> Mask:
 
 def _without_shafts(free: Mask, width: _Widths, door: float) -> Mask:
     """Return free cells without what is closed and too narrow for anyone, as cupboards are."""
-    count, spaces = cv2.connectedComponents(free, connectivity=8)
+    count, parts = cv2.connectedComponents(free, connectivity=8)
+    spaces = np.asarray(parts, dtype=np.int32)
     widest = np.zeros(count, np.float32)
     np.maximum.at(widest, spaces.reshape(-1), width.reshape(-1))
     return np.asarray((2.0 * widest >= _SHAFT * door)[spaces], dtype=np.uint8)

@@ -61,9 +61,9 @@ class RoomSegmenter(Segmenter):
     turned map has the same rooms, turned.
 
     In a drawing walls are strokes, the borders of polygons, or one of two shades of a picture, in
-    which either the walls or the free space may be dark; what joins the picture's border is outside.
-    There all is measured by the drawing itself: no metres are known. A label that one line alone has
-    names the room in which its middle lies.
+    which either the walls or the free space may be dark; what joins the picture's border is
+    outside. There all is measured by the drawing itself: no metres are known. A label that one line
+    alone has names the room in which its middle lies.
 
     Rooms come in reading order: by their highest point from the top down, then from the left.
     One that the map's file names, with the type ``room`` and a place in it, has that name.
@@ -247,7 +247,7 @@ def _furnished(free: Mask, longest: float) -> Mask:
     """Return free cells together with the things, no longer than so many cells, among them."""
     # What an outline of a thing encloses is of the thing.
     things = (1 - free) | _small(free, longest, 4)
-    framed = cv2.copyMakeBorder(things, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(1,))
+    framed = np.pad(things, 1, constant_values=1)
     return np.asarray(_small(framed, longest, 8)[1:-1, 1:-1] | free)
 
 
