@@ -109,6 +109,26 @@ def test_a_label_that_one_line_has_names_the_room_around_its_middle():
     assert kitchen.polygon.contains(shapely.Point(1.9, 6.9))
 
 
+def test_texts_of_an_svg_plan_name_its_rooms(tmp_path):
+    paths = "".join(
+        f'<path fill="none" stroke="black" d="M{" L".join(f"{x} {9 - y}" for x, y in line)}"/>'
+        for line in WALLS
+    )
+    texts = (
+        '<text x="1" y="2">bath</text><text x="99" y="1" display="none">cellar</text>'
+        '<text transform="translate(5 2)"><tspan x="0" y="0">living\n room</tspan></text>'
+        '<text x="none" y="2">attic</text>'
+    )
+    file = tmp_path / "plan.svg"
+    file.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg"><g transform="scale(10)">{paths}{texts}</g></svg>'
+    )
+    rooms = segmented(read_source(file)).scene.objects
+    assert sorted(item.label for item in rooms) == ["", "", "", "bath", "living room"]
+    bath = next(item for item in rooms if item.label == "bath")
+    assert bath.polygon.contains(shapely.Point(10, -20))
+
+
 def test_polygons_are_walls():
     boxes = [
         [(x - 0.1, y - 0.1), (u + 0.1, y - 0.1), (u + 0.1, v + 0.1), (x - 0.1, v + 0.1)]

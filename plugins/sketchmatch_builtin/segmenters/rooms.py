@@ -62,8 +62,8 @@ class RoomSegmenter(Segmenter):
 
     In a drawing walls are strokes, the borders of polygons, or one of two shades of a picture, in
     which either the walls or the free space may be dark; what joins the picture's border is
-    outside. There all is measured by the drawing itself: no metres are known. A label that one line
-    alone has names the room in which its middle lies.
+    outside. There all is measured by the drawing itself: no metres are known. A text
+    of an SVG document, and a label that one line alone has, name the room around them.
 
     Rooms come in reading order: by their highest point from the top down, then from the left.
     One that the map's file names, with the type ``room`` and a place in it, has that name.
@@ -233,9 +233,10 @@ def _names(source: StrokeSet | PolygonSet | Image) -> list[Landmark]:
         if isinstance(source, StrokeSet)
         else [(polygon.label, polygon.rings[0]) for polygon in source.polygons if polygon.rings]
     )
+    written = list(source.landmarks) if isinstance(source, StrokeSet) else []
     given = Counter(label for label, _ in lines)
     # What several lines are called is a layer or a kind of line, and no room.
-    return [
+    return written + [
         Landmark(label, (float(x), float(y)), ROOM)
         for label, points in lines
         if label and given[label] == 1 and len(points)
