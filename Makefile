@@ -17,7 +17,8 @@ KERNEL_SHARE := 99
 says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 
 .PHONY: demo test test-slow test-all test-units test-interpreted mutation lint proto bench \
-  bench-histograms bench-match bench-searchers bench-server bench-startup experiments fuzz reference api serve clean
+  bench-histograms bench-match bench-searchers bench-server bench-startup experiments fuzz look \
+  reference api serve clean
 
 demo: $(VENV)/runtime
 	@$(BIN)/sketchmatch demo
@@ -59,6 +60,10 @@ lint: $(VENV)/dev .venv-proto/tools
 proto: .venv-proto/tools
 	$(PROTO_BIN)/buf lint proto
 	$(PROTO_BIN)/python proto/generate.py
+
+# One picture of every map, floor and drawing as it is segmented by default: look at it.
+look: $(VENV)/dev
+	@$(BIN)/python -m tests.look $(ARGS)
 
 bench: $(VENV)/dev
 	@$(BIN)/python -m tests.benchmarks.stages

@@ -210,8 +210,8 @@ def test_segmenters_are_chosen_by_the_names_of_their_stages(command_line, where)
     done = command_line("match", *ROOM, *where, "--map-segmenter", "strokes")
     assert done.returncode == ExitCode.INVALID_INPUT
     assert "map_segmenter.name is 'strokes', which cannot read" in done.stderr
-    done = command_line("match", *ROOM, *where, "--sketch-segmenter", "rooms")
-    assert "sketch_segmenter.name is 'rooms', which cannot read" in done.stderr
+    done = command_line("match", *ROOM, *where, "--sketch-segmenter", "image")
+    assert "sketch_segmenter.name is 'image', which cannot read" in done.stderr
 
 
 @pytest.mark.parametrize("command", ["match", "relate"])
@@ -383,10 +383,13 @@ def test_plugins_show_is_what_the_catalogue_says_of_one(command_line, where):
     done = command_line("plugins", "show", "rooms", *where)
     lines = [line.split("\t") for line in done.stdout.splitlines()]
     assert lines[:2] == [["kind", "segmenter"], ["name", "rooms"]]
-    assert ["reads", "occupancy_grid", "map_server_map"] in lines
+    sources = ["occupancy_grid", "map_server_map", "stroke_set", "polygon_set", "image"]
+    assert ["reads", *sources] in lines
     assert next(line for line in lines if line[:2] == ["parameter", "door_width"]) == [
-        *("parameter", "door_width", "number", "1.2", "> 0, ≤ 100", "m"),
-        "Passages up to this wide are doorways.",
+        *("parameter", "door_width", "number | null", "null", "> 0, ≤ 10000", "m"),
+        "Passages up to this wide are doorways; when left out half the width of the map's typical "
+        "room, but of a robot's map at most 2.1 m. What is in metres here is in a drawing's own "
+        "unit for drawings.",
     ]
 
 

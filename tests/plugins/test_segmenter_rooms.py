@@ -2,6 +2,7 @@
 
 import contextlib
 
+import cv2
 import numpy as np
 import pytest
 import shapely.affinity
@@ -62,7 +63,7 @@ def areas(found):
 
 
 def test_a_floors_rooms_are_found_in_reading_order():
-    found = segmented(floor())
+    found = segmented(floor(), door_width=1.2)
     assert areas(found) == pytest.approx(AREAS, rel=0.03)
     assert found.warnings == ()
 
@@ -85,7 +86,7 @@ def test_furniture_and_speckle_belong_to_the_room_around_them():
     cells[150:160, 165:195] = -1
     inside = np.argwhere(cells == 0)
     cells[tuple(inside[rng.permutation(len(inside))[:300]].T)] = 100
-    found = segmented(cells)
+    found = segmented(cells, door_width=1.2)
     assert areas(found) == pytest.approx(AREAS, rel=0.06)
     assert all(len(item.rings) == 1 for item in found.scene.objects)
 
@@ -93,8 +94,8 @@ def test_furniture_and_speckle_belong_to_the_room_around_them():
 def test_what_is_longer_than_furniture_is_a_hole():
     cells = floor()
     cells[131:153, 97:119] = -1
-    assert [len(item.rings) for item in segmented(cells).scene.objects] == [1] * 6
-    longer = segmented(cells, furniture=1.0).scene.objects[1]
+    assert [len(item.rings) for item in segmented(cells, door_width=1.2).scene.objects] == [1] * 6
+    longer = segmented(cells, door_width=1.2, furniture=1.0).scene.objects[1]
     assert len(longer.rings) == 2
     assert longer.area == pytest.approx(AREAS[1] - 1.1 * 1.1, rel=0.03)
 
@@ -126,12 +127,41 @@ def test_a_corridor_that_narrows_a_little_stays_whole():
     for x in range(20, 230, 50):
         cells[68:80, x : x + 4] = 100  # juts 0.6 m out: 1.0 m of 1.6 are left
         cells[68:76, x : x + 4] = 0
-    assert areas(segmented(cells))[3] == pytest.approx(AREAS[3], rel=0.06)
-    assert len(segmented(cells).scene) == 6
+    found = segmented(cells, door_width=1.2)
+    assert areas(found)[3] == pytest.approx(AREAS[3], rel=0.06)
+    assert len(found.scene) == 6
+
+
+@pytest.mark.parametrize("size", [0.5, 1.0])
+def test_the_width_of_doorways_is_found_from_the_map(size):
+    """Whole and at half its size, where a door of 0.45 m is as wide beside its rooms."""
+    assert len(segmented(floor(), cell=CELL * size, min_area=2.0 * size**2).scene) == 7
+    with pytest.raises(InvalidInputError, match=r"passages of up to 0\.3 m"):
+        segmented(floor(), cell=CELL * size, door_width=0.3)
+
+
+def test_rays_of_a_laser_through_glass_are_no_room():
+    cells = np.pad(floor(), ((0, 160), (0, 0)), constant_values=-1)
+    rows, columns = np.mgrid[: len(cells), : cells.shape[1]]
+    turn = np.arctan2(columns - 100, rows - 100)
+    beam = (rows >= 180) & (abs(turn) < 0.5) & (np.floor(turn * 40) % 2 == 0)
+    cells[beam] = 0
+    plain = segmented(floor(), door_width=1.2)
+    found = segmented(cells, door_width=1.2)
+    assert sorted(areas(found)) == pytest.approx(sorted(areas(plain)), rel=0.06)
+
+
+@pytest.mark.parametrize("length", [1.8, 3.0])
+def test_the_inside_of_a_cupboards_outline_is_no_room(length):
+    cells = floor()
+    x = round(length / CELL)
+    cells[168:180, 80 : 80 + x] = 100
+    cells[170:178, 82 : 78 + x] = 0
+    assert len(segmented(cells, door_width=1.2, min_area=0.5).scene) == 6
 
 
 def test_min_area_leaves_small_rooms_out_and_the_others_as_they_are():
-    found = segmented(floor(), min_area=12.5)
+    found = segmented(floor(), door_width=1.2, min_area=12.5)
     assert areas(found) == pytest.approx([AREAS[k] for k in (1, 2, 3, 5)], rel=0.03)
 
 
@@ -232,9 +262,9 @@ def test_a_room_with_two_farthest_corners_is_simplified_alike_however_the_map_li
 @settings(max_examples=20)
 def test_padding_and_scaling_the_map_does_that_to_the_rooms(seed):
     cells, _ = offices(np.random.default_rng(seed))
-    plain = [item.polygon for item in segmented(cells).scene.objects]
+    plain = [item.polygon for item in segmented(cells, door_width=1.2).scene.objects]
     padded = OccupancyGrid(np.pad(cells, 7, constant_values=-1), CELL, (-7 * CELL, -7 * CELL, 0.0))
-    again = [item.polygon for item in segmented(padded).scene.objects]
+    again = [item.polygon for item in segmented(padded, door_width=1.2).scene.objects]
     assert shapely.equals_exact(plain, again, tolerance=1e-9).all()
     scaled = segmented(cells, cell=0.1, door_width=2.4, min_area=8.0, furniture=4.0).scene.objects
     for small, large in zip(plain, scaled, strict=True):
@@ -279,7 +309,7 @@ def real_map(name):
 
 
 def test_the_small_office_is_two_rooms_joined_by_two_metres():
-    found = segmented(real_map("pmb2-small-office/map.yaml"), door_width=2.2)
+    found = segmented(real_map("pmb2-small-office/map.yaml"))
     assert areas(found) == pytest.approx([46.7, 95.3], rel=0.02)
 
 
@@ -289,9 +319,61 @@ def test_the_small_office_is_two_rooms_joined_by_two_metres():
         "turtlebot3/map.yaml",
         "nav2-depot/depot.yaml",
         "husky-playpen/playpen_map.yaml",
-        "pmb2-small-office/map.yaml",
     ],
 )
 def test_maps_of_one_room_say_so(name):
     with pytest.raises(InvalidInputError, match="has only one room"):
         segmented(real_map(name))
+
+
+FLOORS = {
+    "Freiburg101_scan": 20,
+    "Freiburg52_scan": 17,
+    "lab_a_scan": 90,
+    "lab_c_scan": 29,
+    "lab_intel": 33,
+    "office_a": 48,
+    "office_c": 68,
+    "office_e": 59,
+    "office_g": 72,
+    "office_i": 54,
+}
+"""How many of the rooms marked by hand are found, of the floor empty and with furniture."""
+
+
+def marked(name):
+    """The rooms of a floor that people marked, numbered from 1."""
+    path = ROOT.parent / "shared" / "data" / "floors-ipa" / f"{name}_gt_segmentation.png"
+    require(path.exists(), f"the floor {name}")
+    shades = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    _, labels, statistics, _ = cv2.connectedComponentsWithStats(
+        (shades > 250).astype(np.uint8), connectivity=4
+    )
+    large = np.flatnonzero(statistics[:, cv2.CC_STAT_AREA] >= 20)[1:]
+    numbers = np.zeros(len(statistics), np.int64)
+    numbers[large] = np.arange(1, len(large) + 1)
+    return numbers[labels], len(large)
+
+
+def found_of(name, truth, count):
+    """How many of the marked rooms have a room that shares half of what both cover."""
+    shades = cv2.imread(
+        str(ROOT.parent / "shared" / "data" / "floors-ipa" / f"{name}.png"), cv2.IMREAD_GRAYSCALE
+    )
+    cells = np.where(shades > 250, 0, 100).astype(np.int8)[::-1]
+    found = np.zeros(shades.shape, np.int32)
+    for number, item in enumerate(segmented(cells).scene.objects, 1):
+        corners = [np.round(ring / CELL - 0.5).astype(np.int32) for ring in item.rings]
+        cv2.fillPoly(found, corners, number)
+    both = np.zeros((count + 1, int(found.max()) + 1))
+    np.add.at(both, (truth.reshape(-1), found[::-1].reshape(-1)), 1.0)
+    either = both.sum(axis=1)[:, None] + both.sum(axis=0) - both
+    return int(((both / either)[1:, 1:].max(axis=1) > 0.5).sum())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FLOORS)
+def test_rooms_that_people_marked_are_found(name):
+    truth, count = marked(name)
+    found = found_of(name, truth, count) + found_of(f"{name}_furnitures", truth, count)
+    assert found >= FLOORS[name]

@@ -138,7 +138,7 @@ def test_segmenters_and_their_parameters_are_chosen_by_side():
             r"map_segmenter\.name is 'room', which is no segmenter; choose",
         ),
         ({"map_segmenter": "strokes"}, r"is 'strokes', which cannot read source occupancy_grid"),
-        ({"sketch_segmenter": "rooms"}, r"is 'rooms', which cannot read source stroke_set"),
+        ({"sketch_segmenter": "image"}, r"is 'image', which cannot read source stroke_set"),
         (
             {"params": {"map_segmenter": {"size": 1}}},
             r"map_segmenter\.parameters\.size is no param",

@@ -87,7 +87,7 @@ def test_an_algorithm_of_another_kind_is_unknown():
 def test_a_segmenter_that_cannot_read_the_source_is_refused_with_those_that_can():
     error = refused({"sketch_segmenter": Choice("polygons")}, SOURCES["strokes"], None)
     assert (error.reason, error.field) == (Reason.WRONG_ALGORITHM, "sketch_segmenter.name")
-    assert "stroke_set; choose one of: strokes" in error.problem
+    assert "stroke_set; choose one of: rooms, strokes" in error.problem
 
 
 @pytest.mark.parametrize("choice", [Choice("polygons"), Choice("", {"min_size": 1.0})])
@@ -184,36 +184,38 @@ def test_levels_are_laid_over_each_other_as_the_oracle_does(chosen, parameters):
     assert found.searcher.params.model_dump(exclude_unset=True) == expected
 
 
-MAPS = Defaults({"map_segmenter": Choice("rooms", {"min_area": 2.0})})
+MAPS = Defaults({"map_segmenter": Choice("occupancy-grid", {"region_share": 0.5})})
+ROOMS = {"map_segmenter": Choice("rooms", {"min_area": 2.0})}
 
 
 def test_a_configured_segmenter_is_used_for_the_sources_that_it_reads():
     registry, grid = default_registry(), SOURCES["occupancy-grid"]
     pipeline = resolve(registry, {}, SOURCES["strokes"], grid, MAPS)
-    assert pipeline.map_segmenter.name == "rooms"
-    assert pipeline.map_segmenter.params.min_area == 2.0
+    assert pipeline.map_segmenter.name == "occupancy-grid"
+    assert pipeline.map_segmenter.params.region_share == 0.5
     assert resolve(registry, {}, None, SOURCES["polygons"], MAPS).map_segmenter.name == "polygons"
     assert resolve(registry, {}, None, None, MAPS).map_segmenter is None
     assert resolve(registry, {}, grid, None, MAPS).sketch_segmenter.name == "occupancy-grid"
-    named = {"map_segmenter": Choice("occupancy-grid")}
-    assert resolve(registry, named, None, grid, MAPS).map_segmenter.name == "occupancy-grid"
+    named = {"map_segmenter": Choice("rooms")}
+    assert resolve(registry, named, None, grid, MAPS).map_segmenter.name == "rooms"
 
 
 def test_a_segmenter_in_the_request_stays_strict():
     with pytest.raises(InvalidInputError, match="cannot read source polygon_set"):
         resolve(
-            default_registry(), {"map_segmenter": Choice("rooms")}, None, SOURCES["polygons"], MAPS
+            default_registry(), {"map_segmenter": Choice("image")}, None, SOURCES["polygons"], MAPS
         )
 
 
 def test_a_source_alone_takes_what_holds_for_its_side_of_a_match():
     registry = default_registry()
-    for name, expected in [("occupancy-grid", "rooms"), ("image", "image"), ("strokes", "strokes")]:
-        found = resolve_segmenter(registry, Choice(), SOURCES[name], MAPS)
-        assert found.name == expected
+    for name in ("image", "strokes"):
+        assert resolve_segmenter(registry, Choice(), SOURCES[name], MAPS).name == name
+    found = resolve_segmenter(registry, Choice(), SOURCES["occupancy-grid"], MAPS)
+    assert found.params.region_share == 0.5
     mine = Defaults(profiles=(Profile("mine", "", MAPS.pipeline),))
     found = resolve_segmenter(registry, Choice(), SOURCES["occupancy-grid"], mine, "mine")
-    assert found.name == "rooms"
+    assert found.params.region_share == 0.5
 
 
 def test_an_unknown_profile_is_refused_with_the_choices():
@@ -247,7 +249,7 @@ def test_a_profile_of_no_use_is_refused_and_says_why():
 
 
 def test_the_algorithms_of_a_request_are_told_without_setting_them_up():
-    defaults = Defaults({"searcher": Choice("easm", {"no": "such parameter"}), **MAPS.pipeline})
+    defaults = Defaults({"searcher": Choice("easm", {"no": "such parameter"}), **ROOMS})
     found = chosen_algorithms(
         default_registry(),
         {"map_segmenter": Choice(), "searcher": Choice(), "histogram": Choice("hybrid")},
@@ -260,7 +262,7 @@ def test_the_algorithms_of_a_request_are_told_without_setting_them_up():
 def test_the_catalogue_knows_what_holds_where_a_request_says_nothing():
     registry = default_registry()
     defaults = Defaults(
-        {"searcher": Choice("easm", {"patience": 9}), **MAPS.pipeline},
+        {"searcher": Choice("easm", {"patience": 9}), **ROOMS},
         {Kind.SEARCHER: {"easm": {"population": 7}, "nn": {"seed_points": 5}}},
     )
     names = default_names(registry, defaults)

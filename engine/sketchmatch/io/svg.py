@@ -28,6 +28,7 @@ Nothing outside the document is ever opened, and a document that defines entitie
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -54,7 +55,7 @@ from sketchmatch.io._svg_frame import NUMBER, Frame, css_transform, fitted, leng
 from sketchmatch.io._svg_ink import pen_lines
 from sketchmatch.io._svg_style import INITIAL, Colour, Look, Styles
 from sketchmatch.io._svg_tree import LONGEST_CAUSE, invalid, named_element, tag_of
-from sketchmatch.model import FloatArray, Stroke, StrokeSet
+from sketchmatch.model import FloatArray, Landmark, Stroke, StrokeSet
 from sketchmatch.model.limits import check_vertices, source_limits
 
 __all__ = ["decode_svg"]
@@ -134,6 +135,7 @@ def decode_svg(data: bytes) -> StrokeSet:
             for points in _lines(shape, tolerance)
         ),
         tuple(f"{each.place} was taken for the paper: all else lies on it." for each in ground),
+        tuple(drawing.names),
     )
 
 
@@ -241,6 +243,7 @@ class _Drawing:
         self._visited = 1
         self.background = self._styles.background(root)
         self.page: Box | None = None
+        self.names: list[Landmark] = []
 
     def shapes(self) -> Iterator[_Shape]:
         """Yield the shapes that are shown, in the order they are drawn."""
@@ -250,6 +253,9 @@ class _Drawing:
             element, outer = stack.pop()
             look = self._styles.look(element, outer.look)
             if not look.displayed or not _for_us(element):
+                continue
+            if tag_of(element) == "text":
+                self.names.extend(_written(element, outer.matrix))
                 continue
             inner = replace(
                 outer, look=look, size=(None, None), matrix=self._placed(element, look, outer)
@@ -313,7 +319,7 @@ class _Drawing:
             size = (element.get("width"), element.get("height"))
             context = replace(context, matrix=self._offset(element, context), size=size)
             return ([] if target is None else [target]), context
-        children = [child for child in element if tag_of(child) in _DRAWN]
+        children = [child for child in element if tag_of(child) in {*_DRAWN, "text"}]
         if tag_of(element) == "switch":
             shown = next((child for child in element if tag_of(child) and _for_us(child)), None)
             return [child for child in children if child is shown], context
@@ -481,6 +487,23 @@ def _for_us(element: ElementTree.Element) -> bool:
         each.strip().lower().startswith("en") for each in languages.split(",")
     )
     return english and "requiredExtensions" not in element.attrib
+
+
+def _written(text: ElementTree.Element, matrix: Any) -> Iterator[Landmark]:
+    """Yield what a text says and where it begins, unless that cannot be read."""
+    name = _spaced(" ".join("".join(text.itertext()).split()))
+    placed = [text, *(part for part in text if tag_of(part) == "tspan")]
+    try:
+        own = svgelements.Matrix(text.get("transform", ""))
+        x, y = (
+            next((float(part.get(axis, "").split()[0]) for part in placed if part.get(axis)), 0.0)
+            for axis in ("x", "y")
+        )
+        point = (own * matrix).point_in_matrix_space((x, y))
+    except (ValueError, IndexError, TypeError):
+        return
+    if name and math.isfinite(point.x) and math.isfinite(point.y):
+        yield Landmark(name, (float(point.x), -float(point.y)), "room")
 
 
 def _label(element: ElementTree.Element) -> str:

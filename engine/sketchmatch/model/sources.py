@@ -80,10 +80,13 @@ class StrokeSet:
     notes
         What whoever read the file left out or had to decide, each one sentence for people: the
         engine puts them before the segmenter's warnings.
+    landmarks
+        Names that are written in the sketch, of kind ``"room"``, in sketch units.
     """
 
     strokes: tuple[Stroke, ...]
     notes: tuple[str, ...] = ()
+    landmarks: tuple[Landmark, ...] = ()
 
     field = "stroke_set"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +12,38 @@ from sketchmatch.model import FloatArray, IntArray
 from sketchmatch_builtin.segmenters._cells import Mask
 from sketchmatch_builtin.segmenters._merging import groups
 
-__all__ = ["divided"]
+__all__ = ["divided", "doorway"]
 
 _Labels = NDArray[np.int32]
 _Widths = NDArray[np.float32]
 
 # Of the wider part's width: a passage as wide as this is no doorway, but the same corridor.
-_SAME_WIDTH = 0.75
+_SAME_WIDTH = 0.88
+# Of the mean distance to a wall, which in a square room is a sixth of its side: half that side.
+_DOORWAY = 3.0
+# A ray of a laser is nowhere twice this share of a doorway wide.
+_RAY = 0.1
+# What nothing leads into, and is nowhere this share of a doorway wide, is a cupboard or a shaft.
+_SHAFT = 0.5
+
+
+def doorway(free: Mask, most: float) -> float:
+    """Return up to how wide, in cells, a passage is a doorway: half of a typical room's width.
+
+    Parameters
+    ----------
+    free
+        1 where a cell is free, 0 elsewhere; at least one is.
+    most
+        The widest doorway there is, in cells.
+    """
+    return min(_DOORWAY * float(_widths(np.pad(free, 1))[1:-1, 1:-1][free > 0].mean()), most)
+
+
+def _widths(free: Mask) -> _Widths:
+    """Return how far each free cell is from the nearest that is not."""
+    widths = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.asarray(widths, dtype=np.float32)
 
 
 def divided(free: Mask, door: float, least: float) -> Mask:
@@ -35,12 +62,13 @@ def divided(free: Mask, door: float, least: float) -> Mask:
     -------
     ndarray
         Shape of ``free``: rooms are components of cells joined by sides or corners. Corners and
-        closets that no room reaches are among them, however small.
+        closets that no room reaches are among them, however small, but not rays of a laser
+        through glass, nor what is closed and too narrow for anyone.
     """
     free = np.pad(free, 1)
-    width = np.asarray(
-        cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE), dtype=np.float32
-    )
+    width = _widths(free)
+    free = _without_shafts(free, width, door)
+    free &= _near(width > _RAY * door, 2.0 * _RAY * door)
     labels = _bodies(free, width, door / 2.0 + 0.5)
     labels = _with_narrow_rooms(free, labels, least)
     _grow(free, labels)
@@ -56,7 +84,7 @@ def _bodies(free: Mask, width: _Widths, radius: float) -> _Labels:
     distance = cv2.distanceTransform(1 - cores, cv2.DIST_L2, cv2.DIST_MASK_5)
     nearest = _nearest(_numbered(cores, 8)[0])
     # A core's disc is free, so that within it the nearest core lies on this side of all walls.
-    nearest[(distance > radius - 0.5) | (free == 0)] = 0
+    nearest[(distance > math.floor(radius)) | (free == 0)] = 0
     return nearest
 
 
@@ -144,6 +172,23 @@ def _passages(labels: _Labels, width: _Widths) -> tuple[IntArray, FloatArray]:
     passage = np.zeros(len(found))
     np.maximum.at(passage, number.reshape(-1), np.concatenate(widths))
     return found, passage
+
+
+def _near(mask: NDArray[np.bool_], reach: float) -> Mask:
+    """Return which cells are within reach of a mask; corners of what it is the core of are."""
+    if not mask.any():
+        return np.zeros(mask.shape, np.uint8)
+    away = cv2.distanceTransform(1 - mask.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    return (away <= reach).view(np.uint8)
+
+
+def _without_shafts(free: Mask, width: _Widths, door: float) -> Mask:
+    """Return free cells without what is closed and too narrow for anyone, as cupboards are."""
+    count, parts = cv2.connectedComponents(free, connectivity=8)
+    spaces = np.asarray(parts, dtype=np.int32)
+    widest = np.zeros(count, np.float32)
+    np.maximum.at(widest, spaces.reshape(-1), width.reshape(-1))
+    return np.asarray((2.0 * widest >= _SHAFT * door)[spaces], dtype=np.uint8)
 
 
 def _along_borders(labels: _Labels) -> NDArray[np.bool_]:

@@ -1,0 +1,147 @@
+"""Drawn floor plans as cells: what lies between walls is free, whoever drew them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from sketchmatch.api import InvalidInputError, Reason
+from sketchmatch.model import FloatArray, Image, PolygonSet, StrokeSet
+from sketchmatch_builtin.segmenters._cells import Mask
+from sketchmatch_builtin.segmenters._doorways import divided, doorway
+
+__all__ = ["Plan", "drawn"]
+
+# Cells along the longer side of what lines are drawn into, or a picture is made smaller to.
+_SIDE = 1000
+# Around a plan there is free space, this share of its longer side wide.
+_MARGIN = 0.1
+# Shades of a picture that are nearer to each other are of one thing.
+_CONTRAST = 32.0
+_LARGEST = 1e15
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Free cells of a drawn plan, row 0 the lowest, all that is outside the building left out.
+
+    Attributes
+    ----------
+    free
+        1 where a cell is free, in a frame of cells that are not.
+    cell
+        Side of a cell in the drawing's unit.
+    corner
+        (x, y) of the lower left corner of cell (0, 0), in the drawing's unit.
+    door
+        Up to how wide a passage is a doorway, in cells.
+    """
+
+    free: Mask
+    cell: float
+    corner: tuple[float, float]
+    door: float
+
+
+def drawn(source: StrokeSet | PolygonSet | Image, door_width: float | None) -> Plan:
+    """Return the free cells of a drawn plan.
+
+    Parameters
+    ----------
+    source
+        Strokes and outlines that are walls, or a picture of free space and walls, of which either
+        is darker.
+    door_width
+        Widest doorway in the drawing's unit, or None to find it from the drawing.
+    """
+    if isinstance(source, Image):
+        figure, cell, corner = _of_picture(source)
+    else:
+        figure, cell, corner = _of_lines(_lines(source), source.field)
+    door = None if door_width is None else door_width / cell
+    free, width = _between(figure, door)
+    # Walls have less room between their borders than what lies between them.
+    if isinstance(source, Image) and np.count_nonzero(figure) > np.count_nonzero(free):
+        free, width = figure, doorway(figure, math.inf) if door is None else door
+    return Plan(free, cell, corner, width)
+
+
+def _lines(source: StrokeSet | PolygonSet) -> list[FloatArray]:
+    """Return lines that are walls, each of shape (k, 2)."""
+    if isinstance(source, StrokeSet):
+        return [stroke.points for stroke in source.strokes]
+    rings = [ring for polygon in source.polygons for ring in polygon.rings]
+    return [np.concatenate([ring, ring[:1]]) for ring in rings if len(ring)]
+
+
+def _of_lines(lines: Sequence[FloatArray], field: str) -> tuple[Mask, float, tuple[float, float]]:
+    """Return the cells that lines go through, in free space all around."""
+    points = np.concatenate([np.zeros((0, 2)), *lines])
+    path = "strokes" if field == "stroke_set" else "polygons"
+    if not len(points) or not (np.abs(points) < _LARGEST).all():
+        what = "hold no point" if not len(points) else "hold a point that is no plain number"
+        raise InvalidInputError(Reason.TOO_FEW_OBJECTS, path, f"{what}; draw the walls of rooms")
+    low, size = points.min(axis=0), np.ptp(points, axis=0)
+    cell = float(size.max()) / _SIDE or 1.0
+    margin = round(_MARGIN * _SIDE)
+    columns, rows = (np.ceil(size / cell).astype(int) + 2 * margin + 1).tolist()
+    walls = np.zeros((rows, columns), np.uint8)
+    corners = [np.floor((line - low) / cell).astype(np.int32) + margin for line in lines]
+    cv2.polylines(walls, corners, False, (1,), thickness=2)
+    return walls, cell, (float(low[0]) - margin * cell, float(low[1]) - margin * cell)
+
+
+def _of_picture(source: Image) -> tuple[Mask, float, tuple[float, float]]:
+    """Return the cells that are not of the shade along the picture's border, in a margin."""
+    grey = source.pixels
+    if grey.ndim == 3:
+        grey = np.asarray(cv2.cvtColor(grey, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
+    rows, columns = grey.shape
+    scale = max(max(rows, columns) / _SIDE, 1.0)
+    if scale > 1.0:
+        side = (max(round(columns / scale), 1), max(round(rows / scale), 1))
+        grey = np.asarray(cv2.resize(grey, side, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    if float(np.ptp(grey)) < _CONTRAST:
+        raise InvalidInputError(
+            Reason.TOO_FEW_OBJECTS, "pixels", "is of one shade; give a picture of rooms and walls"
+        )
+    _, light = cv2.threshold(grey[::-1], 0, 1, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
+    border = np.concatenate([light[0], light[-1], light[:, 0], light[:, -1]])
+    margin = round(_MARGIN * max(grey.shape))
+    figure = np.pad(light.astype(np.uint8) ^ np.uint8(border.mean() > 0.5), margin)
+    return figure, scale, (-margin * scale, -margin * scale)
+
+
+def _between(walls: Mask, door: float | None) -> tuple[Mask, float]:
+    """Return the cells between walls, without what is outside, and how wide a doorway is.
+
+    Outside is what joins the border through whatever is wider than a doorway: the outer wall may
+    have doors, too. How wide these are is found from what lies within the hull of the walls, and
+    then from what lies behind doorways.
+    """
+    free = 1 - walls
+    inside = _hull(walls) & free
+    for _ in range(2):
+        width = door or (doorway(inside, math.inf) if inside.any() else 1.0)
+        inside = _off_border(divided(free, width, width**2 / 2.0)) & free
+    # What was cut within the building is joined again, to be cut once for all sources.
+    reach = np.ones((5, 5), np.uint8)
+    return np.asarray(cv2.dilate(inside, reach), dtype=np.uint8) & free, width
+
+
+def _hull(mask: Mask) -> Mask:
+    filled = np.zeros(mask.shape, np.uint8)
+    if mask.any():
+        cv2.fillConvexPoly(filled, cv2.convexHull(cv2.findNonZero(mask)), (1,))
+    return filled
+
+
+def _off_border(mask: Mask) -> Mask:
+    """Return a mask's components that do not reach its border."""
+    framed = np.pad(mask, 1, constant_values=1)
+    cv2.floodFill(framed, None, (0, 0), (0,), flags=8)
+    return np.asarray(framed[1:-1, 1:-1])

@@ -1,0 +1,179 @@
+"""The segmenter of rooms on drawn floor plans: strokes, polygons and pictures."""
+
+import itertools
+
+import cv2
+import numpy as np
+import pytest
+import shapely
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io import read_source
+from sketchmatch.model import Image, LabelledPolygon, PolygonSet, Stroke, StrokeSet
+from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
+from tests.tools import ROOT, require
+
+WALLS = [
+    [(0, 0), (12, 0), (12, 9), (6.5, 9)],  # a door in the outer wall
+    [(5.6, 9), (0, 9), (0, 0)],
+    [(0, 5), (1, 5)],
+    [(1.9, 5), (5.0, 5)],
+    [(5.9, 5), (9, 5)],
+    [(9.9, 5), (12, 5)],
+    [(4, 5), (4, 9)],
+    [(8, 5), (8, 9)],
+    [(0, 3), (3, 3)],
+    [(3.9, 3), (12, 3)],
+]
+"""Three rooms above a corridor and one below, all joined by gaps as wide as a door."""
+
+AREAS = [16.0, 16.0, 16.0, 24.0, 36.0]
+
+
+def strokes(lines, factor=1.0, labels=()):
+    labels = [*labels, *[""] * (len(lines) - len(labels))]
+    return StrokeSet(
+        tuple(
+            Stroke(factor * np.array(line, dtype=float), None, label)
+            for line, label in zip(lines, labels, strict=True)
+        )
+    )
+
+
+def segmented(source, **params):
+    return RoomSegmenter(RoomSegmenter.Params(**params)).segment(source)
+
+
+def areas(source, unit=1.0, **params):
+    return [item.area / unit**2 for item in segmented(source, **params).scene.objects]
+
+
+def picture(paper=255, ink=0, scale=40):
+    pixels = np.full((11 * scale, 14 * scale, 3), paper, np.uint8)
+    for line in WALLS:
+        corners = [((x + 1) * scale, (10 - y) * scale) for x, y in line]
+        cv2.polylines(pixels, [np.array(corners, np.int32)], False, (ink,) * 3, 5)
+    return pixels
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.001, 300.0])
+def test_strokes_that_are_walls_with_gaps_enclose_rooms_at_any_scale(factor):
+    found = areas(strokes(WALLS, factor), factor)
+    assert sorted(found) == pytest.approx(AREAS, rel=0.08)
+
+
+@pytest.mark.parametrize(("paper", "ink"), [(255, 0), (20, 235), (200, 90)])
+def test_pictures_of_plans_are_read_dark_on_light_and_light_on_dark(paper, ink):
+    assert sorted(areas(Image(picture(paper, ink)), 40)) == pytest.approx(AREAS, rel=0.12)
+
+
+def test_rooms_of_a_picture_lie_where_they_are_drawn():
+    rooms = segmented(Image(picture())).scene.objects
+    corridor = min(rooms, key=lambda item: abs(item.area - 24 * 1600))
+    # y points up from the picture's lower edge, 1 m of paper below the plan.
+    assert corridor.centroid == pytest.approx((7 * 40, 5 * 40), abs=12)
+
+
+def test_a_large_picture_has_the_same_rooms():
+    assert sorted(areas(Image(picture(scale=120)), 120)) == pytest.approx(AREAS, rel=0.12)
+
+
+@pytest.mark.parametrize("light", [True, False])
+def test_a_mask_of_free_space_is_cut_where_it_is_narrow(light):
+    mask = np.zeros((300, 500), np.uint8)
+    mask[40:240, 40:220] = mask[60:260, 260:460] = mask[120:150, 220:260] = 255
+    found = areas(Image(mask if light else 255 - mask))
+    assert sorted(found) == pytest.approx([36000, 40000], rel=0.05)
+
+
+def test_a_door_drawn_with_its_swing_is_no_room():
+    turn = np.linspace(0.0, np.pi / 2, 20)
+    swing = [(1 + 0.9 * np.sin(t), 5 + 0.9 * np.cos(t)) for t in turn]
+    lines = [*WALLS, [(1, 5), (1, 5.9)], swing]
+    assert len(segmented(strokes(lines)).scene) == 5
+
+
+def test_names_written_in_a_picture_are_no_walls():
+    pixels = picture()
+    cv2.putText(pixels, "kitchen", (80, 130), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (0, 0, 0), 2)
+    assert sorted(areas(Image(pixels), 40)) == pytest.approx(AREAS, rel=0.12)
+
+
+def test_a_label_that_one_line_has_names_the_room_around_its_middle():
+    table = [(1.5, 6.5), (2.2, 6.5), (2.2, 7.2), (1.5, 6.5)]
+    lines = [table, *WALLS]
+    labels = ["kitchen", *["wall"] * len(WALLS)]
+    rooms = segmented(strokes(lines, labels=labels)).scene.objects
+    assert [item.label for item in rooms if item.label] == ["kitchen"]
+    kitchen = next(item for item in rooms if item.label)
+    assert kitchen.polygon.contains(shapely.Point(1.9, 6.9))
+
+
+def test_texts_of_an_svg_plan_name_its_rooms(tmp_path):
+    paths = "".join(
+        f'<path fill="none" stroke="black" d="M{" L".join(f"{x} {9 - y}" for x, y in line)}"/>'
+        for line in WALLS
+    )
+    texts = (
+        '<text x="1" y="2">bath</text><text x="99" y="1" display="none">cellar</text>'
+        '<text transform="translate(5 2)"><tspan x="0" y="0">living\n room</tspan></text>'
+        '<text x="none" y="2">attic</text>'
+    )
+    file = tmp_path / "plan.svg"
+    file.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg"><g transform="scale(10)">{paths}{texts}</g></svg>'
+    )
+    rooms = segmented(read_source(file)).scene.objects
+    assert sorted(item.label for item in rooms) == ["", "", "", "bath", "living room"]
+    bath = next(item for item in rooms if item.label == "bath")
+    assert bath.polygon.contains(shapely.Point(10, -20))
+
+
+def test_polygons_are_walls():
+    boxes = [
+        [(x - 0.1, y - 0.1), (u + 0.1, y - 0.1), (u + 0.1, v + 0.1), (x - 0.1, v + 0.1)]
+        for line in WALLS
+        for (a, b), (c, d) in itertools.pairwise(line)
+        for x, u, y, v in [(min(a, c), max(a, c), min(b, d), max(b, d))]
+    ]
+    polygons = PolygonSet(tuple(LabelledPolygon((np.array(box, float),)) for box in boxes))
+    assert sorted(areas(polygons)) == pytest.approx(AREAS, rel=0.2)
+
+
+def test_door_width_is_in_the_drawings_own_unit():
+    assert len(segmented(strokes(WALLS, 100.0), door_width=110.0).scene) == 5
+    with pytest.raises(InvalidInputError, match="passages of up to 10, and a match"):
+        segmented(strokes(WALLS, 100.0), door_width=10.0)
+
+
+REFUSED = {
+    "nothing": (StrokeSet(()), "strokes"),
+    "a dot": (strokes([[(3, 4)]]), "strokes"),
+    "a line": (strokes([[(0, 0), (5, 5)]]), "strokes"),
+    "a room": (strokes([[(0, 0), (5, 0), (5, 5), (0, 5), (0, 0)]]), "strokes"),
+    "no number": (strokes([[(0, np.nan), (5, 5)]]), "strokes"),
+    "one shade": (Image(np.full((50, 50), 200, np.uint8)), "pixels"),
+    "no polygon": (PolygonSet(()), "polygons"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_has_no_two_rooms_is_refused_in_one_sentence(case):
+    source, path = REFUSED[case]
+    with pytest.raises(InvalidInputError) as caught:
+        segmented(source)
+    assert (caught.value.field, caught.value.reason) == (path, Reason.TOO_FEW_OBJECTS)
+
+
+DRAWN = {
+    **{"00": 3, "01": 4, "02": 5, "03": 5, "04": 2, "05": 3},
+    **{"06": 4, "07": 4, "08": 5, "09": 5, "10": 5, "11": 4},
+}
+"""Regions of the masks that people drew from memory, looked at in the contact sheet."""
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_masks_that_people_drew_are_cut_into_regions(name):
+    path = ROOT.parent / "shared" / "data" / "sketches" / "rooms-rsi" / "sketches" / f"{name}.png"
+    require(path.exists(), f"the sketch {name}")
+    assert len(segmented(read_source(path)).scene) == DRAWN[name]
