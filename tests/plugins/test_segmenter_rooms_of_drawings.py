@@ -9,7 +9,7 @@ import shapely
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
-from sketchmatch.model import Image, LabelledPolygon, PolygonSet, Stroke, StrokeSet
+from sketchmatch.model import Image, LabelledPolygon, OccupancyGrid, PolygonSet, Stroke, StrokeSet
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
 from tests.tools import ROOT, require
 
@@ -60,6 +60,23 @@ def picture(paper=255, ink=0, scale=40):
 def test_strokes_that_are_walls_with_gaps_enclose_rooms_at_any_scale(factor):
     found = areas(strokes(WALLS, factor), factor)
     assert sorted(found) == pytest.approx(AREAS, rel=0.08)
+
+
+@pytest.mark.slow
+def test_a_floor_at_twice_the_resolution_has_the_same_rooms():
+    path = ROOT.parent / "shared" / "data" / "floors-ipa" / "lab_c_scan.png"
+    require(path.exists(), "the floor lab_c_scan")
+    shades = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    cells = np.where(shades > 250, 0, 100).astype(np.int8)[::-1]
+    finer = np.kron(cells, np.ones((2, 2), np.int8))
+    coarse, fine = (
+        [item.polygon for item in segmented(OccupancyGrid(grid, cell)).scene.objects]
+        for grid, cell in ((cells, 0.05), (finer, 0.025))
+    )
+    assert len(coarse) == len(fine) == 20
+    for room in coarse:
+        shares = [room.intersection(other).area / room.union(other).area for other in fine]
+        assert max(shares) > 0.9
 
 
 @pytest.mark.parametrize(("paper", "ink"), [(255, 0), (20, 235), (200, 90)])
@@ -152,6 +169,7 @@ REFUSED = {
     "a line": (strokes([[(0, 0), (5, 5)]]), "strokes"),
     "a room": (strokes([[(0, 0), (5, 0), (5, 5), (0, 5), (0, 0)]]), "strokes"),
     "no number": (strokes([[(0, np.nan), (5, 5)]]), "strokes"),
+    "too small": (strokes(WALLS, 1e-200), "strokes"),
     "one shade": (Image(np.full((50, 50), 200, np.uint8)), "pixels"),
     "no polygon": (PolygonSet(()), "polygons"),
 }

@@ -22,7 +22,8 @@ _SIDE = 1000
 _MARGIN = 0.1
 # Shades of a picture that are nearer to each other are of one thing.
 _CONTRAST = 32.0
-_LARGEST = 1e15
+# Beyond these, coordinates are a fault, and areas would overflow or vanish.
+_SMALLEST, _LARGEST = 1e-100, 1e15
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,10 @@ def _of_lines(lines: Sequence[FloatArray], field: str) -> tuple[Mask, float, tup
         what = "hold no point" if not len(points) else "hold a point that is no plain number"
         raise InvalidInputError(Reason.TOO_FEW_OBJECTS, path, f"{what}; draw the walls of rooms")
     low, size = points.min(axis=0), np.ptp(points, axis=0)
+    if 0.0 < size.max() < _SMALLEST:
+        raise InvalidInputError(
+            Reason.TOO_FEW_OBJECTS, path, f"are {size.max():g} wide; draw them in a usual unit"
+        )
     cell = float(size.max()) / _SIDE or 1.0
     margin = round(_MARGIN * _SIDE)
     columns, rows = (np.ceil(size / cell).astype(int) + 2 * margin + 1).tolist()
