@@ -372,3 +372,17 @@ def test_on_another_place_the_answer_stands_but_nothing_is_asked():
     assert result.probability == pytest.approx(0.1)
     assert result.ambiguity is None
     assert repr(result).startswith("<MatchResult: probably not this place (0.250 that it is): 3 of")
+
+
+@pytest.mark.parametrize(("columns", "rows", "turns"), [(3, 3, 4), (4, 3, 2)])
+def test_a_regular_grid_of_equal_pillars_is_its_place_whichever_way_it_is_turned(
+    columns, rows, turns
+):
+    # In the mirror, or with its things exchanged, it is itself: that says nothing of chance.
+    box = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    places = itertools.product(range(columns), range(rows))
+    pillars = Scene.from_polygons([box + 3.0 * np.array(place) for place in places])
+    result = match(pillars, pillars)
+    assert result.place_probability > 0.9
+    assert result.ambiguity.maps == turns
+    assert result.probability == pytest.approx(1.0 / turns, abs=0.05)
