@@ -75,7 +75,7 @@ class RoomSegmenter(Segmenter):
     cover. It was tuned on every second building by name, where 284 of 322 are found; on the others
     212 of 238. Recall and precision as [1]_ measures them, how much of a room and of a segment the
     largest overlap is, are 98.1 and 97.7 % empty, 91.8 and 97.8 % with furniture, without the rooms
-    below 0.3 m². Of all twenty floors these figures are quoted from it: morphological 98.1 and
+    below 0.3 m². Of all twenty floors its own figures, as others quote them: morphological 98.1 and
     88.5 %, 84.6 and 90.5 %; distance transform 96.9 and 88.4 %, 76.1 and 88.4 %; Voronoi 95.0 and
     94.8 %, 86.6 and 94.5 %; feature-based 89.2 and 90.4 %, 85.1 and 87.1 %. Neither its other ten
     floors nor its smallest rooms are in ours. MAORIS [2]_ reports 0.98 by Matthews' coefficient, on
