@@ -23,12 +23,14 @@ def logging_to_standard_error() -> Iterator[None]:
     Lines begin with the time, in UTC, and how grave it is. A thread writes them: where nobody
     reads standard error, lines are lost, and calls go on.
     """
-    handler, root = _Handler(), logging.getLogger()
+    handler, root, ours = _Handler(), logging.getLogger(), logging.getLogger("sketchmatch")
     root.addHandler(handler)
-    logging.getLogger("sketchmatch").setLevel(logging.INFO)
+    before = ours.level
+    ours.setLevel(logging.INFO)
     try:
         yield
     finally:
+        ours.setLevel(before)
         root.removeHandler(handler)
         handler.close()
 
