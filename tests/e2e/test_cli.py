@@ -605,7 +605,7 @@ def test_a_server_that_is_not_there_is_exit_code_3(command_line, arguments):
 
 @pytest.mark.slow
 def test_a_busy_server_is_exit_code_3_as_well(command_line):
-    with processes.server("--max-matches", "1") as running:
+    with processes.server("--max-matches", "1", "--max-waiting", "0") as running:
         other = Terminal("match", *ROOM, *LONG, "--server", running.address)
         other.wait_for("searching")
         done = command_line("match", *ROOM, "--server", running.address)
