@@ -17,7 +17,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from sketchmatch.model import BoolArray, FloatArray, IntArray
-from sketchmatch_builtin.judges._evidence import AT_FIRST, FARTHEST, LINES
+from sketchmatch_builtin.judges._evidence import AT_FIRST, LINES, scaled_lines, within
 from sketchmatch_builtin.judges.calibration import Layers, PlaceLayers
 
 __all__ = ["Case", "fitted_maps", "fitted_place"]
@@ -106,7 +106,7 @@ def fitted_place(
     """
     rng = np.random.default_rng(seed)
     of_places = _scaling(rows)
-    x, counts = _scaled(rows, of_places), counts / counts.mean()
+    x, counts = within(rows, of_places), counts / counts.mean()
     parameters = {
         "first": _random(rng, x.shape[1], _PLACE_WIDTH),
         "first_bias": np.zeros(_PLACE_WIDTH),
@@ -172,9 +172,8 @@ def _map_slopes(at: _Parameters, cases: Sequence[Case]) -> _Parameters:
 
 def _small(case: Case, of_lines: FloatArray, of_maps: FloatArray, of_scenes: FloatArray) -> Case:
     """Return a case in numbers as the layers see them, in half the room."""
-    lines = _scaled(case.lines, of_lines) * case.matched[:, :, None]
-    lines[:, :, 0] = case.matched
-    parts = lines, _scaled(case.whole, of_maps), _scaled(case.scene, of_scenes)
+    lines = scaled_lines(case.lines, case.matched, of_lines)
+    parts = lines, within(case.whole, of_maps), within(case.scene, of_scenes)
     lines, whole, scene = (each.astype(np.float32) for each in parts)
     score = (AT_FIRST * case.score).astype(np.float32)
     return case._replace(lines=lines, whole=whole, scene=scene, score=score)
@@ -215,8 +214,3 @@ def _random(rng: np.random.Generator, rows: int, columns: int) -> FloatArray:
 def _scaling(rows: FloatArray) -> FloatArray:
     """Return middle and scale of numbers, shape (2, k)."""
     return np.stack([rows.mean(axis=0), rows.std(axis=0) + 1e-5])
-
-
-def _scaled(rows: FloatArray, scaling: FloatArray) -> FloatArray:
-    scaled: FloatArray = np.clip((rows - scaling[0]) / scaling[1], -FARTHEST, FARTHEST)
-    return scaled

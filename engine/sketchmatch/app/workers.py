@@ -90,7 +90,6 @@ class Workers:
         self._doing: dict[Task, _Worker] = {}
         self._own: _Key = frozenset()
         self._background: set[asyncio.Task[None]] = set()
-        self._closed = False
 
     async def start(self, setup: Setup) -> None:
         """Start the workers that are kept: one first, since it may have to compile kernels.
@@ -170,7 +169,6 @@ class Workers:
 
     async def close(self) -> None:
         """Kill all workers and wait until they have ended."""
-        self._closed = True
         for worker in tuple(self._all):
             worker.kill()
         while self._all or self._background:

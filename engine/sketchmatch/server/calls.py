@@ -7,10 +7,12 @@ import logging
 import time
 from collections.abc import Awaitable, Callable
 from contextvars import ContextVar
-from typing import Any, cast
+from typing import Any
 from urllib.parse import unquote
 
 import grpc
+
+from sketchmatch.server.wrapping import WrappingInterceptor, kind_of
 
 __all__ = ["CallLogInterceptor", "note", "noted"]
 
@@ -30,26 +32,15 @@ def noted() -> str:
     return " ".join(f"{name}={value}" for name, value in _facts.get({}).items())
 
 
-class CallLogInterceptor(grpc.aio.ServerInterceptor):
+class CallLogInterceptor(WrappingInterceptor):
     """Writes the lines; health and reflection, which others poll, have none."""
 
-    async def intercept_service(
-        self,
-        continuation: Callable[
-            [grpc.HandlerCallDetails], Awaitable[grpc.RpcMethodHandler[Any, Any] | None]
-        ],
-        handler_call_details: grpc.HandlerCallDetails,
-    ) -> grpc.RpcMethodHandler[Any, Any] | None:
+    def wrapped(self, handler: Any, path: str) -> Any:
         """Return the method's handler, with its calls told of."""
-        handler = cast(Any, await continuation(handler_call_details))
-        path = handler_call_details.method
-        if handler is not None and path.startswith(_OURS):
-            # A caller without a token is refused before it has sent a request.
-            asked = "stream" if handler.request_streaming else "unary"
-            kind = f"{asked}_{'stream' if handler.response_streaming else 'unary'}"
-            method = _told(getattr(handler, kind), path.rpartition("/")[2])
-            handler = handler._replace(**{kind: method})
-        return cast("grpc.RpcMethodHandler[Any, Any] | None", handler)
+        if not path.startswith(_OURS):
+            return handler
+        kind = kind_of(handler)
+        return handler._replace(**{kind: _told(getattr(handler, kind), path.rpartition("/")[2])})
 
 
 def _told(method: Callable[[Any, _Context], Awaitable[Any]], name: str) -> Any:

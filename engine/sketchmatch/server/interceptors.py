@@ -6,7 +6,7 @@ import asyncio
 import logging
 from collections.abc import AsyncIterable, AsyncIterator, Awaitable, Callable
 from functools import partial
-from typing import Any, NoReturn, cast
+from typing import Any, NoReturn
 
 import grpc
 
@@ -15,6 +15,7 @@ from sketchmatch.app.packed import Packed
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.server.calls import note, noted
 from sketchmatch.server.status import is_fault, refusal
+from sketchmatch.server.wrapping import WrappingInterceptor, kind_of
 
 __all__ = ["ErrorInterceptor", "OpeningInterceptor"]
 
@@ -24,47 +25,34 @@ _log = logging.getLogger(__name__)
 _Context = grpc.aio.ServicerContext[Any, Any]
 
 
-class ErrorInterceptor(grpc.aio.ServerInterceptor):
+class ErrorInterceptor(WrappingInterceptor):
     """Ends a call whose method raises with the status of the error."""
 
-    async def intercept_service(
-        self,
-        continuation: Callable[
-            [grpc.HandlerCallDetails], Awaitable[grpc.RpcMethodHandler[Any, Any] | None]
-        ],
-        handler_call_details: grpc.HandlerCallDetails,
-    ) -> grpc.RpcMethodHandler[Any, Any] | None:
+    def wrapped(self, handler: Any, path: str) -> Any:
         """Return the method's handler, with its errors caught."""
-        handler = cast(Any, await continuation(handler_call_details))
         # Health and reflection see to themselves.
-        if handler is not None and handler_call_details.method.startswith(_OURS):
-            kind = _kind(handler)
-            handler = handler._replace(**{kind: _caught(getattr(handler, kind))})
-        return cast("grpc.RpcMethodHandler[Any, Any] | None", handler)
+        if not path.startswith(_OURS):
+            return handler
+        kind = kind_of(handler)
+        return handler._replace(**{kind: _caught(getattr(handler, kind))})
 
 
-class OpeningInterceptor(grpc.aio.ServerInterceptor):
+class OpeningInterceptor(WrappingInterceptor):
     """Inflates and decodes requests, but those that methods want as they come.
 
     gRPC itself would inflate them before anybody knows of the call, and say of what it cannot
     decode that nobody knows what happened. What is opened here is short, and opened for anybody.
     """
 
-    async def intercept_service(
-        self,
-        continuation: Callable[
-            [grpc.HandlerCallDetails], Awaitable[grpc.RpcMethodHandler[Any, Any] | None]
-        ],
-        handler_call_details: grpc.HandlerCallDetails,
-    ) -> grpc.RpcMethodHandler[Any, Any] | None:
+    def wrapped(self, handler: Any, path: str) -> Any:
         """Return the method's handler, with its requests opened by us."""
-        handler = cast(Any, await continuation(handler_call_details))
-        if handler is not None and handler.request_deserializer is not None:
-            kind, read = _kind(handler), partial(Packed, read=handler.request_deserializer)
-            opening = _opening_each if handler.request_streaming else _opening
-            method = opening(getattr(handler, kind))
-            handler = handler._replace(request_deserializer=read, **{kind: method})
-        return cast("grpc.RpcMethodHandler[Any, Any] | None", handler)
+        del path
+        if handler.request_deserializer is None:
+            return handler
+        kind, read = kind_of(handler), partial(Packed, read=handler.request_deserializer)
+        opening = _opening_each if handler.request_streaming else _opening
+        method = opening(getattr(handler, kind))
+        return handler._replace(request_deserializer=read, **{kind: method})
 
 
 def _opening(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
@@ -90,12 +78,6 @@ async def _opened(packed: Packed, context: _Context) -> Any:
         return packed.opened(_SHORT_BYTES)
     except InvalidInputError as error:
         await _abort(context, error)
-
-
-def _kind(handler: Any) -> str:
-    asked = "stream" if handler.request_streaming else "unary"
-    answered = "stream" if handler.response_streaming else "unary"
-    return f"{asked}_{answered}"
 
 
 def _caught(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:

@@ -15,6 +15,7 @@ from typing import Any, cast
 import grpc
 from google.rpc import error_details_pb2, status_pb2
 
+from sketchmatch.server.wrapping import WrappingInterceptor, kind_of
 from sketchmatch_proto.v1.match_pb2 import MatchAccepted, MatchResult, Outcome
 
 __all__ = ["Counter", "Gauge", "Histogram", "Metric", "Metrics", "MetricsInterceptor"]
@@ -205,7 +206,7 @@ class Metrics:
             self.stage_seconds.add(stage, algorithm, seconds=elapsed.total_seconds())
 
 
-class MetricsInterceptor(grpc.aio.ServerInterceptor):
+class MetricsInterceptor(WrappingInterceptor):
     """Counts calls, those that other interceptors refuse too; so it comes first.
 
     Parameters
@@ -217,25 +218,13 @@ class MetricsInterceptor(grpc.aio.ServerInterceptor):
     def __init__(self, metrics: Metrics) -> None:
         self._metrics = metrics
 
-    async def intercept_service(
-        self,
-        continuation: Callable[
-            [grpc.HandlerCallDetails], Awaitable[grpc.RpcMethodHandler[Any, Any] | None]
-        ],
-        handler_call_details: grpc.HandlerCallDetails,
-    ) -> grpc.RpcMethodHandler[Any, Any] | None:
+    def wrapped(self, handler: Any, path: str) -> Any:
         """Return the method's handler, counting."""
-        handler = cast(Any, await continuation(handler_call_details))
-        method = handler_call_details.method
-        if handler is None or method.startswith(_HEALTH):
-            return cast("grpc.RpcMethodHandler[Any, Any] | None", handler)
-        taking = "stream" if handler.request_streaming else "unary"
-        giving = "stream" if handler.response_streaming else "unary"
-        behaviour = getattr(handler, f"{taking}_{giving}")
-        if inspect.iscoroutinefunction(behaviour):
-            counted = self._counted(behaviour, self._metrics.label_of(method))
-            handler = handler._replace(**{f"{taking}_{giving}": counted})
-        return cast("grpc.RpcMethodHandler[Any, Any]", handler)
+        kind = kind_of(handler)
+        behaviour = getattr(handler, kind)
+        if path.startswith(_HEALTH) or not inspect.iscoroutinefunction(behaviour):
+            return handler
+        return handler._replace(**{kind: self._counted(behaviour, self._metrics.label_of(path))})
 
     def _counted(self, behaviour: Callable[[Any, Any], Awaitable[Any]], method: str) -> Any:
         metrics = self._metrics

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sketchmatch.model import FloatArray, IntArray
+from sketchmatch.model import BoolArray, FloatArray, IntArray
 from sketchmatch_builtin.alignment import Measured, Whole
 from sketchmatch_builtin.judges.calibration import Layers, Posterior
 
@@ -29,8 +29,10 @@ __all__ = [
     "lost_numbers",
     "map_numbers",
     "place_numbers",
+    "scaled_lines",
     "scene_numbers",
     "weighed",
+    "within",
     "worths",
 ]
 
@@ -156,11 +158,9 @@ def worths(known: Described, measured: Measured, layers: Layers, related: bool) 
     related
         Whether relations count, or places, sizes and shapes alone.
     """
-    lines = _within(line_numbers(measured, related), *layers.of_lines)
-    lines *= measured.matched[:, :, None]
-    lines[:, :, 0] = measured.matched
-    scene = _within(scene_numbers(known), *layers.of_scenes)
-    whole = _within(map_numbers(measured, known.drawn), *layers.of_maps)
+    lines = scaled_lines(line_numbers(measured, related), measured.matched, layers.of_lines)
+    scene = within(scene_numbers(known), layers.of_scenes)
+    whole = within(map_numbers(measured, known.drawn), layers.of_maps)
     width = lines.shape[2]
     hidden = lines @ layers.first[:width] + (scene @ layers.first[width:] + layers.first_bias)
     summed = LINES * np.maximum(hidden, 0.0).sum(axis=1)
@@ -169,6 +169,13 @@ def worths(known: Described, measured: Measured, layers: Layers, related: bool) 
     score = AT_FIRST * measured.wholes[:, Whole.SCORE]
     found: FloatArray = second @ layers.last + whole @ layers.direct + layers.score * score
     return found
+
+
+def scaled_lines(numbers: FloatArray, matched: BoolArray, of_lines: FloatArray) -> FloatArray:
+    """Return the numbers of lines as layers take them; the first says whether there is a line."""
+    lines = within(numbers, of_lines) * matched[:, :, None]
+    lines[:, :, 0] = matched
+    return lines
 
 
 def place_numbers(known: Described, layers: Layers) -> FloatArray:
@@ -228,7 +235,7 @@ def weighed(known: Described, learned: Posterior) -> Weighed:
     shares[: len(values)] = np.exp(values + labels - (values + labels).max())
     shares /= shares.sum()
     numbers, layers = place_numbers(known, learned.bare), learned.place
-    numbers = _within(numbers, *layers.of_places)
+    numbers = within(numbers, layers.of_places)
     hidden = np.maximum(numbers @ layers.first + layers.first_bias, 0.0)
     here = float(hidden @ layers.last + numbers @ layers.direct) + layers.constant
     lost = float(lost_numbers(shares, known.drawn, known.mapped) @ learned.lost)
@@ -241,8 +248,17 @@ def lost_numbers(shares: FloatArray, drawn: int, mapped: int) -> FloatArray:
     return np.array([1.0, few, math.log(mapped), math.log(shares.max()), drawn / mapped])
 
 
-def _within(numbers: FloatArray, middle: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return numbers in units of what was learned from, and not far beyond it."""
+def within(numbers: FloatArray, scaling: FloatArray) -> FloatArray:
+    """Return numbers in units of what was learned from, and not far beyond it.
+
+    Parameters
+    ----------
+    numbers
+        Shape (…, k).
+    scaling
+        Shape (2, k): middle and scale.
+    """
+    middle, scale = scaling
     bounded: FloatArray = np.clip((numbers - middle) / scale, -FARTHEST, FARTHEST)
     return bounded
 
