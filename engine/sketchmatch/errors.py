@@ -16,10 +16,12 @@ __all__ = [
     "AnswerUnavailableError",
     "InvalidInputError",
     "NotAuthenticatedError",
+    "NotFoundError",
     "PluginError",
     "Reason",
     "ServerStoppingError",
     "SketchmatchError",
+    "StoreError",
     "TooBusyError",
     "WorkerLostError",
     "quoted",
@@ -72,6 +74,8 @@ class Reason(StrEnum):
     SERVER_STOPPING = "SERVER_STOPPING"
     WORKER_LOST = "WORKER_LOST"
     NOT_AUTHENTICATED = "NOT_AUTHENTICATED"
+    NOT_FOUND = "NOT_FOUND"
+    STORE_UNAVAILABLE = "STORE_UNAVAILABLE"
 
 
 class SketchmatchError(Exception):
@@ -128,6 +132,18 @@ class NotAuthenticatedError(SketchmatchError):
     """The caller does not show who it is; the sentence never quotes what it shows instead."""
 
     reason = Reason.NOT_AUTHENTICATED
+
+
+class NotFoundError(SketchmatchError):
+    """The server keeps nothing of this name, or it is another caller's."""
+
+    reason = Reason.NOT_FOUND
+
+
+class StoreError(SketchmatchError):
+    """What the server keeps on disk cannot be read or written."""
+
+    reason = Reason.STORE_UNAVAILABLE
 
 
 class PluginError(SketchmatchError):

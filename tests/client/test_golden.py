@@ -7,11 +7,13 @@ import pytest
 from sketchmatch_client import (
     DeadlineExceededError,
     InvalidRequestError,
+    NotFoundError,
     Pin,
     ServerBusyError,
     ServerFailedError,
     ServerUnavailableError,
     SketchmatchError,
+    StoreError,
     sources,
 )
 from tests.contract.golden import NAMES, golden
@@ -233,6 +235,16 @@ class TestStatuses:
     def test_a_time_budget_that_was_too_short_keeps_the_servers_sentence(self, error):
         assert type(error) is DeadlineExceededError
         assert error.reason == "TIME_BUDGET_EXHAUSTED"
+
+    @pytest.mark.parametrize("error", ["not_found"], indirect=True)
+    def test_what_the_server_does_not_keep_is_not_found(self, error):
+        assert type(error) is NotFoundError
+        assert error.reason == "NOT_FOUND"
+
+    @pytest.mark.parametrize("error", ["failed_precondition"], indirect=True)
+    def test_a_store_that_fails_is_said(self, error):
+        assert type(error) is StoreError
+        assert error.reason == "STORE_UNAVAILABLE"
 
     @pytest.mark.parametrize("error", ["internal"], indirect=True)
     def test_a_plugin_that_failed_is_the_servers_fault(self, error):

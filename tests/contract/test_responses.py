@@ -10,8 +10,10 @@ from sketchmatch.app.setup import RequestLimits, Setup
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
+    NotFoundError,
     PluginError,
     Reason,
+    StoreError,
     TooBusyError,
     WorkerLostError,
 )
@@ -46,6 +48,15 @@ REFUSALS = {
     ),
     "Status.unavailable": status.refusal(
         WorkerLostError("the worker ended its process (signal 9)", 2)
+    ),
+    "Status.not_found": status.refusal(
+        NotFoundError("no match is called 6f1c; it ended long ago, or is another caller's")
+    ),
+    "Status.failed_precondition": status.refusal(
+        StoreError(
+            "the store's file /srv/matches.sqlite is full; delete what is not needed, or allow it "
+            "more bytes"
+        )
     ),
     "Status.internal": status.refusal(
         PluginError("searcher guessing of acme-tiles 2.1 failed: it ended without any answer")

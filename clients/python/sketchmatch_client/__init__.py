@@ -17,11 +17,13 @@ from sketchmatch_client.errors import (
     DeadlineExceededError,
     InvalidRequestError,
     NotAuthenticatedError,
+    NotFoundError,
     NotSupportedError,
     ServerBusyError,
     ServerFailedError,
     ServerUnavailableError,
     SketchmatchError,
+    StoreError,
 )
 
 __all__ = [
@@ -36,6 +38,7 @@ __all__ = [
     "MatchCollector",
     "MatchOptions",
     "NotAuthenticatedError",
+    "NotFoundError",
     "NotSupportedError",
     "Pin",
     "Progress",
@@ -43,6 +46,7 @@ __all__ = [
     "ServerFailedError",
     "ServerUnavailableError",
     "SketchmatchError",
+    "StoreError",
     "match_request",
     "segment_request",
     "sources",

@@ -16,11 +16,13 @@ __all__ = [
     "DeadlineExceededError",
     "InvalidRequestError",
     "NotAuthenticatedError",
+    "NotFoundError",
     "NotSupportedError",
     "ServerBusyError",
     "ServerFailedError",
     "ServerUnavailableError",
     "SketchmatchError",
+    "StoreError",
     "refused_as",
     "translated_errors",
 ]
@@ -99,6 +101,14 @@ class NotAuthenticatedError(SketchmatchError):
     """Server or client does not trust the other: give another token, or other certificates."""
 
 
+class NotFoundError(SketchmatchError):
+    """The server keeps nothing of this name, or it is another caller's."""
+
+
+class StoreError(SketchmatchError):
+    """The server cannot read or write what it keeps on disk; its operator has to act."""
+
+
 class NotSupportedError(SketchmatchError):
     """The server does not know the method; it is older than this client, or another server."""
 
@@ -132,6 +142,8 @@ def refused_as(reason: str, field: str, problem: str) -> Iterator[None]:
 _OTHERS: dict[grpc.StatusCode, type[SketchmatchError]] = {
     grpc.StatusCode.CANCELLED: CallCancelledError,
     grpc.StatusCode.UNIMPLEMENTED: NotSupportedError,
+    grpc.StatusCode.NOT_FOUND: NotFoundError,
+    grpc.StatusCode.FAILED_PRECONDITION: StoreError,
     grpc.StatusCode.UNAUTHENTICATED: NotAuthenticatedError,
     grpc.StatusCode.PERMISSION_DENIED: NotAuthenticatedError,
 }

@@ -130,6 +130,7 @@ def _exit_code(error: Exception) -> ExitCode:
         client.DeadlineExceededError: ExitCode.NO_ANSWER_IN_TIME,
         client.ServerUnavailableError: ExitCode.SERVER_UNAVAILABLE,
         client.ServerBusyError: ExitCode.SERVER_UNAVAILABLE,
+        client.NotFoundError: ExitCode.INVALID_INPUT,
         client.NotAuthenticatedError: ExitCode.NOT_AUTHENTICATED,
         client.SketchmatchError: ExitCode.ALGORITHM_FAILED,
     }

@@ -115,6 +115,17 @@ def serve(
             "read along.",
         ),
     ] = False,
+    store: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Where the server keeps things; in the user's folder for application state by "
+            "default. A folder serves one server at a time.",
+        ),
+    ] = None,
+    no_store: Annotated[
+        bool, typer.Option("--no-store", help="Keep nothing beyond the life of the server.")
+    ] = False,
     metrics_address: Annotated[
         str | None,
         typer.Option(
@@ -159,6 +170,8 @@ def serve(
         "server.tls_client_ca": tls_client_ca,
         "server.tokens": tokens,
         "server.insecure": insecure or None,
+        "server.store": store,
+        "server.keep": False if no_store else None,
         "server.metrics_address": metrics_address,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
@@ -216,7 +229,17 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
         Path(server.tokens) if server.tokens else None,
         server.insecure,
         server.metrics_address,
+        _store(server.store, server.keep),
     )
+
+
+def _store(folder: str | None, keep: bool) -> Path | None:
+    """Return where to keep things; None for nowhere."""
+    from platformdirs import user_state_path
+
+    if not keep:
+        return None
+    return Path(folder) if folder else user_state_path("sketchmatch", appauthor=False)
 
 
 def _setup(configuration: Configuration) -> Setup:

@@ -192,6 +192,13 @@ class _Server(_Section):
         "add` writes it; calls need none, when left out.",
         examples=["tokens"],
     )
+    store: str | None = Field(
+        None,
+        description="Folder of the server's own for what it keeps: one in the user's folder for "
+        "application state, when left out.",
+        examples=["/var/lib/sketchmatch"],
+    )
+    keep: bool = Field(True, description="Keep things on disk, beyond the life of the server.")
     metrics_address: Annotated[str | None, AfterValidator(_watched)] = Field(
         None,
         description="Host and port for Prometheus' /metrics and the probes /livez and /readyz over "

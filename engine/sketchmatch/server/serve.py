@@ -89,6 +89,8 @@ class ServerSettings:
         read along.
     metrics_address
         Host and port for metrics and probes over HTTP; None for none.
+    store
+        The folder for what is kept beyond the life of the server; None for keeping nothing.
     """
 
     address: str = "127.0.0.1:50051"
@@ -99,6 +101,7 @@ class ServerSettings:
     tokens: Path | None = None
     insecure: bool = False
     metrics_address: str | None = None
+    store: Path | None = None
 
 
 async def serve(

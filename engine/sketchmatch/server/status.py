@@ -12,10 +12,12 @@ from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
     NotAuthenticatedError,
+    NotFoundError,
     PluginError,
     Reason,
     ServerStoppingError,
     SketchmatchError,
+    StoreError,
     TooBusyError,
     WorkerLostError,
 )
@@ -33,6 +35,8 @@ _CODES: dict[type[SketchmatchError], grpc.StatusCode] = {
     WorkerLostError: grpc.StatusCode.UNAVAILABLE,
     AnswerUnavailableError: grpc.StatusCode.DEADLINE_EXCEEDED,
     NotAuthenticatedError: grpc.StatusCode.UNAUTHENTICATED,
+    NotFoundError: grpc.StatusCode.NOT_FOUND,
+    StoreError: grpc.StatusCode.FAILED_PRECONDITION,
     PluginError: grpc.StatusCode.INTERNAL,
 }
 
@@ -59,7 +63,13 @@ def refusal(error: BaseException) -> Refusal:
             delay = duration_pb2.Duration(seconds=error.retry_seconds)
             retry = error_details_pb2.RetryInfo(retry_delay=delay)
             return _refusal(_CODES[type(error)], error, error.reason, retry)
-        case AnswerUnavailableError() | NotAuthenticatedError() | PluginError():
+        case (
+            AnswerUnavailableError()
+            | NotAuthenticatedError()
+            | NotFoundError()
+            | StoreError()
+            | PluginError()
+        ):
             return _refusal(_CODES[type(error)], error, error.reason)
     return Refusal(
         grpc.StatusCode.INTERNAL,

@@ -74,6 +74,12 @@ class _ErrorReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._En
     """UNAVAILABLE: the process that answered the request has ended. Send the request again after the
     time in `RetryInfo`.
     """
+    ERROR_REASON_NOT_FOUND: _ErrorReason.ValueType  # 22
+    """NOT_FOUND: the server keeps nothing of this name, or it is another caller's."""
+    ERROR_REASON_STORE_UNAVAILABLE: _ErrorReason.ValueType  # 23
+    """FAILED_PRECONDITION: what the server keeps on disk cannot be read or written; its operator has
+    to act. Requests that need nothing of it are answered all the same.
+    """
 
 class ErrorReason(_ErrorReason, metaclass=_ErrorReasonEnumTypeWrapper):
     """Why a request was refused, for programs. People read the status message.
@@ -140,5 +146,11 @@ when another one has taken its place.
 ERROR_REASON_WORKER_LOST: ErrorReason.ValueType  # 21
 """UNAVAILABLE: the process that answered the request has ended. Send the request again after the
 time in `RetryInfo`.
+"""
+ERROR_REASON_NOT_FOUND: ErrorReason.ValueType  # 22
+"""NOT_FOUND: the server keeps nothing of this name, or it is another caller's."""
+ERROR_REASON_STORE_UNAVAILABLE: ErrorReason.ValueType  # 23
+"""FAILED_PRECONDITION: what the server keeps on disk cannot be read or written; its operator has
+to act. Requests that need nothing of it are answered all the same.
 """
 global___ErrorReason = ErrorReason
