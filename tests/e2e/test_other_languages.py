@@ -1,0 +1,161 @@
+"""Languages for which there is no client of ours: their pages' commands, and one answer for all."""
+
+import os
+import re
+import shutil
+import subprocess
+
+import pytest
+
+from sketchmatch_client import Client, SketchmatchError
+from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
+from tests.client.fake_server import running
+from tests.client.test_golden import MATCHES
+from tests.contract.golden import FOLDER, NAMES, golden
+from tests.shell import steps
+from tests.tools import ROOT, TOOLS, require, tool
+
+pytestmark = pytest.mark.slow
+
+SAID = {file.stem: file.read_text("utf-8").splitlines() for file in (FOLDER / "said").iterdir()}
+"""What a program in any language prints about a golden request or status."""
+STATUSES = [name for name in NAMES if name.startswith("Status.")]
+_OFFLINE = re.compile("dial tcp|Could ?n.t resolve|failed to download|EAI_AGAIN|ENOTFOUND", re.I)
+
+
+class Program:
+    """The program of a page, in a copy of the checkout, built as the page says."""
+
+    def __init__(self, folder, page, **environment):
+        self.folder = folder / page
+        for name in ("proto", page):
+            shutil.copytree(ROOT / name, folder / name, dirs_exist_ok=True)
+        self._environment = {**os.environ, "PATH": f"{TOOLS}:{os.environ['PATH']}", **environment}
+        text = (self.folder / "README.md").read_text("utf-8")
+        self._build, self._run = map(
+            steps, re.findall(r"^```console\n(.*?)^```", text, re.S | re.M)
+        )
+        for step in self._build:
+            done = self._bash(step.command)
+            require(not _OFFLINE.search(done.stderr), f"a registry that `{step.command}` reaches")
+            assert done.returncode == 0, done.stderr
+
+    def example(self, address):
+        """Run what the page shows, and see that it shows the same."""
+        (step,) = self._run
+        done = self._bash(step.command.replace("localhost:50051", address))
+        assert (done.returncode, done.stderr) == (0, "")
+        lines = done.stdout.splitlines()
+        assert len(lines) == len(step.shown)
+        assert step.missing_in(lines) is None, lines
+
+    def says(self, address, request):
+        """Return code and lines of the program about a request."""
+        file = self.folder / "request.binpb"
+        file.write_bytes(request.SerializeToString())
+        (step,) = self._run
+        done = self._bash(f"{step.command.replace('localhost:50051', address)} {file}")
+        return done.returncode, done.stdout.splitlines()
+
+    def _bash(self, command):
+        return subprocess.run(
+            ["bash", "-c", command],
+            cwd=self.folder,
+            env=self._environment,
+            capture_output=True,
+            text=True,
+            timeout=550,
+            check=False,
+        )
+
+
+def go(folder):
+    require(shutil.which("go"), "go")
+    tool("buf")
+    return Program(folder, "clients/go", GOFLAGS="-p=1")
+
+
+def rust(folder):
+    require(shutil.which("cargo"), "cargo")
+    protoc = folder / "protoc"
+    protoc.write_text(f'#!/bin/sh\nexec {tool("python")} -m grpc_tools.protoc "$@"\n')
+    protoc.chmod(0o755)
+    return Program(folder, "clients/rust", PROTOC=str(protoc), CARGO_BUILD_JOBS="1")
+
+
+def node(folder):
+    require(shutil.which("npm"), "npm")
+    return Program(folder, "proto/examples")
+
+
+@pytest.fixture(scope="module", params=[go, rust, node], ids=["go", "rust", "node"])
+def program(request, tmp_path_factory):
+    return request.param(tmp_path_factory.mktemp(request.param.__name__))
+
+
+def test_the_pages_example_has_the_answer_that_it_shows(program, address):
+    program.example(address)
+
+
+def test_the_golden_request_has_the_golden_answer(program, address):
+    name = "MatchRequest.turned"
+    assert program.says(address, golden(name)) == (0, SAID[name])
+
+
+def test_a_request_arrives_as_it_was_written(program):
+    with running() as fake:
+        program.says(fake.address, golden("MatchRequest"))
+    assert fake.requests == [golden("MatchRequest")]
+
+
+@pytest.mark.parametrize("name", STATUSES)
+def test_an_error_is_told_with_its_details(program, name):
+    with running() as fake:
+        fake.error = golden(name)
+        assert program.says(fake.address, MatchRequest()) == (1, SAID[name])
+
+
+def test_what_the_server_refuses_names_its_field(program, address):
+    request = golden("MatchRequest.turned")
+    request.pipeline.histogram.parameters["directions"] = 3
+    field = "pipeline.histogram.parameters.directions"
+    assert program.says(address, request) == (
+        1,
+        [
+            f"error 3: {field} is 3; it should be a multiple of 2",
+            "reason INVALID_PARAMETER",
+            f"field {field}",
+        ],
+    )
+
+
+def test_the_python_client_has_the_golden_answer_too(address):
+    sketch, map_, options = MATCHES["MatchRequest.turned"]
+    with Client(address) as client:
+        lines = client.match(sketch, map_, **options).result.object_matches
+    assert [
+        f"{line.sketch_object} {line.sketch_label} is {line.map_object} {line.map_label}, "
+        f"confidence {line.confidence:.3f}"
+        for line in lines
+    ] == SAID["MatchRequest.turned"]
+
+
+@pytest.mark.parametrize("name", STATUSES)
+def test_the_python_client_tells_the_same_of_an_error(name):
+    sketch, map_, options = MATCHES["MatchRequest.turned"]
+    with running() as fake, Client(fake.address, retries=0) as client:
+        fake.error = golden(name)
+        with pytest.raises(SketchmatchError) as no:
+            client.match(sketch, map_, **options)
+    error = no.value
+    field, pause = getattr(error, "field", ""), getattr(error, "retry_after", None)
+    assert [
+        f"error {golden(name).code}: {error}",
+        f"reason {error.reason}",
+        *([f"field {field}"] if field else []),
+        *([f"retry after {pause:g}s"] if pause is not None else []),
+    ] == SAID[name]
+
+
+def test_every_golden_status_is_told():
+    assert set(SAID) == {"MatchRequest.turned", *STATUSES}
