@@ -23,6 +23,7 @@ from sketchmatch_client.errors import (
     ServerUnavailableError,
     SketchmatchError,
 )
+from sketchmatch_views import MatchRow
 
 __all__ = [
     "AccessOptions",
@@ -35,6 +36,7 @@ __all__ = [
     "MatchCall",
     "MatchCollector",
     "MatchOptions",
+    "MatchRow",
     "NotAuthenticatedError",
     "NotSupportedError",
     "Pin",
