@@ -69,7 +69,7 @@ def test_a_scope_cancels_those_who_go_through_events(endless):
 
                 async def follow():
                     async for event in client.events(IMAGE, IMAGE):
-                        seen.append(event.WhichOneof("event"))
+                        seen.append(event.WhichOneof("event"))  # noqa: PERF401 (as they come)
 
                 group.start_soon(follow)
                 await begun(endless)
