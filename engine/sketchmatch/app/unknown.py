@@ -30,7 +30,7 @@ def read_whole(read: Callable[[bytes], Message], data: bytes) -> Message:
     if not known.DESCRIPTOR.full_name.startswith(_OURS):
         return known
     size = known.ByteSize()
-    known.DiscardUnknownFields()  # type: ignore[no-untyped-call]
+    known.DiscardUnknownFields()
     if known.ByteSize() == size:
         return known
     message = read(data)
@@ -47,7 +47,7 @@ def read_whole(read: Callable[[bytes], Message], data: bytes) -> Message:
 
 def _first_unknown(message: Message, known: Message) -> tuple[str, int]:
     """Return where the first unknown field is; ``known`` is the message without such fields."""
-    found = UnknownFieldSet(message)  # type: ignore[no-untyped-call]
+    found = UnknownFieldSet(message)
     if len(found):
         return "", found[0].field_number
     for (path, inner), (_, rest) in zip(_messages(message), _messages(known), strict=True):
