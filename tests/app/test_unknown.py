@@ -42,9 +42,7 @@ def with_newer(message: Message, *path: object) -> bytes:
     changed.CopyFrom(message)
     inner = changed
     for step in path:
-        inner = (
-            inner[step] if isinstance(step, int) or step == "population" else getattr(inner, step)
-        )
+        inner = inner[step] if isinstance(step, int) else getattr(inner, step)
     inner.MergeFromString(NEWER)
     return changed.SerializeToString()
 
@@ -138,3 +136,13 @@ def test_a_null_is_a_value_and_no_parameters_are_none(setup):
     with pytest.raises(InvalidInputError) as no:
         list(answers(job, setup))
     assert no.value.reason is Reason.INVALID_PARAMETER
+
+
+@pytest.mark.parametrize("kind", ["stroke_set", "polygon_set"])
+def test_a_way_of_y_that_nobody_knows_is_refused(setup, kind):
+    request = golden("MatchRequest" if kind == "stroke_set" else "MatchRequest.turned")
+    getattr(request.sketch, kind).y_axis = 7
+    job = Order("m1", "MatchRequest", request.SerializeToString()).job(LIMIT)
+    with pytest.raises(InvalidInputError, match=r"is 7, .*; give Y_AXIS_UP or Y_AXIS_DOWN$") as no:
+        list(answers(job, setup))
+    assert (no.value.reason, no.value.field) == (Reason.INVALID_FIELD, f"sketch.{kind}.y_axis")

@@ -343,4 +343,11 @@ def _points(
 
 
 def _upward(y_axis: int) -> float:
+    if y_axis not in source_pb2.YAxis.values():
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "y_axis",
+            f"is {y_axis}, which this server's contract does not know; give Y_AXIS_UP or "
+            "Y_AXIS_DOWN",
+        )
     return -1.0 if y_axis == source_pb2.Y_AXIS_DOWN else 1.0
