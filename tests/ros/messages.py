@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from functools import cache
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -37,9 +38,9 @@ def store():
         f"sketchmatch_msgs/msg/{file.stem}": file.read_text("utf-8")
         for file in OURS.glob("msg/*.msg")
     }
-    for file in OURS.glob("action/*.action"):
+    for file, names in _parts().items():
         parts = file.read_text("utf-8").split("\n---\n")
-        for part, text in zip(("Goal", "Result", "Feedback"), parts, strict=True):
+        for part, text in zip(names, parts, strict=True):
             texts[f"sketchmatch_msgs/msg/{file.stem}{part}"] = text
     texts["nav2_msgs/msg/CostmapFilterInfo"] = _FILTER_INFO
     types = {}
@@ -92,18 +93,23 @@ def modules() -> dict[str, ModuleType]:
     found: dict[str, ModuleType] = {}
     for full_name in store().fielddefs:
         package, _, name = full_name.split("/")
-        if package == "sketchmatch_msgs" and name.startswith("MatchSketch"):
-            continue
         module = found.setdefault(f"{package}.msg", ModuleType(f"{package}.msg"))
         module.__dict__[name] = message(full_name)
         found.setdefault(package, ModuleType(package))
-    action = ModuleType("sketchmatch_msgs.action")
-    parts = {
-        part: message(f"sketchmatch_msgs/msg/MatchSketch{part}")
-        for part in ("Goal", "Result", "Feedback")
+    for file, names in _parts().items():
+        kind = f"sketchmatch_msgs.{file.parent.name}"
+        parts = {part: message(f"sketchmatch_msgs/msg/{file.stem}{part}") for part in names}
+        module = found.setdefault(kind, ModuleType(kind))
+        module.__dict__[file.stem] = SimpleNamespace(**parts)
+    return found
+
+
+def _parts() -> dict[Path, tuple[str, ...]]:
+    """Return our actions and services, and what their parts are called."""
+    return {
+        **dict.fromkeys(OURS.glob("action/*.action"), ("Goal", "Result", "Feedback")),
+        **dict.fromkeys(OURS.glob("srv/*.srv"), ("Request", "Response")),
     }
-    action.__dict__["MatchSketch"] = SimpleNamespace(**parts)
-    return {**found, "sketchmatch_msgs.action": action}
 
 
 _MISSING = object()

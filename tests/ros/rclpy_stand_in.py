@@ -47,7 +47,8 @@ class Publisher:
 class LifecycleNode:
     def __init__(self, name):
         self.name, self.state = name, "unconfigured"
-        self.parameters, self.publishers, self.subscriptions, self.said = {}, {}, {}, []
+        self.parameters, self.publishers, self.subscriptions = {}, {}, {}
+        self.services, self.said = {}, []
 
     def declare_parameter(self, name, default):
         self.parameters.setdefault(name, default)
@@ -81,6 +82,14 @@ class LifecycleNode:
 
     def destroy_subscription(self, subscription):
         del self.subscriptions[subscription.topic]
+
+    def create_service(self, kind, name, callback, *, callback_group):
+        assert type(callback_group).__name__ == "ReentrantCallbackGroup"
+        self.services[name] = lambda request: callback(request, kind.Response())
+        return name
+
+    def destroy_service(self, service):
+        del self.services[service]
 
     def on_configure(self, _state):
         return TransitionCallbackReturn.SUCCESS

@@ -162,7 +162,8 @@ def test_markers_outline_and_name_each_object_in_its_colour(ros, match, header):
 
 def test_an_error_has_reason_field_and_pause(ros):
     refused = InvalidRequestError("map is empty", "INVALID_GRID", "map")
-    found = read(wire(ros.conversions.failure(refused)), "sketchmatch_msgs/msg/MatchSketchResult")
+    result = ros.conversions.failure(refused, message("sketchmatch_msgs/msg/ObjectMap")())
+    found = read(wire(result), "sketchmatch_msgs/msg/MatchSketchResult")
     assert (found.error, found.error_reason, found.error_field) == (
         "map is empty",
         "INVALID_GRID",
@@ -174,7 +175,7 @@ def test_an_error_has_reason_field_and_pause(ros):
 def test_a_busy_server_says_when_to_come_back(ros):
     busy = ServerBusyError("the server is busy", "LIMIT_EXCEEDED")
     busy.retry_after = 2.0
-    assert ros.conversions.failure(busy).retry_after == 2.0
+    assert ros.conversions.failure(busy, None).retry_after == 2.0
 
 
 def test_a_route_looks_where_it_goes(ros, header):
@@ -219,7 +220,34 @@ def test_zones_beyond_the_map_are_cut_and_several_are_joined(ros):
     assert (0, 0) in occupied(mask)
     assert (2, 4) in occupied(mask)
     assert (1, 1) not in occupied(mask)
-    assert occupied(ros.conversions.keepout_mask([], grid(np.zeros((3, 5))))) == set()
+    for nothing in ([], [[]]):
+        assert occupied(ros.conversions.keepout_mask(nothing, grid(np.zeros((3, 5))))) == set()
+
+
+def test_what_is_to_be_carried_lies_as_the_objects_of_its_sketch(ros, match):
+    point, stroke = message(POINT), message("sketchmatch_msgs/msg/Stroke")
+    sketch = message("sketchmatch_msgs/msg/Sketch")
+    zones = [stroke(points=[point(x=1.0, y=2.0), point(x=3.0, y=4.0)])]
+    drawn = ros.conversions.drawn_features(sketch(zones=zones, y_axis=sketch.Y_AXIS_DOWN), match)
+    assert drawn.zones == [[(1.0, -2.0), (3.0, -4.0)]]
+    assert drawn.routes == [[(p.x, p.y) for p in match.scenes.sketch_route]]
+    assert len(drawn.routes[0]) > 1
+    match.scenes.ClearField("sketch_route")
+    drawn = ros.conversions.drawn_features(sketch(zones=zones, y_axis=sketch.Y_AXIS_UP), match)
+    assert (drawn.routes, drawn.zones) == ([], [[(1.0, 2.0), (3.0, 4.0)]])
+
+
+def test_the_service_answers_in_the_order_of_what_was_drawn(ros, header):
+    carried = ros.conversions.carried(
+        ros.matching.Features([[(0, 0), (1, 0)], []], [[], [(0, 0), (2, 0), (2, 2)]]), header
+    )
+    found = read(wire(carried), "sketchmatch_msgs/msg/CarryResponse")
+    assert [len(path.poses) for path in found.routes] == [2, 0]
+    assert [[(p.x, p.y) for p in zone.points] for zone in found.zones] == [
+        [],
+        [(0, 0), (2, 0), (2, 2)],
+    ]
+    assert found.routes[0].header.frame_id == "map"
 
 
 def test_nav2_is_told_of_the_mask(ros, header):

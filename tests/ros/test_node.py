@@ -1,13 +1,14 @@
 """The node between stand-ins for rclpy and a server: its life, its goals, and what it publishes."""
 
 from array import array
+from copy import deepcopy
 from threading import Thread
 
 import grpc
 import numpy as np
 import pytest
 
-from sketchmatch_client import sources
+from sketchmatch_client import InvalidRequestError, sources
 from tests.client.fake_server import EVENTS, reason, running, violation
 from tests.contract.golden import golden
 from tests.pace import wait_until
@@ -205,31 +206,110 @@ def test_a_node_that_was_never_configured_can_be_shut_down(ros):
     )
 
 
-def test_what_a_carrier_carries_is_published_for_nav2(ros, server):
-    asked = []
+class Carrier:
+    """Carries a hundredth of everything; fails where it is told to."""
 
-    def carry(client, sketch, map_, partners):
-        asked.append((client, sketch, map_, partners))
-        zone = [(0.0, 0.0), (0.04, 0.0), (0.04, 0.04), (0.0, 0.04)]
-        return ros.matching.Carried(routes=[[(0, 0), (1, 0)]], zones=[zone])
+    def __init__(self, features):
+        self.features, self.asked, self.error = features, [], None
 
-    made = ros.node.SketchmatchNode(carry)
+    def __call__(self, client, sketch, map_, partners, drawn):
+        assert client.server_info().api_version == "sketchmatch.v1"
+        self.asked.append((sketch, map_, partners, drawn))
+        if self.error is not None:
+            raise self.error
+        return self.features(
+            *(
+                [[(x / 100, y / 100) for x, y in line] for line in lines]
+                for lines in (drawn.routes, drawn.zones)
+            )
+        )
+
+
+@pytest.fixture
+def carrier(ros):
+    return Carrier(ros.matching.Features)
+
+
+@pytest.fixture
+def carrying(ros, server, carrier):
+    """An active node with a map and a carrier."""
+    made = ros.node.SketchmatchNode(carrier)
     made.parameters["address"] = server.address
     made.go("configure", "inactive")
     made.go("activate", "active")
     made.subscriptions["map"].callback(room())
-    executed(made)
-    (_, sketch, map_, partners) = asked[0]
-    assert sketch == server.requests[0].sketch
-    assert map_ == server.requests[0].map
-    assert partners == {1: 3, 2: 0}
-    (route,), (mask,) = sent(made, "route"), sent(made, "keepout_mask")
-    assert (route.header.frame_id, len(route.poses)) == ("site", 2)
-    assert list(np.array(mask.data)) == [100, 0, 0, 0, 0, 0]
-    (told,) = sent(made, "keepout_filter_info")
-    assert told.filter_mask_topic == "/sketchmatch/keepout_mask"
+    yield made
     made.go("deactivate", "inactive")
     made.go("cleanup", "unconfigured")
+    assert made.services == {}
+
+
+def with_zone(wanted):
+    point = message("geometry_msgs/msg/Point")
+    corners = [point(x=x, y=y) for x, y in [(0.0, 0.0), (4.0, 0.0), (4.0, -4.0), (0.0, -4.0)]]
+    wanted.sketch.zones = [message("sketchmatch_msgs/msg/Stroke")(points=corners)]
+    return wanted
+
+
+def test_what_a_carrier_carries_is_published_for_nav2(carrying, carrier, server):
+    handle = GoalHandle(carrying.action_server, with_zone(goal()))
+    assert carrying.action_server.accepts(handle.request) is GoalResponse.ACCEPT
+    carrying.action_server.execute(handle)
+    ((sketch, map_, partners, drawn),) = carrier.asked
+    assert (sketch, map_) == (server.requests[0].sketch, server.requests[0].map)
+    assert partners == {1: 3, 2: 0}
+    assert drawn.zones == [[(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]]
+    (route,), (mask,) = sent(carrying, "route"), sent(carrying, "keepout_mask")
+    assert route.header.frame_id == "site"
+    assert len(route.poses) == len(STREAM[1].scenes.sketch_route) > 1
+    assert list(np.array(mask.data)) == [100, 0, 0, 0, 0, 0]
+    (told,) = sent(carrying, "keepout_filter_info")
+    assert told.filter_mask_topic == "/sketchmatch/keepout_mask"
+
+
+def test_a_sketch_without_route_and_zones_takes_away_those_of_an_earlier_one(
+    carrying, carrier, server
+):
+    executed(carrying)
+    scenes = deepcopy(STREAM[1])
+    scenes.scenes.ClearField("sketch_route")
+    server.events = (STREAM[0], scenes, *STREAM[2:])
+    executed(carrying)
+    assert len(carrier.asked) == 1
+    assert [bool(path.poses) for path in sent(carrying, "route")] == [True, False]
+    assert not any(sent(carrying, "keepout_mask")[-1].data)
+
+
+def test_what_cannot_be_carried_aborts_and_keeps_the_object_map(carrying, carrier):
+    carrier.error = InvalidRequestError("the objects are mirrored", "INVALID_FIELD", "object_map")
+    handle, result = executed(carrying)
+    assert handle.status == "aborted"
+    assert (result.error, result.error_field) == ("the objects are mirrored", "object_map")
+    assert len(result.object_map.objects) == 2
+    assert sent(carrying, "route") == []
+
+
+def test_more_of_the_latest_sketch_is_carried_on_demand(carrying, carrier):
+    point, stroke = message("geometry_msgs/msg/Point"), message("sketchmatch_msgs/msg/Stroke")
+    line = stroke(points=[point(x=100.0, y=-200.0), point(x=300.0, y=-200.0)])
+    wanted = message("sketchmatch_msgs/msg/CarryRequest")(routes=[line], zones=[line], y_axis=1)
+    early = carrying.services["~/carry"](wanted)
+    assert (early.routes, early.zones) == ([], [])
+    assert "send a goal to match_sketch first" in early.error
+    executed(carrying)
+    found = carrying.services["~/carry"](wanted)
+    places = [(pose.pose.position.x, pose.pose.position.y) for pose in found.routes[0].poses]
+    assert places == [(1, 2), (3, 2)]
+    assert [(p.x, p.y) for p in found.zones[0].points] == [(1, 2), (3, 2)]
+    assert (found.error, found.routes[0].header.frame_id) == ("", "site")
+    carrier.error = InvalidRequestError("it folds", "INVALID_FIELD", "object_map")
+    assert carrying.services["~/carry"](wanted).error == "it folds"
+
+
+def test_zones_are_refused_where_nothing_carries_them(node):
+    assert node.action_server.accepts(with_zone(goal())) is GoalResponse.REJECT
+    assert "no carrier for zones" in node.said[-1][1]
+    assert node.services == {}
 
 
 def test_the_action_runs_beside_itself(node):

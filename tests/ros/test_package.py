@@ -38,10 +38,10 @@ def test_every_interface_is_generated_and_its_parts_are_depended_on():
     text = (OURS / "CMakeLists.txt").read_text("utf-8")
     files = {
         str(file.relative_to(OURS))
-        for kind in ("msg", "action")
+        for kind in ("msg", "action", "srv")
         for file in (OURS / kind).iterdir()
     }
-    assert set(re.findall(r'"((?:msg|action)/\w+\.\w+)"', text)) == files
+    assert set(re.findall(r'"((?:msg|action|srv)/\w+\.\w+)"', text)) == files
     used = {name.partition("/")[0] for name in re.findall(r"\w+/msg/\w+", str(ours()))}
     assert used - {"sketchmatch_msgs", "builtin_interfaces"} <= depends(OURS)
 
@@ -73,7 +73,7 @@ def test_rviz_shows_the_topics_that_the_node_has():
     code = (PACKAGE / "sketchmatch_ros" / "node.py").read_text("utf-8")
     published = set(re.findall(r'"~/(\w+)", _LATCHED', code))
     assert topics <= {f"/sketchmatch/{name}" for name in published}
-    for name in (*published, "match_sketch"):
+    for name in (*published, "match_sketch", "carry"):
         assert f"`~/{name}`" in README
 
 

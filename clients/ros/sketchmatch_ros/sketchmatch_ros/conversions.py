@@ -7,20 +7,24 @@ from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, Point32, Polygon, Pose, PoseStamped, Quaternion
 from nav2_msgs.msg import CostmapFilterInfo
 from nav_msgs.msg import MapMetaData, OccupancyGrid, Path
 from sketchmatch_msgs.action import MatchSketch
-from sketchmatch_msgs.msg import MatchedObject, ObjectMap, Sketch
+from sketchmatch_msgs.msg import MatchedObject, ObjectMap, Sketch, Stroke
+from sketchmatch_msgs.srv import Carry
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from sketchmatch_client import Match, Progress, SketchmatchError, sources
 from sketchmatch_proto.v1.match_pb2 import Phase
 from sketchmatch_proto.v1.source_pb2 import Source
+from sketchmatch_ros.matching import Features
 from sketchmatch_views import PAIR_COLOURS
 
 __all__ = [
+    "carried",
+    "drawn_features",
     "failure",
     "feedback",
     "filter_info",
@@ -30,6 +34,7 @@ __all__ = [
     "object_map",
     "route_path",
     "sketch_source",
+    "upright",
 ]
 
 XY = Sequence[float]
@@ -62,6 +67,18 @@ def sketch_source(sketch: Sketch) -> Source:
     )
 
 
+def upright(strokes: Iterable[Stroke], y_axis: int) -> list[list[XY]]:
+    """Return the points of strokes as the objects of their sketch lie, y upwards."""
+    up = -1.0 if y_axis == Sketch.Y_AXIS_DOWN else 1.0
+    return [[(point.x, up * point.y) for point in stroke.points] for stroke in strokes]
+
+
+def drawn_features(sketch: Sketch, match: Match) -> Features:
+    """Return what is to be carried of a sketch: the route that was found in it, and its zones."""
+    route = [(point.x, point.y) for point in match.scenes.sketch_route]
+    return Features([route] if route else [], upright(sketch.zones, sketch.y_axis))
+
+
 def feedback(progress: Progress) -> MatchSketch.Feedback:
     """Return how far a match is."""
     elapsed = progress.elapsed
@@ -73,9 +90,10 @@ def feedback(progress: Progress) -> MatchSketch.Feedback:
     )
 
 
-def failure(error: SketchmatchError) -> MatchSketch.Result:
-    """Return what an aborted goal says of why."""
+def failure(error: SketchmatchError, answer: ObjectMap) -> MatchSketch.Result:
+    """Return what an aborted goal says of why, with the object map as far as there is one."""
     return MatchSketch.Result(
+        object_map=answer,
         error=str(error),
         error_reason=error.reason,
         error_field=getattr(error, "field", ""),
@@ -173,12 +191,23 @@ def keepout_mask(zones: Iterable[Sequence[XY]], grid: OccupancyGrid) -> Occupanc
     """
     info = grid.info
     cells = array("b", bytes(info.width * info.height))
-    for zone in zones:
+    for zone in filter(None, zones):
         outline = [_in_cells(point, info) for point in zone]
         for row, column in chain(_inside(outline, info), _along(outline)):
             if 0 <= row < info.height and 0 <= column < info.width:
                 cells[row * info.width + column] = _OCCUPIED
     return OccupancyGrid(header=grid.header, info=info, data=cells)
+
+
+def carried(features: Features, header: Header) -> Carry.Response:
+    """Return what was carried, as the service answers it."""
+    outlines = [
+        Polygon(points=[Point32(x=float(x), y=float(y), z=0.0) for x, y in zone])
+        for zone in features.zones
+    ]
+    return Carry.Response(
+        routes=[route_path(route, header) for route in features.routes], zones=outlines
+    )
 
 
 def filter_info(mask_topic: str, header: Header) -> CostmapFilterInfo:

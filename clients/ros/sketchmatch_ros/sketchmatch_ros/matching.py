@@ -11,7 +11,7 @@ from typing import Protocol
 from sketchmatch_client import Client, Match, MatchCall, Progress
 from sketchmatch_proto.v1.source_pb2 import Source
 
-__all__ = ["Carried", "Carrier", "Matching", "Options"]
+__all__ = ["Carrier", "Features", "Matching", "Options"]
 
 _LOOK_SECONDS = 0.05
 
@@ -41,15 +41,15 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Carried:
-    """What was carried into the map's frame.
+class Features:
+    """Routes and zones, y upwards: in a sketch as its objects are, or in the map's frame.
 
     Attributes
     ----------
     routes
-        Ways to drive, each a list of places.
+        Ways to drive, each a list of places; empty where one cannot be carried.
     zones
-        Outlines of areas to keep out of.
+        Outlines of areas to keep out of; empty where one cannot be carried.
     """
 
     routes: Sequence[Sequence[XY]] = ()
@@ -57,15 +57,20 @@ class Carried:
 
 
 class Carrier(Protocol):
-    """Carries what was drawn in a sketch, its route first of all, into the map's frame.
+    """Carries routes and zones of a sketch into the map's frame.
 
     This is where a server's transfer plugs in: a node that has none publishes no route and no mask.
     """
 
     def __call__(
-        self, client: Client, sketch: Source, map_: Source, partners: Mapping[int, int]
-    ) -> Carried:
-        """Return what was carried.
+        self,
+        client: Client,
+        sketch: Source,
+        map_: Source,
+        partners: Mapping[int, int],
+        drawn: Features,
+    ) -> Features:
+        """Return each route and each zone as it is on the map, in the order of those drawn.
 
         Parameters
         ----------
@@ -75,6 +80,13 @@ class Carrier(Protocol):
             What was matched.
         partners
             Which sketched object is which mapped one, by index.
+        drawn
+            What is to be carried.
+
+        Raises
+        ------
+        SketchmatchError
+            If nothing can be carried.
         """
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import rclpy
 from nav2_msgs.msg import CostmapFilterInfo
 from nav_msgs.msg import OccupancyGrid, Path
@@ -12,13 +15,14 @@ from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sketchmatch_msgs.action import MatchSketch
 from sketchmatch_msgs.msg import ObjectMap
+from sketchmatch_msgs.srv import Carry
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
-from sketchmatch_client import CallCancelledError, Client, Match, SketchmatchError
+from sketchmatch_client import CallCancelledError, Client, SketchmatchError
 from sketchmatch_proto.v1.source_pb2 import Source
 from sketchmatch_ros import conversions
-from sketchmatch_ros.matching import Carrier, Matching, Options
+from sketchmatch_ros.matching import Carrier, Features, Matching, Options
 
 __all__ = ["SketchmatchNode", "main"]
 
@@ -40,6 +44,16 @@ _PARAMETERS = {
 """Defaults; ``config/sketchmatch.yaml`` says what each is."""
 
 
+@dataclass(frozen=True)
+class _Matched:
+    """The last match: what was matched, which sketched object is which, and on what grid."""
+
+    sketch: Source
+    map_: Source
+    partners: Mapping[int, int]
+    grid: OccupancyGrid
+
+
 class SketchmatchNode(LifecycleNode):
     """Matches sketches with the latest map while it is active.
 
@@ -58,6 +72,7 @@ class SketchmatchNode(LifecycleNode):
         self._active = False
         self._grid: OccupancyGrid | None = None
         self._map: Source | None = None
+        self._last: _Matched | None = None
 
     def on_configure(self, state: object) -> TransitionCallbackReturn:
         """Make the client and all topics; the server need not be there yet."""
@@ -80,6 +95,9 @@ class SketchmatchNode(LifecycleNode):
             self._mask = publish(OccupancyGrid, "~/keepout_mask", _LATCHED)
             self._filter = publish(CostmapFilterInfo, "~/keepout_filter_info", _LATCHED)
             self._published += [self._route, self._mask, self._filter]
+            self._service = self.create_service(
+                Carry, "~/carry", self.carry_more, callback_group=ReentrantCallbackGroup()
+            )
         self._maps = self.create_subscription(
             OccupancyGrid, self._said("map_topic"), self.take_map, _LATCHED
         )
@@ -140,6 +158,8 @@ class SketchmatchNode(LifecycleNode):
             reason = f"no map has come on {self._said('map_topic')} yet; start map_server"
         elif not goal.sketch.strokes:
             reason = "the sketch has no strokes; draw two objects or more"
+        elif goal.sketch.zones and self._carry is None:
+            reason = "this node has no carrier for zones; leave them out"
         else:
             return GoalResponse.ACCEPT
         self.get_logger().warning(f"refuses a goal: {reason}")
@@ -148,6 +168,7 @@ class SketchmatchNode(LifecycleNode):
     def execute(self, goal_handle: object) -> MatchSketch.Result:
         """Match, publish the answer, and end the goal."""
         goal, grid, map_ = goal_handle.request, self._grid, self._map
+        answer = ObjectMap()
         try:
             sketch = conversions.sketch_source(goal.sketch)
             match = self._matching.match(
@@ -157,32 +178,54 @@ class SketchmatchNode(LifecycleNode):
                 on_progress=lambda now: goal_handle.publish_feedback(conversions.feedback(now)),
                 is_cancelled=lambda: goal_handle.is_cancel_requested,
             )
-            header = Header(stamp=self.get_clock().now().to_msg(), frame_id=grid.header.frame_id)
-            answer = conversions.object_map(match, header)
+            answer = conversions.object_map(match, self._header(grid))
             self._answers.publish(answer)
             self._markers.publish(conversions.markers(answer))
-            self._publish_carried(match, sketch, map_, grid, header)
+            self._last = last = _Matched(sketch, map_, match.object_map, grid)
+            self._publish_carried(last, conversions.drawn_features(goal.sketch, match))
         except SketchmatchError as error:
             if isinstance(error, CallCancelledError) and goal_handle.is_cancel_requested:
                 goal_handle.canceled()
             else:
                 self.get_logger().error(str(error))
                 goal_handle.abort()
-            return conversions.failure(error)
+            return conversions.failure(error, answer)
         goal_handle.succeed()
         return MatchSketch.Result(object_map=answer)
 
-    def _publish_carried(
-        self, match: Match, sketch: Source, map_: Source, grid: OccupancyGrid, header: Header
-    ) -> None:
+    def carry_more(self, request: Carry.Request, response: Carry.Response) -> Carry.Response:
+        """Carry routes and zones of the sketch that was matched last."""
+        last = self._last
+        if not self._active or last is None:
+            response.error = "no sketch was matched yet; send a goal to match_sketch first"
+            return response
+        drawn = Features(
+            conversions.upright(request.routes, request.y_axis),
+            conversions.upright(request.zones, request.y_axis),
+        )
+        try:
+            return conversions.carried(self._carried(last, drawn), self._header(last.grid))
+        except SketchmatchError as error:
+            response.error = str(error)
+            return response
+
+    def _publish_carried(self, last: _Matched, drawn: Features) -> None:
+        """Publish routes and zones; empty ones take the place of those of an earlier sketch."""
         if self._carry is None:
             return
-        carried = self._carry(self._client, sketch, map_, match.object_map)
-        for route in carried.routes[:1]:
-            self._route.publish(conversions.route_path(route, header))
-        if carried.zones:
-            self._mask.publish(conversions.keepout_mask(carried.zones, grid))
-            self._filter.publish(conversions.filter_info(self._mask.topic_name, header))
+        empty = not (drawn.routes or drawn.zones)
+        carried = drawn if empty else self._carried(last, drawn)
+        header = self._header(last.grid)
+        route = next(iter(carried.routes), ())
+        self._route.publish(conversions.route_path(route, header))
+        self._mask.publish(conversions.keepout_mask(carried.zones, last.grid))
+        self._filter.publish(conversions.filter_info(self._mask.topic_name, header))
+
+    def _carried(self, last: _Matched, drawn: Features) -> Features:
+        return self._carry(self._client, last.sketch, last.map_, last.partners, drawn)
+
+    def _header(self, grid: OccupancyGrid) -> Header:
+        return Header(stamp=self.get_clock().now().to_msg(), frame_id=grid.header.frame_id)
 
     def _options(self, goal: MatchSketch.Goal) -> Options:
         return Options(
@@ -200,8 +243,10 @@ class SketchmatchNode(LifecycleNode):
         self.destroy_subscription(self._maps)
         for publisher in self._published:
             self.destroy_lifecycle_publisher(publisher)
+        if self._carry is not None:
+            self.destroy_service(self._service)
         self._client.close()
-        self._grid = self._map = None
+        self._grid = self._map = self._last = None
         del self._client
 
 
