@@ -202,5 +202,32 @@ def test_the_python_client_tells_the_same_of_an_error(name):
     ] == SAID[name]
 
 
+def test_cmake_lines_generate_and_compile(tmp_path):
+    require(shutil.which("cmake") and shutil.which("grpc_cpp_plugin"), "gRPC for C++ and cmake")
+    (lines,) = blocks("proto/README.md", "cmake")
+    head = "cmake_minimum_required(VERSION 3.16)\nproject(robot CXX)\n"
+    (tmp_path / "CMakeLists.txt").write_text(head + lines, "utf-8")
+    shutil.copytree(ROOT / "proto", tmp_path / "proto", ignore=_BUILT)
+    for command in (
+        ["cmake", "-S", ".", "-B", "build", "-G", "Unix Makefiles"],
+        # One of each is enough: all of them take minutes.
+        ["make", "-C", "build", "gen/google/rpc/status.pb.o"],
+        ["make", "-C", "build", "gen/sketchmatch/v1/match_service.grpc.pb.o"],
+    ):
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_protoc_lines_generate(tmp_path):
+    require(shutil.which("protoc") and shutil.which("grpc_cpp_plugin"), "protoc and its plugin")
+    (lines,) = (block for block in blocks("proto/README.md", "sh") if "--cpp_out" in block)
+    shutil.copytree(ROOT / "proto", tmp_path / "proto", ignore=_BUILT)
+    (tmp_path / "gen").mkdir()
+    subprocess.run(["bash", "-ec", lines], cwd=tmp_path, check=True)
+    for name in ("match_service.grpc.pb.h", "match_service.pb.h"):
+        assert (tmp_path / "gen" / "sketchmatch" / "v1" / name).exists()
+    assert (tmp_path / "gen" / "com" / "google" / "rpc" / "Status.java").exists()
+
+
 def test_every_golden_status_is_told():
     assert set(SAID) == {"MatchRequest.turned", *STATUSES}
