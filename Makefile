@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 PROTO_BIN := .venv-proto/bin
 PIP := -m pip --disable-pip-version-check install --quiet
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
-OURS := engine plugins clients/python proto tests
+OURS := engine plugins clients/python clients/ros proto tests
 
 # Two at a time, each file by one of them: the servers of a file are started once.
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile

@@ -23,7 +23,7 @@ _CHECKOUT = (
     "LICENSE",
     "CONTRIBUTING.md",
 )
-_NO_INDEX = re.compile("No matching distribution|Could not find a version|connection error", re.I)
+NO_INDEX = re.compile("No matching distribution|Could not find a version|connection error", re.I)
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def install(shell: Shell, block: str) -> None:
         try:
             shell.follow(step)
         except AssertionError as error:
-            require(not _NO_INDEX.search(str(error)), "a package index that pip reaches")
+            require(not NO_INDEX.search(str(error)), "a package index that pip reaches")
             raise
 
 

@@ -1,10 +1,18 @@
+import json
 import re
 import time
 from threading import Thread
 
 import pytest
 
-from sketchmatch_client import AccessOptions, CallCancelledError, Client, MatchOptions, sources
+from sketchmatch_client import (
+    AccessOptions,
+    CallCancelledError,
+    Client,
+    MatchOptions,
+    MatchRow,
+    sources,
+)
 from tests.client.fake_server import EVENTS
 from tests.tools import ROOT
 
@@ -12,7 +20,7 @@ README = (ROOT / "clients" / "python" / "README.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=["one call", "asyncio", "tls"])
+@pytest.mark.parametrize("example", EXAMPLES, ids=["one call", "asyncio", "anyio", "tls"])
 def test_the_examples_run(example, server, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "room.yaml").write_text("image: room.pgm\n", encoding="utf-8")
@@ -33,7 +41,7 @@ def test_a_button_stops_a_match(server):
                 time.sleep(0.01)
             action()
 
-    (example,) = re.findall(r"```py\n(.*?)```", README, re.DOTALL)
+    _, example = re.findall(r"```py\n(.*?)```", README, re.DOTALL)
     server.events, server.endless = EVENTS[:3], True
     source = sources.image(b"picture")
     with Client(server.address) as client:
@@ -44,6 +52,22 @@ def test_a_button_stops_a_match(server):
         exec(example, names)
     assert names["match"] is None
     assert server.cancelled.wait(5)
+
+
+def test_a_match_is_written_as_geojson(server, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    example, _ = re.findall(r"```py\n(.*?)```", README, re.DOTALL)
+    source = sources.image(b"picture")
+    with Client(server.address) as client:
+        match = client.match(source, source)
+    exec(example, {"match": match})
+    written = json.loads((tmp_path / "answer.geojson").read_text(encoding="utf-8"))
+    assert written == match.to_geojson()
+
+
+def test_every_key_of_a_row_is_listed():
+    text = README.partition("`match.rows()`")[2].partition("\n\n")[0]
+    assert {name for name in MatchRow.__annotations__ if f"`{name}`" not in text} == set()
 
 
 def test_every_way_into_a_server_is_listed():

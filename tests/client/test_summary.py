@@ -72,7 +72,10 @@ def test_a_result_without_its_scenes_names_objects_by_number(match):
 
 def test_a_match_is_the_same_table_in_a_notebook(match):
     match.result.object_matches[0].sketch_label = "<b>"
-    assert match._repr_html_() == f"<pre>{str(match).replace('<b>', '&lt;b&gt;')}</pre>"
+    picture, _, table = match._repr_html_().partition("<pre>")
+    assert table == f"{str(match).replace('<b>', '&lt;b&gt;')}</pre>"
+    assert picture.startswith("<svg ")
+    assert picture.endswith("</svg>")
 
 
 def test_a_match_has_none_where_there_is_no_value():

@@ -51,6 +51,19 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in folder.glob("*_pb2*.py*")}
 
 
+def test_googles_own_files_are_those_of_the_pinned_version():
+    (site,) = (tool("python").parents[1] / "lib").glob("python*/site-packages")
+    for file in (PROTO / "google" / "rpc").iterdir():
+        assert file.read_bytes() == (site / "google" / "rpc" / file.name).read_bytes()
+
+
+def test_all_that_is_shipped_compiles_together(tmp_path):
+    files = sorted(PROTO.rglob("*.proto"))
+    assert {file.name for file in files} >= {"status.proto", "error_details.proto", "errors.proto"}
+    run(tool("python"), "-m", "grpc_tools.protoc", "-I", PROTO, f"--python_out={tmp_path}", *files)
+    assert (tmp_path / "google" / "rpc" / "error_details_pb2.py").exists()
+
+
 def test_error_reasons_are_the_engines():
     assert names(errors_pb2.ErrorReason, "ERROR_REASON_") == {reason.name for reason in Reason}
 

@@ -25,6 +25,7 @@ from sketchmatch_client.errors import (
     SketchmatchError,
     StoreError,
 )
+from sketchmatch_views import MatchRow
 
 __all__ = [
     "AccessOptions",
@@ -37,6 +38,7 @@ __all__ = [
     "MatchCall",
     "MatchCollector",
     "MatchOptions",
+    "MatchRow",
     "NotAuthenticatedError",
     "NotFoundError",
     "NotSupportedError",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import Any
 
 from google.protobuf.duration_pb2 import Duration
 
@@ -21,6 +22,8 @@ from sketchmatch_proto.v1.match_pb2 import (
     Phase,
 )
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+from sketchmatch_proto.v1.scene_pb2 import Scene
+from sketchmatch_views import Line, MatchRow, MatchView, Shape
 
 __all__ = ["Match", "MatchCollector", "Progress", "ProgressCallback", "tell_progress"]
 
@@ -170,9 +173,41 @@ class Match:
         """Return which object is which, for a terminal; objects count from 0."""
         return match_table(self.result, self.scenes.sketch)
 
+    def rows(self) -> list[MatchRow]:
+        """Return a plain dict for each sketched object, in their order, as data frames take them.
+
+        Its keys are those of :class:`MatchRow`: indices and labels of the object and of its
+        partner, where the partner is, and what is known of both. What is unknown is None.
+        """
+        return self._view().rows()
+
+    def to_geojson(self) -> dict[str, Any]:
+        """Return a GeoJSON FeatureCollection in the map's frame, in metres.
+
+        A feature for each row of :meth:`rows`, which are its properties, with the polygon of the
+        partner, or no geometry where there is none; then one for each mapped object without
+        partner. The property ``label`` is the mapped object's label, or else the sketched one's.
+        """
+        return self._view().geojson()
+
     def _repr_html_(self) -> str:
-        """Return the same for a notebook."""
-        return f"<pre>{escape(str(self))}</pre>"
+        """Return the same for a notebook, with a picture of both scenes."""
+        return f"{self._view().svg()}<pre>{escape(str(self))}</pre>"
+
+    def _view(self) -> MatchView:
+        result = self.result
+        known = len(result.unmatched_sketch_probabilities) > 0
+        alone = {
+            k: result.unmatched_sketch_probabilities[n] if known else None
+            for n, k in enumerate(result.unmatched_sketch_objects)
+        }
+        return MatchView(
+            _shapes(self.scenes.sketch),
+            _shapes(self.scenes.map),
+            [_line(line) for line in result.object_matches],
+            alone,
+            [(point.x, point.y) for point in self.scenes.sketch_route],
+        )
 
 
 class MatchCollector:
@@ -222,3 +257,27 @@ def tell_progress(event: MatchResponse, on_progress: ProgressCallback | None) ->
 
 def _object_map(lines: Sequence[ObjectMatch]) -> dict[int, int]:
     return {line.sketch_object: line.map_object for line in lines}
+
+
+def _shapes(scene: Scene) -> list[Shape]:
+    return [
+        Shape(
+            [[(point.x, point.y) for point in ring.points] for ring in item.rings],
+            (item.centroid.x, item.centroid.y),
+            item.label,
+        )
+        for item in scene.objects
+    ]
+
+
+def _line(line: ObjectMatch) -> Line:
+    seen = line.HasField("relation")
+    return Line(
+        line.sketch_object,
+        line.map_object,
+        line.confidence,
+        line.probability if line.HasField("probability") else None,
+        line.margin if line.HasField("margin") else None,
+        line.relation.phrase if seen else None,
+        line.relation.reference_object if seen else None,
+    )

@@ -132,7 +132,7 @@ def _segment(request: SegmentRequest, setup: Setup) -> Generator[Message, None, 
             request.source, "source", request.HasField("source"), engine.registry.readers
         )
     segmenter = engine.resolve_segmenter(
-        requests.choice(request.segmenter), source, request.profile
+        requests.checked_choice(request.segmenter, "segmenter"), source, request.profile
     )
     with requests.paths_of(request):
         found = engine.segment(source, segmenter, f"source.{source.field}")

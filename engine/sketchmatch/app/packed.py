@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from google.protobuf.message import DecodeError, Message
 
+from sketchmatch.app.unknown import read_whole
 from sketchmatch.errors import InvalidInputError, Reason
 
 __all__ = ["Packed", "check_size", "inflated"]
@@ -44,10 +45,10 @@ class Packed:
         Raises
         ------
         InvalidInputError
-            If it is larger, or no such message.
+            If it is larger, no such message, or one with fields that the contract does not know.
         """
         try:
-            return self.read(inflated(self.data, limit))
+            return read_whole(self.read, inflated(self.data, limit))
         except DecodeError:
             raise InvalidInputError(
                 Reason.INVALID_FIELD,

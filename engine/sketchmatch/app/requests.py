@@ -39,6 +39,7 @@ from sketchmatch_proto.v1 import (
 )
 
 __all__ = [
+    "checked_choice",
     "choice",
     "file_kind",
     "match_request",
@@ -78,7 +79,10 @@ def match_request(
     return MatchRequest(
         sketch=source(request.sketch, "sketch", request.HasField("sketch"), readers),
         map=source(request.map, "map", request.HasField("map"), readers),
-        selection=selection(request),
+        selection={
+            stage: checked_choice(getattr(request.pipeline, stage), f"pipeline.{stage}")
+            for stage in STAGES
+        },
         seed=request.seed,
         time_budget=time_budget(request, limits),
         weights=_weights(request.weights) if request.HasField("weights") else None,
@@ -92,6 +96,25 @@ def match_request(
 def selection(request: match_service_pb2.MatchRequest) -> Selection:
     """Read what is asked for in each stage."""
     return {stage: choice(getattr(request.pipeline, stage)) for stage in STAGES}
+
+
+def checked_choice(message: pipeline_pb2.AlgorithmSelection, field: str) -> Choice:
+    """Read what is asked for in one stage, of which every parameter has a value.
+
+    Raises
+    ------
+    InvalidInputError
+        If a ``google.protobuf.Value`` has none, as where code misspelled its kind.
+    """
+    for name, value in message.parameters.fields.items():
+        if _is_blank(value):
+            raise InvalidInputError(
+                Reason.INVALID_FIELD,
+                f"{field}.parameters.{name}",
+                "has no value; set one kind of google.protobuf.Value, such as number_value "
+                "(numberValue in JavaScript), or null_value",
+            )
+    return choice(message)
 
 
 def choice(message: pipeline_pb2.AlgorithmSelection) -> Choice:
@@ -222,6 +245,17 @@ def _plain(value: struct_pb2.Value) -> Any:
     return None
 
 
+def _is_blank(value: struct_pb2.Value) -> bool:
+    """Whether a value, or one within it, is of no kind: protobuf calls that an error."""
+    match value.WhichOneof("kind"):
+        case "struct_value":
+            return any(map(_is_blank, value.struct_value.fields.values()))
+        case "list_value":
+            return any(map(_is_blank, value.list_value.values))
+        case kind:
+            return kind is None
+
+
 def _weights(message: match_pb2.ConfidenceWeights) -> ConfidenceWeights:
     """Read weights, of which any can be left out."""
     return ConfidenceWeights(**{field.name: value for field, value in message.ListFields()})
@@ -309,4 +343,11 @@ def _points(
 
 
 def _upward(y_axis: int) -> float:
+    if y_axis not in source_pb2.YAxis.values():
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "y_axis",
+            f"is {y_axis}, which this server's contract does not know; give Y_AXIS_UP or "
+            "Y_AXIS_DOWN",
+        )
     return -1.0 if y_axis == source_pb2.Y_AXIS_DOWN else 1.0

@@ -7,23 +7,11 @@ from functools import cache
 import numpy as np
 
 from sketchmatch.model import FloatArray
+from sketchmatch_views import PAIR_COLOURS
 
 __all__ = ["Colour", "mixed", "pair_colour", "readable_on"]
 
 Colour = tuple[int, int, int]
-
-# Okabe and Ito's colours without yellow and black, which drown on white and among outlines
-# (https://jfly.uni-koeln.de/color), then purple, olive and teal of the same strength.
-_FIRST: tuple[Colour, ...] = (
-    (0, 114, 178),
-    (213, 94, 0),
-    (0, 158, 115),
-    (204, 121, 167),
-    (230, 159, 0),
-    (86, 180, 233),
-    (120, 72, 168),
-    (140, 112, 20),
-)
 
 _COUNT = 128
 
@@ -83,9 +71,9 @@ def readable_on(colour: Colour) -> Colour:
 def _palette() -> tuple[Colour, ...]:
     """Return the first colours and, one by one, the candidate furthest from all before it."""
     candidates = _candidates()
-    views = [_views(candidates), _views(np.array(_FIRST, dtype=np.float64))]
+    views = [_views(candidates), _views(np.array(PAIR_COLOURS, dtype=np.float64))]
     nearest = np.min([_apart(views[0], seen) for seen in views[1].swapaxes(0, 1)], axis=0)
-    colours = list(_FIRST)
+    colours = list(PAIR_COLOURS)
     while len(colours) < _COUNT:
         best = int(np.argmax(nearest))
         r, g, b = candidates[best].tolist()

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import zip_longest
+from typing import Any
 
 from sketchmatch.api import Outcome
 from sketchmatch.model import Confidence, FloatArray, Scene
 from sketchmatch.model.text import Table, Tabular, likelihood, name
+from sketchmatch_views import Line, MatchRow, MatchView, Shape
 
 __all__ = [
     "AlternativeMap",
@@ -271,6 +273,45 @@ class MatchResult(Tabular):
         matched = set(self.object_map.values())
         return tuple(k for k in range(len(self.map)) if k not in matched)
 
+    def rows(self) -> list[MatchRow]:
+        """Return a plain dict for each sketched object, in their order, as data frames take them.
+
+        Its keys are those of :class:`sketchmatch_views.MatchRow`: indices and labels of the object
+        and of its partner, where the partner is, and what is known of both. What is unknown is
+        None.
+        """
+        return self._view().rows()
+
+    def to_geojson(self) -> dict[str, Any]:
+        """Return a GeoJSON FeatureCollection in the map's frame, in its units.
+
+        A feature for each row of :meth:`rows`, which are its properties, with the polygon of the
+        partner, or no geometry where there is none; then one for each mapped object without
+        partner. The property ``label`` is the mapped object's label, or else the sketched one's.
+        ``sketchmatch`` reads such a file as a map.
+        """
+        return self._view().geojson()
+
+    def _repr_html_(self) -> str:
+        """Return the table for a notebook, with a picture of both scenes."""
+        return f"{self._view().svg()}{super()._repr_html_()}"
+
+    def _view(self) -> MatchView:
+        likely = dict(
+            zip(
+                self.unmatched_sketch_objects,
+                self.unmatched_sketch_probabilities,
+                strict=bool(self.unmatched_sketch_probabilities),
+            )
+        )
+        return MatchView(
+            _shapes(self.sketch),
+            _shapes(self.map),
+            [_line(match) for match in self.matches],
+            {k: likely.get(k) for k in self.unmatched_sketch_objects},
+            [] if self.sketch_route is None else self.sketch_route.tolist(),
+        )
+
     def _headline(self) -> str:
         facts = [
             f"{len(self.matches)} of {len(self.sketch)} sketched objects matched",
@@ -316,3 +357,23 @@ def _confidences(fmap: float, omap: float) -> str:
 
 def _likely(probability: float | None) -> str:
     return "" if probability is None else f", probability {likelihood(probability)}"
+
+
+def _shapes(scene: Scene) -> list[Shape]:
+    return [
+        Shape([ring.tolist() for ring in item.rings], item.centroid, item.label)
+        for item in scene.objects
+    ]
+
+
+def _line(match: ObjectMatch) -> Line:
+    seen = match.relation
+    return Line(
+        match.sketch_object,
+        match.map_object,
+        match.confidence,
+        match.probability,
+        match.margin,
+        None if seen is None else seen.phrase,
+        None if seen is None else seen.reference_object,
+    )

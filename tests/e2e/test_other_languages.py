@@ -1,0 +1,233 @@
+"""Languages for which there is no client of ours: their pages' commands, and one answer for all."""
+
+import os
+import re
+import shutil
+import subprocess
+
+import pytest
+
+from sketchmatch_client import Client, SketchmatchError
+from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
+from tests.client.fake_server import running
+from tests.client.test_golden import MATCHES
+from tests.contract.golden import FOLDER, NAMES, golden
+from tests.shell import steps
+from tests.tools import ROOT, TOOLS, require, tool
+
+pytestmark = pytest.mark.slow
+
+SAID = {file.stem: file.read_text("utf-8").splitlines() for file in (FOLDER / "said").iterdir()}
+"""What a program in any language prints about a golden request or status."""
+STATUSES = [name for name in NAMES if name.startswith("Status.")]
+_OFFLINE = re.compile("dial tcp|Could ?n.t resolve|failed to download|EAI_AGAIN|ENOTFOUND", re.I)
+
+_BUILT = shutil.ignore_patterns("Cargo.lock", "target", "node_modules", "package-lock.json")
+
+
+class Program:
+    """The program of a page, in a copy of the checkout, built as the page says."""
+
+    def __init__(self, folder, page, files=(), **environment):
+        self.folder = folder / page
+        for name in ("proto", page):
+            shutil.copytree(ROOT / name, folder / name, dirs_exist_ok=True, ignore=_BUILT)
+        for name, text in dict(files).items():
+            (self.folder / name).write_text(text, "utf-8")
+        self._environment = {**os.environ, "PATH": f"{TOOLS}:{os.environ['PATH']}", **environment}
+        text = (self.folder / "README.md").read_text("utf-8")
+        self._build, self._run = map(
+            steps, re.findall(r"^```console\n(.*?)^```", text, re.S | re.M)
+        )
+        for step in self._build:
+            done = self._bash(step.command)
+            require(not _OFFLINE.search(done.stderr), f"a registry that `{step.command}` reaches")
+            assert done.returncode == 0, done.stderr
+
+    def example(self, address):
+        """Run what the page shows, and see that it shows the same."""
+        (step,) = self._run
+        done = self._bash(step.command.replace("localhost:50051", address))
+        assert (done.returncode, done.stderr) == (0, "")
+        lines = done.stdout.splitlines()
+        assert len(lines) == len(step.shown)
+        assert step.missing_in(lines) is None, lines
+
+    def says(self, address, request):
+        """Return code and lines of the program about a request."""
+        file = self.folder / "request.binpb"
+        file.write_bytes(request.SerializeToString())
+        (step,) = self._run
+        done = self._bash(f"{step.command.replace('localhost:50051', address)} {file}")
+        return done.returncode, done.stdout.splitlines()
+
+    def _bash(self, command):
+        return subprocess.run(
+            ["bash", "-c", command],
+            cwd=self.folder,
+            env=self._environment,
+            capture_output=True,
+            text=True,
+            timeout=550,
+            check=False,
+        )
+
+
+# What stands around the blocks of a page, so that they are compiled with its program.
+_IN_GO = """\
+package main
+
+import (
+	"context"
+	"fmt"
+
+	"google.golang.org/grpc"
+	"google.golang.org/grpc/credentials"
+	"google.golang.org/grpc/credentials/insecure"
+	"google.golang.org/grpc/metadata"
+
+	pb "example.com/sketch/sketchmatch/v1"
+)
+"""
+_GO_BLOCK = """
+func block{}(
+	call context.Context, request *pb.MatchRequest, token string,
+) (context.Context, error) {{
+{}	connection.Close()
+	return call, err
+}}
+"""
+_RUST_BLOCK = """
+#[allow(dead_code)]
+async fn block(request: MatchRequest) -> Result<(), Box<dyn Error>> {{
+{}Ok(()) }}
+"""
+
+
+def blocks(page, language):
+    return re.findall(rf"```{language}\n(.*?)```", (ROOT / page).read_text("utf-8"), re.S)
+
+
+def go(folder):
+    require(shutil.which("go"), "go")
+    tool("buf")
+    found = blocks("clients/go/README.md", "go")
+    code = _IN_GO + "".join(_GO_BLOCK.format(k, block) for k, block in enumerate(found))
+    return Program(folder, "clients/go", {"blocks.go": code}, GOFLAGS="-p=1")
+
+
+def rust(folder):
+    require(shutil.which("cargo"), "cargo")
+    protoc = folder / "protoc"
+    protoc.write_text(f'#!/bin/sh\nexec {tool("python")} -m grpc_tools.protoc "$@"\n')
+    protoc.chmod(0o755)
+    # The other block, on encryption, wants a feature of tonic that takes minutes to build.
+    call, _ = blocks("clients/rust/README.md", "rust")
+    code = (ROOT / "clients" / "rust" / "src" / "main.rs").read_text("utf-8")
+    files = {"src/main.rs": code + _RUST_BLOCK.format(call)}
+    return Program(folder, "clients/rust", files, PROTOC=str(protoc), CARGO_BUILD_JOBS="1")
+
+
+def node(folder):
+    require(shutil.which("npm"), "npm")
+    return Program(folder, "proto/examples")
+
+
+@pytest.fixture(scope="module", params=[go, rust, node], ids=["go", "rust", "node"])
+def program(request, tmp_path_factory):
+    return request.param(tmp_path_factory.mktemp(request.param.__name__))
+
+
+def test_the_pages_example_has_the_answer_that_it_shows(program, address):
+    program.example(address)
+
+
+def test_the_golden_request_has_the_golden_answer(program, address):
+    name = "MatchRequest.turned"
+    assert program.says(address, golden(name)) == (0, SAID[name])
+
+
+def test_a_request_arrives_as_it_was_written(program):
+    with running() as fake:
+        program.says(fake.address, golden("MatchRequest"))
+    assert fake.requests == [golden("MatchRequest")]
+
+
+@pytest.mark.parametrize("name", STATUSES)
+def test_an_error_is_told_with_its_details(program, name):
+    with running() as fake:
+        fake.error = golden(name)
+        assert program.says(fake.address, MatchRequest()) == (1, SAID[name])
+
+
+def test_what_the_server_refuses_names_its_field(program, address):
+    request = golden("MatchRequest.turned")
+    request.pipeline.histogram.parameters["directions"] = 3
+    field = "pipeline.histogram.parameters.directions"
+    assert program.says(address, request) == (
+        1,
+        [
+            f"error 3: {field} is 3; it should be a multiple of 2",
+            "reason INVALID_PARAMETER",
+            f"field {field}",
+        ],
+    )
+
+
+def test_the_python_client_has_the_golden_answer_too(address):
+    sketch, map_, options = MATCHES["MatchRequest.turned"]
+    with Client(address) as client:
+        lines = client.match(sketch, map_, **options).result.object_matches
+    assert [
+        f"{line.sketch_object} {line.sketch_label} is {line.map_object} {line.map_label}, "
+        f"confidence {line.confidence:.3f}"
+        for line in lines
+    ] == SAID["MatchRequest.turned"]
+
+
+@pytest.mark.parametrize("name", STATUSES)
+def test_the_python_client_tells_the_same_of_an_error(name):
+    sketch, map_, options = MATCHES["MatchRequest.turned"]
+    with running() as fake, Client(fake.address, retries=0) as client:
+        fake.error = golden(name)
+        with pytest.raises(SketchmatchError) as no:
+            client.match(sketch, map_, **options)
+    error = no.value
+    field, pause = getattr(error, "field", ""), getattr(error, "retry_after", None)
+    assert [
+        f"error {golden(name).code}: {error}",
+        f"reason {error.reason}",
+        *([f"field {field}"] if field else []),
+        *([f"retry after {pause:g}s"] if pause is not None else []),
+    ] == SAID[name]
+
+
+def test_cmake_lines_generate_and_compile(tmp_path):
+    require(shutil.which("cmake") and shutil.which("grpc_cpp_plugin"), "gRPC for C++ and cmake")
+    (lines,) = blocks("proto/README.md", "cmake")
+    head = "cmake_minimum_required(VERSION 3.16)\nproject(robot CXX)\n"
+    (tmp_path / "CMakeLists.txt").write_text(head + lines, "utf-8")
+    shutil.copytree(ROOT / "proto", tmp_path / "proto", ignore=_BUILT)
+    for command in (
+        ["cmake", "-S", ".", "-B", "build", "-G", "Unix Makefiles"],
+        # One of each is enough: all of them take minutes.
+        ["make", "-C", "build", "gen/google/rpc/status.pb.o"],
+        ["make", "-C", "build", "gen/sketchmatch/v1/match_service.grpc.pb.o"],
+    ):
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_protoc_lines_generate(tmp_path):
+    require(shutil.which("protoc") and shutil.which("grpc_cpp_plugin"), "protoc and its plugin")
+    (lines,) = (block for block in blocks("proto/README.md", "sh") if "--cpp_out" in block)
+    shutil.copytree(ROOT / "proto", tmp_path / "proto", ignore=_BUILT)
+    (tmp_path / "gen").mkdir()
+    subprocess.run(["bash", "-ec", lines], cwd=tmp_path, check=True)
+    for name in ("match_service.grpc.pb.h", "match_service.pb.h"):
+        assert (tmp_path / "gen" / "sketchmatch" / "v1" / name).exists()
+    assert (tmp_path / "gen" / "com" / "google" / "rpc" / "Status.java").exists()
+
+
+def test_every_golden_status_is_told():
+    assert set(SAID) == {"MatchRequest.turned", *STATUSES}

@@ -1,0 +1,85 @@
+"""What ROS's tools read of the packages fits what is in them."""
+
+import ast
+import re
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+
+from tests.ros.messages import OURS, store
+from tests.tools import ROOT
+
+ROS = ROOT / "clients" / "ros"
+PACKAGE = ROS / "sketchmatch_ros"
+README = (ROS / "README.md").read_text(encoding="utf-8")
+
+
+def depends(folder):
+    root = ElementTree.parse(folder / "package.xml").getroot()
+    return {item.text for item in root if item.tag.endswith("depend")}
+
+
+def imported(folder):
+    trees = [ast.parse(file.read_text("utf-8")) for file in folder.rglob("*.py")]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    names += [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module]
+    return {name.partition(".")[0] for name in names}
+
+
+def test_every_ros_package_that_is_imported_is_depended_on():
+    ros = {name for name in imported(PACKAGE) if name.endswith("_msgs")} | {"rclpy", "launch_ros"}
+    assert ros <= depends(PACKAGE)
+    assert "ament_index_python" in depends(PACKAGE)
+
+
+def test_every_interface_is_generated_and_its_parts_are_depended_on():
+    text = (OURS / "CMakeLists.txt").read_text("utf-8")
+    files = {
+        str(file.relative_to(OURS))
+        for kind in ("msg", "action", "srv")
+        for file in (OURS / kind).iterdir()
+    }
+    assert set(re.findall(r'"((?:msg|action|srv)/\w+\.\w+)"', text)) == files
+    used = {name.partition("/")[0] for name in re.findall(r"\w+/msg/\w+", str(ours()))}
+    assert used - {"sketchmatch_msgs", "builtin_interfaces"} <= depends(OURS)
+
+
+def ours():
+    return [
+        fields for name, fields in store().fielddefs.items() if name.startswith("sketchmatch_msgs")
+    ]
+
+
+def test_the_parameters_file_has_every_parameter_with_its_default(ros):
+    text = (PACKAGE / "config" / "sketchmatch.yaml").read_text("utf-8")
+    assert yaml.safe_load(text)["sketchmatch"]["ros__parameters"] == ros.node._PARAMETERS
+    for name in ros.node._PARAMETERS:
+        assert f"`{name}`" in README
+
+
+def test_everything_that_setup_installs_is_there():
+    listed = re.findall(r'\["([^"]+)"\]', (PACKAGE / "setup.py").read_text("utf-8"))
+    for name in listed:
+        assert (PACKAGE / name.replace("{PACKAGE}", "sketchmatch_ros")).exists(), name
+    assert {"package.xml", "launch/sketchmatch.launch.py"} < set(listed)
+
+
+def test_rviz_shows_the_topics_that_the_node_has():
+    shown = yaml.safe_load((PACKAGE / "rviz" / "sketchmatch.rviz").read_text("utf-8"))
+    displays = shown["Visualization Manager"]["Displays"]
+    topics = {item["Topic"]["Value"] for item in displays} - {"/map"}
+    code = (PACKAGE / "sketchmatch_ros" / "node.py").read_text("utf-8")
+    published = set(re.findall(r'"~/(\w+)", _LATCHED', code))
+    assert topics <= {f"/sketchmatch/{name}" for name in published}
+    for name in (*published, "match_sketch", "carry"):
+        assert f"`~/{name}`" in README
+
+
+@pytest.mark.parametrize("word", ["COPY", "RUN"])
+def test_the_recipe_copies_what_there_is(word):
+    text = (ROS / "Dockerfile").read_text("utf-8")
+    assert f"{word} " in text
+    for source in re.findall(r"^COPY (\S+) ", text, re.M):
+        assert (ROOT / source).is_dir()
