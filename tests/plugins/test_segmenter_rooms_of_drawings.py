@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 import shapely
 
+from sketchmatch import match
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import Image, LabelledPolygon, OccupancyGrid, PolygonSet, Stroke, StrokeSet
+from sketchmatch_builtin.segmenters._widths import divided_by_width
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
 from tests.tools import ROOT, require
 
@@ -98,7 +100,7 @@ def test_a_large_picture_has_the_same_rooms():
 @pytest.mark.parametrize("light", [True, False])
 def test_a_mask_of_free_space_is_cut_where_it_is_narrow(light):
     mask = np.zeros((300, 500), np.uint8)
-    mask[40:240, 40:220] = mask[60:260, 260:460] = mask[120:150, 220:260] = 255
+    mask[40:240, 60:240] = mask[60:260, 260:460] = mask[120:150, 240:260] = 255
     found = areas(Image(mask if light else 255 - mask))
     assert sorted(found) == pytest.approx([36000, 40000], rel=0.05)
 
@@ -184,14 +186,102 @@ def test_what_has_no_two_rooms_is_refused_in_one_sentence(case):
 
 
 DRAWN = {
-    **{"00": 3, "01": 4, "02": 5, "03": 5, "04": 2, "05": 3},
-    **{"06": 4, "07": 4, "08": 5, "09": 5, "10": 5, "11": 4},
+    **{"00": 6, "01": 4, "02": 5, "03": 2, "04": 4, "05": 5},
+    **{"06": 5, "07": 4, "08": 5, "09": 4, "10": 6, "11": 7},
 }
 """Regions of the masks that people drew from memory, looked at in the contact sheet."""
 
 
+RSI = ROOT.parent / "shared" / "data" / "sketches" / "rooms-rsi"
+
+
 @pytest.mark.parametrize("name", DRAWN)
 def test_masks_that_people_drew_are_cut_into_regions(name):
-    path = ROOT.parent / "shared" / "data" / "sketches" / "rooms-rsi" / "sketches" / f"{name}.png"
+    path = RSI / "sketches" / f"{name}.png"
     require(path.exists(), f"the sketch {name}")
     assert len(segmented(read_source(path)).scene) == DRAWN[name]
+
+
+def belonging(path):
+    """The sets of an annotator: points of the sketch, and of the plan, from the top left."""
+    found = []
+    for line in path.read_text().splitlines():
+        words = line.split()
+        if line.startswith("#"):
+            if "match" in line:
+                found.append(([], []))
+            side = 0 if "map1" in line else 1
+        elif words:
+            row, column = map(float, words)
+            found[-1][side].append((column, row))
+    return [both for both in found if all(both)]
+
+
+def sets_at(item, points_of_sets, height):
+    """The sets of which a point lies in a region, or within 2 pixels of it."""
+    region = item.polygon.buffer(2.0)
+    return {
+        number
+        for number, points in enumerate(points_of_sets)
+        if any(region.contains(shapely.Point(x, height - y)) for x, y in points)
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("annotator", "least"), [(1, 33), (2, 35)])
+def test_regions_that_people_drew_find_those_that_they_are_on_the_plan(annotator, least):
+    require(RSI.exists(), "the sketches of people")
+    plan = read_source(RSI / "model_simple.png")
+    mapped = segmented(plan).scene
+    right, judged = 0, 0
+    for name in DRAWN:
+        drawn = read_source(RSI / "sketches" / f"{name}.png")
+        sets = belonging(RSI / "truth" / f"annotator-{annotator}" / f"gt_{name}_model_simple.dat")
+        sketch = segmented(drawn).scene
+        for a, b in match(sketch, mapped).object_map.items():
+            here = sets_at(sketch.objects[a], [points for points, _ in sets], len(drawn.pixels))
+            there = sets_at(mapped.objects[b], [points for _, points in sets], len(plan.pixels))
+            judged += bool(here or there)
+            right += bool(here & there)
+    assert right >= least
+    assert right >= 0.78 * judged
+
+
+def free_cells(*boxes):
+    cells = np.zeros((120, 200), np.uint8)
+    for x, y, width, height in boxes:
+        cells[y : y + height, x : x + width] = 1
+    return cells
+
+
+def places(cells):
+    """The areas of places, the largest first."""
+    mask = divided_by_width(cells, 0.5, 2.0, 20.0)
+    return sorted(cv2.connectedComponentsWithStats(mask, connectivity=8)[2][1:, 4], reverse=True)
+
+
+def test_where_a_corridor_opens_into_a_hall_it_ends():
+    cells = free_cells((10, 10, 90, 90), (100, 40, 80, 20))
+    assert places(cells) == pytest.approx([8100, 1600], rel=0.08)
+
+
+def test_a_corridor_more_than_half_as_wide_is_of_the_hall():
+    cells = free_cells((10, 10, 90, 90), (100, 30, 80, 48))
+    assert places(cells) == pytest.approx([8100 + 80 * 48], rel=0.01)
+
+
+def test_a_gap_in_a_thin_wall_parts_two_rooms_and_is_none():
+    cells = free_cells((10, 10, 80, 90), (92, 10, 80, 90), (90, 45, 2, 20))
+    assert places(cells) == pytest.approx([7200, 7200], rel=0.02)
+
+
+@pytest.mark.parametrize("turns", [1, 2, 3])
+def test_turned_free_space_has_the_same_places(turns):
+    cells = free_cells((10, 10, 90, 90), (100, 40, 80, 20), (40, 0, 12, 10), (165, 60, 15, 50))
+    assert places(np.rot90(cells, turns).copy()) == pytest.approx(places(cells), rel=0.02)
+
+
+def test_what_is_smaller_than_the_smallest_place_is_of_the_next():
+    cells = free_cells((10, 10, 90, 90), (100, 40, 9, 4))
+    assert len(places(cells)) == 1
+    assert places(cells)[0] == pytest.approx(8136, rel=0.01)

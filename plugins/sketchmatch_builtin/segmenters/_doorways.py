@@ -12,7 +12,7 @@ from sketchmatch.model import FloatArray, IntArray
 from sketchmatch_builtin.segmenters._cells import Mask
 from sketchmatch_builtin.segmenters._merging import groups
 
-__all__ = ["divided", "doorway"]
+__all__ = ["along_borders", "divided", "doorway", "grow"]
 
 _Labels = NDArray[np.int32]
 _Widths = NDArray[np.float32]
@@ -71,9 +71,9 @@ def divided(free: Mask, door: float, least: float) -> Mask:
     free &= _near(width > _RAY * door, 2.0 * _RAY * door)
     labels = _bodies(free, width, door / 2.0 + 0.5)
     labels = _with_narrow_rooms(free, labels, least)
-    _grow(free, labels)
+    grow(free, labels)
     labels = _joined(labels, width)
-    return np.asarray((free & ~_along_borders(labels))[1:-1, 1:-1], dtype=np.uint8)
+    return np.asarray((free & ~along_borders(labels))[1:-1, 1:-1], dtype=np.uint8)
 
 
 def _bodies(free: Mask, width: _Widths, radius: float) -> _Labels:
@@ -133,7 +133,7 @@ def _numbered(mask: Mask, connectivity: int) -> tuple[_Labels, IntArray]:
     return numbers[parts], sizes[order]
 
 
-def _grow(free: Mask, labels: _Labels) -> None:
+def grow(free: Mask, labels: _Labels) -> None:
     """Give free cells without a label that of the nearest, in steps from side to side.
 
     Of several that are as near it is the highest.
@@ -191,7 +191,7 @@ def _without_shafts(free: Mask, width: _Widths, door: float) -> Mask:
     return np.asarray((2.0 * widest >= _SHAFT * door)[spaces], dtype=np.uint8)
 
 
-def _along_borders(labels: _Labels) -> NDArray[np.bool_]:
+def along_borders(labels: _Labels) -> NDArray[np.bool_]:
     """Return the cells that touch, by a side or a corner, a cell of another room."""
     around = np.ones((3, 3), np.uint8)
     # Labels are few, far below 2²⁴, and so exact as float32, which OpenCV can dilate.

@@ -1,0 +1,137 @@
+"""Free space cut where its width changes: the narrow beside the wide is a place of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from sketchmatch.model import FloatArray, IntArray
+from sketchmatch_builtin.segmenters._cells import Mask
+from sketchmatch_builtin.segmenters._doorways import along_borders, grow
+from sketchmatch_builtin.segmenters._merging import groups
+
+__all__ = ["divided_by_width"]
+
+_Labels = NDArray[np.int32]
+_Widths = NDArray[np.float32]
+
+# Widths that differ by less are the same.
+_STEP = 1.08
+# Of the square of its greatest half width: what has a smaller area is a doorway, or a corner.
+_SMALLEST = 2.0
+
+
+def divided_by_width(free: Mask, share: float, narrowest: float, least: float) -> Mask:
+    """Return the free cells without those along the borders between places.
+
+    How wide free space is at a cell is the widest disc within it that covers the cell. From the
+    widest cells down, each joins the places that it touches, that a disc of this width can be moved
+    to, and that are nowhere more than 1 / ``share`` times as wide: these become one by that. It
+    begins a new one where there are none.
+
+    Parameters
+    ----------
+    free
+        1 where a cell is free, 0 elsewhere.
+    share
+        Of the width of the wider place: what is narrower is another place.
+    narrowest
+        Half the width, in cells, from which a place counts.
+    least
+        Area in cells of the smallest place; what is smaller belongs to those that it touches.
+
+    Returns
+    -------
+    ndarray
+        Shape of ``free``: places are components of cells joined by sides or corners.
+    """
+    free = np.pad(free, 1)
+    distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    places = _Places(np.zeros(free.shape, np.int32))
+    width = float(distance.max())
+    while width >= narrowest:
+        fits = (distance >= width).astype(np.uint8)
+        away, way = cv2.distanceTransformWithLabels(
+            1 - fits, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
+        )
+        new = (away < width) & (free > 0) & (places.labels == 0)
+        places.add(new, np.asarray(way, dtype=np.int32), fits > 0, width, share)
+        width /= _STEP
+    labels, widest = places.labels, places.widest
+    area = np.bincount(labels.reshape(-1), minlength=len(widest))
+    large = area >= np.maximum(_SMALLEST * widest**2, least)
+    large[0] = False
+    labels = np.where(large, np.arange(len(large)), 0).astype(np.int32)[labels]
+    grow(free, labels)
+    return np.asarray((free & (labels > 0) & ~along_borders(labels))[1:-1, 1:-1], dtype=np.uint8)
+
+
+@dataclass
+class _Places:
+    """Cells so far, by the number of their place; 0 where none is.
+
+    Attributes
+    ----------
+    labels
+        Shape (rows, columns).
+    widest
+        Shape (places + 1,), half of the width of each where it is widest, in cells.
+    within
+        Shape (places + 1,), the flat index of a cell where a disc of each that was added fits.
+    """
+
+    labels: _Labels
+    widest: FloatArray = field(default_factory=lambda: np.zeros(1))
+    within: IntArray = field(default_factory=lambda: np.zeros(1, np.int64))
+
+    def add(
+        self,
+        new: NDArray[np.bool_],
+        way: _Labels,
+        fits: NDArray[np.bool_],
+        width: float,
+        share: float,
+    ) -> None:
+        """Add cells of a width; ``way`` tells among which cells that a disc fits the nearest is."""
+        parts, ways = _parts(new, way)
+        before = len(self.widest)
+        parts[new] += before - 1
+        cells = np.flatnonzero(fits)
+        known, first = np.unique(way.reshape(-1)[cells], return_index=True)
+        within = np.append(self.within, cells[first[np.searchsorted(known, ways)]])
+        widest = np.append(self.widest, np.full(len(ways), width))
+        reached = way.reshape(-1)[within]
+        a, b = _touching(self.labels, parts)
+        joined = (reached[a] == reached[b]) & (width >= share * widest[a])
+        group = groups(len(widest), np.stack([a, b])[:, joined]).astype(np.int32)
+        self.widest = np.zeros(group.max() + 1)
+        np.maximum.at(self.widest, group, widest)
+        self.within = np.zeros(len(self.widest), np.int64)
+        self.within[group] = within
+        self.labels = group[self.labels + parts]
+
+
+def _parts(new: NDArray[np.bool_], way: _Labels) -> tuple[_Labels, IntArray]:
+    """Return the components of new cells by their ways, numbered from 1, and the way of each."""
+    _, components = cv2.connectedComponents(new.view(np.uint8), connectivity=8)
+    labels = np.asarray(components, dtype=np.int32)
+    most = int(way.max()) + 1
+    found, number = np.unique(labels[new].astype(np.int64) * most + way[new], return_inverse=True)
+    labels[new] = number.reshape(-1) + 1
+    return labels, found % most
+
+
+def _touching(labels: _Labels, parts: _Labels) -> IntArray:
+    """Return which labels and parts share a side or a corner, shape (2, k)."""
+    found = [np.zeros((2, 0), np.int64)]
+    for rows, columns in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        left = slice(max(-columns, 0), labels.shape[1] - max(columns, 0))
+        right = slice(max(columns, 0), labels.shape[1] + min(columns, 0))
+        here, there = (slice(0, labels.shape[0] - rows), left), (slice(rows, None), right)
+        for a, b in ((here, there), (there, here)):
+            both = (labels[a] > 0) & (parts[b] > 0)
+            found.append(np.stack([labels[a][both], parts[b][both]]).astype(np.int64))
+    return np.unique(np.concatenate(found, axis=1), axis=1)
