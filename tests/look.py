@@ -43,10 +43,10 @@ BY_EYE: dict[str, tuple[int, int]] = {
     "floors-ipa/office_g.png": (36, 36),
     "floors-ipa/office_i.png": (27, 27),
     "sketches/rooms-rsi/sketches/01.png": (5, 4),
-    "sketches/rooms-rsi/sketches/02.png": (5, 5),
+    "sketches/rooms-rsi/sketches/02.png": (5, 6),
     "sketches/rooms-rsi/sketches/06.png": (4, 5),
-    "sketches/rooms-rsi/sketches/07.png": (4, 4),
-    "sketches/rooms-rsi/sketches/11.png": (4, 7),
+    "sketches/rooms-rsi/sketches/07.png": (4, 5),
+    "sketches/rooms-rsi/sketches/11.png": (4, 4),
     "sketches/rooms-rsi/robot-maps-hih/layout.png": (5, 5),
 }
 """What a person counts, things of robots' maps and rooms of others, and what is found."""

@@ -186,8 +186,8 @@ def test_what_has_no_two_rooms_is_refused_in_one_sentence(case):
 
 
 DRAWN = {
-    **{"00": 6, "01": 4, "02": 5, "03": 2, "04": 4, "05": 5},
-    **{"06": 5, "07": 4, "08": 5, "09": 4, "10": 6, "11": 7},
+    **{"00": 7, "01": 4, "02": 6, "03": 2, "04": 4, "05": 3},
+    **{"06": 5, "07": 5, "08": 5, "09": 4, "10": 5, "11": 4},
 }
 """Regions of the masks that people drew from memory, looked at in the contact sheet."""
 
@@ -228,7 +228,7 @@ def sets_at(item, points_of_sets, height):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("annotator", "least"), [(1, 33), (2, 35)])
+@pytest.mark.parametrize(("annotator", "least"), [(1, 35), (2, 34)])
 def test_regions_that_people_drew_find_those_that_they_are_on_the_plan(annotator, least):
     require(RSI.exists(), "the sketches of people")
     plan = read_source(RSI / "model_simple.png")
@@ -244,7 +244,7 @@ def test_regions_that_people_drew_find_those_that_they_are_on_the_plan(annotator
             judged += bool(here or there)
             right += bool(here & there)
     assert right >= least
-    assert right >= 0.78 * judged
+    assert right >= 0.8 * judged
 
 
 def free_cells(*boxes):
@@ -265,9 +265,9 @@ def test_where_a_corridor_opens_into_a_hall_it_ends():
     assert places(cells) == pytest.approx([8100, 1600], rel=0.08)
 
 
-def test_a_corridor_more_than_half_as_wide_is_of_the_hall():
-    cells = free_cells((10, 10, 90, 90), (100, 30, 80, 48))
-    assert places(cells) == pytest.approx([8100 + 80 * 48], rel=0.01)
+def test_a_corridor_nearly_as_wide_is_of_the_hall():
+    cells = free_cells((10, 10, 90, 90), (100, 26, 80, 56))
+    assert places(cells) == pytest.approx([8100 + 80 * 56], rel=0.01)
 
 
 def test_a_gap_in_a_thin_wall_parts_two_rooms_and_is_none():

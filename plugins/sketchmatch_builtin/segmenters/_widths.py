@@ -18,8 +18,8 @@ __all__ = ["divided_by_width"]
 _Labels = NDArray[np.int32]
 _Widths = NDArray[np.float32]
 
-# Widths that differ by less are the same.
-_STEP = 1.08
+# Widths that differ by a smaller factor are the same.
+_STEP = 1.16
 # Of the square of its greatest half width: what has a smaller area is a doorway, or a corner.
 _SMALLEST = 2.0
 
@@ -126,12 +126,10 @@ def _parts(new: NDArray[np.bool_], way: _Labels) -> tuple[_Labels, IntArray]:
 
 def _touching(labels: _Labels, parts: _Labels) -> IntArray:
     """Return which labels and parts share a side or a corner, shape (2, k)."""
-    found = [np.zeros((2, 0), np.int64)]
-    for rows, columns in ((0, 1), (1, 0), (1, 1), (1, -1)):
-        left = slice(max(-columns, 0), labels.shape[1] - max(columns, 0))
-        right = slice(max(columns, 0), labels.shape[1] + min(columns, 0))
-        here, there = (slice(0, labels.shape[0] - rows), left), (slice(rows, None), right)
-        for a, b in ((here, there), (there, here)):
-            both = (labels[a] > 0) & (parts[b] > 0)
-            found.append(np.stack([labels[a][both], parts[b][both]]).astype(np.int64))
-    return np.unique(np.concatenate(found, axis=1), axis=1)
+    columns = labels.shape[1]
+    cells = np.flatnonzero(parts)
+    around = [row + column for row in (-columns, 0, columns) for column in (-1, 0, 1)]
+    beside = labels.reshape(-1)[cells[:, None] + np.array(around)]
+    known = beside > 0
+    pairs = np.stack([beside, np.broadcast_to(parts.reshape(-1)[cells, None], known.shape)])
+    return np.unique(pairs[:, known].astype(np.int64), axis=1)

@@ -89,7 +89,7 @@ class RoomSegmenter(Segmenter):
     94.8 %, 86.6 and 94.5 %; feature-based 89.2 and 90.4 %, 85.1 and 87.1 %. Neither its other ten
     floors nor its smallest rooms are in ours. MAORIS [2]_ reports 0.98 by Matthews' coefficient, on
     empty floors, which was not measured here. Of 12 masks that people drew of one building from
-    memory, matched with its plan, 34 of 43 and 36 of 42 lines join regions that belong together by
+    memory, matched with its plan, 37 of 42 and 36 of 43 lines join regions that belong together by
     [2]_'s two annotators; cut at one width as a robot's map is, 12 of 23 and 12 of 24.
 
     References
