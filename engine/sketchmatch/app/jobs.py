@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 
 from google.protobuf.message import Message
 
+from sketchmatch.api import Segmentation, Segmenter
 from sketchmatch.app import requests, responses
+from sketchmatch.app.scenes import name_of, segmentation, without_store
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, ServerStoppingError
+from sketchmatch.model import Scene
+from sketchmatch.model import Source as AnySource
 from sketchmatch.pipeline.clock import Clock
+from sketchmatch.pipeline.describe import in_directions
 from sketchmatch.pipeline.selection import Choice, chosen_algorithms, stage_of
+from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Registered, RegisteredReader
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
-from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest
+from sketchmatch_proto.v1.scene_service_pb2 import (
+    GetSceneResponse,
+    PutSceneRequest,
+    SegmentRequest,
+    StoredScene,
+)
+from sketchmatch_proto.v1.source_pb2 import Source
 
 __all__ = ["Job", "algorithms", "answers", "time_budget"]
 
@@ -30,10 +42,14 @@ class Job:
         A name that no other job of the application has.
     request
         A message of the contract that wants work; which one says what is to be done.
+    caller, brought
+        As of an :class:`~sketchmatch.app.orders.Order`.
     """
 
     id: str
     request: Message
+    caller: str = ""
+    brought: tuple[bytes, ...] = ()
 
 
 def answers(
@@ -55,9 +71,11 @@ def answers(
     """
     match job.request:
         case MatchRequest():
-            return _match(job.id, job.request, setup, begun)
+            return _match(job, job.request, setup, begun)
         case SegmentRequest():
             return _segment(job.request, setup)
+        case PutSceneRequest():
+            return _put_scene(job.request, setup)
     raise TypeError(f"a {type(job.request).__name__} is no request for work")
 
 
@@ -77,7 +95,7 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
                 "map_segmenter": requests.source_type(request.map, readers),
             }
             files = [request.sketch, request.map]
-        case SegmentRequest(profile=profile):
+        case SegmentRequest(profile=profile) | PutSceneRequest(profile=profile):
             found, files = requests.source_type(request.source, readers), [request.source]
             stage = "sketch_segmenter" if found is None else stage_of(found)
             selection, types = {stage: requests.choice(request.segmenter)}, {stage: found}
@@ -108,14 +126,16 @@ def time_budget(job: Job, setup: Setup) -> float | None:
 
 
 def _match(
-    name: str, request: MatchRequest, setup: Setup, begun: Callable[[Clock], None]
+    job: Job, request: MatchRequest, setup: Setup, begun: Callable[[Clock], None]
 ) -> Generator[Message, None, None]:
     engine = setup.engine
     with engine.limited():
-        value = requests.match_request(request, setup.limits, engine.registry.readers)
+        value = requests.match_request(
+            request, setup.limits, engine.registry.readers, _stored(job, setup)
+        )
     writer, clock = responses.ResponseWriter(value), Clock(value.time_budget)
     begun(clock)
-    with requests.paths_of(request), closing(engine.match(value, name, clock)) as events:
+    with requests.paths_of(request), closing(engine.match(value, job.id, clock)) as events:
         try:
             for event in events:
                 yield writer.response(event)
@@ -125,15 +145,63 @@ def _match(
             raise
 
 
-def _segment(request: SegmentRequest, setup: Setup) -> Generator[Message, None, None]:
+def _stored(job: Job, setup: Setup) -> requests.Stored:
+    """Return what finds the stored scenes that a job may name."""
+    brought = {StoredScene.FromString(record).name: record for record in job.brought}
+
+    def stored(name: str, field: str) -> Segmentation:
+        if name in brought:
+            record = brought[name]
+            if setup.shelf is not None:
+                return setup.shelf.decoded(name, record)
+            return segmentation(StoredScene.FromString(record))
+        if setup.shelf is None:
+            raise without_store(field)
+        return setup.shelf.segmentation(name, job.caller, field)
+
+    return stored
+
+
+def _put_scene(request: PutSceneRequest, setup: Setup) -> Generator[Message, None, None]:
+    """Find the objects of a source to be kept; one that is kept already is told by its name."""
+    engine, given = setup.engine, request.source
+    source, segmenter = _source_and_segmenter(request, setup)
+    name, data = name_of(given, segmenter, engine.registry)
+    if setup.shelf is not None and (record := setup.shelf.record(name)) is not None:
+        yield GetSceneResponse(stored_scene=StoredScene.FromString(record))
+        return
+    with requests.paths_of(request):
+        found = engine.segment(source, segmenter, f"source.{source.field}")
+    record = responses.stored_scene(name, found, segmenter)
+    yield GetSceneResponse(stored_scene=record, source=Source.FromString(data))
+    if setup.shelf is not None:
+        kept = setup.shelf.decoded(name, record.SerializeToString())
+        _describe(kept.scene, request.profile, setup)
+
+
+def _describe(scene: Scene, profile: str, setup: Setup) -> None:
+    """Describe a scene as most matches will need it, which is remembered."""
+    engine = setup.engine
+    histogram = engine.resolve({}, profile=profile).histogram
+    with suppress(InvalidInputError):  # a match will be told
+        for each in (histogram, in_directions(histogram, histogram.directions)):
+            finish(engine.describe(scene, each))
+
+
+def _source_and_segmenter(
+    request: SegmentRequest | PutSceneRequest, setup: Setup
+) -> tuple[AnySource, Segmenter]:
     engine = setup.engine
     with engine.limited():
         source = requests.source(
             request.source, "source", request.HasField("source"), engine.registry.readers
         )
-    segmenter = engine.resolve_segmenter(
-        requests.choice(request.segmenter), source, request.profile
-    )
+    choice = requests.choice(request.segmenter)
+    return source, engine.resolve_segmenter(choice, source, request.profile)
+
+
+def _segment(request: SegmentRequest, setup: Setup) -> Generator[Message, None, None]:
+    source, segmenter = _source_and_segmenter(request, setup)
     with requests.paths_of(request):
-        found = engine.segment(source, segmenter, f"source.{source.field}")
+        found = setup.engine.segment(source, segmenter, f"source.{source.field}")
     yield responses.segmented(found, segmenter)

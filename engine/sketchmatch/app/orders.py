@@ -12,13 +12,13 @@ from sketchmatch.app.jobs import Job
 from sketchmatch.app.packed import Packed, inflated
 from sketchmatch_proto.v1 import source_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
-from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest
+from sketchmatch_proto.v1.scene_service_pb2 import PutSceneRequest, SegmentRequest
 
 __all__ = ["Order"]
 
-_Request: TypeAlias = type[MatchRequest] | type[SegmentRequest]
+_Request: TypeAlias = type[MatchRequest] | type[SegmentRequest] | type[PutSceneRequest]
 _TYPES: dict[str, _Request] = {
-    kind.DESCRIPTOR.name: kind for kind in (MatchRequest, SegmentRequest)
+    kind.DESCRIPTOR.name: kind for kind in (MatchRequest, SegmentRequest, PutSceneRequest)
 }
 _SOURCE = source_pb2.Source.DESCRIPTOR
 _FILE = _SOURCE.fields_by_name["file"].number
@@ -35,14 +35,21 @@ class Order:
     id
         A name that no other order of the application has.
     kind
-        Name of the message: MatchRequest or SegmentRequest.
+        Name of the message: MatchRequest, SegmentRequest or PutSceneRequest.
     data
         The message, perhaps compressed.
+    caller
+        Who asks, by name of token or certificate, or empty: whose stored scenes it may name.
+    brought
+        Stored scenes that come with the request, as messages ``StoredScene``: these are not looked
+        for.
     """
 
     id: str
     kind: str
     data: bytes
+    caller: str = ""
+    brought: tuple[bytes, ...] = ()
 
     def job(self, limit: int) -> Job:
         """Inflate and decode the request.
@@ -57,7 +64,8 @@ class Order:
         InvalidInputError
             If it is not what it should be.
         """
-        return Job(self.id, Packed(self.data, _TYPES[self.kind].FromString).opened(limit))
+        request = Packed(self.data, _TYPES[self.kind].FromString).opened(limit)
+        return Job(self.id, request, self.caller, self.brought)
 
     def outline(self, limit: int) -> Job:
         """Decode the request but for sketch and map, of which only files are kept.

@@ -58,6 +58,7 @@ __all__ = [
     "segmented",
     "selection",
     "server_info",
+    "stored_scene",
 ]
 
 _SOURCE_KINDS = {
@@ -203,6 +204,20 @@ def segmented(found: Segmentation, segmenter: Segmenter) -> scene_service_pb2.Se
         warnings=found.warnings,
         segmenter=selection(segmenter),
         route=_points(found.route),
+    )
+
+
+def stored_scene(
+    name: str, found: Segmentation, segmenter: Segmenter
+) -> scene_service_pb2.StoredScene:
+    """Return what a segmenter found as the record that is kept of it."""
+    told = segmented(found, segmenter)
+    return scene_service_pb2.StoredScene(
+        name=name,
+        scene=told.scene,
+        warnings=told.warnings,
+        segmenter=told.segmenter,
+        route=told.route,
     )
 
 

@@ -8,7 +8,7 @@ from numbers import Integral, Real
 from types import MappingProxyType
 from typing import Any
 
-from sketchmatch.api import Judge, Searcher
+from sketchmatch.api import Judge, Searcher, Segmentation
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model import ConfidenceWeights, RequestWeights, Scene, Source
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
@@ -39,7 +39,7 @@ class MatchRequest:
     Attributes
     ----------
     sketch, map
-        Sources, or scenes that need no segmentation.
+        Sources, or scenes and segmentations, which need none.
     selection
         Algorithms and parameters, by stage.
     seed
@@ -72,8 +72,8 @@ class MatchRequest:
         If a value is out of its bounds.
     """
 
-    sketch: Source | Scene
-    map: Source | Scene
+    sketch: Source | Scene | Segmentation
+    map: Source | Scene | Segmentation
     selection: Selection = field(default_factory=lambda: MappingProxyType({}))
     seed: int = 0
     time_budget: float | None = None

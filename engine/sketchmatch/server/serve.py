@@ -18,6 +18,7 @@ from grpc_reflection.v1alpha import reflection
 import sketchmatch
 from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
+from sketchmatch.app.store import Store
 from sketchmatch.config.addresses import is_of_this_machine
 from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
 from sketchmatch.server.callers import CallerInterceptor
@@ -135,7 +136,8 @@ async def serve(
     """
     lacking = _refuse_strangers(settings)
     files = _Files(settings, say)
-    app = Application(load(), settings.workers)
+    store = None if settings.store is None else Store(settings.store)
+    app = Application(load(), settings.workers, store)
     metrics = Metrics(_METHODS)
     server = grpc.aio.server(
         interceptors=[
@@ -206,6 +208,8 @@ async def serve(
         await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
         await ending
         await app.close()
+        if store:
+            store.close()
         if monitor:
             await asyncio.to_thread(monitor.close)
         unwatch()
