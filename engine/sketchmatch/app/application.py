@@ -22,6 +22,7 @@ from sketchmatch.app.orders import Order
 from sketchmatch.app.packed import check_size
 from sketchmatch.app.remembered import Remembered
 from sketchmatch.app.setup import Setup
+from sketchmatch.app.sketches import Sketches
 from sketchmatch.app.store import Store
 from sketchmatch.app.tasks import Task
 from sketchmatch.app.waiting import Caller, FairQueue
@@ -134,10 +135,13 @@ class Application:
     ----------
     scenes
         The scenes that are kept.
+    sketches
+        The sketches in progress.
     """
 
     def __init__(self, setup: Setup, workers: int = 0, store: Store | None = None) -> None:
         self.scenes = Keeping(self, store)
+        self.sketches = Sketches(self)
         self._remembered = Remembered(self.scenes.path)
         self._setup = self._remembering(setup)
         self._kept = workers
@@ -306,6 +310,7 @@ class Application:
     async def drain(self, seconds: float) -> None:
         """Begin nothing more; what runs ends by itself, or in so many seconds with what it has."""
         self._stopping = True
+        self.sketches.stop()
         for task in tuple(self._waiting):
             self._waiting.remove(task, task.caller)
             task.log.end(ServerStoppingError("the server is about to stop"))
@@ -318,6 +323,7 @@ class Application:
     async def close(self) -> None:
         """End all tasks that are under way, and wait for their threads and processes."""
         self._stopping = True
+        self.sketches.stop()
         for task in tuple(self._running):
             self._place(task).stop(task)
         await self._here.close()
@@ -394,6 +400,7 @@ class Application:
         while True:
             await asyncio.sleep(_LOOK)
             self._workers.look()
+            self.sketches.look()
             now, longest = time.monotonic(), self._setup.limits.max_wait
             for task in [task for task in self._waiting if now - task.asked > longest]:
                 self._waiting.remove(task, task.caller)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from typing import cast
 
 from google.protobuf.message import Message
 
@@ -12,11 +13,17 @@ from sketchmatch.api import Segmentation, Segmenter
 from sketchmatch.app import requests, responses
 from sketchmatch.app.scenes import name_of, segmentation, without_store
 from sketchmatch.app.setup import Setup
-from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, ServerStoppingError
+from sketchmatch.errors import (
+    AnswerUnavailableError,
+    InvalidInputError,
+    Reason,
+    ServerStoppingError,
+)
 from sketchmatch.model import Scene
 from sketchmatch.model import Source as AnySource
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.describe import in_directions
+from sketchmatch.pipeline.events import Accepted
 from sketchmatch.pipeline.selection import Choice, chosen_algorithms, stage_of
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Registered, RegisteredReader
@@ -27,6 +34,7 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
     SegmentRequest,
     StoredScene,
 )
+from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest
 from sketchmatch_proto.v1.source_pb2 import Source
 
 __all__ = ["Job", "algorithms", "answers", "time_budget"]
@@ -76,6 +84,8 @@ def answers(
             return _segment(job.request, setup)
         case PutSceneRequest():
             return _put_scene(job.request, setup)
+        case CreateSketchRequest():
+            return _map_of_sketch(job, job.request, setup)
     raise TypeError(f"a {type(job.request).__name__} is no request for work")
 
 
@@ -86,6 +96,8 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
     refused where the job is done.
     """
     request, profile = job.request, ""
+    if isinstance(request, CreateSketchRequest):
+        request = request.match
     readers = setup.engine.registry.readers
     match request:
         case MatchRequest():
@@ -177,6 +189,39 @@ def _put_scene(request: PutSceneRequest, setup: Setup) -> Generator[Message, Non
     if setup.shelf is not None:
         kept = setup.shelf.decoded(name, record.SerializeToString())
         _describe(kept.scene, request.profile, setup)
+
+
+def _map_of_sketch(
+    job: Job, request: CreateSketchRequest, setup: Setup
+) -> Generator[Message, None, None]:
+    """Find the objects of the map of a sketch, once it is known that the match can be had."""
+    engine, match = setup.engine, MatchRequest()
+    match.CopyFrom(request.match)
+    try:
+        if match.HasField("sketch"):
+            problem = "is set, and a sketch begins empty; set strokes by UpdateSketch"
+            raise InvalidInputError(Reason.INVALID_FIELD, "sketch", problem)
+        stroke = match.sketch.stroke_set.strokes.add()
+        for x in (0.0, 1.0, 2.0):
+            stroke.points.add(x=x, y=x * x)
+        with engine.limited():
+            value = requests.match_request(
+                match, setup.limits, engine.registry.readers, _stored(job, setup)
+            )
+        with requests.paths_of(match), closing(engine.match(value)) as events:
+            pipeline = cast(Accepted, next(events)).pipeline
+            found = engine.segment_side("map", value.map, pipeline)
+    except InvalidInputError as error:
+        raise error.within("match") from None
+    if pipeline.map_segmenter is None:
+        record = responses.stored_scene(match.map.stored_scene, found)
+    else:
+        name, _ = name_of(match.map, pipeline.map_segmenter, engine.registry)
+        record = responses.stored_scene(name, found, pipeline.map_segmenter)
+    yield GetSceneResponse(stored_scene=record)
+    if setup.shelf is not None:
+        found = setup.shelf.decoded(record.name, record.SerializeToString())
+    _describe(found.scene, match.pipeline.profile, setup)
 
 
 def _describe(scene: Scene, profile: str, setup: Setup) -> None:

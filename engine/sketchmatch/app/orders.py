@@ -13,13 +13,21 @@ from sketchmatch.app.packed import Packed, inflated
 from sketchmatch_proto.v1 import source_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from sketchmatch_proto.v1.scene_service_pb2 import PutSceneRequest, SegmentRequest
+from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest
 
 __all__ = ["Order"]
 
-_Request: TypeAlias = type[MatchRequest] | type[SegmentRequest] | type[PutSceneRequest]
-_TYPES: dict[str, _Request] = {
-    kind.DESCRIPTOR.name: kind for kind in (MatchRequest, SegmentRequest, PutSceneRequest)
-}
+_Request: TypeAlias = (
+    type[MatchRequest] | type[SegmentRequest] | type[PutSceneRequest] | type[CreateSketchRequest]
+)
+_KINDS: tuple[_Request, ...] = (
+    MatchRequest,
+    SegmentRequest,
+    PutSceneRequest,
+    CreateSketchRequest,
+)
+_TYPES = {kind.DESCRIPTOR.name: kind for kind in _KINDS}
+_MATCH = MatchRequest.DESCRIPTOR
 _SOURCE = source_pb2.Source.DESCRIPTOR
 _FILE = _SOURCE.fields_by_name["file"].number
 _VARINT, _FIXED64, _MESSAGE, _FIXED32 = 0, 1, 2, 5
@@ -35,7 +43,7 @@ class Order:
     id
         A name that no other order of the application has.
     kind
-        Name of the message: MatchRequest, SegmentRequest or PutSceneRequest.
+        Name of the message: MatchRequest, SegmentRequest, PutSceneRequest or CreateSketchRequest.
     data
         The message, perhaps compressed.
     caller
@@ -87,11 +95,15 @@ class Order:
 
 
 def _outline(data: bytes, request: Message) -> bytes:
-    sources = {field.number for field in request.DESCRIPTOR.fields if field.message_type is _SOURCE}
+    fields = request.DESCRIPTOR.fields_by_number
     kept = bytearray()
     for number, wire_type, first, payload, end in _fields(data, 0, len(data)):
-        if number in sources and wire_type == _MESSAGE:
-            inner = _source_outline(data, payload, end)
+        kind = fields[number].message_type if number in fields else None
+        if kind in (_SOURCE, _MATCH) and wire_type == _MESSAGE:
+            if kind is _SOURCE:
+                inner = _source_outline(data, payload, end)
+            else:
+                inner = _outline(data[payload:end], MatchRequest())
             kept += bytes([number << 3 | _MESSAGE]) + _varint_of(len(inner)) + inner
         else:
             kept += data[first:end]

@@ -26,7 +26,7 @@ class Remembered:
 
     def __init__(self, path: Path | None) -> None:
         self.path = path
-        self._shelf = None if path is None else Shelf(path)
+        self._shelf = Shelf(path)
         self._hand_in: Callable[[Described], None] = lambda _: None
         self._memory = Memory(fetch=self._fetch, described=self._described)
 
@@ -37,11 +37,9 @@ class Remembered:
         return replace(setup, engine=engine, shelf=self._shelf)
 
     def _fetch(self, scene: Scene, histogram: Histogram) -> FloatArray | None:
-        if self._shelf is None or not self._shelf.holds(scene):
-            return None
-        return self._shelf.histograms(scene, histogram)
+        return self._shelf.histograms(scene, histogram) if self._shelf.holds(scene) else None
 
     def _described(self, scene: Scene, descriptor: SceneDescriptor) -> None:
-        if self._shelf is not None and self._shelf.holds(scene):
+        if self.path is not None and self._shelf.holds(scene):
             told = described_by(descriptor.described_by)
             self._hand_in(Described(scene.identity, told, descriptor.histograms))

@@ -208,16 +208,15 @@ def segmented(found: Segmentation, segmenter: Segmenter) -> scene_service_pb2.Se
 
 
 def stored_scene(
-    name: str, found: Segmentation, segmenter: Segmenter
+    name: str, found: Segmentation, segmenter: Segmenter | None = None
 ) -> scene_service_pb2.StoredScene:
     """Return what a segmenter found as the record that is kept of it."""
-    told = segmented(found, segmenter)
     return scene_service_pb2.StoredScene(
         name=name,
-        scene=told.scene,
-        warnings=told.warnings,
-        segmenter=told.segmenter,
-        route=told.route,
+        scene=scene(found.scene),
+        warnings=found.warnings,
+        segmenter=None if segmenter is None else selection(segmenter),
+        route=_points(found.route),
     )
 
 

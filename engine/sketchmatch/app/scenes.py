@@ -343,11 +343,11 @@ class Shelf:
     Parameters
     ----------
     path
-        The archive's file.
+        The archive's file; None where none is kept, but for those that come with requests.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._file = Reading(path)
+    def __init__(self, path: Path | None) -> None:
+        self._file = None if path is None else Reading(path)
         self._lock = Lock()
         self._held: OrderedDict[str, Segmentation] = OrderedDict()
 
@@ -359,8 +359,10 @@ class Shelf:
         NotFoundError
             If the caller has put none of this name; the sentence begins with ``field``.
         StoreError
-            If the file cannot be read.
+            If there is no file, or it cannot be read.
         """
+        if self._file is None:
+            raise without_store(field)
         record = self._file.work(lambda connection: _record(connection, name, caller, field))
         return self.decoded(name, record)
 
@@ -379,33 +381,33 @@ class Shelf:
 
     def record(self, name: str) -> bytes | None:
         """Return the record of a scene that somebody has put, or None."""
-        try:
-            found = self._file.work(
-                lambda connection: connection.execute(
-                    "SELECT record FROM scenes WHERE name = ?", (name,)
-                ).fetchone()
-            )
-        except StoreError:
-            return None  # who writes to it will be told
+        found = self._found("SELECT record FROM scenes WHERE name = ?", name)
         return None if found is None else bytes(found[0])
 
     def histograms(self, scene: Scene, histogram: Histogram) -> FloatArray | None:
         """Return the histograms of a scene, or None where they are not kept."""
-        try:
-            found = self._file.work(
-                lambda connection: connection.execute(
-                    "SELECT bytes, directions FROM histograms "
-                    "WHERE outlines = ? AND described_by = ?",
-                    (scene.identity, described_by(histogram.identity)),
-                ).fetchone()
-            )
-        except StoreError:
-            return None
+        found = self._found(
+            "SELECT bytes, directions FROM histograms WHERE outlines = ? AND described_by = ?",
+            scene.identity,
+            described_by(histogram.identity),
+        )
         if found is None:
             return None
         table = _table(*found)
         fits = table.shape == (pair_count(len(scene)), histogram.directions)
         return table if fits else None
+
+    def _found(self, query: str, *keys: str) -> tuple[Any, ...] | None:
+        """Return a row, or None where there is none or it cannot be read: who writes is told."""
+        if self._file is None:
+            return None
+        try:
+            row: tuple[Any, ...] | None = self._file.work(
+                lambda connection: connection.execute(query, keys).fetchone()
+            )
+        except StoreError:
+            return None
+        return row
 
     def holds(self, scene: Scene) -> bool:
         """Whether a scene came from here."""

@@ -29,6 +29,7 @@ from sketchmatch.server.monitor import Monitor
 from sketchmatch.server.notify import notify
 from sketchmatch.server.readiness import Readiness
 from sketchmatch.server.services import CatalogService, MatchService, SceneService
+from sketchmatch.server.sketching import SketchService
 from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
 from sketchmatch.server.tokens import read_tokens
 from sketchmatch.server.watchdog import watch
@@ -38,6 +39,7 @@ from sketchmatch_proto.v1 import (
     catalog_service_pb2_grpc,
     match_service_pb2,
     scene_service_pb2,
+    sketch_service_pb2,
 )
 
 __all__ = ["ServerSettings", "serve"]
@@ -55,12 +57,13 @@ _SERVICES = (
     match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name,
     scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name,
     catalog_service_pb2.DESCRIPTOR.services_by_name["CatalogService"].full_name,
+    sketch_service_pb2.DESCRIPTOR.services_by_name["SketchService"].full_name,
 )
 
 
 _METHODS = tuple(
     f"/{service.full_name}/{method.name}"
-    for file in (match_service_pb2, scene_service_pb2, catalog_service_pb2)
+    for file in (match_service_pb2, scene_service_pb2, catalog_service_pb2, sketch_service_pb2)
     for service in file.DESCRIPTOR.services_by_name.values()
     for method in service.methods
 )
@@ -340,6 +343,7 @@ def _add_services(
 ) -> None:
     matching, scenes = MatchService(app, metrics.matched), SceneService(app)
     server.add_generic_rpc_handlers((matching.handler(), scenes.handler()))
+    server.add_generic_rpc_handlers((SketchService(app).handler(),))
     catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), server)
     health_pb2_grpc.add_HealthServicer_to_server(readiness.servicer, server)
     reflection.enable_server_reflection(

@@ -32,7 +32,14 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
     UpdateSceneRequest,
 )
 
-__all__ = ["CatalogService", "MatchService", "SceneService"]
+__all__ = [
+    "CatalogService",
+    "MatchService",
+    "SceneService",
+    "answering",
+    "caller_from",
+    "handler_of",
+]
 
 _MATCH = match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name
 _SCENE = scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name
@@ -59,7 +66,7 @@ class MatchService:
 
     async def Match(self, request: bytes, context: _Context) -> None:  # noqa: N802
         """Run a match and pass its events on."""
-        with self._app.running("MatchRequest", request, _caller(context)) as task:
+        with self._app.running("MatchRequest", request, caller_from(context)) as task:
             note(match=task.id)
             pacing, accepted = Pacing(), MatchAccepted()
             async with aclosing(followed(task.log)) as responses:
@@ -78,7 +85,7 @@ class MatchService:
 
     def handler(self) -> grpc.GenericRpcHandler:
         """Return what answers the calls of the service."""
-        return _handler(_MATCH, Match=grpc.unary_stream_rpc_method_handler(self.Match))
+        return handler_of(_MATCH, Match=grpc.unary_stream_rpc_method_handler(self.Match))
 
 
 class SceneService:
@@ -89,7 +96,7 @@ class SceneService:
 
     async def Segment(self, request: bytes, context: _Context) -> bytes:  # noqa: N802
         """Segment, and return what was found."""
-        with self._app.running("SegmentRequest", request, _caller(context)) as task:
+        with self._app.running("SegmentRequest", request, caller_from(context)) as task:
             async with aclosing(followed(task.log)) as told:
                 responses = [response async for response in told]
         # Nobody waits for an answer to a request that was stopped.
@@ -97,20 +104,20 @@ class SceneService:
 
     async def PutScene(self, request: bytes, context: _Context) -> PutSceneResponse:  # noqa: N802
         """Keep a scene."""
-        return await self._app.scenes.put(request, _caller(context))
+        return await self._app.scenes.put(request, caller_from(context))
 
     def handler(self) -> grpc.GenericRpcHandler:
         """Return what answers the calls of the service."""
-        return _handler(
+        return handler_of(
             _SCENE,
             Segment=grpc.unary_unary_rpc_method_handler(self.Segment),
             PutScene=grpc.unary_unary_rpc_method_handler(
                 self.PutScene, response_serializer=PutSceneResponse.SerializeToString
             ),
-            GetScene=_answering(GetSceneRequest, self._app.scenes.get),
-            ListScenes=_answering(ListScenesRequest, self._app.scenes.list),
-            UpdateScene=_answering(UpdateSceneRequest, self._app.scenes.update),
-            DeleteScene=_answering(DeleteSceneRequest, self._app.scenes.delete),
+            GetScene=answering(GetSceneRequest, self._app.scenes.get),
+            ListScenes=answering(ListScenesRequest, self._app.scenes.list),
+            UpdateScene=answering(UpdateSceneRequest, self._app.scenes.update),
+            DeleteScene=answering(DeleteSceneRequest, self._app.scenes.delete),
         )
 
 
@@ -135,7 +142,7 @@ class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):
         return self._app.info()
 
 
-def _caller(context: _Context) -> Caller:
+def caller_from(context: _Context) -> Caller:
     """Return who calls, by name or else by host, and the connection."""
     peer, name = context.peer() or "", caller_of(context)
     if name:
@@ -161,13 +168,13 @@ def _note_event(event: MatchResponse) -> None:
             note(outcome=name.removeprefix("OUTCOME_"))
 
 
-def _answering(
+def answering(
     kind: type[_Request], method: Callable[[_Request, Caller], Awaitable[_Response]]
 ) -> grpc.RpcMethodHandler[_Request, _Response]:
     """Return what answers a short request as a method of the application does."""
 
     async def answer(request: _Request, context: _Context) -> _Response:
-        return await method(request, _caller(context))
+        return await method(request, caller_from(context))
 
     return grpc.unary_unary_rpc_method_handler(
         answer,
@@ -176,5 +183,6 @@ def _answering(
     )
 
 
-def _handler(service: str, **methods: Any) -> grpc.GenericRpcHandler:
+def handler_of(service: str, **methods: Any) -> grpc.GenericRpcHandler:
+    """Return what answers the calls of a service by the handlers of its methods."""
     return grpc.method_handlers_generic_handler(service, methods)
