@@ -190,6 +190,7 @@ class Application:
         data: bytes,
         caller: Caller = Caller(),  # noqa: B008
         brought: tuple[bytes, ...] = (),
+        former: tuple[bytes, bytes] | None = None,
     ) -> Iterator[Task]:
         """Admit a request and do it, in its turn, until the end of the block.
 
@@ -199,8 +200,8 @@ class Application:
             Name of the message, and the message.
         caller
             Who asks.
-        brought
-            Stored scenes that the request names, as messages.
+        brought, former
+            As of an :class:`~sketchmatch.app.orders.Order`.
 
         Raises
         ------
@@ -215,7 +216,7 @@ class Application:
         if self._stopping:
             raise ServerStoppingError("the server is about to stop")
         check_size(len(data), setup.limits.max_request_bytes)
-        order = Order(uuid.uuid4().hex, kind, data, caller.known, brought)
+        order = Order(uuid.uuid4().hex, kind, data, caller.known, brought, former)
         task = Task(order, setup, caller)
         self._admit(task)
         try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 from google.protobuf.message import Message
@@ -24,9 +24,11 @@ from sketchmatch.model import Source as AnySource
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.describe import in_directions
 from sketchmatch.pipeline.events import Accepted
+from sketchmatch.pipeline.former import Former
 from sketchmatch.pipeline.selection import Choice, chosen_algorithms, stage_of
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Registered, RegisteredReader
+from sketchmatch_proto.v1.match_pb2 import MatchResult
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from sketchmatch_proto.v1.scene_service_pb2 import (
     GetSceneResponse,
@@ -34,7 +36,7 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
     SegmentRequest,
     StoredScene,
 )
-from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest
+from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest, SketchObjects
 from sketchmatch_proto.v1.source_pb2 import Source
 
 __all__ = ["Job", "algorithms", "answers", "time_budget"]
@@ -50,7 +52,7 @@ class Job:
         A name that no other job of the application has.
     request
         A message of the contract that wants work; which one says what is to be done.
-    caller, brought
+    caller, brought, former
         As of an :class:`~sketchmatch.app.orders.Order`.
     """
 
@@ -58,6 +60,7 @@ class Job:
     request: Message
     caller: str = ""
     brought: tuple[bytes, ...] = ()
+    former: tuple[bytes, bytes] | None = None
 
 
 def answers(
@@ -145,6 +148,8 @@ def _match(
         value = requests.match_request(
             request, setup.limits, engine.registry.readers, _stored(job, setup)
         )
+    if job.former is not None:
+        value = replace(value, former=_former(*job.former))
     writer, clock = responses.ResponseWriter(value), Clock(value.time_budget)
     begun(clock)
     with requests.paths_of(request), closing(engine.match(value, job.id, clock)) as events:
@@ -172,6 +177,20 @@ def _stored(job: Job, setup: Setup) -> requests.Stored:
         return setup.shelf.segmentation(name, job.caller, field)
 
     return stored
+
+
+def _former(objects: bytes, result: bytes) -> Former:
+    """Read what was found in a sketch before it was changed."""
+    found, told = SketchObjects.FromString(objects), MatchResult.FromString(result)
+    sketch = segmentation(StoredScene(scene=found.scene)).scene
+    return Former(
+        sketch,
+        tuple(
+            {line.sketch_object: line.map_object for line in each.object_matches}
+            for each in (told, *told.alternatives)
+        ),
+        1.0 - told.place_probability if told.HasField("place_probability") else None,
+    )
 
 
 def _put_scene(request: PutSceneRequest, setup: Setup) -> Generator[Message, None, None]:

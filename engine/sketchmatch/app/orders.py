@@ -51,6 +51,9 @@ class Order:
     brought
         Stored scenes that come with the request, as messages ``StoredScene``: these are not looked
         for.
+    former
+        What was found in the sketch before it was changed, as messages ``SketchObjects`` and
+        ``MatchResult``, for a quick answer.
     """
 
     id: str
@@ -58,6 +61,7 @@ class Order:
     data: bytes
     caller: str = ""
     brought: tuple[bytes, ...] = ()
+    former: tuple[bytes, bytes] | None = None
 
     def job(self, limit: int) -> Job:
         """Inflate and decode the request.
@@ -73,7 +77,7 @@ class Order:
             If it is not what it should be.
         """
         request = Packed(self.data, _TYPES[self.kind].FromString).opened(limit)
-        return Job(self.id, request, self.caller, self.brought)
+        return Job(self.id, request, self.caller, self.brought, self.former)
 
     def outline(self, limit: int) -> Job:
         """Decode the request but for sketch and map, of which only files are kept.

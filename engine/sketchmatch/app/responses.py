@@ -160,6 +160,7 @@ def result(value: MatchResult) -> match_pb2.MatchResult:
         place_probability=value.place_probability,
         ambiguity=_ambiguity(value.ambiguity),
         unmatched_sketch_probabilities=value.unmatched_sketch_probabilities,
+        provisional=value.provisional,
     )
 
 

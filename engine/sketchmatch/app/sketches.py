@@ -64,6 +64,9 @@ _LONGEST_NAME = 64
 _SLOW = 0.1
 """Seconds after which the progress of a search is worth telling."""
 
+_PEN_RESTS = 0.15
+"""Seconds without a change after which a quick answer is followed by the whole one."""
+
 _OVERTAKEN = 0.5
 """Seconds after which a match of a revision that is not the latest is given up."""
 
@@ -138,6 +141,8 @@ class _Sketch:
         self.board = _Board()
         self.revision = 0
         self.done = -1
+        self.former: tuple[bytes, bytes] | None = None
+        """Objects and result of the last revision that has any."""
         self.touched = time.monotonic()
         self.watchers = 0
         self.changed = asyncio.Event()
@@ -353,15 +358,41 @@ class Sketches:
 
     async def _match(self, sketch: _Sketch, revision: int) -> None:
         """Match a revision, and tell what comes of it, unless it is overtaken."""
-        began = time.monotonic()
-        brought = (sketch.record,)
-        with self._app.running("MatchRequest", sketch.request(), sketch.caller, brought) as task:
+        data = sketch.request()
+        if sketch.former is not None:
+            if not await self._answer(sketch, revision, data, sketch.former):
+                return
+            with suppress(TimeoutError):
+                await asyncio.wait_for(sketch.changed.wait(), _PEN_RESTS)
+            if sketch.revision != revision:
+                return
+        await self._answer(sketch, revision, data, None)
+
+    async def _answer(
+        self, sketch: _Sketch, revision: int, data: bytes, former: tuple[bytes, bytes] | None
+    ) -> bool:
+        """Tell one answer to a revision; return whether it is worth looking for a better one."""
+        began, brought, better = time.monotonic(), (sketch.record,), False
+        objects = SketchObjects()
+        with self._app.running("MatchRequest", data, sketch.caller, brought, former) as task:
             async with aclosing(followed(task.log)) as responses:
                 async for response in responses:
                     taken = time.monotonic() - began
                     if sketch.revision != revision and taken > _OVERTAKEN:
-                        return
-                    _tell(sketch.board, revision, MatchResponse.FromString(response), taken)
+                        return False
+                    told = _told(MatchResponse.FromString(response), taken)
+                    if told is None:
+                        continue
+                    place, event = told
+                    event.revision = revision
+                    sketch.board.put(place, event)
+                    if place == "objects":
+                        objects = event.objects
+                    elif place == "outcome":
+                        better = event.result.result.provisional
+                        result = event.result.result
+                        sketch.former = objects.SerializeToString(), result.SerializeToString()
+        return better
 
 
 def question(result: match_pb2.MatchResult) -> SketchQuestion | None:
@@ -395,8 +426,8 @@ def question(result: match_pb2.MatchResult) -> SketchQuestion | None:
     )
 
 
-def _tell(board: _Board, revision: int, event: MatchResponse, taken: float) -> None:
-    """Put what a match tells on the board."""
+def _told(event: MatchResponse, taken: float) -> tuple[str, WatchSketchResponse] | None:
+    """Return what a match tells after some seconds, and the place on the board for it."""
     match event.WhichOneof("event"):
         case "scenes":
             found = SketchObjects(
@@ -404,12 +435,13 @@ def _tell(board: _Board, revision: int, event: MatchResponse, taken: float) -> N
                 warnings=event.scenes.sketch_warnings,
                 route=event.scenes.sketch_route,
             )
-            board.put("objects", WatchSketchResponse(revision=revision, objects=found))
+            return "objects", WatchSketchResponse(objects=found)
         case "progress" if taken > _SLOW:
-            board.put("progress", WatchSketchResponse(revision=revision, progress=event.progress))
+            return "progress", WatchSketchResponse(progress=event.progress)
         case "result":
             result = SketchResult(result=event.result, question=question(event.result))
-            board.put("outcome", WatchSketchResponse(revision=revision, result=result))
+            return "outcome", WatchSketchResponse(result=result)
+    return None
 
 
 def _map_event(record: StoredScene) -> WatchSketchResponse:

@@ -25,6 +25,7 @@ from sketchmatch.pipeline.events import (
     Progress,
     Segmented,
 )
+from sketchmatch.pipeline.former import starts
 from sketchmatch.pipeline.judge import judged
 from sketchmatch.pipeline.knowledge import check_pins_obeyed, knowledge
 from sketchmatch.pipeline.memory import Memory
@@ -178,6 +179,9 @@ def _events(
     partial = goal.price < math.inf
     known = knowledge(request.pins, request.synonyms, scenes, is_swapped(*scenes), partial)
     goal = replace(goal, allowed=known.allowed, pinned=known.pinned, names=known.names)
+    if request.former is not None and pipeline.searcher.warm:
+        start = starts(request.former, sketch.scene, len(map_.scene), is_swapped(*scenes))
+        goal = replace(goal, start=start, elsewhere=request.former.elsewhere if start else None)
     comparison = yield from _compared(scenes, pipeline, goal.weights, registry, clock, memory)
     with clock.timing("search"):
         work = search(comparison, pipeline.searcher, goal, registry, clock)

@@ -322,7 +322,7 @@ class SketchResult(google.protobuf.message.Message):
     @property
     def result(self) -> sketchmatch_proto.v1.match_pb2.MatchResult:
         """The same as `MatchService.Match` returns for the strokes of this revision, but for its name and
-        what it cost.
+        what it cost; or, before that and sooner, one that says it is `provisional`.
         """
 
     @property
