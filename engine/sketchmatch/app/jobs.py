@@ -28,7 +28,7 @@ from sketchmatch.pipeline.former import Former
 from sketchmatch.pipeline.selection import Choice, chosen_algorithms, stage_of
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Registered, RegisteredReader
-from sketchmatch_proto.v1.match_pb2 import MatchResult
+from sketchmatch_proto.v1.match_pb2 import AlternativeMap, MatchResult
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from sketchmatch_proto.v1.scene_service_pb2 import (
     GetSceneResponse,
@@ -183,11 +183,11 @@ def _former(objects: bytes, result: bytes) -> Former:
     """Read what was found in a sketch before it was changed."""
     found, told = SketchObjects.FromString(objects), MatchResult.FromString(result)
     sketch = segmentation(StoredScene(scene=found.scene)).scene
+    maps: tuple[MatchResult | AlternativeMap, ...] = (told, *told.alternatives)
     return Former(
         sketch,
         tuple(
-            {line.sketch_object: line.map_object for line in each.object_matches}
-            for each in (told, *told.alternatives)
+            {line.sketch_object: line.map_object for line in each.object_matches} for each in maps
         ),
         1.0 - told.place_probability if told.HasField("place_probability") else None,
     )
@@ -198,8 +198,8 @@ def _put_scene(request: PutSceneRequest, setup: Setup) -> Generator[Message, Non
     engine, given = setup.engine, request.source
     source, segmenter = _source_and_segmenter(request, setup)
     name, data = name_of(given, segmenter, engine.registry)
-    if setup.shelf is not None and (record := setup.shelf.record(name)) is not None:
-        yield GetSceneResponse(stored_scene=StoredScene.FromString(record))
+    if setup.shelf is not None and (known := setup.shelf.record(name)) is not None:
+        yield GetSceneResponse(stored_scene=StoredScene.FromString(known))
         return
     with requests.paths_of(request):
         found = engine.segment(source, segmenter, f"source.{source.field}")

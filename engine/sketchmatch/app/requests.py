@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from google.protobuf import struct_pb2
@@ -106,7 +106,7 @@ def match_request(
 
 def _side(
     request: match_service_pb2.MatchRequest,
-    side: str,
+    side: Literal["sketch", "map"],
     readers: Sequence[RegisteredReader],
     stored: Stored | None,
 ) -> Source | Segmentation:

@@ -406,8 +406,9 @@ def question(result: match_pb2.MatchResult) -> SketchQuestion | None:
         return None
     asked = deciding[0]
     likely: dict[int, float] = {}
-    others = [result.alternatives[k] for k in result.ambiguity.alternatives]
-    for each in (result, *others):
+    maps: list[match_pb2.MatchResult | match_pb2.AlternativeMap] = [result]
+    maps += [result.alternatives[k] for k in result.ambiguity.alternatives]
+    for each in maps:
         partners = {line.sketch_object: line.map_object for line in each.object_matches}
         partner = partners.get(asked, -1)
         likely[partner] = likely.get(partner, 0.0) + each.probability

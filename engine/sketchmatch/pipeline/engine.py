@@ -91,7 +91,9 @@ class Engine:
         with self.limited():
             return segment(source, segmenter, self.registry, field)
 
-    def segment_side(self, side: str, given: Source | Scene, pipeline: Pipeline) -> Segmentation:
+    def segment_side(
+        self, side: str, given: Source | Scene | Segmentation, pipeline: Pipeline
+    ) -> Segmentation:
         """Find the objects of the sketch or of the map of a match."""
         with self.limited():
             return segment_side(side, given, pipeline, self.registry)
