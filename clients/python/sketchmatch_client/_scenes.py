@@ -11,6 +11,7 @@ from sketchmatch_client.errors import InvalidRequestError, refused_as
 from sketchmatch_proto.v1.scene_service_pb2 import (
     DeleteSceneRequest,
     GetSceneRequest,
+    ObjectLabel,
     PutSceneRequest,
     UpdateSceneRequest,
 )
@@ -45,7 +46,8 @@ def update_request(name: str, labels: Mapping[int, str]) -> UpdateSceneRequest:
         problem = f"labels is {reprlib.repr(labels)}; give a dict from objects to labels"
         raise InvalidRequestError(problem, "INVALID_FIELD", "labels")
     with refused_as("INVALID_FIELD", "labels", "does not lead from indices, from 0, to text"):
-        return UpdateSceneRequest(name=_name(name), labels=labels)
+        given = [ObjectLabel(object=k, label=label) for k, label in labels.items()]
+    return UpdateSceneRequest(name=_name(name), labels=given)
 
 
 def delete_request(name: str) -> DeleteSceneRequest:

@@ -97,7 +97,7 @@ class Keeping:
 
     async def update(self, request: UpdateSceneRequest, caller: Caller) -> UpdateSceneResponse:
         """Keep a scene of a caller with other labels."""
-        labels = dict(request.labels)
+        labels = [(each.object, each.label) for each in request.labels]
         record = await self._asked(
             request.name, lambda archive: archive.relabel(request.name, labels, caller.known)
         )

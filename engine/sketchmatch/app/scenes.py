@@ -11,7 +11,7 @@ import sqlite3
 import time
 import zlib
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -228,7 +228,7 @@ class SceneArchive:
 
         return self._file.work(job)
 
-    def relabel(self, name: str, labels: Mapping[int, str], caller: str) -> StoredScene:
+    def relabel(self, name: str, labels: Sequence[tuple[int, str]], caller: str) -> StoredScene:
         """Keep a scene with other labels, beside the one of this name.
 
         Raises
@@ -246,12 +246,12 @@ class SceneArchive:
                 "WHERE name = ?",
                 (name,),
             ).fetchone()
-            for k, label in sorted(labels.items()):
-                if k >= len(record.scene.objects):
-                    count = len(record.scene.objects)
-                    problem = f"is of no object; the scene has {count}, from 0 to {count - 1}"
-                    raise InvalidInputError(Reason.INVALID_FIELD, f"labels[{k}]", problem)
-                record.scene.objects[k].label = cleaned_label(label)
+            for k, (place, label) in enumerate(labels):
+                if place >= len(record.scene.objects):
+                    last = len(record.scene.objects) - 1
+                    problem = f"is {place}, which is no object; the scene has objects 0 to {last}"
+                    raise InvalidInputError(Reason.INVALID_FIELD, f"labels[{k}].object", problem)
+                record.scene.objects[place].label = cleaned_label(label)
             wanted = _labels_of(record)
             record.name = content if wanted == json.loads(found) else _relabelled(content, wanted)
             _put(connection, record, content, caller)

@@ -162,6 +162,7 @@ class Reading:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._opened: int | None = None
         self._connection: sqlite3.Connection | None = None
         self._one_at_a_time = Lock()
 
@@ -175,7 +176,10 @@ class Reading:
         """
         with self._one_at_a_time:
             try:
+                if self._connection is not None and self._opened != _inode(self.path):
+                    self._close()  # there is another one in its place, or none
                 if self._connection is None:
+                    self._opened = _inode(self.path)
                     self._connection = sqlite3.connect(
                         f"{self.path.absolute().as_uri()}?mode=ro",
                         timeout=_PATIENCE_SECONDS,
@@ -185,11 +189,22 @@ class Reading:
                     )
                 return job(self._connection)
             except sqlite3.Error as error:
-                if self._connection is not None:
-                    with suppress(sqlite3.Error):
-                        self._connection.close()
-                    self._connection = None
+                self._close()
                 raise _said(self.path, error) from error
+
+    def _close(self) -> None:
+        if self._connection is not None:
+            with suppress(sqlite3.Error):
+                self._connection.close()
+            self._connection = None
+
+
+def _inode(path: Path) -> int | None:
+    """Return which file is at a path; None for none."""
+    try:
+        return path.stat().st_ino
+    except OSError:
+        return None
 
 
 def _said(path: Path, error: sqlite3.Error) -> StoreError:

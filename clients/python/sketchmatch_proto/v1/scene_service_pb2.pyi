@@ -325,41 +325,45 @@ class UpdateSceneRequest(google.protobuf.message.Message):
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
-    @typing.final
-    class LabelsEntry(google.protobuf.message.Message):
-        DESCRIPTOR: google.protobuf.descriptor.Descriptor
-
-        KEY_FIELD_NUMBER: builtins.int
-        VALUE_FIELD_NUMBER: builtins.int
-        key: builtins.int
-        value: builtins.str
-        def __init__(
-            self,
-            *,
-            key: builtins.int = ...,
-            value: builtins.str = ...,
-        ) -> None: ...
-        def ClearField(self, field_name: typing.Literal["key", b"key", "value", b"value"]) -> None: ...
-
     NAME_FIELD_NUMBER: builtins.int
     LABELS_FIELD_NUMBER: builtins.int
     name: builtins.str
     """Name of the scene. Required."""
     @property
-    def labels(self) -> google.protobuf.internal.containers.ScalarMap[builtins.int, builtins.str]:
-        """The labels, by index of the object, from 0; an empty one takes the label away. The other objects
-        keep theirs.
-        """
+    def labels(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectLabel]:
+        """The labels; the other objects keep theirs."""
 
     def __init__(
         self,
         *,
         name: builtins.str = ...,
-        labels: collections.abc.Mapping[builtins.int, builtins.str] | None = ...,
+        labels: collections.abc.Iterable[global___ObjectLabel] | None = ...,
     ) -> None: ...
     def ClearField(self, field_name: typing.Literal["labels", b"labels", "name", b"name"]) -> None: ...
 
 global___UpdateSceneRequest = UpdateSceneRequest
+
+@typing.final
+class ObjectLabel(google.protobuf.message.Message):
+    """A label for an object of a scene."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    OBJECT_FIELD_NUMBER: builtins.int
+    LABEL_FIELD_NUMBER: builtins.int
+    object: builtins.int
+    """Index of the object, from 0."""
+    label: builtins.str
+    """Its label; an empty one takes the label away."""
+    def __init__(
+        self,
+        *,
+        object: builtins.int = ...,
+        label: builtins.str = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["label", b"label", "object", b"object"]) -> None: ...
+
+global___ObjectLabel = ObjectLabel
 
 @typing.final
 class UpdateSceneResponse(google.protobuf.message.Message):
