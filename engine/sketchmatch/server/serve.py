@@ -20,7 +20,7 @@ from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
 from sketchmatch.app.store import Store
 from sketchmatch.config.addresses import is_of_this_machine
-from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
+from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError, StoreError
 from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.calls import CallLogInterceptor
 from sketchmatch.server.interceptors import ErrorInterceptor, OpeningInterceptor
@@ -139,7 +139,7 @@ async def serve(
     """
     lacking = _refuse_strangers(settings)
     files = _Files(settings, say)
-    store = None if settings.store is None else Store(settings.store)
+    store = _opened(settings.store, say)
     app = Application(load(), settings.workers, store)
     metrics = Metrics(_METHODS)
     server = grpc.aio.server(
@@ -217,6 +217,17 @@ async def serve(
             await asyncio.to_thread(monitor.close)
         unwatch()
     say("stopped")
+
+
+def _opened(folder: Path | None, say: Callable[[str], None]) -> Store | None:
+    """Return the store in a folder; one that cannot be used is said, and nothing is kept."""
+    if folder is None:
+        return None
+    try:
+        return Store(folder)
+    except StoreError as error:
+        say(f"{error}; nothing is kept until then")
+        return None
 
 
 class _Files:
