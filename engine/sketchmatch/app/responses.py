@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 from google.protobuf.duration_pb2 import Duration
@@ -176,8 +177,9 @@ def fmap_entry(entry: Correspondence) -> match_pb2.FmapEntry:
     )
 
 
+@lru_cache(maxsize=32)
 def scene(value: Scene) -> scene_pb2.Scene:
-    """Return a scene as a message."""
+    """Return a scene as a message, which is not to be changed: one is made of each scene."""
     return scene_pb2.Scene(
         objects=[
             scene_pb2.SceneObject(

@@ -13,10 +13,10 @@ import asyncio
 import logging
 import secrets
 import time
-from collections.abc import AsyncGenerator, Mapping
+from collections.abc import AsyncGenerator, Coroutine, Mapping
 from contextlib import aclosing, suppress
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sketchmatch.app.following import followed
 from sketchmatch.app.packed import Packed
@@ -359,14 +359,13 @@ class Sketches:
     async def _match(self, sketch: _Sketch, revision: int) -> None:
         """Match a revision, and tell what comes of it, unless it is overtaken."""
         data = sketch.request()
-        if sketch.former is not None:
-            if not await self._answer(sketch, revision, data, sketch.former):
-                return
+        if sketch.former is None:
+            await self._answer(sketch, revision, data, None)
+        elif await self._answer(sketch, revision, data, sketch.former):
             with suppress(TimeoutError):
                 await asyncio.wait_for(sketch.changed.wait(), _PEN_RESTS)
-            if sketch.revision != revision:
-                return
-        await self._answer(sketch, revision, data, None)
+            if sketch.revision == revision:
+                await _unless_changed(sketch, self._answer(sketch, revision, data, None))
 
     async def _answer(
         self, sketch: _Sketch, revision: int, data: bytes, former: tuple[bytes, bytes] | None
@@ -393,6 +392,19 @@ class Sketches:
                         result = event.result.result
                         sketch.former = objects.SerializeToString(), result.SerializeToString()
         return better
+
+
+async def _unless_changed(sketch: _Sketch, work: Coroutine[Any, Any, bool]) -> None:
+    """Do work to its end, or until the sketch is changed: a quick answer is more urgent then."""
+    doing, changed = asyncio.create_task(work), asyncio.create_task(sketch.changed.wait())
+    try:
+        await asyncio.wait((doing, changed), return_when=asyncio.FIRST_COMPLETED)
+        if doing.done():
+            doing.result()
+    finally:
+        for each in (doing, changed):
+            each.cancel()
+        await asyncio.gather(doing, changed, return_exceptions=True)
 
 
 def question(result: match_pb2.MatchResult) -> SketchQuestion | None:

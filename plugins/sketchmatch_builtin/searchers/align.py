@@ -21,6 +21,9 @@ from sketchmatch_builtin.searchers.auto import Auto
 
 __all__ = ["Align"]
 
+_NEAR = 10
+"""The best maps near those that it starts with."""
+
 _OFFERED = 10
 """Maps to complete between two pauses."""
 
@@ -116,7 +119,7 @@ class Align(Searcher):
         poses = 0
         if problem.start:
             start = [sides.drawn_partners(each) for each in problem.start]
-            laid = near_maps(sides, start, partial=problem.partial)
+            laid = near_maps(sides, start, partial=problem.partial)[:_NEAR]
         else:
             work = laid_maps(sides, self.params.poses, partial=problem.partial)
             while True:
