@@ -1,12 +1,13 @@
 """How many sketches are kept, for how long and for whom."""
 
 import asyncio
+from types import SimpleNamespace
 
 import pytest
 
 from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
-from sketchmatch.app.sketches import Sketches, SketchLimits
+from sketchmatch.app.sketches import Sketches, SketchLimits, _unless_changed
 from sketchmatch.app.waiting import Caller
 from sketchmatch.errors import (
     InvalidInputError,
@@ -133,3 +134,35 @@ def test_nothing_is_begun_by_a_server_that_stops():
             await made(sketches)
 
     with_sketches(scenario)
+
+
+@pytest.mark.parametrize("changed", [False, True])
+def test_the_whole_answer_is_given_up_once_something_is_drawn(changed):
+    async def run():
+        sketch, told = SimpleNamespace(changed=asyncio.Event()), []
+
+        async def answer():
+            try:
+                await asyncio.sleep(0.02)
+                told.append("answered")
+            finally:
+                told.append("over")
+            return False
+
+        if changed:
+            asyncio.get_running_loop().call_soon(sketch.changed.set)
+        await _unless_changed(sketch, answer())
+        return told
+
+    assert asyncio.run(run()) == (["over"] if changed else ["answered", "over"])
+
+
+def test_what_goes_wrong_with_the_whole_answer_is_told():
+    async def run():
+        async def answer():
+            raise TooBusyError("there is no room")
+
+        await _unless_changed(SimpleNamespace(changed=asyncio.Event()), answer())
+
+    with pytest.raises(TooBusyError):
+        asyncio.run(run())

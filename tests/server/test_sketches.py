@@ -1,6 +1,7 @@
 """Sketches in progress, over the wire: drawn, changed, undone, watched."""
 
 import asyncio
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,6 +27,7 @@ from sketchmatch_proto.v1.match_pb2 import MatchResult
 from tests.contract.golden import golden
 from tests.pace import slowness
 from tests.server.harness import hosting, scene, shapes, turned
+from tests.tools import ROOT
 
 MAP = scene(9, 1, [f"thing {k}" for k in range(9)])
 OUTLINES = [[*outline, outline[0]] for outline in np.array(turned(shapes(9, 1)), object)]
@@ -365,3 +367,10 @@ def test_nothing_is_asked_where_nothing_is_open():
     result = golden("MatchResponse.result").result
     result.ClearField("ambiguity")
     assert question(result) is None
+
+
+def test_the_example_of_the_clients_readme_runs(client, capsys):
+    page = (ROOT / "clients" / "python" / "README.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"^~~~python\n(.*?)^~~~", page, re.DOTALL | re.MULTILINE)
+    exec(example, {"client": client, "room": MAP, "sources": sources})
+    assert "map_object" in capsys.readouterr().out
