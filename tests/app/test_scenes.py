@@ -213,6 +213,11 @@ class TestShelf:
         archive.delete(name, "anna")
         assert shelf.histograms(scene, histogram) is None
 
+    def test_histograms_of_what_is_not_kept_are_not_kept(self, archive):
+        archive.keep(Described("outlines of another scene", "h", np.ones((1, 8))))
+        with sqlite3.connect(archive.path) as file:
+            assert file.execute("SELECT count(*) FROM histograms").fetchone() == (0,)
+
     def test_without_a_store_the_field_is_named(self):
         with pytest.raises(StoreError, match=r"^map\.stored_scene needs a store, and this server"):
             Shelf(None).segmentation("x", "anna", "map.stored_scene")

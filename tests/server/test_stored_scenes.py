@@ -1,10 +1,12 @@
 """Scenes that a server keeps, over the wire: put, matched with, labelled, listed and deleted."""
 
+import sqlite3
 from collections.abc import Iterator
 
 import pytest
 
 from sketchmatch.app.setup import RequestLimits, Setup
+from sketchmatch.model import Scene
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import default_registry
 from sketchmatch_client import Client, InvalidRequestError, NotFoundError, StoreError, sources
@@ -154,3 +156,15 @@ def test_scenes_outlive_the_server_and_workers_match_with_them(tmp_path):
         assert (again.stored_scene.name, again.created) == (name, False)
         with pytest.raises(NotFoundError, match=r"^map\.stored_scene is"):
             client.match(SKETCH, sources.stored_scene(MISSING))
+
+
+def test_the_histograms_of_a_scene_are_kept_with_it_and_no_others(tmp_path):
+    store = tmp_path / "store"
+    with hosting(setup(), store=store) as host, Client(host.address, timeout=60) as client:
+        client.put_scene(MAP)
+        client.sketch(scene(5, 3)).delete()  # of a map that comes along, and is not kept
+    with sqlite3.connect(store / "scenes.sqlite") as file:
+        rows = file.execute("SELECT outlines, length(bytes) FROM histograms").fetchall()
+    assert rows
+    assert {outlines for outlines, _ in rows} == {Scene.from_polygons(shapes(6, 1)).identity}
+    assert min(size for _, size in rows) >= 15 * 180 * 8

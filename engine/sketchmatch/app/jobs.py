@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import cast
 
 from google.protobuf.message import Message
+from google.protobuf.wrappers_pb2 import BytesValue
 
 from sketchmatch.api import Segmentation, Segmenter
 from sketchmatch.app import requests, responses
-from sketchmatch.app.scenes import name_of, segmentation, without_store
+from sketchmatch.app.scenes import (
+    LARGEST_KEPT,
+    Described,
+    described_by,
+    name_of,
+    segmentation,
+    without_store,
+)
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import (
     AnswerUnavailableError,
@@ -19,7 +27,7 @@ from sketchmatch.errors import (
     Reason,
     ServerStoppingError,
 )
-from sketchmatch.model import Scene
+from sketchmatch.model import Scene, SceneDescriptor
 from sketchmatch.model import Source as AnySource
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.describe import in_directions
@@ -206,8 +214,11 @@ def _put_scene(request: PutSceneRequest, setup: Setup) -> Generator[Message, Non
     record = responses.stored_scene(name, found, segmenter)
     yield GetSceneResponse(stored_scene=record, source=Source.FromString(data))
     if setup.shelf is not None:
-        kept = setup.shelf.decoded(name, record.SerializeToString())
-        _describe(kept.scene, request.profile, setup)
+        found = setup.shelf.decoded(name, record.SerializeToString())
+    for each in _describe(found.scene, request.profile, setup):
+        if each.histograms.nbytes <= LARGEST_KEPT:
+            described = Described(each.scene, described_by(each.described_by), each.histograms)
+            yield BytesValue(value=described.packed())
 
 
 def _map_of_sketch(
@@ -243,13 +254,16 @@ def _map_of_sketch(
     _describe(found.scene, match.pipeline.profile, setup)
 
 
-def _describe(scene: Scene, profile: str, setup: Setup) -> None:
+def _describe(scene: Scene, profile: str, setup: Setup) -> list[SceneDescriptor]:
     """Describe a scene as most matches will need it, which is remembered."""
     engine = setup.engine
     histogram = engine.resolve({}, profile=profile).histogram
-    with suppress(InvalidInputError):  # a match will be told
-        for each in (histogram, in_directions(histogram, histogram.directions)):
-            finish(engine.describe(scene, each))
+    ways = (histogram, in_directions(histogram, histogram.directions))
+    try:
+        found = [finish(engine.describe(scene, each)) for each in ways]
+    except InvalidInputError:
+        return []  # a match will be told
+    return [*{each.described_by: each for each in found}.values()]
 
 
 def _source_and_segmenter(

@@ -7,11 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from google.protobuf.wrappers_pb2 import BytesValue
+
 from sketchmatch.app.following import followed
 from sketchmatch.app.scenes import Described, SceneArchive, without_store
 from sketchmatch.app.store import Store
 from sketchmatch.app.waiting import Caller
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, ServerStoppingError
 from sketchmatch_proto.v1.scene_service_pb2 import (
     DeleteSceneRequest,
     DeleteSceneResponse,
@@ -59,21 +61,17 @@ class Keeping:
         archive = self._kept("the request")
         await asyncio.to_thread(archive.open)
         while True:
-            found = await self.found(data, caller)
+            found, histograms = await self._found(data, caller)
             if found.HasField("source"):
                 created = await asyncio.to_thread(archive.put, found, caller.known)
+                for packed in histograms:
+                    self.keep(packed)
                 return PutSceneResponse(stored_scene=found.stored_scene, created=created)
             claimed = await asyncio.to_thread(archive.claim, found.stored_scene.name, caller.known)
             if claimed is not None:
                 record, created = claimed
                 return PutSceneResponse(stored_scene=record, created=created)
             # It was deleted meanwhile.
-
-    async def found(self, data: bytes, caller: Caller) -> GetSceneResponse:
-        """Return what is in a source, which comes with it unless it is kept already."""
-        with self._app.running("PutSceneRequest", data, caller) as task:
-            told = [response async for response in followed(task.log)]
-        return GetSceneResponse.FromString(told[0] if told else b"")
 
     async def get(self, request: GetSceneRequest, caller: Caller) -> GetSceneResponse:
         """Return a scene of a caller."""
@@ -126,6 +124,15 @@ class Keeping:
         await asyncio.gather(*self._writing)
         if self._archive is not None:
             self._archive.close()
+
+    async def _found(self, data: bytes, caller: Caller) -> tuple[GetSceneResponse, list[bytes]]:
+        """Return what is in a source, which comes with it unless it is kept, and histograms."""
+        with self._app.running("PutSceneRequest", data, caller) as task:
+            told = [response async for response in followed(task.log)]
+        if not told:
+            raise ServerStoppingError("the server is about to stop")
+        histograms = [BytesValue.FromString(each).value for each in told[1:]]
+        return GetSceneResponse.FromString(told[0]), histograms
 
     def _kept(self, field: str) -> SceneArchive:
         if self._archive is None:

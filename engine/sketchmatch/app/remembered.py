@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from sketchmatch.api import Histogram
-from sketchmatch.app.scenes import Described, Shelf, described_by
+from sketchmatch.app.scenes import LARGEST_KEPT, Described, Shelf, described_by
 from sketchmatch.app.setup import Setup
 from sketchmatch.model import FloatArray, Scene, SceneDescriptor
 from sketchmatch.pipeline.memory import Memory
@@ -40,6 +40,7 @@ class Remembered:
         return self._shelf.histograms(scene, histogram) if self._shelf.holds(scene) else None
 
     def _described(self, scene: Scene, descriptor: SceneDescriptor) -> None:
-        if self.path is not None and self._shelf.holds(scene):
+        small = descriptor.histograms.nbytes <= LARGEST_KEPT
+        if self.path is not None and small and self._shelf.holds(scene):
             told = described_by(descriptor.described_by)
             self._hand_in(Described(scene.identity, told, descriptor.histograms))

@@ -37,6 +37,7 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
 )
 
 __all__ = [
+    "LARGEST_KEPT",
     "Described",
     "SceneArchive",
     "Shelf",
@@ -57,6 +58,7 @@ CREATE TABLE scenes (
     objects INTEGER NOT NULL, labels TEXT NOT NULL
 );
 CREATE INDEX scenes_by_content ON scenes (content);
+CREATE INDEX scenes_by_outlines ON scenes (outlines);
 CREATE TABLE owners (
     caller TEXT NOT NULL, put_time INTEGER NOT NULL, name TEXT NOT NULL,
     PRIMARY KEY (caller, name)
@@ -67,6 +69,9 @@ CREATE TABLE histograms (
     bytes BLOB NOT NULL, PRIMARY KEY (outlines, described_by)
 )
 """
+LARGEST_KEPT = 32 * 1024 * 1024
+"""Bytes of the histograms of a scene above which these are computed again."""
+
 _PAGE, _LONGEST_PAGE = 100, 1000
 _DIGITS = 64
 _HELD = 32
@@ -318,12 +323,14 @@ class SceneArchive:
 
         def job(connection: sqlite3.Connection) -> None:
             connection.execute(
-                "INSERT OR IGNORE INTO histograms VALUES (?, ?, ?, ?)",
+                "INSERT OR IGNORE INTO histograms SELECT ?, ?, ?, ? "
+                "WHERE EXISTS (SELECT 1 FROM scenes WHERE outlines = ?)",
                 (
                     described.outlines,
                     described.described_by,
                     described.histograms.shape[1],
                     np.ascontiguousarray(described.histograms, dtype="<f8").tobytes(),
+                    described.outlines,
                 ),
             )
 
