@@ -86,7 +86,7 @@ class Keeping:
         found = await asyncio.to_thread(archive.get, name, caller.known, False, field)
         return found.stored_scene
 
-    async def list(self, request: ListScenesRequest, caller: Caller) -> ListScenesResponse:
+    async def listed(self, request: ListScenesRequest, caller: Caller) -> ListScenesResponse:
         """Return a part of the list of a caller's scenes."""
         archive = self._kept("the request")
         return await asyncio.to_thread(

@@ -115,7 +115,7 @@ class SceneService:
                 self.PutScene, response_serializer=PutSceneResponse.SerializeToString
             ),
             GetScene=answering(GetSceneRequest, self._app.scenes.get),
-            ListScenes=answering(ListScenesRequest, self._app.scenes.list),
+            ListScenes=answering(ListScenesRequest, self._app.scenes.listed),
             UpdateScene=answering(UpdateSceneRequest, self._app.scenes.update),
             DeleteScene=answering(DeleteSceneRequest, self._app.scenes.delete),
         )
