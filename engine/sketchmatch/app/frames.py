@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterator
-from enum import IntEnum
+from enum import IntEnum, unique
 
 from sketchmatch.errors import (
     AnswerUnavailableError,
@@ -23,6 +23,7 @@ __all__ = ["Flag", "Frames", "Says", "failure", "failure_of", "frame"]
 _HEAD = struct.Struct("!IB")
 
 
+@unique
 class Says(IntEnum):
     """What a frame is; the low bits of an answer are flags."""
 
