@@ -17,7 +17,8 @@ KERNEL_SHARE := 99
 says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 
 .PHONY: demo test test-slow test-all test-units test-interpreted mutation lint proto bench \
-  bench-histograms bench-match bench-searchers bench-server bench-startup experiments fuzz look \
+  bench-histograms bench-match bench-searchers bench-server bench-sketches bench-startup experiments \
+  fuzz look \
   reference api serve clean
 
 demo: $(VENV)/runtime
@@ -79,6 +80,9 @@ bench-searchers: $(VENV)/bench
 
 bench-server: $(VENV)/dev
 	@$(BIN)/python -m tests.benchmarks.server $(ARGS)
+
+bench-sketches: $(VENV)/dev
+	@$(BIN)/python -m tests.benchmarks.sketches $(ARGS)
 
 bench-startup: $(VENV)/dev
 	@$(BIN)/python -m tests.benchmarks.startup

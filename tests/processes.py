@@ -74,8 +74,9 @@ class Server:
 
     def __init__(self, *arguments: str, **options: Any) -> None:
         self.said: list[str] = []
+        keeping = () if {"--store", "--no-store"} & {*arguments} else ("--no-store",)
         self.process = subprocess.Popen(
-            [*COMMAND, "serve", "--address", "127.0.0.1:0", *arguments],
+            [*COMMAND, "serve", "--address", "127.0.0.1:0", *arguments, *keeping],
             stderr=subprocess.PIPE,
             text=True,
             encoding="utf-8",

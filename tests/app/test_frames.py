@@ -6,10 +6,12 @@ from sketchmatch.app.frames import Frames, Says, failure, failure_of, frame
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
+    NotFoundError,
     PluginError,
     Reason,
     ServerStoppingError,
     SketchmatchError,
+    StoreError,
 )
 
 
@@ -35,6 +37,8 @@ class OddError(SketchmatchError):
         (PickyError(Reason.INVALID_GRID, Words("cells"), Words("is empty")), InvalidInputError),
         (LateError("no time"), AnswerUnavailableError),
         (ServerStoppingError("it stops"), ServerStoppingError),
+        (NotFoundError("there is none"), NotFoundError),
+        (StoreError("it is full"), StoreError),
         (PluginError("it failed"), PluginError),
         (OddError("odd"), PluginError),
     ],

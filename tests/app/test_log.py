@@ -4,8 +4,8 @@ from contextlib import aclosing
 
 import pytest
 
+from sketchmatch.app.following import followed
 from sketchmatch.app.tasks import Log
-from sketchmatch.server.services import followed
 
 
 def told(log, *items):

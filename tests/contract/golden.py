@@ -16,6 +16,7 @@ from sketchmatch_proto.v1 import (
     pipeline_pb2,
     scene_pb2,
     scene_service_pb2,
+    sketch_service_pb2,
     source_pb2,
 )
 
@@ -31,6 +32,7 @@ FILES = tuple(
         pipeline_pb2,
         scene_pb2,
         scene_service_pb2,
+        sketch_service_pb2,
         source_pb2,
     )
 )

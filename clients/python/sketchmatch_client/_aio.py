@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, Unpack, cast
 
 import grpc
 import grpc.aio
+from google.protobuf.message import Message
 
+from sketchmatch_client import _scenes
 from sketchmatch_client._access import AccessOptions, access_to
 from sketchmatch_client._channel import (
     CHECK_HEALTH,
@@ -30,12 +32,14 @@ from sketchmatch_client._channel import (
 from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, tell_progress
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
 from sketchmatch_client._retry import Attempts, checked_retries
+from sketchmatch_client._sketch import AsyncSketch, create_request
 from sketchmatch_client.errors import (
     DeadlineExceededError,
     ServerUnavailableError,
     SketchmatchError,
     translated_errors,
 )
+from sketchmatch_client.sources import YAxis
 from sketchmatch_proto.v1.catalog_service_pb2 import (
     GetServerInfoRequest,
     GetServerInfoResponse,
@@ -45,8 +49,16 @@ from sketchmatch_proto.v1.catalog_service_pb2 import (
 from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceStub
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest, MatchResponse
 from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceStub
-from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+from sketchmatch_proto.v1.scene_service_pb2 import (
+    GetSceneResponse,
+    ListScenesRequest,
+    PutSceneResponse,
+    SceneSummary,
+    SegmentResponse,
+    StoredScene,
+)
 from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceStub
+from sketchmatch_proto.v1.sketch_service_pb2_grpc import SketchServiceStub
 from sketchmatch_proto.v1.source_pb2 import Source
 
 if TYPE_CHECKING:  # these exist for type checkers alone
@@ -156,6 +168,60 @@ class AsyncClient:
             lambda limit: stub.Segment(request, timeout=limit, metadata=self._metadata), timeout
         )
 
+    async def put_scene(
+        self,
+        source: Source,
+        *,
+        segmenter: str | None = None,
+        params: Mapping[str, Any] | None = None,
+        profile: str | None = None,
+        timeout: float | None = None,
+    ) -> PutSceneResponse:
+        """Have the server keep a scene; see :meth:`Client.put_scene`."""
+        request = _scenes.put_request(source, segmenter, params, profile)
+        return await self._of_scenes("PutScene", request, timeout)  # type: ignore[no-any-return]
+
+    async def get_scene(
+        self, name: str, *, include_source: bool = False, timeout: float | None = None
+    ) -> GetSceneResponse:
+        """Return a scene that you have put, with its source where that is wanted."""
+        request = _scenes.get_request(name, include_source)
+        return await self._of_scenes("GetScene", request, timeout)  # type: ignore[no-any-return]
+
+    async def list_scenes(self, *, timeout: float | None = None) -> list[SceneSummary]:
+        """Return what there is to say of all scenes that you have put, the latest first."""
+        found, request = list[SceneSummary](), ListScenesRequest()
+        while True:
+            page = await self._of_scenes("ListScenes", request, timeout)
+            found.extend(page.scenes)
+            if not page.next_page_token:
+                return found
+            request.page_token = page.next_page_token
+
+    async def update_scene(
+        self, name: str, labels: Mapping[int, str], *, timeout: float | None = None
+    ) -> StoredScene:
+        """Give objects of a kept scene other labels; see :meth:`Client.update_scene`."""
+        request = _scenes.update_request(name, labels)
+        return (await self._of_scenes("UpdateScene", request, timeout)).stored_scene  # type: ignore[no-any-return]
+
+    async def delete_scene(self, name: str, *, timeout: float | None = None) -> None:
+        """Forget a scene; it stays for others who have put it."""
+        await self._of_scenes("DeleteScene", _scenes.delete_request(name), timeout)
+
+    async def sketch(
+        self,
+        map: Source,  # noqa: A002
+        *,
+        y_axis: YAxis = "up",
+        timeout: float | None = None,
+        **options: Unpack[MatchOptions],
+    ) -> AsyncSketch:
+        """Begin a sketch that is matched while it is drawn; see :meth:`Client.sketch`."""
+        request = create_request(map, y_axis, **options)
+        made = await self._sketched("CreateSketch", request, timeout)
+        return AsyncSketch(self, made.sketch_id)
+
     async def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""
         stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
@@ -226,11 +292,30 @@ class AsyncClient:
                     raise
             await asyncio.sleep(pause)
 
+    async def _of_scenes(self, method: str, request: Message, timeout: float | None) -> Any:
+        """Call a method of the service of scenes."""
+        call = getattr(SceneServiceStub(self._channel), method)
+        return await self._asked(
+            lambda limit: call(request, timeout=limit, metadata=self._metadata), timeout
+        )
+
+    async def _sketched(
+        self, method: str, request: Message, timeout: float | None, retries: int | None = None
+    ) -> Any:
+        """Call a method of the service of sketches."""
+        call = getattr(SketchServiceStub(self._channel), method)
+        return await self._asked(
+            lambda limit: call(request, timeout=limit, metadata=self._metadata), timeout, retries
+        )
+
     async def _asked(
-        self, call: Callable[[float | None], Awaitable[_Answer]], timeout: float | None
+        self,
+        call: Callable[[float | None], Awaitable[_Answer]],
+        timeout: float | None,
+        retries: int | None = None,
     ) -> _Answer:
         """Return what a call returns that is given the seconds it may take, perhaps made again."""
-        attempts = Attempts(self._retries, self._limit(timeout))
+        attempts = Attempts(self._retries if retries is None else retries, self._limit(timeout))
         while True:
             try:
                 with translated_errors(self._address):

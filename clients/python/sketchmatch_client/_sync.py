@@ -9,7 +9,9 @@ from types import TracebackType
 from typing import Any, Self, TypeVar, Unpack
 
 import grpc
+from google.protobuf.message import Message
 
+from sketchmatch_client import _scenes
 from sketchmatch_client._access import AccessOptions, access_to
 from sketchmatch_client._call import MatchCall
 from sketchmatch_client._channel import (
@@ -27,12 +29,14 @@ from sketchmatch_client._channel import (
 from sketchmatch_client._match import Match, ProgressCallback
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
 from sketchmatch_client._retry import Attempts, checked_retries
+from sketchmatch_client._sketch import Sketch, create_request
 from sketchmatch_client.errors import (
     DeadlineExceededError,
     ServerUnavailableError,
     SketchmatchError,
     translated_errors,
 )
+from sketchmatch_client.sources import YAxis
 from sketchmatch_proto.v1.catalog_service_pb2 import (
     GetServerInfoRequest,
     GetServerInfoResponse,
@@ -41,8 +45,16 @@ from sketchmatch_proto.v1.catalog_service_pb2 import (
 )
 from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceStub
 from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceStub
-from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+from sketchmatch_proto.v1.scene_service_pb2 import (
+    GetSceneResponse,
+    ListScenesRequest,
+    PutSceneResponse,
+    SceneSummary,
+    SegmentResponse,
+    StoredScene,
+)
 from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceStub
+from sketchmatch_proto.v1.sketch_service_pb2_grpc import SketchServiceStub
 from sketchmatch_proto.v1.source_pb2 import Source
 
 __all__ = ["Client"]
@@ -217,6 +229,105 @@ class Client:
             lambda limit: stub.Segment(request, timeout=limit, metadata=self._metadata), timeout
         )
 
+    def put_scene(
+        self,
+        source: Source,
+        *,
+        segmenter: str | None = None,
+        params: Mapping[str, Any] | None = None,
+        profile: str | None = None,
+        timeout: float | None = None,
+    ) -> PutSceneResponse:
+        """Find the objects of a source, and have the server keep them for later matches.
+
+        ``sources.stored_scene`` makes the name in the answer a sketch or map.
+
+        Parameters
+        ----------
+        source, segmenter, params, profile, timeout
+            As for :meth:`segment`.
+
+        Returns
+        -------
+        PutSceneResponse
+            The scene, under the hash of what it is, and whether you had not put it before.
+        """
+        request = _scenes.put_request(source, segmenter, params, profile)
+        return self._of_scenes("PutScene", request, timeout)  # type: ignore[no-any-return]
+
+    def get_scene(
+        self, name: str, *, include_source: bool = False, timeout: float | None = None
+    ) -> GetSceneResponse:
+        """Return a scene that you have put, with its source where that is wanted."""
+        request = _scenes.get_request(name, include_source)
+        return self._of_scenes("GetScene", request, timeout)  # type: ignore[no-any-return]
+
+    def list_scenes(self, *, timeout: float | None = None) -> list[SceneSummary]:
+        """Return what there is to say of all scenes that you have put, the latest first."""
+        found, request = list[SceneSummary](), ListScenesRequest()
+        while True:
+            page = self._of_scenes("ListScenes", request, timeout)
+            found.extend(page.scenes)
+            if not page.next_page_token:
+                return found
+            request.page_token = page.next_page_token
+
+    def update_scene(
+        self, name: str, labels: Mapping[int, str], *, timeout: float | None = None
+    ) -> StoredScene:
+        """Give objects of a kept scene other labels.
+
+        Parameters
+        ----------
+        name
+            Of the scene, which stays as it is.
+        labels
+            By index, from 0; an empty one takes the label away.
+        timeout
+            Seconds after which the call fails.
+
+        Returns
+        -------
+        StoredScene
+            The scene with these labels, under its own name.
+        """
+        request = _scenes.update_request(name, labels)
+        return (self._of_scenes("UpdateScene", request, timeout)).stored_scene  # type: ignore[no-any-return]
+
+    def delete_scene(self, name: str, *, timeout: float | None = None) -> None:
+        """Forget a scene; it stays for others who have put it."""
+        self._of_scenes("DeleteScene", _scenes.delete_request(name), timeout)
+
+    def sketch(
+        self,
+        map: Source,  # noqa: A002
+        *,
+        y_axis: YAxis = "up",
+        timeout: float | None = None,
+        **options: Unpack[MatchOptions],
+    ) -> Sketch:
+        """Begin a sketch that is matched while it is drawn.
+
+        Parameters
+        ----------
+        map
+            From :mod:`sketchmatch_client.sources`; a stored scene is there at once.
+        y_axis
+            Which way y grows in the strokes to come: ``"down"`` on screens.
+        timeout
+            Seconds after which the call fails.
+        **options
+            As for :meth:`match`, at each revision.
+
+        Returns
+        -------
+        Sketch
+            Empty; ``update`` draws, ``watch`` tells what comes of it.
+        """
+        request = create_request(map, y_axis, **options)
+        made = self._sketched("CreateSketch", request, timeout)
+        return Sketch(self, made.sketch_id)
+
     def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""
         stub, request = CatalogServiceStub(self._channel), ListAlgorithmsRequest()
@@ -283,9 +394,30 @@ class Client:
                 raise never_served(self._address, timeout)
             time.sleep(HEALTH_POLL_SECONDS)
 
-    def _asked(self, call: Callable[[float | None], _Answer], timeout: float | None) -> _Answer:
+    def _of_scenes(self, method: str, request: Message, timeout: float | None) -> Any:
+        """Call a method of the service of scenes."""
+        call = getattr(SceneServiceStub(self._channel), method)
+        return self._asked(
+            lambda limit: call(request, timeout=limit, metadata=self._metadata), timeout
+        )
+
+    def _sketched(
+        self, method: str, request: Message, timeout: float | None, retries: int | None = None
+    ) -> Any:
+        """Call a method of the service of sketches."""
+        call = getattr(SketchServiceStub(self._channel), method)
+        return self._asked(
+            lambda limit: call(request, timeout=limit, metadata=self._metadata), timeout, retries
+        )
+
+    def _asked(
+        self,
+        call: Callable[[float | None], _Answer],
+        timeout: float | None,
+        retries: int | None = None,
+    ) -> _Answer:
         """Return what a call returns that is given the seconds it may take, perhaps made again."""
-        attempts = Attempts(self._retries, self._limit(timeout))
+        attempts = Attempts(self._retries if retries is None else retries, self._limit(timeout))
         while True:
             try:
                 with translated_errors(self._address):

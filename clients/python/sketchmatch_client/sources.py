@@ -27,7 +27,16 @@ from sketchmatch_map_files import (
 )
 from sketchmatch_proto.v1 import source_pb2
 
-__all__ = ["YAxis", "file", "image", "map_server_map", "occupancy_grid", "polygons", "strokes"]
+__all__ = [
+    "YAxis",
+    "file",
+    "image",
+    "map_server_map",
+    "occupancy_grid",
+    "polygons",
+    "stored_scene",
+    "strokes",
+]
 
 YAxis = Literal["up", "down"]
 """Which way y grows: screens, tablets and pictures deliver ``"down"``."""
@@ -112,6 +121,25 @@ def polygons(
     return source_pb2.Source(
         polygon_set=source_pb2.PolygonSet(polygons=drawn, y_axis=_y_axis(y_axis))
     )
+
+
+def stored_scene(name: str) -> source_pb2.Source:
+    """Return a scene that the server keeps, by its name.
+
+    Raises
+    ------
+    InvalidRequestError
+        If that is no text.
+
+    Examples
+    --------
+    >>> stored_scene("9f86d081").stored_scene
+    '9f86d081'
+    """
+    with refused_as(
+        "INVALID_FIELD", "stored_scene", f"is {reprlib.repr(name)}; give the name of a scene"
+    ):
+        return source_pb2.Source(stored_scene=name)
 
 
 def occupancy_grid(

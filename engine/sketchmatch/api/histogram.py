@@ -51,6 +51,14 @@ class Histogram(_algorithm.Algorithm, ABC):
         return self.params.directions or _DIRECTIONS
 
     @property
+    def of_pairs(self) -> bool:
+        """Whether a pair's histogram follows from its two objects and the bounds of the scene.
+
+        Then the host may keep it while other objects of the scene change.
+        """
+        return False
+
+    @property
     @abstractmethod
     def exponent(self) -> float:
         """r: scaling both objects by λ multiplies the histogram by λ^(3−r)."""

@@ -79,6 +79,10 @@ class JudgeProblem:
     usual
         Whether relations are those of the default similarity on histograms of constant forces,
         found by a searcher of object maps; what was learned of ζ holds for no others.
+    elsewhere
+        How likely the sketch shows another place, as it was judged a moment ago, before something
+        was drawn or erased. Where it is given, a judge may take it for granted, to be quick, and
+        go by the candidates alone; the host asks again without it.
     """
 
     template: Scene
@@ -95,6 +99,7 @@ class JudgeProblem:
     exchanges: FloatArray | None = None
     omissions: FloatArray | None = None
     usual: bool = True
+    elsewhere: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

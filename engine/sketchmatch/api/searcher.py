@@ -67,6 +67,11 @@ class MatchProblem:
     names
         int64, shape (N, N'): 1 where both objects have a label and these mean the same, −1 where
         they do not, 0 where one has none; None where a side has no labels at all.
+    start
+        Object maps that were right a moment ago, before something was drawn or erased, the best
+        first; each int64, shape (N,), −1 for an object without partner. A searcher that is ``warm``
+        looks near these alone, to be quick; the host asks again without them. Any other never
+        gets them.
     """
 
     table: RelationTable
@@ -79,6 +84,7 @@ class MatchProblem:
     allowed: BoolArray | None = None
     pinned: IntArray | None = None
     names: IntArray | None = None
+    start: tuple[IntArray, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -143,6 +149,11 @@ class Searcher(Algorithm, ABC):
         It tells them in ``SearchProgress.maps``, and is asked once, for all of the template; any
         other searcher is asked again for parts of it.
         """
+        return False
+
+    @property
+    def warm(self) -> bool:
+        """Whether it is quick where a problem has maps to start with: ``MatchProblem.start``."""
         return False
 
     @abstractmethod

@@ -8,4 +8,9 @@ limit. Workers are forked from a process that holds the warm kernels (``template
 lost, or does not stop when it is told to, is simply replaced (``workers``). Other people's plugins
 get workers of their own kind, which are watched besides, and at most half of the places. Without
 workers the same is done in threads of the server's process, and for the command line in its own.
+
+Scenes are kept under the hash of what they are in one SQLite file (``scenes``, ``keeping``), which
+workers read for themselves; what they remember of scenes (``remembered``) saves the next request
+about the same ones that work. Sketches in progress (``sketches``) live in the event loop, each with
+a runner that has its latest revision matched.
 """

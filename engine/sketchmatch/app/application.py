@@ -17,9 +17,13 @@ from google.protobuf.message import Message
 from sketchmatch.app import responses
 from sketchmatch.app.frames import Flag
 from sketchmatch.app.jobs import Job, answers
+from sketchmatch.app.keeping import Keeping
 from sketchmatch.app.orders import Order
 from sketchmatch.app.packed import check_size
+from sketchmatch.app.remembered import Remembered
 from sketchmatch.app.setup import Setup
+from sketchmatch.app.sketches import Sketches
+from sketchmatch.app.store import Store
 from sketchmatch.app.tasks import Task
 from sketchmatch.app.waiting import Caller, FairQueue
 from sketchmatch.app.worker import flags
@@ -124,13 +128,27 @@ class Application:
     workers
         How many worker processes wait at least; without any, requests are answered in threads of
         this process, but for strangers' plugins.
+    store
+        Where scenes are kept; None where none are.
+
+    Attributes
+    ----------
+    scenes
+        The scenes that are kept.
+    sketches
+        The sketches in progress.
     """
 
-    def __init__(self, setup: Setup, workers: int = 0) -> None:
-        self._setup = setup
+    def __init__(self, setup: Setup, workers: int = 0, store: Store | None = None) -> None:
+        self.scenes = Keeping(self, store)
+        self.sketches = Sketches(self)
+        self._remembered = Remembered(self.scenes.path)
+        self._setup = self._remembering(setup)
         self._kept = workers
         self._began = time.monotonic()
         self._workers = Workers(workers, self._ended, self._dispatch)
+        self._workers.scenes = self.scenes.path
+        self._workers.described = self.scenes.keep
         self._here = Here(self._ended)
         self._running: set[Task] = set()
         self._waiting = FairQueue[Task]()
@@ -146,8 +164,8 @@ class Application:
 
     def change(self, setup: Setup) -> None:
         """Answer with another setup from now on, and admit by its limits."""
-        self._setup = setup
-        self._workers.change(setup)
+        self._setup = self._remembering(setup)
+        self._workers.change(self._setup)
         self._dispatch()
 
     @property
@@ -166,7 +184,14 @@ class Application:
         return answers(Job(uuid.uuid4().hex, request), self._setup)
 
     @contextmanager
-    def running(self, kind: str, data: bytes, caller: Caller = Caller()) -> Iterator[Task]:  # noqa: B008
+    def running(
+        self,
+        kind: str,
+        data: bytes,
+        caller: Caller = Caller(),  # noqa: B008
+        brought: tuple[bytes, ...] = (),
+        former: tuple[bytes, bytes] | None = None,
+    ) -> Iterator[Task]:
         """Admit a request and do it, in its turn, until the end of the block.
 
         Parameters
@@ -175,13 +200,8 @@ class Application:
             Name of the message, and the message.
         caller
             Who asks.
-
-        Parameters
-        ----------
-        request
-            A message of the contract that wants work.
-        caller
-            The name of who asks; empty where nobody has names.
+        brought, former
+            As of an :class:`~sketchmatch.app.orders.Order`.
 
         Raises
         ------
@@ -196,7 +216,8 @@ class Application:
         if self._stopping:
             raise ServerStoppingError("the server is about to stop")
         check_size(len(data), setup.limits.max_request_bytes)
-        task = Task(Order(uuid.uuid4().hex, kind, data), setup, caller)
+        order = Order(uuid.uuid4().hex, kind, data, caller.known, brought, former)
+        task = Task(order, setup, caller)
         self._admit(task)
         try:
             yield task
@@ -290,6 +311,7 @@ class Application:
     async def drain(self, seconds: float) -> None:
         """Begin nothing more; what runs ends by itself, or in so many seconds with what it has."""
         self._stopping = True
+        self.sketches.stop()
         for task in tuple(self._waiting):
             self._waiting.remove(task, task.caller)
             task.log.end(ServerStoppingError("the server is about to stop"))
@@ -302,12 +324,18 @@ class Application:
     async def close(self) -> None:
         """End all tasks that are under way, and wait for their threads and processes."""
         self._stopping = True
+        self.sketches.stop()
         for task in tuple(self._running):
             self._place(task).stop(task)
         await self._here.close()
         await self._workers.close()
+        await self.scenes.close()
         if self._looking is not None:
             self._looking.cancel()
+
+    def _remembering(self, setup: Setup) -> Setup:
+        """Return a setup with what this process remembers of scenes."""
+        return self._remembered.setup(setup, self.scenes.keep_described)
 
     def _admit(self, task: Task) -> None:
         """Let a task begin or wait; if there is no room, it or the greediest one goes away."""
@@ -373,6 +401,7 @@ class Application:
         while True:
             await asyncio.sleep(_LOOK)
             self._workers.look()
+            self.sketches.look()
             now, longest = time.monotonic(), self._setup.limits.max_wait
             for task in [task for task in self._waiting if now - task.asked > longest]:
                 self._waiting.remove(task, task.caller)

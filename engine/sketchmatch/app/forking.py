@@ -37,3 +37,5 @@ def renew() -> None:
     if pid is not None:
         with suppress(OSError):
             os.kill(pid, signal.SIGKILL)  # it is started anew when it is needed
+            if hasattr(os, "waitid"):  # and while it is dying, who needs it is refused
+                os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterator
-from enum import IntEnum
+from enum import IntEnum, unique
 
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
+    NotFoundError,
     PluginError,
     Reason,
     ServerStoppingError,
     SketchmatchError,
+    StoreError,
 )
 
 __all__ = ["Flag", "Frames", "Says", "failure", "failure_of", "frame"]
@@ -21,6 +23,7 @@ __all__ = ["Flag", "Frames", "Says", "failure", "failure_of", "frame"]
 _HEAD = struct.Struct("!IB")
 
 
+@unique
 class Says(IntEnum):
     """What a frame is; the low bits of an answer are flags."""
 
@@ -42,6 +45,8 @@ class Says(IntEnum):
     """The work is done, or was stopped."""
     FAILED = 9
     """The work ended with an error."""
+    DESCRIBED = 10
+    """Histograms of a scene that is kept, to be kept beside it."""
     ANSWER = 16
     """A response."""
 
@@ -80,19 +85,26 @@ def frame(kind: int, content: bytes = b"") -> bytes:
     return _HEAD.pack(len(content), kind) + content
 
 
+_SENTENCES: dict[str, type[SketchmatchError]] = {
+    "unavailable": AnswerUnavailableError,
+    "not found": NotFoundError,
+    "store": StoreError,
+}
+"""Errors that are a sentence and nothing else."""
+
+
 def failure(error: Exception, log: str) -> bytes:
     """Return what is told of an error: nothing that needs a plugin's own classes to be read."""
     told: dict[str, object] = {"log": log}
+    sentence = next((kind for kind, each in _SENTENCES.items() if isinstance(error, each)), None)
     match error:
         case InvalidInputError():
             told |= {"kind": "input", "reason": str(Reason(error.reason))}
             told |= {"field": f"{error.field}", "problem": f"{error.problem}"}
-        case AnswerUnavailableError():
-            told |= {"kind": "unavailable", "problem": f"{error}"}
         case ServerStoppingError():
             told |= {"kind": "stopping", "problem": f"{error.problem}"}
         case SketchmatchError():
-            told |= {"kind": "plugin", "problem": f"{error}"}
+            told |= {"kind": sentence or "plugin", "problem": f"{error}"}
     return json.dumps(told).encode()
 
 
@@ -102,10 +114,8 @@ def failure_of(content: bytes) -> tuple[SketchmatchError | None, str]:
     match told:
         case {"kind": "input", "reason": reason, "field": field, "problem": problem}:
             return InvalidInputError(Reason(reason), field, problem), told["log"]
-        case {"kind": "unavailable", "problem": problem}:
-            return AnswerUnavailableError(problem), told["log"]
         case {"kind": "stopping", "problem": problem}:
             return ServerStoppingError(problem), told["log"]
-        case {"kind": "plugin", "problem": problem}:
-            return PluginError(problem), told["log"]
+        case {"kind": str(kind), "problem": problem}:
+            return _SENTENCES.get(kind, PluginError)(problem), told["log"]
     return None, told["log"]

@@ -4,18 +4,48 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import cast
 
 from google.protobuf.message import Message
+from google.protobuf.wrappers_pb2 import BytesValue
 
+from sketchmatch.api import Segmentation, Segmenter
 from sketchmatch.app import requests, responses
+from sketchmatch.app.scenes import (
+    LARGEST_KEPT,
+    Described,
+    described_by,
+    name_of,
+    segmentation,
+    without_store,
+)
 from sketchmatch.app.setup import Setup
-from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, ServerStoppingError
+from sketchmatch.errors import (
+    AnswerUnavailableError,
+    InvalidInputError,
+    Reason,
+    ServerStoppingError,
+)
+from sketchmatch.model import Scene, SceneDescriptor
+from sketchmatch.model import Source as AnySource
 from sketchmatch.pipeline.clock import Clock
+from sketchmatch.pipeline.describe import in_directions
+from sketchmatch.pipeline.events import Accepted
+from sketchmatch.pipeline.former import Former
 from sketchmatch.pipeline.selection import Choice, chosen_algorithms, stage_of
+from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Registered, RegisteredReader
+from sketchmatch_proto.v1.match_pb2 import AlternativeMap, MatchResult
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
-from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest
+from sketchmatch_proto.v1.scene_service_pb2 import (
+    GetSceneResponse,
+    PutSceneRequest,
+    SegmentRequest,
+    StoredScene,
+)
+from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest, SketchObjects
+from sketchmatch_proto.v1.source_pb2 import Source
 
 __all__ = ["Job", "algorithms", "answers", "time_budget"]
 
@@ -30,10 +60,15 @@ class Job:
         A name that no other job of the application has.
     request
         A message of the contract that wants work; which one says what is to be done.
+    caller, brought, former
+        As of an :class:`~sketchmatch.app.orders.Order`.
     """
 
     id: str
     request: Message
+    caller: str = ""
+    brought: tuple[bytes, ...] = ()
+    former: tuple[bytes, bytes] | None = None
 
 
 def answers(
@@ -55,9 +90,13 @@ def answers(
     """
     match job.request:
         case MatchRequest():
-            return _match(job.id, job.request, setup, begun)
+            return _match(job, job.request, setup, begun)
         case SegmentRequest():
             return _segment(job.request, setup)
+        case PutSceneRequest():
+            return _put_scene(job.request, setup)
+        case CreateSketchRequest():
+            return _map_of_sketch(job, job.request, setup)
     raise TypeError(f"a {type(job.request).__name__} is no request for work")
 
 
@@ -68,6 +107,8 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
     refused where the job is done.
     """
     request, profile = job.request, ""
+    if isinstance(request, CreateSketchRequest):
+        request = request.match
     readers = setup.engine.registry.readers
     match request:
         case MatchRequest():
@@ -77,7 +118,7 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
                 "map_segmenter": requests.source_type(request.map, readers),
             }
             files = [request.sketch, request.map]
-        case SegmentRequest(profile=profile):
+        case SegmentRequest(profile=profile) | PutSceneRequest(profile=profile):
             found, files = requests.source_type(request.source, readers), [request.source]
             stage = "sketch_segmenter" if found is None else stage_of(found)
             selection, types = {stage: requests.choice(request.segmenter)}, {stage: found}
@@ -108,14 +149,18 @@ def time_budget(job: Job, setup: Setup) -> float | None:
 
 
 def _match(
-    name: str, request: MatchRequest, setup: Setup, begun: Callable[[Clock], None]
+    job: Job, request: MatchRequest, setup: Setup, begun: Callable[[Clock], None]
 ) -> Generator[Message, None, None]:
     engine = setup.engine
     with engine.limited():
-        value = requests.match_request(request, setup.limits, engine.registry.readers)
+        value = requests.match_request(
+            request, setup.limits, engine.registry.readers, _stored(job, setup)
+        )
+    if job.former is not None:
+        value = replace(value, former=_former(*job.former))
     writer, clock = responses.ResponseWriter(value), Clock(value.time_budget)
     begun(clock)
-    with requests.paths_of(request), closing(engine.match(value, name, clock)) as events:
+    with requests.paths_of(request), closing(engine.match(value, job.id, clock)) as events:
         try:
             for event in events:
                 yield writer.response(event)
@@ -125,15 +170,116 @@ def _match(
             raise
 
 
-def _segment(request: SegmentRequest, setup: Setup) -> Generator[Message, None, None]:
+def _stored(job: Job, setup: Setup) -> requests.Stored:
+    """Return what finds the stored scenes that a job may name."""
+    brought = {StoredScene.FromString(record).name: record for record in job.brought}
+
+    def stored(name: str, field: str) -> Segmentation:
+        if name in brought:
+            record = brought[name]
+            if setup.shelf is not None:
+                return setup.shelf.decoded(name, record)
+            return segmentation(StoredScene.FromString(record))
+        if setup.shelf is None:
+            raise without_store(field)
+        return setup.shelf.segmentation(name, job.caller, field)
+
+    return stored
+
+
+def _former(objects: bytes, result: bytes) -> Former:
+    """Read what was found in a sketch before it was changed."""
+    found, told = SketchObjects.FromString(objects), MatchResult.FromString(result)
+    sketch = segmentation(StoredScene(scene=found.scene)).scene
+    maps: tuple[MatchResult | AlternativeMap, ...] = (told, *told.alternatives)
+    return Former(
+        sketch,
+        tuple(
+            {line.sketch_object: line.map_object for line in each.object_matches} for each in maps
+        ),
+        1.0 - told.place_probability if told.HasField("place_probability") else None,
+    )
+
+
+def _put_scene(request: PutSceneRequest, setup: Setup) -> Generator[Message, None, None]:
+    """Find the objects of a source to be kept; one that is kept already is told by its name."""
+    engine, given = setup.engine, request.source
+    source, segmenter = _source_and_segmenter(request, setup)
+    name, data = name_of(given, segmenter, engine.registry)
+    if setup.shelf is not None and (known := setup.shelf.record(name)) is not None:
+        yield GetSceneResponse(stored_scene=StoredScene.FromString(known))
+        return
+    with requests.paths_of(request):
+        found = engine.segment(source, segmenter, f"source.{source.field}")
+    record = responses.stored_scene(name, found, segmenter)
+    yield GetSceneResponse(stored_scene=record, source=Source.FromString(data))
+    if setup.shelf is not None:
+        found = setup.shelf.decoded(name, record.SerializeToString())
+    for each in _describe(found.scene, request.profile, setup):
+        if each.histograms.nbytes <= LARGEST_KEPT:
+            described = Described(each.scene, described_by(each.described_by), each.histograms)
+            yield BytesValue(value=described.packed())
+
+
+def _map_of_sketch(
+    job: Job, request: CreateSketchRequest, setup: Setup
+) -> Generator[Message, None, None]:
+    """Find the objects of the map of a sketch, once it is known that the match can be had."""
+    engine, match = setup.engine, MatchRequest()
+    match.CopyFrom(request.match)
+    try:
+        if match.HasField("sketch"):
+            problem = "is set, and a sketch begins empty; set strokes by UpdateSketch"
+            raise InvalidInputError(Reason.INVALID_FIELD, "sketch", problem)
+        stroke = match.sketch.stroke_set.strokes.add()
+        for x in (0.0, 1.0, 2.0):
+            stroke.points.add(x=x, y=x * x)
+        with engine.limited():
+            value = requests.match_request(
+                match, setup.limits, engine.registry.readers, _stored(job, setup)
+            )
+        with requests.paths_of(match), closing(engine.match(value)) as events:
+            pipeline = cast(Accepted, next(events)).pipeline
+            found = engine.segment_side("map", value.map, pipeline)
+    except InvalidInputError as error:
+        raise error.within("match") from None
+    if pipeline.map_segmenter is None:
+        record = responses.stored_scene(match.map.stored_scene, found)
+    else:
+        name, _ = name_of(match.map, pipeline.map_segmenter, engine.registry)
+        record = responses.stored_scene(name, found, pipeline.map_segmenter)
+    yield GetSceneResponse(stored_scene=record)
+    if setup.shelf is not None:
+        found = setup.shelf.decoded(record.name, record.SerializeToString())
+    _describe(found.scene, match.pipeline.profile, setup)
+
+
+def _describe(scene: Scene, profile: str, setup: Setup) -> list[SceneDescriptor]:
+    """Describe a scene as most matches will need it, which is remembered."""
+    engine = setup.engine
+    histogram = engine.resolve({}, profile=profile).histogram
+    ways = (histogram, in_directions(histogram, histogram.directions))
+    try:
+        found = [finish(engine.describe(scene, each)) for each in ways]
+    except InvalidInputError:
+        return []  # a match will be told
+    return [*{each.described_by: each for each in found}.values()]
+
+
+def _source_and_segmenter(
+    request: SegmentRequest | PutSceneRequest, setup: Setup
+) -> tuple[AnySource, Segmenter]:
     engine = setup.engine
     with engine.limited():
         source = requests.source(
             request.source, "source", request.HasField("source"), engine.registry.readers
         )
-    segmenter = engine.resolve_segmenter(
-        requests.checked_choice(request.segmenter, "segmenter"), source, request.profile
-    )
+    choice = requests.checked_choice(request.segmenter, "segmenter")
+    return source, engine.resolve_segmenter(choice, source, request.profile)
+
+
+def _segment(request: SegmentRequest, setup: Setup) -> Generator[Message, None, None]:
+    source, segmenter = _source_and_segmenter(request, setup)
     with requests.paths_of(request):
-        found = engine.segment(source, segmenter, f"source.{source.field}")
+        found = setup.engine.segment(source, segmenter, f"source.{source.field}")
     yield responses.segmented(found, segmenter)

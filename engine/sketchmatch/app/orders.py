@@ -12,14 +12,22 @@ from sketchmatch.app.jobs import Job
 from sketchmatch.app.packed import Packed, inflated
 from sketchmatch_proto.v1 import source_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
-from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest
+from sketchmatch_proto.v1.scene_service_pb2 import PutSceneRequest, SegmentRequest
+from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest
 
 __all__ = ["Order"]
 
-_Request: TypeAlias = type[MatchRequest] | type[SegmentRequest]
-_TYPES: dict[str, _Request] = {
-    kind.DESCRIPTOR.name: kind for kind in (MatchRequest, SegmentRequest)
-}
+_Request: TypeAlias = (
+    type[MatchRequest] | type[SegmentRequest] | type[PutSceneRequest] | type[CreateSketchRequest]
+)
+_KINDS: tuple[_Request, ...] = (
+    MatchRequest,
+    SegmentRequest,
+    PutSceneRequest,
+    CreateSketchRequest,
+)
+_TYPES = {kind.DESCRIPTOR.name: kind for kind in _KINDS}
+_MATCH = MatchRequest.DESCRIPTOR
 _SOURCE = source_pb2.Source.DESCRIPTOR
 _FILE = _SOURCE.fields_by_name["file"].number
 _VARINT, _FIXED64, _MESSAGE, _FIXED32 = 0, 1, 2, 5
@@ -35,14 +43,25 @@ class Order:
     id
         A name that no other order of the application has.
     kind
-        Name of the message: MatchRequest or SegmentRequest.
+        Name of the message: MatchRequest, SegmentRequest, PutSceneRequest or CreateSketchRequest.
     data
         The message, perhaps compressed.
+    caller
+        Who asks, by name of token or certificate, or empty: whose stored scenes it may name.
+    brought
+        Stored scenes that come with the request, as messages ``StoredScene``: these are not looked
+        for.
+    former
+        What was found in the sketch before it was changed, as messages ``SketchObjects`` and
+        ``MatchResult``, for a quick answer.
     """
 
     id: str
     kind: str
     data: bytes
+    caller: str = ""
+    brought: tuple[bytes, ...] = ()
+    former: tuple[bytes, bytes] | None = None
 
     def job(self, limit: int) -> Job:
         """Inflate and decode the request.
@@ -57,7 +76,8 @@ class Order:
         InvalidInputError
             If it is not what it should be.
         """
-        return Job(self.id, Packed(self.data, _TYPES[self.kind].FromString).opened(limit))
+        request = Packed(self.data, _TYPES[self.kind].FromString).opened(limit)
+        return Job(self.id, request, self.caller, self.brought, self.former)
 
     def outline(self, limit: int) -> Job:
         """Decode the request but for sketch and map, of which only files are kept.
@@ -79,11 +99,15 @@ class Order:
 
 
 def _outline(data: bytes, request: Message) -> bytes:
-    sources = {field.number for field in request.DESCRIPTOR.fields if field.message_type is _SOURCE}
+    fields = request.DESCRIPTOR.fields_by_number
     kept = bytearray()
     for number, wire_type, first, payload, end in _fields(data, 0, len(data)):
-        if number in sources and wire_type == _MESSAGE:
-            inner = _source_outline(data, payload, end)
+        kind = fields[number].message_type if number in fields else None
+        if kind in (_SOURCE, _MATCH) and wire_type == _MESSAGE:
+            if kind is _SOURCE:
+                inner = _source_outline(data, payload, end)
+            else:
+                inner = _outline(data[payload:end], MatchRequest())
             kept += bytes([number << 3 | _MESSAGE]) + _varint_of(len(inner)) + inner
         else:
             kept += data[first:end]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from google.protobuf import struct_pb2
 
+from sketchmatch.api import Segmentation
 from sketchmatch.app.setup import RequestLimits
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io.files import FileKind, decode_file, kind_of_file
@@ -39,6 +40,7 @@ from sketchmatch_proto.v1 import (
 )
 
 __all__ = [
+    "Stored",
     "checked_choice",
     "choice",
     "file_kind",
@@ -49,6 +51,9 @@ __all__ = [
     "source_type",
     "time_budget",
 ]
+
+Stored: TypeAlias = Callable[[str, str], Segmentation]
+"""Finds a stored scene by its name; the other text is the path of the field that names it."""
 
 _KINDS = "stroke_set, polygon_set, occupancy_grid, map_server_map, image or file"
 _OPTIONS = ("alternatives", "allow_unmatched", "unmatched_price")
@@ -68,8 +73,18 @@ def match_request(
     request: match_service_pb2.MatchRequest,
     limits: RequestLimits,
     readers: Sequence[RegisteredReader] = (),
+    stored: Stored | None = None,
 ) -> MatchRequest:
-    """Read a request to match, within some limits; ``readers`` are those of plugins.
+    """Read a request to match, within some limits.
+
+    Parameters
+    ----------
+    request, limits
+        The request, and what it may ask for.
+    readers
+        Those of plugins.
+    stored
+        Finds stored scenes, where these may be named.
 
     Raises
     ------
@@ -77,8 +92,8 @@ def match_request(
         If it cannot be used, with the path of the field.
     """
     return MatchRequest(
-        sketch=source(request.sketch, "sketch", request.HasField("sketch"), readers),
-        map=source(request.map, "map", request.HasField("map"), readers),
+        sketch=_side(request, "sketch", readers, stored),
+        map=_side(request, "map", readers, stored),
         selection={
             stage: checked_choice(getattr(request.pipeline, stage), f"pipeline.{stage}")
             for stage in STAGES
@@ -91,6 +106,19 @@ def match_request(
         synonyms=tuple(tuple(group.labels) for group in request.synonyms),
         **{field.name: value for field, value in request.ListFields() if field.name in _OPTIONS},
     )
+
+
+def _side(
+    request: match_service_pb2.MatchRequest,
+    side: Literal["sketch", "map"],
+    readers: Sequence[RegisteredReader],
+    stored: Stored | None,
+) -> Source | Segmentation:
+    """Read the sketch or the map, which may be a stored scene."""
+    message = getattr(request, side)
+    if stored is not None and message.WhichOneof("kind") == "stored_scene":
+        return stored(message.stored_scene, f"{side}.stored_scene")
+    return source(message, side, request.HasField(side), readers)
 
 
 def selection(request: match_service_pb2.MatchRequest) -> Selection:
@@ -150,6 +178,9 @@ def source(
         If a reader fails.
     """
     kind = message.WhichOneof("kind")
+    if kind == "stored_scene":
+        problem = "names what is kept already; give the source itself"
+        raise InvalidInputError(Reason.INVALID_FIELD, f"{field}.stored_scene", problem)
     if not present or kind is None:
         raise InvalidInputError(Reason.MISSING_FIELD, field, f"is not set; give {_KINDS}")
     try:
@@ -213,7 +244,9 @@ def time_budget(request: match_service_pb2.MatchRequest, limits: RequestLimits) 
 
 @contextmanager
 def paths_of(
-    request: match_service_pb2.MatchRequest | scene_service_pb2.SegmentRequest,
+    request: match_service_pb2.MatchRequest
+    | scene_service_pb2.SegmentRequest
+    | scene_service_pb2.PutSceneRequest,
 ) -> Iterator[None]:
     """Give errors of the engine, which knows decoded sources alone, the paths of a request."""
     try:

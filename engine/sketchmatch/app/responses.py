@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 from google.protobuf.duration_pb2 import Duration
@@ -58,6 +59,7 @@ __all__ = [
     "segmented",
     "selection",
     "server_info",
+    "stored_scene",
 ]
 
 _SOURCE_KINDS = {
@@ -159,6 +161,7 @@ def result(value: MatchResult) -> match_pb2.MatchResult:
         place_probability=value.place_probability,
         ambiguity=_ambiguity(value.ambiguity),
         unmatched_sketch_probabilities=value.unmatched_sketch_probabilities,
+        provisional=value.provisional,
     )
 
 
@@ -174,8 +177,9 @@ def fmap_entry(entry: Correspondence) -> match_pb2.FmapEntry:
     )
 
 
+@lru_cache(maxsize=32)
 def scene(value: Scene) -> scene_pb2.Scene:
-    """Return a scene as a message."""
+    """Return a scene as a message, which is not to be changed: one is made of each scene."""
     return scene_pb2.Scene(
         objects=[
             scene_pb2.SceneObject(
@@ -202,6 +206,19 @@ def segmented(found: Segmentation, segmenter: Segmenter) -> scene_service_pb2.Se
         scene=scene(found.scene),
         warnings=found.warnings,
         segmenter=selection(segmenter),
+        route=_points(found.route),
+    )
+
+
+def stored_scene(
+    name: str, found: Segmentation, segmenter: Segmenter | None = None
+) -> scene_service_pb2.StoredScene:
+    """Return what a segmenter found as the record that is kept of it."""
+    return scene_service_pb2.StoredScene(
+        name=name,
+        scene=scene(found.scene),
+        warnings=found.warnings,
+        segmenter=None if segmenter is None else selection(segmenter),
         route=_points(found.route),
     )
 

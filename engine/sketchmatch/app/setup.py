@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+from sketchmatch.app.scenes import Shelf
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import OWN_DISTRIBUTION, Registered, RegisteredReader
 from sketchmatch.registry.distributions import canonical
@@ -98,11 +99,14 @@ class Setup:
         Which plugins run in processes of their own.
     strangers, trusted
         The algorithms and readers that do, and those that do not.
+    shelf
+        The scenes that are kept; None where none are.
     """
 
     engine: Engine
     limits: RequestLimits = field(default_factory=RequestLimits)
     isolation: Isolation = field(default_factory=Isolation)
+    shelf: Shelf | None = field(default=None, compare=False)
     strangers: tuple[Registered | RegisteredReader, ...] = field(init=False, repr=False)
     trusted: tuple[Registered | RegisteredReader, ...] = field(init=False, repr=False)
 

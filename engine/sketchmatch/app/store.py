@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from sketchmatch.errors import StoreError
 
-__all__ = ["Database", "Store"]
+__all__ = ["Database", "Reading", "Store"]
 
 _Result = TypeVar("_Result")
 
@@ -154,13 +154,68 @@ class Database:
             raise
         except sqlite3.Error as error:
             self._close()
-            code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
-            if code in _FULL:
-                fault = "is full; delete what is not needed, or allow it more bytes"
-            elif code in _DAMAGED:
-                fault = "is damaged; move it away, and another is made"
-            elif code in _TAKEN:
-                fault = "is in use by another process; end that"
-            else:
-                fault = f"cannot be used ({error}); see to its folder and disk"
-            raise StoreError(f"the store's file {self.path} {fault}") from error
+            raise _said(self.path, error) from error
+
+
+class Reading:
+    """A file of the store as other processes see it, for one thread at a time: to read alone."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._opened: int | None = None
+        self._connection: sqlite3.Connection | None = None
+        self._one_at_a_time = Lock()
+
+    def work(self, job: Callable[[sqlite3.Connection], _Result]) -> _Result:
+        """Read something.
+
+        Raises
+        ------
+        StoreError
+            If the file is damaged, in use or gone.
+        """
+        with self._one_at_a_time:
+            try:
+                if self._connection is not None and self._opened != _inode(self.path):
+                    self._close()  # there is another one in its place, or none
+                if self._connection is None:
+                    self._opened = _inode(self.path)
+                    self._connection = sqlite3.connect(
+                        f"{self.path.absolute().as_uri()}?mode=ro",
+                        timeout=_PATIENCE_SECONDS,
+                        isolation_level=None,
+                        check_same_thread=False,
+                        uri=True,
+                    )
+                return job(self._connection)
+            except sqlite3.Error as error:
+                self._close()
+                raise _said(self.path, error) from error
+
+    def _close(self) -> None:
+        if self._connection is not None:
+            with suppress(sqlite3.Error):
+                self._connection.close()
+            self._connection = None
+
+
+def _inode(path: Path) -> int | None:
+    """Return which file is at a path; None for none."""
+    try:
+        return path.stat().st_ino
+    except OSError:
+        return None
+
+
+def _said(path: Path, error: sqlite3.Error) -> StoreError:
+    """Return what is wrong with a file, in a sentence."""
+    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
+    if code in _FULL:
+        fault = "is full; delete what is not needed, or allow it more bytes"
+    elif code in _DAMAGED:
+        fault = "is damaged; move it away, and another is made"
+    elif code in _TAKEN:
+        fault = "is in use by another process; end that"
+    else:
+        fault = f"cannot be used ({error}); see to its folder and disk"
+    return StoreError(f"the store's file {path} {fault}")

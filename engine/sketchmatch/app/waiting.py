@@ -20,10 +20,13 @@ class Caller(NamedTuple):
         The caller's name, or the host where it is.
     connection
         One of its connections.
+    known
+        The caller's name by token or certificate; empty where nobody asked for any.
     """
 
     name: str = ""
     connection: str = ""
+    known: str = ""
 
 
 class FairQueue(Generic[_Item]):

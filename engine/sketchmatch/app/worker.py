@@ -21,6 +21,7 @@ from sketchmatch.app.faults import told
 from sketchmatch.app.frames import Flag, Frames, Says, failure, frame
 from sketchmatch.app.jobs import answers
 from sketchmatch.app.orders import Order
+from sketchmatch.app.remembered import Remembered
 from sketchmatch.app.setup import RequestLimits, Setup
 from sketchmatch.kernels._jit import on_compile
 from sketchmatch.model.limits import SourceLimits
@@ -61,12 +62,15 @@ class WorkerSetup:
     patience
         Seconds without a sign of life after which the worker ends itself, should nobody be left to
         end it; None where it does nothing that could keep it from noticing.
+    scenes
+        The file of the scenes that are kept; None where none are.
     """
 
     defaults: Defaults
     sources: SourceLimits
     limits: RequestLimits
     patience: float | None
+    scenes: Path | None = None
 
 
 def live(connection: socket, distributions: tuple[str, ...], stranger: bool) -> None:
@@ -105,6 +109,7 @@ class _Worker:
         self._curtailed: float | None = None
         self._setup: Setup
         self._patience: float | None = None
+        self._remembered = Remembered(None)
 
     def say(self, kind: int, content: bytes = b"") -> None:
         """Send a frame; it is one sign of life."""
@@ -164,7 +169,12 @@ class _Worker:
 
     def _set_up(self, content: bytes, registry: Registry) -> None:
         given: WorkerSetup = pickle.loads(content)
-        self._setup = Setup(Engine(registry, given.defaults, given.sources), given.limits)
+        if given.scenes != self._remembered.path:
+            self._remembered = Remembered(given.scenes)
+        self._setup = self._remembered.setup(
+            Setup(Engine(registry, given.defaults, given.sources), given.limits),
+            lambda described: self.say(Says.DESCRIBED, described.packed()),
+        )
         self._patience = given.patience
 
     def _do(self, kind: int, content: bytes) -> None:

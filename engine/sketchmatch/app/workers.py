@@ -83,6 +83,10 @@ class Workers:
     def __init__(self, kept: int, ended: _Ended, gave_way: Callable[[], None]) -> None:
         self.compiling: Callable[[], None] = lambda: None
         """Called whenever a worker has to compile a kernel."""
+        self.described: Callable[[bytes], None] = lambda _: None
+        """Called with what a worker that needs no stranger's plugin hands in to be kept."""
+        self.scenes: Path | None = None
+        """The file of the scenes that are kept."""
         self.gave_way = gave_way
         self._kept = kept
         self._ended = ended
@@ -394,6 +398,8 @@ class _Worker(asyncio.Protocol):
             case Says.COMPILING:
                 self.compiled = True
                 self._workers.compiling()
+            case Says.DESCRIBED if not self._strangers:
+                self._workers.described(content)
             case Says.READY:
                 self._answer(None)
             case Says.ENDED:
@@ -439,7 +445,8 @@ class _Worker(asyncio.Protocol):
     def _set_up(self, setup: Setup) -> None:
         self._setup, engine = setup, setup.engine
         patience = setup.isolation.patience if self._strangers else None
-        told = WorkerSetup(engine.defaults, engine.limits, setup.limits, patience)
+        scenes = self._workers.scenes
+        told = WorkerSetup(engine.defaults, engine.limits, setup.limits, patience, scenes)
         self.send(Says.SETUP, pickle.dumps(told))
 
     def _seconds(self, task: Task) -> float | None:

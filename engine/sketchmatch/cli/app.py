@@ -23,12 +23,19 @@ from sketchmatch.cli import (
     output,
     plugins,
     relate,
+    scenes,
     segment,
     serve,
     status,
     tokens,
 )
-from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, PluginError
+from sketchmatch.errors import (
+    AnswerUnavailableError,
+    InvalidInputError,
+    NotFoundError,
+    PluginError,
+    StoreError,
+)
 
 __all__ = ["ExitCode", "main"]
 
@@ -50,6 +57,7 @@ app.command("demo")(demo.demo)
 app.add_typer(plugins.app, name="plugins")
 app.add_typer(config.app, name="config")
 app.add_typer(tokens.app, name="tokens")
+app.add_typer(scenes.app, name="scenes")
 
 
 class ExitCode(IntEnum):
@@ -126,6 +134,8 @@ def _exit_code(error: Exception) -> ExitCode:
         InvalidInputError: ExitCode.INVALID_INPUT,
         AnswerUnavailableError: ExitCode.NO_ANSWER_IN_TIME,
         PluginError: ExitCode.ALGORITHM_FAILED,
+        NotFoundError: ExitCode.INVALID_INPUT,
+        StoreError: ExitCode.INVALID_INPUT,
         client.InvalidRequestError: ExitCode.INVALID_INPUT,
         client.DeadlineExceededError: ExitCode.NO_ANSWER_IN_TIME,
         client.ServerUnavailableError: ExitCode.SERVER_UNAVAILABLE,

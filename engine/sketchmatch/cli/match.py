@@ -35,7 +35,7 @@ def match(
             metavar="MAP",
             help="Map: ROS map .yaml, its picture or folder, bag, .geojson, .dxf, .svg, image, "
             "annotations, scene graph; `sketchmatch plugins list` shows all readers. FILE#PART "
-            "names a part of it, such as layers.",
+            "names a part of it, such as layers. scene:NAME is a scene that the server keeps.",
         ),
     ],
     server: options.Server = None,
@@ -95,7 +95,7 @@ def match(
     """
     from sketchmatch.cli import display, output, pictures, places
     from sketchmatch.cli.answering import answerer
-    from sketchmatch.cli.sources import in_metres, source_of
+    from sketchmatch.cli.sources import in_metres, source_of, stored_of
 
     options.refuse_config(config, server)
     if overlay is not None:
@@ -125,7 +125,10 @@ def match(
         named,
         answerer(server, config, access) as asked,
     ):
-        sources = source_of(sketch, "sketch"), source_of(map_, "map")
+        sources = (
+            stored_of(sketch, asked) or source_of(sketch, "sketch"),
+            stored_of(map_, asked) or source_of(map_, "map"),
+        )
         answer = display.watch(asked.events(*sources, **chosen))
     metres = in_metres(sources[1])
     # Files first: whoever reads the answer may have had enough of it after a line.

@@ -10,6 +10,7 @@ import numpy as np
 
 from sketchmatch.cli.display import doubt, facts, likely
 from sketchmatch.cli.options import say
+from sketchmatch.cli.sources import is_kept
 from sketchmatch.io.files import read_map_files
 from sketchmatch.io.ros_bag import bag_and_topic, is_bag, read_bag
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene, SceneObject, StrokeSet
@@ -54,7 +55,7 @@ def draw_match(match: Match, map_path: Path, target: Path, metres: bool) -> None
         facts=facts(match.result, metres),
         alert=doubt(match),
         footnote=_meaning(match.result),
-        underlay=_grid(map_path),
+        underlay=None if is_kept(map_path) else _grid(map_path),
         route=_way(match.scenes.sketch_route),
     )
     save_overlay(target, picture)

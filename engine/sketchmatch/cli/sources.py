@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sketchmatch.cli.display import say_notes
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io.files import (
     file_and_part,
     is_read_here,
@@ -14,16 +15,62 @@ from sketchmatch.io.files import (
     read_source,
 )
 from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
-from sketchmatch_client import sources
+from sketchmatch_client import Client, sources
 from sketchmatch_map_files import PICTURE_SUFFIXES
 from sketchmatch_proto.v1.source_pb2 import MapServerMap, Source
 
-__all__ = ["in_metres", "source_of"]
+if TYPE_CHECKING:
+    from sketchmatch.cli.answering import Answerer
+
+__all__ = ["in_metres", "is_kept", "source_of", "stored_of", "whole_name"]
+
+_KEPT = "scene:"
+_DIGITS = 64
 
 
 def in_metres(source: Source) -> bool:
     """Whether a source says how long a metre is in it."""
     return source.HasField("map_server_map") or source.HasField("occupancy_grid")
+
+
+def is_kept(path: Path) -> bool:
+    """Whether what was typed for a file names a scene that a server keeps."""
+    return str(path).startswith(_KEPT)
+
+
+def stored_of(path: Path, asked: Answerer) -> Source | None:
+    """Return the scene that was typed for a file, as in scene:5f2b; None where none was.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is none of the name, or no server that could keep any.
+    """
+    if not is_kept(path):
+        return None
+    if not isinstance(asked, Client):
+        problem = "is kept by a server, and none is asked; give --server"
+        raise InvalidInputError(Reason.INVALID_FIELD, quoted(str(path)), problem)
+    return sources.stored_scene(whole_name(str(path).removeprefix(_KEPT), asked))
+
+
+def whole_name(name: str, client: Client) -> str:
+    """Return the name of the one scene whose name begins so.
+
+    Raises
+    ------
+    InvalidInputError
+        If several do, or none.
+    """
+    if len(name) >= _DIGITS:
+        return name
+    known = [each.name for each in client.list_scenes() if each.name.startswith(name)]
+    if len(known) == 1:
+        return known[0]
+    which = f"begins the names of {len(known)} scenes; type more of it"
+    if not known:
+        which = "begins no name of a scene; `sketchmatch scenes list` shows those there are"
+    raise InvalidInputError(Reason.INVALID_FIELD, quoted(name), which)
 
 
 def source_of(path: Path, side: str = "") -> Source:

@@ -93,6 +93,7 @@ def answer(
         probability=says.of_map,
         place_probability=says.of_place,
         ambiguity=says.ambiguity,
+        provisional=bool(goal.start),
         unmatched_sketch_probabilities=says.of_unmatched,
     )
 

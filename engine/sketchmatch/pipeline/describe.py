@@ -9,13 +9,21 @@ import numpy as np
 
 from sketchmatch.api import Histogram
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.model import FloatArray, Scene, SceneDescriptor, object_pairs, pair_count
+from sketchmatch.model import (
+    BoolArray,
+    FloatArray,
+    Scene,
+    SceneDescriptor,
+    object_pairs,
+    pair_count,
+)
 from sketchmatch.model.arrays import sealed
 from sketchmatch.pipeline.guard import blamed, blaming, checked_array, inspecting
+from sketchmatch.pipeline.memory import Memory
 from sketchmatch.pipeline.slices import in_slices
 from sketchmatch.registry import Registry
 
-__all__ = ["check_histograms", "describe", "described", "with_directions"]
+__all__ = ["check_histograms", "describe", "described", "in_directions", "with_directions"]
 
 # What 400 MB hold: the histograms of 700 objects in 180 directions.
 _MAX_HISTOGRAM_VALUES = 50_000_000
@@ -68,15 +76,27 @@ def with_directions(histogram: Histogram, registry: Registry, *scenes: Scene) ->
     if histogram.params.directions is not None:
         return histogram
     with blaming(histogram, registry):
-        return _in_directions(histogram, _needed_directions(*scenes))
+        return in_directions(histogram, _needed_directions(*scenes))
 
 
-def describe(scene: Scene, histogram: Histogram) -> Generator[float, None, SceneDescriptor]:
+def describe(
+    scene: Scene,
+    histogram: Histogram,
+    known: tuple[BoolArray, FloatArray] | None = None,
+) -> Generator[float, None, SceneDescriptor]:
     """Describe every pair of a scene.
 
     A pair that none of the directions meets, because the objects are small for their distance,
     gets the limit of its histogram: the whole force A_a·A_b/D between their centroids, shared by
     the two directions next to it.
+
+    Parameters
+    ----------
+    scene, histogram
+        What is described by what.
+    known
+        Which pairs are known already, and their histograms, as
+        :meth:`~sketchmatch.pipeline.memory.Memory.pairs` returns them.
 
     Yields
     ------
@@ -89,15 +109,19 @@ def describe(scene: Scene, histogram: Histogram) -> Generator[float, None, Scene
         One histogram for each pair (a, b), a < b.
     """
     if histogram.params.directions is None:
-        histogram = _in_directions(histogram, histogram.directions)
+        histogram = in_directions(histogram, histogram.directions)
     pairs = object_pairs(len(scene))
-    histograms = np.empty((len(pairs), histogram.directions))
+    if known is None:
+        missing, histograms = np.arange(len(pairs)), np.empty((len(pairs), histogram.directions))
+    else:
+        missing, histograms = np.flatnonzero(~known[0]), known[1]
 
     def fill(first: int, last: int) -> None:
-        found = histogram.describe(scene, pairs[first:last])
-        histograms[first:last] = checked_array(found, (last - first, histograms.shape[1]))
+        rows = missing[first:last]
+        found = histogram.describe(scene, pairs[rows])
+        histograms[rows] = checked_array(found, (last - first, histograms.shape[1]))
 
-    yield from in_slices(len(pairs), fill)
+    yield from in_slices(len(missing), fill)
     for index in np.flatnonzero(~histograms.any(axis=1)):
         a, b = (scene.objects[k] for k in pairs[index])
         offset = np.subtract(a.centroid, b.centroid)
@@ -112,9 +136,22 @@ def describe(scene: Scene, histogram: Histogram) -> Generator[float, None, Scene
 
 
 def described(
-    scene: Scene, histogram: Histogram, registry: Registry, side: str
+    scene: Scene,
+    histogram: Histogram,
+    registry: Registry,
+    side: str,
+    memory: Memory | None = None,
 ) -> Generator[float, None, SceneDescriptor]:
     """Describe every pair of a scene by an algorithm that is not trusted.
+
+    Parameters
+    ----------
+    scene, histogram, registry
+        What is described by what, and where that comes from.
+    side
+        Path of the scene, for errors.
+    memory
+        What need not be computed again, if anything is remembered.
 
     Yields
     ------
@@ -128,14 +165,22 @@ def described(
     PluginError
         If the histogram breaks its contract.
     """
+    if memory is not None and (known := memory.descriptor(scene, histogram)) is not None:
+        return known
+    pairs = None if memory is None else memory.pairs(scene, histogram)
     try:
         with inspecting(histogram, registry, scene):
-            return (yield from blamed(describe(scene, histogram), histogram, registry))
+            work = describe(scene, histogram, pairs)
+            descriptor = yield from blamed(work, histogram, registry)
     except InvalidInputError as error:
         raise error.within(side) from None
+    if memory is not None:
+        memory.keep(scene, descriptor)
+    return descriptor
 
 
-def _in_directions(histogram: Histogram, directions: int) -> Histogram:
+def in_directions(histogram: Histogram, directions: int) -> Histogram:
+    """Return a histogram with so many directions."""
     params = histogram.params.model_copy(update={"directions": directions})
     return type(histogram)(params)
 

@@ -15,6 +15,7 @@ from sketchmatch.pipeline.describe import check_histograms, described, with_dire
 from sketchmatch.pipeline.events import MatchEvent
 from sketchmatch.pipeline.judge import Judged, judged
 from sketchmatch.pipeline.match import run_match
+from sketchmatch.pipeline.memory import Memory
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.search import Goal, Search, search
 from sketchmatch.pipeline.segment import segment, segment_side
@@ -48,11 +49,14 @@ class Engine:
         What is taken where a request chooses nothing, and the profiles that it can name.
     limits
         How large a sketch or a map may be.
+    memory
+        What of scenes need not be described again; None where nothing is remembered.
     """
 
     registry: Registry
     defaults: Defaults = UNCONFIGURED
     limits: SourceLimits = field(default_factory=SourceLimits)
+    memory: Memory | None = field(default=None, compare=False)
 
     @contextmanager
     def limited(self) -> Iterator[None]:
@@ -64,7 +68,9 @@ class Engine:
         self, request: MatchRequest, match_id: str = "", clock: Clock | None = None
     ) -> Generator[MatchEvent, None, None]:
         """Match, event by event, as :func:`sketchmatch.pipeline.match.run_match` does."""
-        return run_match(request, self.registry, self.defaults, self.limits, match_id, clock)
+        return run_match(
+            request, self.registry, self.defaults, self.limits, match_id, clock, self.memory
+        )
 
     def resolve(
         self,
@@ -85,7 +91,9 @@ class Engine:
         with self.limited():
             return segment(source, segmenter, self.registry, field)
 
-    def segment_side(self, side: str, given: Source | Scene, pipeline: Pipeline) -> Segmentation:
+    def segment_side(
+        self, side: str, given: Source | Scene | Segmentation, pipeline: Pipeline
+    ) -> Segmentation:
         """Find the objects of the sketch or of the map of a match."""
         with self.limited():
             return segment_side(side, given, pipeline, self.registry)
@@ -96,7 +104,7 @@ class Engine:
         """Describe every pair of a scene, once it is known to fit into memory."""
         check_histograms(side or "scene", scene, histogram)
         settled = with_directions(histogram, self.registry, scene)
-        return described(scene, settled, self.registry, side)
+        return described(scene, settled, self.registry, side, self.memory)
 
     def compare(
         self,
@@ -133,7 +141,7 @@ class Engine:
     ) -> Generator[float, None, Comparison]:
         settled = with_directions(histogram, self.registry, *scenes)
         drawn, mapped = (
-            described(scene, settled, self.registry, side)
+            described(scene, settled, self.registry, side, self.memory)
             for side, scene in zip(SIDES, scenes, strict=True)
         )
         descriptors = ((yield from drawn), (yield from mapped))

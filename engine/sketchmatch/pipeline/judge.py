@@ -223,6 +223,7 @@ def problem_of(
         None if exchanges is None else sealed(exchanges),
         None if omissions is None else sealed(omissions),
         usual,
+        goal.elsewhere,
     )
 
 

@@ -8,6 +8,7 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+from sketchmatch.api import Segmentation
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.model import ConfidenceWeights, Scene
 from sketchmatch.model.limits import SourceLimits, limited_to, source_limits
@@ -24,8 +25,10 @@ from sketchmatch.pipeline.events import (
     Progress,
     Segmented,
 )
+from sketchmatch.pipeline.former import starts
 from sketchmatch.pipeline.judge import judged
 from sketchmatch.pipeline.knowledge import check_pins_obeyed, knowledge
+from sketchmatch.pipeline.memory import Memory
 from sketchmatch.pipeline.relate import check_exponent
 from sketchmatch.pipeline.request import (
     MatchRequest,
@@ -53,6 +56,7 @@ def run_match(
     limits: SourceLimits | None = None,
     match_id: str = "",
     clock: Clock | None = None,
+    memory: Memory | None = None,
 ) -> Generator[MatchEvent, None, None]:
     """Match, yielding Accepted, Segmented, some Progress (at most 20 a second) and Finished.
 
@@ -73,6 +77,8 @@ def run_match(
     clock
         With the request's time budget, for whoever may have to curtail it; one is made where there
         is none.
+    memory
+        What of the scenes need not be described again; None where nothing is remembered.
 
     Raises
     ------
@@ -86,7 +92,7 @@ def run_match(
     clock = clock or Clock(request.time_budget)
     plan = _planned(request, registry, defaults)
     name = match_id or uuid.uuid4().hex
-    return _events(request, plan, registry, limits or source_limits(), name, clock)
+    return _events(request, plan, registry, limits or source_limits(), name, clock, memory)
 
 
 @dataclass(frozen=True)
@@ -113,8 +119,8 @@ def _planned(request: MatchRequest, registry: Registry, defaults: Defaults) -> _
         pipeline = resolve(
             registry,
             request.selection,
-            None if isinstance(request.sketch, Scene) else request.sketch,
-            None if isinstance(request.map, Scene) else request.map,
+            None if isinstance(request.sketch, Scene | Segmentation) else request.sketch,
+            None if isinstance(request.map, Scene | Segmentation) else request.map,
             defaults,
             request.profile,
         )
@@ -145,6 +151,7 @@ def _events(
     limits: SourceLimits,
     match_id: str,
     clock: Clock,
+    memory: Memory | None,
 ) -> Generator[MatchEvent, None, None]:
     """Do what is planned."""
     pipeline, goal = plan.pipeline, plan.goal
@@ -172,7 +179,10 @@ def _events(
     partial = goal.price < math.inf
     known = knowledge(request.pins, request.synonyms, scenes, is_swapped(*scenes), partial)
     goal = replace(goal, allowed=known.allowed, pinned=known.pinned, names=known.names)
-    comparison = yield from _compared(scenes, pipeline, goal.weights, registry, clock)
+    if request.former is not None and pipeline.searcher.warm:
+        start = starts(request.former, sketch.scene, len(map_.scene), is_swapped(*scenes))
+        goal = replace(goal, start=start, elsewhere=request.former.elsewhere if start else None)
+    comparison = yield from _compared(scenes, pipeline, goal.weights, registry, clock, memory)
     with clock.timing("search"):
         work = search(comparison, pipeline.searcher, goal, registry, clock)
         found = yield from _watched_search(work, comparison.swapped, clock)
@@ -187,15 +197,16 @@ def _compared(
     weights: ConfidenceWeights,
     registry: Registry,
     clock: Clock,
+    memory: Memory | None,
 ) -> Generator[MatchEvent, None, Comparison]:
     """Describe both scenes and compare them."""
     histogram = pipeline.histogram
     with clock.timing("describe"):
         drawn = yield from _watched(
-            described(scenes[0], histogram, registry, "sketch"), Phase.DESCRIBE, clock
+            described(scenes[0], histogram, registry, "sketch", memory), Phase.DESCRIBE, clock
         )
         mapped = yield from _watched(
-            described(scenes[1], histogram, registry, "map"), Phase.DESCRIBE, clock
+            described(scenes[1], histogram, registry, "map", memory), Phase.DESCRIBE, clock
         )
     with clock.timing("relate"):
         work = compare(scenes, (drawn, mapped), pipeline.similarity, registry, weights)

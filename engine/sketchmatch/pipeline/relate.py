@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Protocol
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -38,6 +39,9 @@ _MOST_LOG_DILATION = 700.0
 _PANEL_VALUES = 2**20
 _TILE_VALUES = 2**17
 _BLAS_ROWS = 16
+
+_MEASURED: WeakKeyDictionary[SceneDescriptor, Histograms] = WeakKeyDictionary()
+"""What maps that are matched again and again would otherwise be measured for each time."""
 
 
 def check_exponent(exponent: float) -> None:
@@ -88,19 +92,30 @@ def relate(
     """
     check_exponent(template.exponent)
     _check_alike(template, argument)
-    rows = Histograms.of(template.histograms)
+    rows = _measured(template)
     shape = (len(rows), len(argument.histograms))
     sigma, rotation, dilation = (np.empty(shape) for _ in range(3))
     panel = max(1, _PANEL_VALUES // rows.bins)
     for first in range(0, shape[1], panel):
         columns = slice(first, min(first + panel, shape[1]))
-        others = Histograms.of(argument.histograms[columns])
+        whole = columns == slice(0, shape[1])
+        others = _measured(argument) if whole else Histograms.of(argument.histograms[columns])
         entries = tuple(array[:, columns] for array in (sigma, rotation, dilation))
         for share in _fill(rows, others, similarity, template.exponent, *entries):
             yield (first + share * len(others)) / shape[1]
     return RelationTable(
         sealed(sigma), sealed(rotation), sealed(dilation), template.objects, argument.objects
     )
+
+
+def _measured(descriptor: SceneDescriptor) -> Histograms:
+    """Return the histograms of a scene as they are compared, for as long as it is described so."""
+    found = _MEASURED.get(descriptor)
+    if found is None:
+        found = Histograms.of(descriptor.histograms)
+        if found.values.size <= _PANEL_VALUES:
+            _MEASURED[descriptor] = found
+    return found
 
 
 def _check_alike(template: SceneDescriptor, argument: SceneDescriptor) -> None:

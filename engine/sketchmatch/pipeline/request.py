@@ -8,10 +8,11 @@ from numbers import Integral, Real
 from types import MappingProxyType
 from typing import Any
 
-from sketchmatch.api import Judge, Searcher
+from sketchmatch.api import Judge, Searcher, Segmentation
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model import ConfidenceWeights, RequestWeights, Scene, Source
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
+from sketchmatch.pipeline.former import Former
 from sketchmatch.pipeline.guard import blaming
 from sketchmatch.pipeline.knowledge import Pin, check_pins, check_synonyms
 from sketchmatch.pipeline.selection import Pipeline, Profile, Selection
@@ -39,7 +40,7 @@ class MatchRequest:
     Attributes
     ----------
     sketch, map
-        Sources, or scenes that need no segmentation.
+        Sources, or scenes and segmentations, which need none.
     selection
         Algorithms and parameters, by stage.
     seed
@@ -65,6 +66,9 @@ class MatchRequest:
         What is known of single objects; every searcher of object maps obeys.
     synonyms
         Groups of labels that mean the same. Labels are evidence, and force nothing.
+    former
+        What was found a moment ago in a sketch that was changed since, for a quick answer near it
+        where the searcher allows that; None for the answer.
 
     Raises
     ------
@@ -72,8 +76,8 @@ class MatchRequest:
         If a value is out of its bounds.
     """
 
-    sketch: Source | Scene
-    map: Source | Scene
+    sketch: Source | Scene | Segmentation
+    map: Source | Scene | Segmentation
     selection: Selection = field(default_factory=lambda: MappingProxyType({}))
     seed: int = 0
     time_budget: float | None = None
@@ -84,6 +88,7 @@ class MatchRequest:
     unmatched_price: float | None = None
     pins: tuple[Pin, ...] = ()
     synonyms: tuple[tuple[str, ...], ...] = ()
+    former: Former | None = None
 
     def __post_init__(self) -> None:
         if not (isinstance(self.seed, Integral) and 0 <= self.seed <= _MAX_SEED):

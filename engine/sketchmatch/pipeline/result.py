@@ -227,6 +227,8 @@ class MatchResult(Tabular):
     unmatched_sketch_probabilities
         How likely each of ``unmatched_sketch_objects`` has no partner on this map; empty where
         unknown.
+    provisional
+        Whether it was looked for near former maps alone, to be quick.
     """
 
     matches: tuple[ObjectMatch, ...]
@@ -250,6 +252,7 @@ class MatchResult(Tabular):
     place_probability: float | None = None
     ambiguity: Ambiguity | None = None
     unmatched_sketch_probabilities: tuple[float, ...] = ()
+    provisional: bool = False
 
     @property
     def object_map(self) -> dict[int, int]:

@@ -47,6 +47,9 @@ class Goal:
     allowed, pinned, names
         What the caller knows of objects, and their labels, as in
         :class:`~sketchmatch.api.MatchProblem`.
+    start, elsewhere
+        What was found a moment ago, where a quick answer is sought, as in
+        :class:`~sketchmatch.api.MatchProblem` and :class:`~sketchmatch.api.JudgeProblem`.
     """
 
     weights: ConfidenceWeights
@@ -58,6 +61,8 @@ class Goal:
     allowed: BoolArray | None = None
     pinned: IntArray | None = None
     names: IntArray | None = None
+    start: tuple[IntArray, ...] = ()
+    elsewhere: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,6 +205,7 @@ def _problem(
         allowed=part.known(goal.allowed),
         pinned=part.known(goal.pinned),
         names=part.known(goal.names),
+        start=() if part.left_out else goal.start,
     )
 
 

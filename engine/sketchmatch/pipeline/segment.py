@@ -44,15 +44,17 @@ def segment(source: Source, segmenter: Segmenter, registry: Registry, field: str
 
 
 def segment_side(
-    side: str, given: Source | Scene, pipeline: Pipeline, registry: Registry
+    side: str, given: Source | Scene | Segmentation, pipeline: Pipeline, registry: Registry
 ) -> Segmentation:
-    """Find the objects of one side of a match; a scene is what it is.
+    """Find the objects of one side of a match; what is segmented already is what it is.
 
     Raises
     ------
     InvalidInputError, PluginError
         As :func:`segment` does.
     """
+    if isinstance(given, Segmentation):
+        return given
     if isinstance(given, Scene):
         return Segmentation(given)
     segmenter = pipeline.segmenter(side)

@@ -18,8 +18,9 @@ from grpc_reflection.v1alpha import reflection
 import sketchmatch
 from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
+from sketchmatch.app.store import Store
 from sketchmatch.config.addresses import is_of_this_machine
-from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
+from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError, StoreError
 from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.calls import CallLogInterceptor
 from sketchmatch.server.interceptors import ErrorInterceptor, OpeningInterceptor
@@ -28,6 +29,7 @@ from sketchmatch.server.monitor import Monitor
 from sketchmatch.server.notify import notify
 from sketchmatch.server.readiness import Readiness
 from sketchmatch.server.services import CatalogService, MatchService, SceneService
+from sketchmatch.server.sketching import SketchService
 from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
 from sketchmatch.server.tokens import read_tokens
 from sketchmatch.server.watchdog import watch
@@ -37,6 +39,7 @@ from sketchmatch_proto.v1 import (
     catalog_service_pb2_grpc,
     match_service_pb2,
     scene_service_pb2,
+    sketch_service_pb2,
 )
 
 __all__ = ["ServerSettings", "serve"]
@@ -54,12 +57,13 @@ _SERVICES = (
     match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name,
     scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name,
     catalog_service_pb2.DESCRIPTOR.services_by_name["CatalogService"].full_name,
+    sketch_service_pb2.DESCRIPTOR.services_by_name["SketchService"].full_name,
 )
 
 
 _METHODS = tuple(
     f"/{service.full_name}/{method.name}"
-    for file in (match_service_pb2, scene_service_pb2, catalog_service_pb2)
+    for file in (match_service_pb2, scene_service_pb2, catalog_service_pb2, sketch_service_pb2)
     for service in file.DESCRIPTOR.services_by_name.values()
     for method in service.methods
 )
@@ -135,7 +139,8 @@ async def serve(
     """
     lacking = _refuse_strangers(settings)
     files = _Files(settings, say)
-    app = Application(load(), settings.workers)
+    store = _opened(settings.store, say)
+    app = Application(load(), settings.workers, store)
     metrics = Metrics(_METHODS)
     server = grpc.aio.server(
         interceptors=[
@@ -206,10 +211,23 @@ async def serve(
         await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
         await ending
         await app.close()
+        if store:
+            store.close()
         if monitor:
             await asyncio.to_thread(monitor.close)
         unwatch()
     say("stopped")
+
+
+def _opened(folder: Path | None, say: Callable[[str], None]) -> Store | None:
+    """Return the store in a folder; one that cannot be used is said, and nothing is kept."""
+    if folder is None:
+        return None
+    try:
+        return Store(folder)
+    except StoreError as error:
+        say(f"{error}; nothing is kept until then")
+        return None
 
 
 class _Files:
@@ -336,6 +354,7 @@ def _add_services(
 ) -> None:
     matching, scenes = MatchService(app, metrics.matched), SceneService(app)
     server.add_generic_rpc_handlers((matching.handler(), scenes.handler()))
+    server.add_generic_rpc_handlers((SketchService(app).handler(),))
     catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), server)
     health_pb2_grpc.add_HealthServicer_to_server(readiness.servicer, server)
     reflection.enable_server_reflection(

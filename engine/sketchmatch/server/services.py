@@ -1,17 +1,16 @@
-"""The three services of the contract, over the application."""
+"""The services of the contract, over the application."""
 
 from __future__ import annotations
 
-import asyncio
-import threading
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import Awaitable, Callable
 from contextlib import aclosing
 from typing import Any, TypeVar
 
 import grpc
+from google.protobuf.message import Message
 
 from sketchmatch.app.application import Application
-from sketchmatch.app.tasks import Log
+from sketchmatch.app.following import followed
 from sketchmatch.app.waiting import Caller
 from sketchmatch.server.callers import caller_of
 from sketchmatch.server.calls import note
@@ -25,8 +24,22 @@ from sketchmatch_proto.v1 import (
 )
 from sketchmatch_proto.v1.match_pb2 import MatchAccepted, MatchResult
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+from sketchmatch_proto.v1.scene_service_pb2 import (
+    DeleteSceneRequest,
+    GetSceneRequest,
+    ListScenesRequest,
+    PutSceneResponse,
+    UpdateSceneRequest,
+)
 
-__all__ = ["CatalogService", "MatchService", "SceneService", "followed"]
+__all__ = [
+    "CatalogService",
+    "MatchService",
+    "SceneService",
+    "answering",
+    "caller_from",
+    "handler_of",
+]
 
 _MATCH = match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name
 _SCENE = scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name
@@ -36,7 +49,8 @@ _PROGRESS = bytes(
     [MatchResponse.DESCRIPTOR.fields_by_name["progress"].number << 3 | _LENGTH_DELIMITED]
 )
 _Context = grpc.aio.ServicerContext[Any, Any]
-_Item = TypeVar("_Item")
+_Request = TypeVar("_Request", bound=Message)
+_Response = TypeVar("_Response", bound=Message)
 
 
 class MatchService:
@@ -52,7 +66,7 @@ class MatchService:
 
     async def Match(self, request: bytes, context: _Context) -> None:  # noqa: N802
         """Run a match and pass its events on."""
-        with self._app.running("MatchRequest", request, _caller(context)) as task:
+        with self._app.running("MatchRequest", request, caller_from(context)) as task:
             note(match=task.id)
             pacing, accepted = Pacing(), MatchAccepted()
             async with aclosing(followed(task.log)) as responses:
@@ -71,26 +85,40 @@ class MatchService:
 
     def handler(self) -> grpc.GenericRpcHandler:
         """Return what answers the calls of the service."""
-        return _handler(_MATCH, Match=grpc.unary_stream_rpc_method_handler(self.Match))
+        return handler_of(_MATCH, Match=grpc.unary_stream_rpc_method_handler(self.Match))
 
 
 class SceneService:
-    """Finds the objects in one source; requests and responses pass as they come."""
+    """Finds the objects in one source, and keeps scenes; what is large passes as it comes."""
 
     def __init__(self, app: Application) -> None:
         self._app = app
 
     async def Segment(self, request: bytes, context: _Context) -> bytes:  # noqa: N802
         """Segment, and return what was found."""
-        with self._app.running("SegmentRequest", request, _caller(context)) as task:
+        with self._app.running("SegmentRequest", request, caller_from(context)) as task:
             async with aclosing(followed(task.log)) as told:
                 responses = [response async for response in told]
         # Nobody waits for an answer to a request that was stopped.
         return responses[0] if responses else b""
 
+    async def PutScene(self, request: bytes, context: _Context) -> PutSceneResponse:  # noqa: N802
+        """Keep a scene."""
+        return await self._app.scenes.put(request, caller_from(context))
+
     def handler(self) -> grpc.GenericRpcHandler:
         """Return what answers the calls of the service."""
-        return _handler(_SCENE, Segment=grpc.unary_unary_rpc_method_handler(self.Segment))
+        return handler_of(
+            _SCENE,
+            Segment=grpc.unary_unary_rpc_method_handler(self.Segment),
+            PutScene=grpc.unary_unary_rpc_method_handler(
+                self.PutScene, response_serializer=PutSceneResponse.SerializeToString
+            ),
+            GetScene=answering(GetSceneRequest, self._app.scenes.get),
+            ListScenes=answering(ListScenesRequest, self._app.scenes.listed),
+            UpdateScene=answering(UpdateSceneRequest, self._app.scenes.update),
+            DeleteScene=answering(DeleteSceneRequest, self._app.scenes.delete),
+        )
 
 
 class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):
@@ -114,12 +142,12 @@ class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):
         return self._app.info()
 
 
-def _caller(context: _Context) -> Caller:
+def caller_from(context: _Context) -> Caller:
     """Return who calls, by name or else by host, and the connection."""
     peer, name = context.peer() or "", caller_of(context)
     if name:
         note(caller=name)
-    return Caller(name or peer.rpartition(":")[0] or peer, peer)
+    return Caller(name or peer.rpartition(":")[0] or peer, peer, name)
 
 
 def _is_progress(response: bytes) -> bool:
@@ -140,31 +168,21 @@ def _note_event(event: MatchResponse) -> None:
             note(outcome=name.removeprefix("OUTCOME_"))
 
 
-def _handler(service: str, **methods: Any) -> grpc.GenericRpcHandler:
+def answering(
+    kind: type[_Request], method: Callable[[_Request, Caller], Awaitable[_Response]]
+) -> grpc.RpcMethodHandler[_Request, _Response]:
+    """Return what answers a short request as a method of the application does."""
+
+    async def answer(request: _Request, context: _Context) -> _Response:
+        return await method(request, caller_from(context))
+
+    return grpc.unary_unary_rpc_method_handler(
+        answer,
+        request_deserializer=kind.FromString,
+        response_serializer=lambda response: response.SerializeToString(),
+    )
+
+
+def handler_of(service: str, **methods: Any) -> grpc.GenericRpcHandler:
+    """Return what answers the calls of a service by the handlers of its methods."""
     return grpc.method_handlers_generic_handler(service, methods)
-
-
-async def followed(log: Log[_Item]) -> AsyncGenerator[_Item, None]:
-    """Yield what a log holds and gets, until it ends; raise the error that it ends with."""
-    loop, changed, seen = asyncio.get_running_loop(), asyncio.Event(), 0
-
-    here = threading.get_ident()
-
-    def wake() -> None:
-        if threading.get_ident() == here:
-            changed.set()
-        else:
-            loop.call_soon_threadsafe(changed.set)
-
-    with log.waking(wake):
-        while True:
-            changed.clear()
-            ended, found = log.ended, log.next(seen)
-            if found is not None:
-                seen, item = found
-                yield item
-            elif ended:
-                break
-            else:
-                await changed.wait()
-    log.check()

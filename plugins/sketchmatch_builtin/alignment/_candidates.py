@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from sketchmatch_builtin.alignment._poses import (
     TOLERANCES,
     Guesses,
     empty_guesses,
+    fitting_pose,
     grid_of,
     guess_poses,
     guessed_pose,
@@ -25,10 +26,22 @@ from sketchmatch_builtin.alignment._sides import Sides
 from sketchmatch_builtin.alignment._things import Things
 from sketchmatch_builtin.searchers._assignment import FORBIDDEN, reduce_by_assignment
 
-__all__ = ["Laid", "completed", "drive", "known_maps", "laid_maps", "refined_maps", "template_maps"]
+__all__ = [
+    "Laid",
+    "completed",
+    "drive",
+    "known_maps",
+    "known_near_maps",
+    "laid_maps",
+    "near_maps",
+    "refined_maps",
+    "template_maps",
+]
 
 GUESSES = 25_000
 """Poses to weigh; beyond, the pairs that were laid on others have met the right pose for sure."""
+
+_Value = TypeVar("_Value")
 
 _FEWEST_PAIRS = 4
 _ROOM = 400
@@ -44,6 +57,10 @@ _STEP = 16_000
 
 _PAIRINGS = 100_000
 """Pairings to weigh for poses that are refined between two pauses, or a few more."""
+
+_NEAR = -1
+_NEAR_PAIRS, _NEAR_POSES = 1, 10
+"""Sketched pairs that are laid on all others, and maps that follow, beside those that are near."""
 
 _LOSS = 9.0
 """How much less than the best a map may be worth that changes make of others."""
@@ -112,13 +129,53 @@ def laid_maps(
         Different maps, what is worth most first.
     """
     laid = yield from _laid(sides, poses, guesses)
+    found = _found(laid, sides, maps, partial)
+    _RECENT.appendleft((_key(sides, poses, maps, partial, guesses), found))
+    return found
+
+
+def near_maps(
+    sides: Sides, start: Iterable[IntArray], maps: int = 100, partial: bool = True
+) -> list[Laid]:
+    """Lay a sketch upon a map near maps that were right a moment ago, and in a few other ways.
+
+    What comes of it is kept for :func:`known_near_maps`.
+
+    Parameters
+    ----------
+    sides, maps, partial
+        As for :func:`laid_maps`.
+    start
+        Maps of the sketch.
+    """
+    guesses = drive(_guessed(sides, 0, _NEAR_PAIRS))
+    laid = drive(_refined(guesses, sides, _NEAR_POSES))
+    partners = np.empty(len(sides.drawn.places), dtype=np.int64)
+    for each in start:
+        pose = fitting_pose(each, sides.drawn, sides.mapped)
+        if pose is not None:
+            u, t, growth, score = refine_pose(
+                *pose, sides.drawn, sides.mapped, sides.bonus, TOLERANCES, partners
+            )
+            laid.append(Laid(partners.copy(), (u, t, growth), score))
+    found = _found(_ranked(laid), sides, maps, partial)
+    _RECENT.appendleft((_key(sides, _NEAR, partial), found))
+    return found
+
+
+def known_near_maps(sides: Sides, partial: bool = True) -> list[Laid]:
+    """Return what :func:`near_maps` found just before, or nothing."""
+    key = _key(sides, _NEAR, partial)
+    return next((found for known, found in tuple(_RECENT) if known == key), [])
+
+
+def _found(laid: list[Laid], sides: Sides, maps: int, partial: bool) -> list[Laid]:
+    """Return maps, and what single changes make of the best, as far as they may be answers."""
     most = min(len(sides.drawn.places), len(sides.mapped.places))
     if not partial:
         laid = _ranked(_filled(each, sides) for each in laid)
     fewest = min(_FEWEST, most) if partial else most
-    found = [each for each in _varied(laid, sides, maps) if each.lines >= fewest]
-    _RECENT.appendleft((_key(sides, poses, maps, partial, guesses), found))
-    return found
+    return [each for each in _varied(laid, sides, maps) if each.lines >= fewest]
 
 
 def known_maps(
@@ -148,13 +205,13 @@ def _laid(sides: Sides, poses: int, guesses: int) -> Generator[int, None, list[L
     return laid
 
 
-def drive(work: Generator[int, None, list[Laid]]) -> list[Laid]:
+def drive(work: Generator[int, None, _Value]) -> _Value:
     """Go on with work to its end."""
     while True:
         try:
             next(work)
         except StopIteration as stop:
-            found: list[Laid] = stop.value
+            found: _Value = stop.value
             return found
 
 
@@ -194,7 +251,9 @@ def template_maps(laid: Iterable[Laid], sides: Sides) -> list[IntArray]:
     return [sides.template_partners(each.partners) for each in laid]
 
 
-def _guessed(sides: Sides, most: int) -> Generator[int, None, Guesses]:
+def _guessed(
+    sides: Sides, most: int, fewest_pairs: int = _FEWEST_PAIRS
+) -> Generator[int, None, Guesses]:
     """Weigh the poses that follow from two pairings each, about so many at most."""
     drawn, mapped = sides.drawn, sides.mapped
     rough = TOLERANCES._replace(omission=_ROUGH)
@@ -203,7 +262,7 @@ def _guessed(sides: Sides, most: int) -> Generator[int, None, Guesses]:
     pairs = _pairs(drawn)
     allowed = np.isfinite(sides.bonus).astype(np.float64)
     there_are = len(mapped.places)
-    fewest = min(len(pairs), _FEWEST_PAIRS) * there_are
+    fewest = min(len(pairs), fewest_pairs) * there_are
     step = max(1, _STEP // len(drawn.places))
     while guesses.state[2] < len(pairs) * there_are:
         if guesses.state[2] >= fewest and guesses.state[1] >= most:

@@ -33,6 +33,7 @@ __all__ = [
     "Tolerances",
     "empty_guesses",
     "fitted_pose",
+    "fitting_pose",
     "grid_of",
     "grown",
     "guess_poses",
@@ -245,6 +246,29 @@ def guessed_pose(
     larger = mapped.sizes[j] - drawn.sizes[i] + mapped.sizes[g] - drawn.sizes[k]
     growth += _TRUST * (0.5 * larger - growth)
     return u, mapped.places[j] - u * drawn.places[i], growth
+
+
+def fitting_pose(
+    partners: IntArray, drawn: Things, mapped: Things
+) -> tuple[complex, complex, float] | None:
+    """Return the pose that lays all objects of a map on their partners as well as may be.
+
+    Returns
+    -------
+    tuple or None
+        The pose, and by how much ln of the areas grows; None where the map tells of none.
+    """
+    (matched,) = np.nonzero(partners >= 0)
+    if len(matched) < 2:
+        return None
+    here, there = drawn.places[matched], mapped.places[partners[matched]]
+    z, w = here - here.mean(), there - there.mean()
+    spread = float((np.abs(z) ** 2).sum())
+    u = complex((w * z.conj()).sum() / spread) if spread > 0.0 else 0.0j
+    if u == 0.0:
+        return None
+    growth = grown(drawn, mapped, partners, 2.0 * math.log(abs(u)), TOLERANCES)
+    return u, complex(there.mean() - u * here.mean()), growth
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +38,7 @@ class Things(NamedTuple):
     spacing: float
 
 
+@lru_cache(maxsize=32)
 def things_of(scene: Scene) -> Things:
     """Return what alignment knows of the objects of a scene."""
     moments = np.array([_moments(item) for item in scene.objects])

@@ -23,6 +23,11 @@ __all__ = ["ForceHistogram", "PowerForce"]
 class ForceHistogram(Histogram):
     """A histogram of forces, whose kernel two squares compile."""
 
+    @property
+    def of_pairs(self) -> bool:
+        """The objects are measured from the middle of the bounds, and nothing else counts."""
+        return True
+
     @classmethod
     def warm_up(cls) -> None:
         """Compile the kernels."""

@@ -13,6 +13,7 @@ from sketchmatch_builtin.alignment import (
     Sides,
     Things,
     known_maps,
+    known_near_maps,
     measured,
     refined_maps,
     relations_of,
@@ -38,6 +39,7 @@ def described(
     met: Iterable[IntArray] = (),
     partial: bool = True,
     related: bool = True,
+    quick: bool = False,
 ) -> Described:
     """Describe maps of a sketch, and of its decoys.
 
@@ -53,18 +55,21 @@ def described(
         Whether objects of both sides may be without partner.
     related
         Whether relations are those that were learned from.
+    quick
+        Whether nothing is laid upon the map here, and no decoys at all.
     """
-    found = [*met, *(each.partners for each in known_maps(sides, partial=partial))]
+    laid = known_near_maps(sides, partial) if quick else known_maps(sides, partial=partial)
+    found = [*met, *(each.partners for each in laid)]
     unique = {each.tobytes(): each for each in found}
     maps = np.stack([*unique.values()])
     relations = relations_of(scenes, table, names, sides.swapped)
     known = measured(maps, sides.drawn, sides.mapped, relations)
     order = best_first(known)
-    decoys = tuple(_measured_decoy(each, sides.mapped) for each in _decoys(sides.drawn))
+    decoys = [] if quick else _decoys(sides.drawn)
     return Described(
         maps[order],
         known.at(order),
-        decoys,
+        tuple(_measured_decoy(each, sides.mapped) for each in decoys),
         len(sides.drawn.places),
         len(sides.mapped.places),
         related,

@@ -82,6 +82,7 @@ class Posterior(Judge):
             [sides.drawn_partners(each.partners) for each in problem.candidates],
             partial=problem.price < math.inf,
             related=problem.usual,
+            quick=problem.elsewhere is not None,
         )
         found = weighed(known, POSTERIOR)
         order = np.argsort(-found.shares, kind="stable")
@@ -89,7 +90,8 @@ class Posterior(Judge):
         told = problem.alternatives + 1
         # Whoever says that a sketched object is a mapped one says that this is the place.
         pinned = problem.pinned is not None and bool((problem.pinned >= 0).any())
-        elsewhere = 0.0 if pinned else found.elsewhere
+        judged = found.elsewhere if problem.elsewhere is None else problem.elsewhere
+        elsewhere = 0.0 if pinned else judged
         here = 1.0 - elsewhere
         likely = here * (1.0 - found.lost) * found.shares[order]
         lines = _lines(maps, likely, problem.table)

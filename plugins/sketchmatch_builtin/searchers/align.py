@@ -11,15 +11,18 @@ from sketchmatch.api import MatchProblem, Outcome, Params, Searcher, SearchProgr
 from sketchmatch.api.kernels import empty_map_state, place_map
 from sketchmatch.model import Fmap, IntArray, RelationTable
 from sketchmatch_builtin.alignment import (
-    Laid,
     completed,
     laid_maps,
+    near_maps,
     sides_of,
     template_maps,
 )
 from sketchmatch_builtin.searchers.auto import Auto
 
 __all__ = ["Align"]
+
+_NEAR = 10
+"""The best maps near those that it starts with."""
 
 _OFFERED = 10
 """Maps to complete between two pauses."""
@@ -86,6 +89,11 @@ class Align(Searcher):
         """It leaves objects out by itself."""
         return True
 
+    @property
+    def warm(self) -> bool:
+        """Beside a few other poses, it tries those of the maps that it starts with."""
+        return True
+
     @classmethod
     def warm_up(cls) -> None:
         """Compile the kernels."""
@@ -108,15 +116,19 @@ class Align(Searcher):
         best = _Best(problem)
         best.offer(completed(None, sides))
         yield best.progress(0)
-        work = laid_maps(sides, self.params.poses, partial=problem.partial)
         poses = 0
-        while True:
-            try:
-                poses = next(work)
-            except StopIteration as stop:
-                laid: list[Laid] = stop.value
-                break
-            yield best.progress(poses)
+        if problem.start:
+            start = [sides.drawn_partners(each) for each in problem.start]
+            laid = near_maps(sides, start, partial=problem.partial)[:_NEAR]
+        else:
+            work = laid_maps(sides, self.params.poses, partial=problem.partial)
+            while True:
+                try:
+                    poses = next(work)
+                except StopIteration as stop:
+                    laid = stop.value
+                    break
+                yield best.progress(poses)
         for k, each in enumerate(laid[: self.params.maps]):
             best.offer(completed(each, sides))
             if (k + 1) % _OFFERED == 0:

@@ -347,6 +347,7 @@ class MatchResult(google.protobuf.message.Message):
     PLACE_PROBABILITY_FIELD_NUMBER: builtins.int
     AMBIGUITY_FIELD_NUMBER: builtins.int
     UNMATCHED_SKETCH_PROBABILITIES_FIELD_NUMBER: builtins.int
+    PROVISIONAL_FIELD_NUMBER: builtins.int
     match_id: builtins.str
     """Name of the match, as in `MatchAccepted`."""
     seed: builtins.int
@@ -380,6 +381,11 @@ class MatchResult(google.protobuf.message.Message):
     """How likely the sketch shows the place of the map at all, within [0, 1]: below one half it is
     probably another place, and the object map means little. Absent where the judge does not know:
     then all probabilities take for granted that it is this one.
+    """
+    provisional: builtins.bool
+    """Whether it is a quick answer about a sketch in progress, found near the maps of the revision before,
+    with `place_probability` as it was then; what `MatchService.Match` would return follows once nothing
+    is drawn for a moment. Never in a result of `Match` itself.
     """
     @property
     def object_matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectMatch]:
@@ -452,9 +458,10 @@ class MatchResult(google.protobuf.message.Message):
         place_probability: builtins.float | None = ...,
         ambiguity: global___Ambiguity | None = ...,
         unmatched_sketch_probabilities: collections.abc.Iterable[builtins.float] | None = ...,
+        provisional: builtins.bool = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["_place_probability", b"_place_probability", "_probability", b"_probability", "_upper_bound", b"_upper_bound", "ambiguity", b"ambiguity", "fmap_confidence", b"fmap_confidence", "place_probability", b"place_probability", "probability", b"probability", "statistics", b"statistics", "upper_bound", b"upper_bound"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_place_probability", b"_place_probability", "_probability", b"_probability", "_upper_bound", b"_upper_bound", "alternatives", b"alternatives", "ambiguity", b"ambiguity", "fmap_confidence", b"fmap_confidence", "fmap_entries", b"fmap_entries", "match_id", b"match_id", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence", "outcome", b"outcome", "place_probability", b"place_probability", "probability", b"probability", "rotation_radians", b"rotation_radians", "scale", b"scale", "search_note", b"search_note", "seed", b"seed", "statistics", b"statistics", "unmatched_map_objects", b"unmatched_map_objects", "unmatched_sketch_objects", b"unmatched_sketch_objects", "unmatched_sketch_probabilities", b"unmatched_sketch_probabilities", "upper_bound", b"upper_bound"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["_place_probability", b"_place_probability", "_probability", b"_probability", "_upper_bound", b"_upper_bound", "alternatives", b"alternatives", "ambiguity", b"ambiguity", "fmap_confidence", b"fmap_confidence", "fmap_entries", b"fmap_entries", "match_id", b"match_id", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence", "outcome", b"outcome", "place_probability", b"place_probability", "probability", b"probability", "provisional", b"provisional", "rotation_radians", b"rotation_radians", "scale", b"scale", "search_note", b"search_note", "seed", b"seed", "statistics", b"statistics", "unmatched_map_objects", b"unmatched_map_objects", "unmatched_sketch_objects", b"unmatched_sketch_objects", "unmatched_sketch_probabilities", b"unmatched_sketch_probabilities", "upper_bound", b"upper_bound"]) -> None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_place_probability", b"_place_probability"]) -> typing.Literal["place_probability"] | None: ...
     @typing.overload

@@ -8,8 +8,8 @@ from sketchmatch_proto.v1 import match_service_pb2 as sketchmatch_dot_v1_dot_mat
 class MatchServiceStub(object):
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`, and a sketch
-    that is matched while it is drawn.
+    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
+    matched while it is drawn is `SketchService`'s.
     """
 
     def __init__(self, channel):
@@ -28,8 +28,8 @@ class MatchServiceStub(object):
 class MatchServiceServicer(object):
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`, and a sketch
-    that is matched while it is drawn.
+    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
+    matched while it is drawn is `SketchService`'s.
     """
 
     def Match(self, request, context):
@@ -81,8 +81,8 @@ def add_MatchServiceServicer_to_server(servicer, server):
 class MatchService(object):
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`, and a sketch
-    that is matched while it is drawn.
+    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
+    matched while it is drawn is `SketchService`'s.
     """
 
     @staticmethod

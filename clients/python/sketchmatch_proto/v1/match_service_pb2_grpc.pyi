@@ -20,8 +20,8 @@ class _ServicerContext(grpc.ServicerContext, grpc.aio.ServicerContext):  # type:
 class MatchServiceStub:
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`, and a sketch
-    that is matched while it is drawn.
+    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
+    matched while it is drawn is `SketchService`'s.
     """
 
     def __init__(self, channel: typing.Union[grpc.Channel, grpc.aio.Channel]) -> None: ...
@@ -59,8 +59,8 @@ class MatchServiceStub:
 class MatchServiceAsyncStub:
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`, and a sketch
-    that is matched while it is drawn.
+    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
+    matched while it is drawn is `SketchService`'s.
     """
 
     Match: grpc.aio.UnaryStreamMultiCallable[
@@ -97,8 +97,8 @@ class MatchServiceAsyncStub:
 class MatchServiceServicer(metaclass=abc.ABCMeta):
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`, and a sketch
-    that is matched while it is drawn.
+    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
+    matched while it is drawn is `SketchService`'s.
     """
 
     @abc.abstractmethod

@@ -8,6 +8,7 @@ import collections.abc
 import google.protobuf.descriptor
 import google.protobuf.internal.containers
 import google.protobuf.message
+import google.protobuf.timestamp_pb2
 import sketchmatch_proto.v1.pipeline_pb2
 import sketchmatch_proto.v1.scene_pb2
 import sketchmatch_proto.v1.source_pb2
@@ -88,3 +89,329 @@ class SegmentResponse(google.protobuf.message.Message):
     def ClearField(self, field_name: typing.Literal["route", b"route", "scene", b"scene", "segmenter", b"segmenter", "warnings", b"warnings"]) -> None: ...
 
 global___SegmentResponse = SegmentResponse
+
+@typing.final
+class PutSceneRequest(google.protobuf.message.Message):
+    """A source to keep, and how to find its objects."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    SOURCE_FIELD_NUMBER: builtins.int
+    SEGMENTER_FIELD_NUMBER: builtins.int
+    PROFILE_FIELD_NUMBER: builtins.int
+    profile: builtins.str
+    """As in `SegmentRequest`."""
+    @property
+    def source(self) -> sketchmatch_proto.v1.source_pb2.Source:
+        """The sketch or map. Required, and no stored scene."""
+
+    @property
+    def segmenter(self) -> sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection:
+        """The segmenter. Absent: the server's default for the form of the source."""
+
+    def __init__(
+        self,
+        *,
+        source: sketchmatch_proto.v1.source_pb2.Source | None = ...,
+        segmenter: sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection | None = ...,
+        profile: builtins.str = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["segmenter", b"segmenter", "source", b"source"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["profile", b"profile", "segmenter", b"segmenter", "source", b"source"]) -> None: ...
+
+global___PutSceneRequest = PutSceneRequest
+
+@typing.final
+class PutSceneResponse(google.protobuf.message.Message):
+    """The scene that is kept."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    STORED_SCENE_FIELD_NUMBER: builtins.int
+    CREATED_FIELD_NUMBER: builtins.int
+    created: builtins.bool
+    """Whether the caller had not put it before."""
+    @property
+    def stored_scene(self) -> global___StoredScene:
+        """The scene, with its name."""
+
+    def __init__(
+        self,
+        *,
+        stored_scene: global___StoredScene | None = ...,
+        created: builtins.bool = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["stored_scene", b"stored_scene"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["created", b"created", "stored_scene", b"stored_scene"]) -> None: ...
+
+global___PutSceneResponse = PutSceneResponse
+
+@typing.final
+class StoredScene(google.protobuf.message.Message):
+    """A scene that the server keeps."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: builtins.int
+    SCENE_FIELD_NUMBER: builtins.int
+    WARNINGS_FIELD_NUMBER: builtins.int
+    SEGMENTER_FIELD_NUMBER: builtins.int
+    ROUTE_FIELD_NUMBER: builtins.int
+    name: builtins.str
+    """The hash of what it is, in hexadecimal: 64 digits. `Source.stored_scene` takes it."""
+    @property
+    def scene(self) -> sketchmatch_proto.v1.scene_pb2.Scene:
+        """The objects."""
+
+    @property
+    def warnings(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.str]:
+        """As in `SegmentResponse`."""
+
+    @property
+    def segmenter(self) -> sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection:
+        """The segmenter that found the objects, with the value of every parameter."""
+
+    @property
+    def route(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[sketchmatch_proto.v1.source_pb2.Point]:
+        """As in `SegmentResponse`."""
+
+    def __init__(
+        self,
+        *,
+        name: builtins.str = ...,
+        scene: sketchmatch_proto.v1.scene_pb2.Scene | None = ...,
+        warnings: collections.abc.Iterable[builtins.str] | None = ...,
+        segmenter: sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection | None = ...,
+        route: collections.abc.Iterable[sketchmatch_proto.v1.source_pb2.Point] | None = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["scene", b"scene", "segmenter", b"segmenter"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["name", b"name", "route", b"route", "scene", b"scene", "segmenter", b"segmenter", "warnings", b"warnings"]) -> None: ...
+
+global___StoredScene = StoredScene
+
+@typing.final
+class GetSceneRequest(google.protobuf.message.Message):
+    """Which scene to return."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: builtins.int
+    INCLUDE_SOURCE_FIELD_NUMBER: builtins.int
+    name: builtins.str
+    """Its name. Required."""
+    include_source: builtins.bool
+    """Whether the source is wanted, too; it may be large."""
+    def __init__(
+        self,
+        *,
+        name: builtins.str = ...,
+        include_source: builtins.bool = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["include_source", b"include_source", "name", b"name"]) -> None: ...
+
+global___GetSceneRequest = GetSceneRequest
+
+@typing.final
+class GetSceneResponse(google.protobuf.message.Message):
+    """A scene that is kept."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    STORED_SCENE_FIELD_NUMBER: builtins.int
+    SOURCE_FIELD_NUMBER: builtins.int
+    @property
+    def stored_scene(self) -> global___StoredScene:
+        """The scene."""
+
+    @property
+    def source(self) -> sketchmatch_proto.v1.source_pb2.Source:
+        """What it was found in, where it is wanted."""
+
+    def __init__(
+        self,
+        *,
+        stored_scene: global___StoredScene | None = ...,
+        source: sketchmatch_proto.v1.source_pb2.Source | None = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["source", b"source", "stored_scene", b"stored_scene"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["source", b"source", "stored_scene", b"stored_scene"]) -> None: ...
+
+global___GetSceneResponse = GetSceneResponse
+
+@typing.final
+class ListScenesRequest(google.protobuf.message.Message):
+    """Which part of the list to return."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    PAGE_SIZE_FIELD_NUMBER: builtins.int
+    PAGE_TOKEN_FIELD_NUMBER: builtins.int
+    page_size: builtins.int
+    """How many scenes to return at most, up to 1000. 0: 100."""
+    page_token: builtins.str
+    """`next_page_token` of the response before, to go on after it. Empty: from the beginning."""
+    def __init__(
+        self,
+        *,
+        page_size: builtins.int = ...,
+        page_token: builtins.str = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["page_size", b"page_size", "page_token", b"page_token"]) -> None: ...
+
+global___ListScenesRequest = ListScenesRequest
+
+@typing.final
+class ListScenesResponse(google.protobuf.message.Message):
+    """A part of the list."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    SCENES_FIELD_NUMBER: builtins.int
+    NEXT_PAGE_TOKEN_FIELD_NUMBER: builtins.int
+    next_page_token: builtins.str
+    """To ask for what follows; empty at the end."""
+    @property
+    def scenes(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___SceneSummary]:
+        """The scenes, the latest first."""
+
+    def __init__(
+        self,
+        *,
+        scenes: collections.abc.Iterable[global___SceneSummary] | None = ...,
+        next_page_token: builtins.str = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["next_page_token", b"next_page_token", "scenes", b"scenes"]) -> None: ...
+
+global___ListScenesResponse = ListScenesResponse
+
+@typing.final
+class SceneSummary(google.protobuf.message.Message):
+    """What a list tells of a scene."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: builtins.int
+    OBJECT_COUNT_FIELD_NUMBER: builtins.int
+    LABELS_FIELD_NUMBER: builtins.int
+    PUT_TIME_FIELD_NUMBER: builtins.int
+    name: builtins.str
+    """Its name."""
+    object_count: builtins.int
+    """How many objects it has."""
+    @property
+    def labels(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.str]:
+        """The labels of those that have one, in the order of the objects."""
+
+    @property
+    def put_time(self) -> google.protobuf.timestamp_pb2.Timestamp:
+        """When the caller put it, or gave it its labels."""
+
+    def __init__(
+        self,
+        *,
+        name: builtins.str = ...,
+        object_count: builtins.int = ...,
+        labels: collections.abc.Iterable[builtins.str] | None = ...,
+        put_time: google.protobuf.timestamp_pb2.Timestamp | None = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["put_time", b"put_time"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["labels", b"labels", "name", b"name", "object_count", b"object_count", "put_time", b"put_time"]) -> None: ...
+
+global___SceneSummary = SceneSummary
+
+@typing.final
+class UpdateSceneRequest(google.protobuf.message.Message):
+    """Labels for objects of a scene."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: builtins.int
+    LABELS_FIELD_NUMBER: builtins.int
+    name: builtins.str
+    """Name of the scene. Required."""
+    @property
+    def labels(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectLabel]:
+        """The labels; the other objects keep theirs."""
+
+    def __init__(
+        self,
+        *,
+        name: builtins.str = ...,
+        labels: collections.abc.Iterable[global___ObjectLabel] | None = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["labels", b"labels", "name", b"name"]) -> None: ...
+
+global___UpdateSceneRequest = UpdateSceneRequest
+
+@typing.final
+class ObjectLabel(google.protobuf.message.Message):
+    """A label for an object of a scene."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    OBJECT_FIELD_NUMBER: builtins.int
+    LABEL_FIELD_NUMBER: builtins.int
+    object: builtins.int
+    """Index of the object, from 0."""
+    label: builtins.str
+    """Its label; an empty one takes the label away."""
+    def __init__(
+        self,
+        *,
+        object: builtins.int = ...,
+        label: builtins.str = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["label", b"label", "object", b"object"]) -> None: ...
+
+global___ObjectLabel = ObjectLabel
+
+@typing.final
+class UpdateSceneResponse(google.protobuf.message.Message):
+    """The scene with the new labels."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    STORED_SCENE_FIELD_NUMBER: builtins.int
+    @property
+    def stored_scene(self) -> global___StoredScene:
+        """The scene, under its own name."""
+
+    def __init__(
+        self,
+        *,
+        stored_scene: global___StoredScene | None = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["stored_scene", b"stored_scene"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["stored_scene", b"stored_scene"]) -> None: ...
+
+global___UpdateSceneResponse = UpdateSceneResponse
+
+@typing.final
+class DeleteSceneRequest(google.protobuf.message.Message):
+    """Which scene to forget."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: builtins.int
+    name: builtins.str
+    """Its name. Required."""
+    def __init__(
+        self,
+        *,
+        name: builtins.str = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["name", b"name"]) -> None: ...
+
+global___DeleteSceneRequest = DeleteSceneRequest
+
+@typing.final
+class DeleteSceneResponse(google.protobuf.message.Message):
+    """Nothing is left to say of it."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    def __init__(
+        self,
+    ) -> None: ...
+
+global___DeleteSceneResponse = DeleteSceneResponse

@@ -6,7 +6,13 @@ from sketchmatch_proto.v1 import scene_service_pb2 as sketchmatch_dot_v1_dot_sce
 
 
 class SceneServiceStub(object):
-    """Finds objects in sketches and maps, without matching them.
+    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+
+    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
+    with the value of every parameter and the version, and of the names that were given to its objects.
+    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
+    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
+    names are all the same one.
     """
 
     def __init__(self, channel):
@@ -20,10 +26,41 @@ class SceneServiceStub(object):
                 request_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.SegmentRequest.SerializeToString,
                 response_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.SegmentResponse.FromString,
                 )
+        self.PutScene = channel.unary_unary(
+                '/sketchmatch.v1.SceneService/PutScene',
+                request_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.PutSceneRequest.SerializeToString,
+                response_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.PutSceneResponse.FromString,
+                )
+        self.GetScene = channel.unary_unary(
+                '/sketchmatch.v1.SceneService/GetScene',
+                request_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.GetSceneRequest.SerializeToString,
+                response_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.GetSceneResponse.FromString,
+                )
+        self.ListScenes = channel.unary_unary(
+                '/sketchmatch.v1.SceneService/ListScenes',
+                request_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.ListScenesRequest.SerializeToString,
+                response_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.ListScenesResponse.FromString,
+                )
+        self.UpdateScene = channel.unary_unary(
+                '/sketchmatch.v1.SceneService/UpdateScene',
+                request_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.UpdateSceneRequest.SerializeToString,
+                response_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.UpdateSceneResponse.FromString,
+                )
+        self.DeleteScene = channel.unary_unary(
+                '/sketchmatch.v1.SceneService/DeleteScene',
+                request_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.DeleteSceneRequest.SerializeToString,
+                response_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.DeleteSceneResponse.FromString,
+                )
 
 
 class SceneServiceServicer(object):
-    """Finds objects in sketches and maps, without matching them.
+    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+
+    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
+    with the value of every parameter and the version, and of the names that were given to its objects.
+    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
+    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
+    names are all the same one.
     """
 
     def Segment(self, request, context):
@@ -45,6 +82,105 @@ class SceneServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def PutScene(self, request, context):
+        """Finds the objects of a source, as `Segment` does, and keeps them, the source and how they lie to
+        each other, so that matches with it do the sketch's part alone. What is kept already is found by
+        its name, and not segmented again.
+
+        Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+        * `INVALID_ARGUMENT`: a field is missing or cannot be used, or nothing usable is in the source;
+        `BadRequest` has the path. Correct the request; the same one fails again.
+        * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+        is not needed, or tell its operator; requests with sources in them are answered all the same.
+        * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
+        `RetryInfo`. Without `RetryInfo` the request is larger than the transport lets through.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+        * `INTERNAL`: the segmenter broke its contract; the message names it and the distribution it is
+        from. Choose another one and tell the author.
+        * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def GetScene(self, request, context):
+        """Returns a scene that the caller has put.
+
+        Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+        * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+        request; the same one fails again.
+        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+        there are.
+        * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+        is not needed, or tell its operator; requests with sources in them are answered all the same.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+        * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def ListScenes(self, request, context):
+        """Lists the scenes that the caller has put, the latest first.
+
+        Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+        * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+        request; the same one fails again.
+        * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+        is not needed, or tell its operator; requests with sources in them are answered all the same.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+        * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def UpdateScene(self, request, context):
+        """Gives objects of a scene other labels. Labels are part of what a match sees, and so of the scene's
+        name: the scene with the new labels has ANOTHER name, which the answer has. The scene under the
+        old name stays as it is until it is deleted.
+
+        Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+        * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+        request; the same one fails again.
+        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+        there are.
+        * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+        is not needed, or tell its operator; requests with sources in them are answered all the same.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+        * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def DeleteScene(self, request, context):
+        """Forgets a scene; it stays for others who have put it.
+
+        Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+        * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+        request; the same one fails again.
+        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+        there are.
+        * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+        is not needed, or tell its operator; requests with sources in them are answered all the same.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+        * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_SceneServiceServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -52,6 +188,31 @@ def add_SceneServiceServicer_to_server(servicer, server):
                     servicer.Segment,
                     request_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.SegmentRequest.FromString,
                     response_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.SegmentResponse.SerializeToString,
+            ),
+            'PutScene': grpc.unary_unary_rpc_method_handler(
+                    servicer.PutScene,
+                    request_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.PutSceneRequest.FromString,
+                    response_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.PutSceneResponse.SerializeToString,
+            ),
+            'GetScene': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetScene,
+                    request_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.GetSceneRequest.FromString,
+                    response_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.GetSceneResponse.SerializeToString,
+            ),
+            'ListScenes': grpc.unary_unary_rpc_method_handler(
+                    servicer.ListScenes,
+                    request_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.ListScenesRequest.FromString,
+                    response_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.ListScenesResponse.SerializeToString,
+            ),
+            'UpdateScene': grpc.unary_unary_rpc_method_handler(
+                    servicer.UpdateScene,
+                    request_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.UpdateSceneRequest.FromString,
+                    response_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.UpdateSceneResponse.SerializeToString,
+            ),
+            'DeleteScene': grpc.unary_unary_rpc_method_handler(
+                    servicer.DeleteScene,
+                    request_deserializer=sketchmatch_dot_v1_dot_scene__service__pb2.DeleteSceneRequest.FromString,
+                    response_serializer=sketchmatch_dot_v1_dot_scene__service__pb2.DeleteSceneResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -61,7 +222,13 @@ def add_SceneServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class SceneService(object):
-    """Finds objects in sketches and maps, without matching them.
+    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+
+    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
+    with the value of every parameter and the version, and of the names that were given to its objects.
+    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
+    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
+    names are all the same one.
     """
 
     @staticmethod
@@ -78,5 +245,90 @@ class SceneService(object):
         return grpc.experimental.unary_unary(request, target, '/sketchmatch.v1.SceneService/Segment',
             sketchmatch_dot_v1_dot_scene__service__pb2.SegmentRequest.SerializeToString,
             sketchmatch_dot_v1_dot_scene__service__pb2.SegmentResponse.FromString,
+            options, channel_credentials,
+            insecure, call_credentials, compression, wait_for_ready, timeout, metadata)
+
+    @staticmethod
+    def PutScene(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(request, target, '/sketchmatch.v1.SceneService/PutScene',
+            sketchmatch_dot_v1_dot_scene__service__pb2.PutSceneRequest.SerializeToString,
+            sketchmatch_dot_v1_dot_scene__service__pb2.PutSceneResponse.FromString,
+            options, channel_credentials,
+            insecure, call_credentials, compression, wait_for_ready, timeout, metadata)
+
+    @staticmethod
+    def GetScene(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(request, target, '/sketchmatch.v1.SceneService/GetScene',
+            sketchmatch_dot_v1_dot_scene__service__pb2.GetSceneRequest.SerializeToString,
+            sketchmatch_dot_v1_dot_scene__service__pb2.GetSceneResponse.FromString,
+            options, channel_credentials,
+            insecure, call_credentials, compression, wait_for_ready, timeout, metadata)
+
+    @staticmethod
+    def ListScenes(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(request, target, '/sketchmatch.v1.SceneService/ListScenes',
+            sketchmatch_dot_v1_dot_scene__service__pb2.ListScenesRequest.SerializeToString,
+            sketchmatch_dot_v1_dot_scene__service__pb2.ListScenesResponse.FromString,
+            options, channel_credentials,
+            insecure, call_credentials, compression, wait_for_ready, timeout, metadata)
+
+    @staticmethod
+    def UpdateScene(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(request, target, '/sketchmatch.v1.SceneService/UpdateScene',
+            sketchmatch_dot_v1_dot_scene__service__pb2.UpdateSceneRequest.SerializeToString,
+            sketchmatch_dot_v1_dot_scene__service__pb2.UpdateSceneResponse.FromString,
+            options, channel_credentials,
+            insecure, call_credentials, compression, wait_for_ready, timeout, metadata)
+
+    @staticmethod
+    def DeleteScene(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(request, target, '/sketchmatch.v1.SceneService/DeleteScene',
+            sketchmatch_dot_v1_dot_scene__service__pb2.DeleteSceneRequest.SerializeToString,
+            sketchmatch_dot_v1_dot_scene__service__pb2.DeleteSceneResponse.FromString,
             options, channel_credentials,
             insecure, call_credentials, compression, wait_for_ready, timeout, metadata)

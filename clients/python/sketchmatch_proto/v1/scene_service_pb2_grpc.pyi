@@ -18,7 +18,14 @@ class _ServicerContext(grpc.ServicerContext, grpc.aio.ServicerContext):  # type:
     ...
 
 class SceneServiceStub:
-    """Finds objects in sketches and maps, without matching them."""
+    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+
+    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
+    with the value of every parameter and the version, and of the names that were given to its objects.
+    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
+    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
+    names are all the same one.
+    """
 
     def __init__(self, channel: typing.Union[grpc.Channel, grpc.aio.Channel]) -> None: ...
     Segment: grpc.UnaryUnaryMultiCallable[
@@ -40,8 +47,114 @@ class SceneServiceStub:
     * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
     """
 
+    PutScene: grpc.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.scene_service_pb2.PutSceneRequest,
+        sketchmatch_proto.v1.scene_service_pb2.PutSceneResponse,
+    ]
+    """Finds the objects of a source, as `Segment` does, and keeps them, the source and how they lie to
+    each other, so that matches with it do the sketch's part alone. What is kept already is found by
+    its name, and not segmented again.
+
+    Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+    * `INVALID_ARGUMENT`: a field is missing or cannot be used, or nothing usable is in the source;
+      `BadRequest` has the path. Correct the request; the same one fails again.
+    * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+      is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
+      `RetryInfo`. Without `RetryInfo` the request is larger than the transport lets through.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+    * `INTERNAL`: the segmenter broke its contract; the message names it and the distribution it is
+      from. Choose another one and tell the author.
+    * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    GetScene: grpc.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.scene_service_pb2.GetSceneRequest,
+        sketchmatch_proto.v1.scene_service_pb2.GetSceneResponse,
+    ]
+    """Returns a scene that the caller has put.
+
+    Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+    * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+      request; the same one fails again.
+    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+      there are.
+    * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+      is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    ListScenes: grpc.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.scene_service_pb2.ListScenesRequest,
+        sketchmatch_proto.v1.scene_service_pb2.ListScenesResponse,
+    ]
+    """Lists the scenes that the caller has put, the latest first.
+
+    Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+    * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+      request; the same one fails again.
+    * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+      is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    UpdateScene: grpc.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.scene_service_pb2.UpdateSceneRequest,
+        sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse,
+    ]
+    """Gives objects of a scene other labels. Labels are part of what a match sees, and so of the scene's
+    name: the scene with the new labels has ANOTHER name, which the answer has. The scene under the
+    old name stays as it is until it is deleted.
+
+    Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+    * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+      request; the same one fails again.
+    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+      there are.
+    * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+      is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    DeleteScene: grpc.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.scene_service_pb2.DeleteSceneRequest,
+        sketchmatch_proto.v1.scene_service_pb2.DeleteSceneResponse,
+    ]
+    """Forgets a scene; it stays for others who have put it.
+
+    Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+    * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+      request; the same one fails again.
+    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+      there are.
+    * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+      is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
 class SceneServiceAsyncStub:
-    """Finds objects in sketches and maps, without matching them."""
+    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+
+    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
+    with the value of every parameter and the version, and of the names that were given to its objects.
+    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
+    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
+    names are all the same one.
+    """
 
     Segment: grpc.aio.UnaryUnaryMultiCallable[
         sketchmatch_proto.v1.scene_service_pb2.SegmentRequest,
@@ -62,8 +175,114 @@ class SceneServiceAsyncStub:
     * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
     """
 
+    PutScene: grpc.aio.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.scene_service_pb2.PutSceneRequest,
+        sketchmatch_proto.v1.scene_service_pb2.PutSceneResponse,
+    ]
+    """Finds the objects of a source, as `Segment` does, and keeps them, the source and how they lie to
+    each other, so that matches with it do the sketch's part alone. What is kept already is found by
+    its name, and not segmented again.
+
+    Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+    * `INVALID_ARGUMENT`: a field is missing or cannot be used, or nothing usable is in the source;
+      `BadRequest` has the path. Correct the request; the same one fails again.
+    * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+      is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
+      `RetryInfo`. Without `RetryInfo` the request is larger than the transport lets through.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+    * `INTERNAL`: the segmenter broke its contract; the message names it and the distribution it is
+      from. Choose another one and tell the author.
+    * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    GetScene: grpc.aio.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.scene_service_pb2.GetSceneRequest,
+        sketchmatch_proto.v1.scene_service_pb2.GetSceneResponse,
+    ]
+    """Returns a scene that the caller has put.
+
+    Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+    * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+      request; the same one fails again.
+    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+      there are.
+    * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+      is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    ListScenes: grpc.aio.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.scene_service_pb2.ListScenesRequest,
+        sketchmatch_proto.v1.scene_service_pb2.ListScenesResponse,
+    ]
+    """Lists the scenes that the caller has put, the latest first.
+
+    Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+    * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+      request; the same one fails again.
+    * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+      is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    UpdateScene: grpc.aio.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.scene_service_pb2.UpdateSceneRequest,
+        sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse,
+    ]
+    """Gives objects of a scene other labels. Labels are part of what a match sees, and so of the scene's
+    name: the scene with the new labels has ANOTHER name, which the answer has. The scene under the
+    old name stays as it is until it is deleted.
+
+    Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+    * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+      request; the same one fails again.
+    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+      there are.
+    * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+      is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    DeleteScene: grpc.aio.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.scene_service_pb2.DeleteSceneRequest,
+        sketchmatch_proto.v1.scene_service_pb2.DeleteSceneResponse,
+    ]
+    """Forgets a scene; it stays for others who have put it.
+
+    Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+    * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+      request; the same one fails again.
+    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+      there are.
+    * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+      is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
 class SceneServiceServicer(metaclass=abc.ABCMeta):
-    """Finds objects in sketches and maps, without matching them."""
+    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+
+    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
+    with the value of every parameter and the version, and of the names that were given to its objects.
+    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
+    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
+    names are all the same one.
+    """
 
     @abc.abstractmethod
     def Segment(
@@ -82,6 +301,115 @@ class SceneServiceServicer(metaclass=abc.ABCMeta):
         * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
         * `INTERNAL`: the segmenter broke its contract; the message names it and the distribution it is
           from. Choose another one and tell the author.
+        * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+
+    @abc.abstractmethod
+    def PutScene(
+        self,
+        request: sketchmatch_proto.v1.scene_service_pb2.PutSceneRequest,
+        context: _ServicerContext,
+    ) -> typing.Union[sketchmatch_proto.v1.scene_service_pb2.PutSceneResponse, collections.abc.Awaitable[sketchmatch_proto.v1.scene_service_pb2.PutSceneResponse]]:
+        """Finds the objects of a source, as `Segment` does, and keeps them, the source and how they lie to
+        each other, so that matches with it do the sketch's part alone. What is kept already is found by
+        its name, and not segmented again.
+
+        Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+        * `INVALID_ARGUMENT`: a field is missing or cannot be used, or nothing usable is in the source;
+          `BadRequest` has the path. Correct the request; the same one fails again.
+        * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+          is not needed, or tell its operator; requests with sources in them are answered all the same.
+        * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
+          `RetryInfo`. Without `RetryInfo` the request is larger than the transport lets through.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+        * `INTERNAL`: the segmenter broke its contract; the message names it and the distribution it is
+          from. Choose another one and tell the author.
+        * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+
+    @abc.abstractmethod
+    def GetScene(
+        self,
+        request: sketchmatch_proto.v1.scene_service_pb2.GetSceneRequest,
+        context: _ServicerContext,
+    ) -> typing.Union[sketchmatch_proto.v1.scene_service_pb2.GetSceneResponse, collections.abc.Awaitable[sketchmatch_proto.v1.scene_service_pb2.GetSceneResponse]]:
+        """Returns a scene that the caller has put.
+
+        Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+        * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+          request; the same one fails again.
+        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+          there are.
+        * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+          is not needed, or tell its operator; requests with sources in them are answered all the same.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+        * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+
+    @abc.abstractmethod
+    def ListScenes(
+        self,
+        request: sketchmatch_proto.v1.scene_service_pb2.ListScenesRequest,
+        context: _ServicerContext,
+    ) -> typing.Union[sketchmatch_proto.v1.scene_service_pb2.ListScenesResponse, collections.abc.Awaitable[sketchmatch_proto.v1.scene_service_pb2.ListScenesResponse]]:
+        """Lists the scenes that the caller has put, the latest first.
+
+        Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+        * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+          request; the same one fails again.
+        * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+          is not needed, or tell its operator; requests with sources in them are answered all the same.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+        * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+
+    @abc.abstractmethod
+    def UpdateScene(
+        self,
+        request: sketchmatch_proto.v1.scene_service_pb2.UpdateSceneRequest,
+        context: _ServicerContext,
+    ) -> typing.Union[sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse, collections.abc.Awaitable[sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse]]:
+        """Gives objects of a scene other labels. Labels are part of what a match sees, and so of the scene's
+        name: the scene with the new labels has ANOTHER name, which the answer has. The scene under the
+        old name stays as it is until it is deleted.
+
+        Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+        * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+          request; the same one fails again.
+        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+          there are.
+        * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+          is not needed, or tell its operator; requests with sources in them are answered all the same.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
+        * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+
+    @abc.abstractmethod
+    def DeleteScene(
+        self,
+        request: sketchmatch_proto.v1.scene_service_pb2.DeleteSceneRequest,
+        context: _ServicerContext,
+    ) -> typing.Union[sketchmatch_proto.v1.scene_service_pb2.DeleteSceneResponse, collections.abc.Awaitable[sketchmatch_proto.v1.scene_service_pb2.DeleteSceneResponse]]:
+        """Forgets a scene; it stays for others who have put it.
+
+        Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
+
+        * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
+          request; the same one fails again.
+        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
+          there are.
+        * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
+          is not needed, or tell its operator; requests with sources in them are answered all the same.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
         * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
         * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
         """

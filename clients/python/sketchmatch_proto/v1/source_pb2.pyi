@@ -64,6 +64,13 @@ class Source(google.protobuf.message.Message):
     MAP_SERVER_MAP_FIELD_NUMBER: builtins.int
     IMAGE_FIELD_NUMBER: builtins.int
     FILE_FIELD_NUMBER: builtins.int
+    STORED_SCENE_FIELD_NUMBER: builtins.int
+    stored_scene: builtins.str
+    """Name of a scene that this server keeps, as `SceneService.PutScene` returned it: its objects
+    are those that were found when it was put. None of this name, or one that only others have
+    put, is NOT_FOUND. It needs no segmenter, and a request that names one for it is
+    INVALID_ARGUMENT with WRONG_ALGORITHM.
+    """
     @property
     def stroke_set(self) -> global___StrokeSet:
         """Pen strokes of a sketch pad."""
@@ -97,10 +104,11 @@ class Source(google.protobuf.message.Message):
         map_server_map: global___MapServerMap | None = ...,
         image: global___EncodedImage | None = ...,
         file: global___EncodedFile | None = ...,
+        stored_scene: builtins.str = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["file", b"file", "image", b"image", "kind", b"kind", "map_server_map", b"map_server_map", "occupancy_grid", b"occupancy_grid", "polygon_set", b"polygon_set", "stroke_set", b"stroke_set"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["file", b"file", "image", b"image", "kind", b"kind", "map_server_map", b"map_server_map", "occupancy_grid", b"occupancy_grid", "polygon_set", b"polygon_set", "stroke_set", b"stroke_set"]) -> None: ...
-    def WhichOneof(self, oneof_group: typing.Literal["kind", b"kind"]) -> typing.Literal["stroke_set", "polygon_set", "occupancy_grid", "map_server_map", "image", "file"] | None: ...
+    def HasField(self, field_name: typing.Literal["file", b"file", "image", b"image", "kind", b"kind", "map_server_map", b"map_server_map", "occupancy_grid", b"occupancy_grid", "polygon_set", b"polygon_set", "stored_scene", b"stored_scene", "stroke_set", b"stroke_set"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["file", b"file", "image", b"image", "kind", b"kind", "map_server_map", b"map_server_map", "occupancy_grid", b"occupancy_grid", "polygon_set", b"polygon_set", "stored_scene", b"stored_scene", "stroke_set", b"stroke_set"]) -> None: ...
+    def WhichOneof(self, oneof_group: typing.Literal["kind", b"kind"]) -> typing.Literal["stroke_set", "polygon_set", "occupancy_grid", "map_server_map", "image", "file", "stored_scene"] | None: ...
 
 global___Source = Source
 

@@ -12,7 +12,7 @@ import numpy as np
 from sketchmatch.api import Histogram
 from sketchmatch.model import FloatArray, IntArray, Scene, SceneObject, object_pairs
 from sketchmatch.model.arrays import sealed
-from sketchmatch.testing.conformance.contract import Contract, require
+from sketchmatch.testing.conformance.contract import Contract, require, require_applicable
 from sketchmatch.testing.conformance.use import Use, contracts_of_use, view_within
 from sketchmatch.testing.sketches import random_scene
 
@@ -101,6 +101,21 @@ def pairs_are_described_alone(algorithm: type[Any]) -> None:
     require(none.shape == (0, _DIRECTIONS), f"of no pairs, the rows have shape {none.shape}")
 
 
+def rows_of_pairs_last(algorithm: type[Any]) -> None:
+    """With ``of_pairs``, keep the rows of two objects to the last digit while others change."""
+    require_applicable(_of(algorithm).of_pairs, "it says of_pairs = False")
+    square = np.array([[0.0, 0.0], [1.3, 0.0], [1.0, 1.1], [0.0, 1.0]])
+    corners = [square + corner for corner in ((0.1, 0.0), (9.0, 0.3), (8.7, 7.0), (0.0, 6.8))]
+    first, *others = (
+        Scene.from_polygons([*corners, factor * square + 3.7]) for factor in (1.0, 0.6, 1.7)
+    )
+    pairs = object_pairs(len(corners))
+    rows = _described(algorithm, scene=first, pairs=pairs)
+    for other in others:
+        changed = _described(algorithm, scene=other, pairs=pairs)
+        require((rows == changed).all(), "it says of_pairs, and a row changed with another object")
+
+
 def _uses() -> Iterator[Use]:
     for angle in (0.0, 1.0):
         scene, pairs = _moved(angle), view_within(_pairs())
@@ -124,6 +139,7 @@ CONTRACTS: tuple[Contract, ...] = (
     scale_multiplies_the_rows,
     translation_changes_nothing,
     pairs_are_described_alone,
+    rows_of_pairs_last,
     *contracts_of_use(_uses, lambda algorithm: _of(algorithm, 180)),
 )
 

@@ -206,6 +206,18 @@ def maps_beside_are_possible(algorithm: type[Searcher]) -> None:
                 check_map(partners, problem)
 
 
+def starts_are_taken(algorithm: type[Searcher]) -> None:
+    """With ``warm``, answer a problem that has maps to start with like any other."""
+    require_applicable(algorithm().warm, "it says warm = False")
+    for problem in _partial_problems():
+        partners = np.arange(problem.table.template_objects)
+        partners[-1] = -1
+        started = replace(problem, start=(sealed(partners),))
+        for progress in run(algorithm(), started).seen:
+            _legal(progress.fmap, started.table)
+            _scored(progress, started)
+
+
 def evidence_is_weighed(algorithm: type[Searcher]) -> None:
     """Take table.entry_evidence for σ, or say object_consistent = False."""
     require_applicable(algorithm().object_consistent, _OF_PAIRS)
@@ -300,6 +312,7 @@ CONTRACTS: tuple[Contract, ...] = (
     optimal_is_optimal,
     object_maps_are_kept_to,
     maps_beside_are_possible,
+    starts_are_taken,
     evidence_is_weighed,
     rotations_are_weighed,
     odd_problems_are_solved,

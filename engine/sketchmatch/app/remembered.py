@@ -1,0 +1,46 @@
+"""What a process remembers of scenes, so that requests about the same ones need not begin anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from sketchmatch.api import Histogram
+from sketchmatch.app.scenes import LARGEST_KEPT, Described, Shelf, described_by
+from sketchmatch.app.setup import Setup
+from sketchmatch.model import FloatArray, Scene, SceneDescriptor
+from sketchmatch.pipeline.memory import Memory
+
+__all__ = ["Remembered"]
+
+
+class Remembered:
+    """Scenes that are kept, and histograms of those met lately.
+
+    Parameters
+    ----------
+    path
+        The file of the scenes that are kept; None where none are.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        self._shelf = Shelf(path)
+        self._hand_in: Callable[[Described], None] = lambda _: None
+        self._memory = Memory(fetch=self._fetch, described=self._described)
+
+    def setup(self, setup: Setup, hand_in: Callable[[Described], None]) -> Setup:
+        """Return a setup whose engine remembers; ``hand_in`` takes what is to be kept."""
+        self._hand_in = hand_in
+        engine = replace(setup.engine, memory=self._memory)
+        return replace(setup, engine=engine, shelf=self._shelf)
+
+    def _fetch(self, scene: Scene, histogram: Histogram) -> FloatArray | None:
+        return self._shelf.histograms(scene, histogram) if self._shelf.holds(scene) else None
+
+    def _described(self, scene: Scene, descriptor: SceneDescriptor) -> None:
+        small = descriptor.histograms.nbytes <= LARGEST_KEPT
+        if self.path is not None and small and self._shelf.holds(scene):
+            told = described_by(descriptor.described_by)
+            self._hand_in(Described(scene.identity, told, descriptor.histograms))

@@ -1,0 +1,166 @@
+"""``sketchmatch scenes``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sketchmatch.cli import options
+from sketchmatch.cli.output import answering
+from sketchmatch.errors import InvalidInputError, Reason, quoted
+
+__all__ = ["app"]
+
+app = typer.Typer(help="Keep scenes on a server, for matches to come.")
+
+_Server = Annotated[
+    str, typer.Option(metavar="HOST:PORT", help="The server that keeps them.", show_default=True)
+]
+_Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of a scene, or how it begins.")]
+_HERE = "127.0.0.1:50051"
+
+
+@app.callback()
+def scenes() -> None:
+    """Keep scenes on a server, for matches to come.
+
+    A scene has the hash of what it is as its name, and `match` takes scene:NAME for a file. You see
+    what you have put yourself.
+    """
+
+
+@app.command("put")
+@answering
+@options.asking
+def put(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A sketch or a map, as `match` takes them.")
+    ],
+    server: _Server = _HERE,
+    access: options.Access = options.Access(),  # noqa: B008
+    profile: options.Profile = "",
+    segmenter: Annotated[str, typer.Option(help="Segmenter; the file's kind decides.")] = "",
+    settings: options.Settings = None,
+    json: options.Json = False,
+    verbose: options.Verbose = False,
+) -> None:
+    """Have a file's objects kept, and print the scene's name.
+
+    Parameters are set as in --set segmenter.min_size=0.3. What is kept already stays as it is.
+    """
+    from sketchmatch.cli import display, output, places
+    from sketchmatch.cli.answering import client_of
+    from sketchmatch.cli.sources import source_of
+
+    parameters = options.parse_settings(settings, ("segmenter",)).get("segmenter", {})
+    with places.places_in(source=file), client_of(server, "--server", access) as client:
+        source = source_of(file)
+        kept = client.put_scene(source, segmenter=segmenter, params=parameters, profile=profile)
+    if json:
+        output.write_message(kept)
+    else:
+        display.say_notes("", kept.stored_scene.warnings, verbose=verbose)
+        output.write_line(kept.stored_scene.name)
+
+
+@app.command("list")
+@answering
+@options.asking
+def list_(
+    server: _Server = _HERE,
+    access: options.Access = options.Access(),  # noqa: B008
+) -> None:
+    """List what you have put, the latest first: name, objects, when, and labels."""
+    from sketchmatch.cli import output
+    from sketchmatch.cli.answering import client_of
+
+    with client_of(server, "--server", access) as client:
+        for each in client.list_scenes():
+            put_at = each.put_time.ToDatetime().strftime("%Y-%m-%dT%H:%M:%SZ")
+            output.write_line(each.name, each.object_count, put_at, ", ".join(each.labels))
+
+
+@app.command("show")
+@answering
+@options.asking
+def show(
+    name: _Name,
+    server: _Server = _HERE,
+    access: options.Access = options.Access(),  # noqa: B008
+    json: options.Json = False,
+    verbose: options.Verbose = False,
+) -> None:
+    """Show the objects of a scene, as `segment` shows those of a file."""
+    from sketchmatch.cli import display, output
+    from sketchmatch.cli.answering import client_of
+    from sketchmatch.cli.sources import whole_name
+    from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
+
+    with client_of(server, "--server", access) as client:
+        found = client.get_scene(whole_name(name, client))
+    if json:
+        output.write_message(found)
+        return
+    kept = found.stored_scene
+    display.show_scene(
+        SegmentResponse(
+            scene=kept.scene, warnings=kept.warnings, segmenter=kept.segmenter, route=kept.route
+        ),
+        verbose,
+    )
+
+
+@app.command("label")
+@answering
+@options.asking
+def label(
+    name: _Name,
+    labels: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="OBJECT=LABEL…",
+            help="By number, from 1 as tables count; 3= takes the label away.",
+        ),
+    ],
+    server: _Server = _HERE,
+    access: options.Access = options.Access(),  # noqa: B008
+) -> None:
+    """Give objects labels, and print the name of the scene with them, which is another one."""
+    from sketchmatch.cli import output
+    from sketchmatch.cli.answering import client_of
+    from sketchmatch.cli.sources import whole_name
+
+    given = _labels(labels)
+    with client_of(server, "--server", access) as client:
+        output.write_line(client.update_scene(whole_name(name, client), given).name)
+
+
+@app.command("delete")
+@answering
+@options.asking
+def delete(
+    name: _Name,
+    server: _Server = _HERE,
+    access: options.Access = options.Access(),  # noqa: B008
+) -> None:
+    """Have a scene forgotten; it stays for others who have put it."""
+    from sketchmatch.cli.answering import client_of
+    from sketchmatch.cli.sources import whole_name
+
+    with client_of(server, "--server", access) as client:
+        client.delete_scene(whole_name(name, client))
+
+
+def _labels(typed: list[str]) -> Mapping[int, str]:
+    """Return labels by index, from 0."""
+    found: dict[int, str] = {}
+    for text in typed:
+        number, equals, called = text.partition("=")
+        if not (equals and number.isascii() and number.isdigit() and int(number) > 0):
+            problem = "is no label of an object; give its number, from 1, as in 3=sofa"
+            raise InvalidInputError(Reason.INVALID_FIELD, quoted(text), problem)
+        found[int(number) - 1] = called
+    return found

@@ -1,0 +1,126 @@
+"""What was described before: whole scenes, and pairs of objects that a scene has kept."""
+
+from __future__ import annotations
+
+from collections import OrderedDict, deque
+from collections.abc import Callable
+from threading import Lock
+
+import numpy as np
+
+from sketchmatch.api import Histogram
+from sketchmatch.model import (
+    BoolArray,
+    FloatArray,
+    Scene,
+    SceneDescriptor,
+    object_pairs,
+    pair_index,
+)
+
+__all__ = ["Memory"]
+
+_RECENT = 16
+_BYTES = 128 * 1024 * 1024
+
+
+class Memory:
+    """Histograms that need not be computed again; several threads may use it.
+
+    What it returns is what would be computed, to the last digit: whoever remembers answers like
+    everybody else.
+
+    Parameters
+    ----------
+    max_bytes
+        Of the histograms of whole scenes that it holds; those used longest ago go first.
+    fetch
+        Returns the histograms of a scene that are kept elsewhere, by its identity and that of the
+        histogram; None where there are none.
+    described
+        Told of each scene that had to be described, with its histograms.
+    """
+
+    def __init__(
+        self,
+        max_bytes: int = _BYTES,
+        fetch: Callable[[Scene, Histogram], FloatArray | None] = lambda *_: None,
+        described: Callable[[Scene, SceneDescriptor], None] = lambda *_: None,
+    ) -> None:
+        self._max_bytes = max_bytes
+        self._fetch = fetch
+        self._described = described
+        self._lock = Lock()
+        self._bytes = 0
+        self._known: OrderedDict[tuple[str, str], SceneDescriptor] = OrderedDict()
+        self._recent: deque[tuple[Scene, SceneDescriptor]] = deque(maxlen=_RECENT)
+
+    def descriptor(self, scene: Scene, histogram: Histogram) -> SceneDescriptor | None:
+        """Return the histograms of a scene, or None where they have to be computed."""
+        key = scene.identity, histogram.identity
+        with self._lock:
+            if (known := self._known.get(key)) is not None:
+                self._known.move_to_end(key)
+                return known
+        found = self._fetch(scene, histogram)
+        if found is None:
+            return None
+        known = SceneDescriptor(found, len(scene), histogram.exponent, key[1], key[0])
+        self._hold(scene, known)
+        return known
+
+    def keep(self, scene: Scene, descriptor: SceneDescriptor) -> None:
+        """Remember the histograms of a scene, which had to be computed."""
+        self._hold(scene, descriptor)
+        self._described(scene, descriptor)
+
+    def _hold(self, scene: Scene, descriptor: SceneDescriptor) -> None:
+        key, size = (descriptor.scene, descriptor.described_by), descriptor.histograms.nbytes
+        with self._lock:
+            self._recent.appendleft((scene, descriptor))
+            if key in self._known or size > self._max_bytes:
+                return
+            self._known[key] = descriptor
+            self._bytes += size
+            while self._bytes > self._max_bytes:
+                _, old = self._known.popitem(last=False)
+                self._bytes -= old.histograms.nbytes
+
+    def pairs(self, scene: Scene, histogram: Histogram) -> tuple[BoolArray, FloatArray] | None:
+        """Return which pairs of a scene are known from another one, and their histograms.
+
+        Returns
+        -------
+        tuple or None
+            Shapes (Q,) and (Q, n), of which only the rows of known pairs mean anything; None where
+            nothing is known.
+        """
+        if not histogram.of_pairs:
+            return None
+        wanted = histogram.identity
+        with self._lock:
+            recent = [each for each in self._recent if each[1].described_by == wanted]
+        best: tuple[int, list[int], SceneDescriptor] | None = None
+        for other, descriptor in recent:
+            if other.bounds != scene.bounds:
+                continue
+            places = {_outline(other, k): k for k in range(len(other))}
+            former = [places.get(_outline(scene, k), -1) for k in range(len(scene))]
+            shared = sum(place >= 0 for place in former)
+            if shared >= 2 and (best is None or shared > best[0]):
+                best = shared, former, descriptor
+        return None if best is None else _copied(best[1], best[2])
+
+
+def _outline(scene: Scene, k: int) -> bytes:
+    return b"|".join(ring.tobytes() for ring in scene.objects[k].rings)
+
+
+def _copied(former: list[int], descriptor: SceneDescriptor) -> tuple[BoolArray, FloatArray]:
+    """Return what a descriptor says of pairs of objects that come in the same order there."""
+    a, b = np.array(former)[object_pairs(len(former))].T
+    known = (a >= 0) & (a < b)
+    histograms = np.empty((len(a), descriptor.directions))
+    rows = pair_index(a[known], b[known], descriptor.objects)
+    histograms[known] = descriptor.histograms[rows]
+    return known, histograms

@@ -1,0 +1,170 @@
+"""Scenes that a server keeps, over the wire: put, matched with, labelled, listed and deleted."""
+
+import sqlite3
+from collections.abc import Iterator
+
+import pytest
+
+from sketchmatch.app.setup import RequestLimits, Setup
+from sketchmatch.model import Scene
+from sketchmatch.pipeline.engine import Engine
+from sketchmatch.registry import default_registry
+from sketchmatch_client import Client, InvalidRequestError, NotFoundError, StoreError, sources
+from tests.server.harness import Host, hosting, scene, shapes, turned
+
+LABELS = [f"thing {k}" for k in range(6)]
+MAP = scene(6, 1, LABELS)
+SKETCH = sources.polygons(turned(shapes(6, 1)[1:5]), ["thing 1", "", "thing 3", ""])
+MISSING = "ab" * 32
+
+
+def setup():
+    return Setup(Engine(default_registry()), RequestLimits(max_time_budget=20.0))
+
+
+@pytest.fixture(scope="module")
+def host(tmp_path_factory) -> Iterator[Host]:
+    with hosting(setup(), store=tmp_path_factory.mktemp("state") / "store") as host:
+        yield host
+
+
+@pytest.fixture
+def client(host):
+    with Client(host.address, timeout=60) as client:
+        yield client
+
+
+@pytest.fixture
+def name(client):
+    return client.put_scene(MAP).stored_scene.name
+
+
+def answer(match):
+    """Return what a match came to, but for its name and cost."""
+    for field in ("match_id", "statistics"):
+        match.result.ClearField(field)
+    return match.result, match.scenes
+
+
+def test_a_match_with_a_stored_scene_is_that_with_its_source(client, name):
+    expected = answer(client.match(SKETCH, MAP))
+    assert answer(client.match(SKETCH, sources.stored_scene(name))) == expected
+    sketch = client.put_scene(SKETCH).stored_scene.name
+    both = client.match(sources.stored_scene(sketch), sources.stored_scene(name))
+    assert answer(both) == expected
+
+
+def test_to_put_a_scene_again_changes_nothing(client, name):
+    again = client.put_scene(MAP)
+    assert (again.stored_scene.name, again.created) == (name, False)
+    assert again.stored_scene.scene == client.segment(MAP).scene
+
+
+def test_a_segmenter_by_name_and_parameters_makes_a_scene_of_its_own(client):
+    grid = [[0] * 40 for _ in range(40)]
+    for row, column in ((5, 5), (5, 25), (25, 10)):
+        for k in range(8):
+            grid[row + k][column : column + 8] = [100] * 8
+    source = sources.occupancy_grid(grid, 0.05)
+    kept = client.put_scene(source).stored_scene
+    other = client.put_scene(source, params={"min_size": 0.05}).stored_scene
+    assert kept.name != other.name
+    assert other.segmenter.parameters["min_size"] == 0.05
+
+
+def test_labels_are_what_a_match_sees(client, name):
+    labelled = client.update_scene(name, {0: "wardrobe"})
+    assert labelled.name != name
+    assert labelled.scene.objects[0].label == "wardrobe"
+    scenes = client.match(SKETCH, sources.stored_scene(labelled.name)).scenes
+    assert scenes.map.objects[0].label == "wardrobe"
+    assert client.match(SKETCH, sources.stored_scene(name)).scenes.map.objects[0].label == "thing 0"
+
+
+def test_a_scene_comes_back_with_its_source_until_it_is_deleted(client):
+    made = client.put_scene(scene(3, 9))
+    name = made.stored_scene.name
+    assert made.created
+    assert client.get_scene(name, include_source=True).source == scene(3, 9)
+    assert name in [each.name for each in client.list_scenes()]
+    client.delete_scene(name)
+    assert name not in [each.name for each in client.list_scenes()]
+    with pytest.raises(NotFoundError, match=f"^name is {name}, and you keep no scene"):
+        client.get_scene(name)
+
+
+@pytest.mark.parametrize("side", ["sketch", "map"])
+def test_a_scene_that_is_not_there_is_named_with_the_side(client, side):
+    sides = {"sketch": SKETCH, "map": MAP, side: sources.stored_scene(MISSING)}
+    with pytest.raises(NotFoundError, match=f"^{side}.stored_scene is {MISSING}, and you"):
+        client.match(**sides)
+
+
+def test_a_segmenter_for_what_is_segmented_is_refused(client, name):
+    with pytest.raises(InvalidRequestError, match="needs none; drop it") as caught:
+        client.match(SKETCH, sources.stored_scene(name), map_segmenter="polygons")
+    assert caught.value.field == "pipeline.map_segmenter"
+
+
+def test_what_cannot_be_kept_is_refused_by_field(client, name):
+    with pytest.raises(InvalidRequestError) as caught:
+        client.put_scene(sources.stored_scene(name))
+    assert caught.value.field == "source.stored_scene"
+    with pytest.raises(InvalidRequestError) as caught:
+        client.put_scene(MAP, segmenter="unheard-of")
+    assert caught.value.field == "segmenter.name"
+    with pytest.raises(InvalidRequestError) as caught:
+        client.get_scene("")
+    assert caught.value.field == "name"
+
+
+def test_without_a_store_inline_sources_are_matched_and_the_rest_is_said(address):
+    with Client(address, timeout=60) as client:
+        for call in (lambda: client.put_scene(MAP), client.list_scenes):
+            with pytest.raises(StoreError, match="this server keeps nothing"):
+                call()
+        with pytest.raises(StoreError, match=r"^map\.stored_scene needs a store"):
+            client.match(SKETCH, sources.stored_scene(MISSING))
+        assert client.match(SKETCH, MAP).object_map
+
+
+def test_a_damaged_store_is_said_and_inline_sources_are_matched(tmp_path):
+    store = tmp_path / "store"
+    store.mkdir()
+    (store / "scenes.sqlite").write_bytes(b"no database " * 1000)
+    with hosting(setup(), store=store) as host, Client(host.address, timeout=60) as client:
+        for call in (lambda: client.put_scene(MAP), client.list_scenes):
+            with pytest.raises(StoreError, match=r"scenes\.sqlite is damaged; move it away"):
+                call()
+        with pytest.raises(StoreError, match="is damaged"):
+            client.match(SKETCH, sources.stored_scene(MISSING))
+        assert client.match(SKETCH, MAP).object_map
+
+
+def test_scenes_outlive_the_server_and_workers_match_with_them(tmp_path):
+    store = tmp_path / "store"
+    with hosting(setup(), store=store) as host, Client(host.address, timeout=60) as client:
+        name = client.put_scene(MAP).stored_scene.name
+        expected = answer(client.match(SKETCH, MAP))
+    with (
+        hosting(setup(), store=store, workers=1) as host,
+        Client(host.address, timeout=60) as client,
+    ):
+        match = client.match(SKETCH, sources.stored_scene(name))
+        assert answer(match) == expected
+        again = client.put_scene(MAP)
+        assert (again.stored_scene.name, again.created) == (name, False)
+        with pytest.raises(NotFoundError, match=r"^map\.stored_scene is"):
+            client.match(SKETCH, sources.stored_scene(MISSING))
+
+
+def test_the_histograms_of_a_scene_are_kept_with_it_and_no_others(tmp_path):
+    store = tmp_path / "store"
+    with hosting(setup(), store=store) as host, Client(host.address, timeout=60) as client:
+        client.put_scene(MAP)
+        client.sketch(scene(5, 3)).delete()  # of a map that comes along, and is not kept
+    with sqlite3.connect(store / "scenes.sqlite") as file:
+        rows = file.execute("SELECT outlines, length(bytes) FROM histograms").fetchall()
+    assert rows
+    assert {outlines for outlines, _ in rows} == {Scene.from_polygons(shapes(6, 1)).identity}
+    assert min(size for _, size in rows) >= 15 * 180 * 8

@@ -1,0 +1,114 @@
+"""What is remembered of scenes is what would be computed, to the last digit."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sketchmatch.model import Scene
+from sketchmatch.pipeline.describe import described, in_directions
+from sketchmatch.pipeline.memory import Memory
+from sketchmatch.pipeline.slices import finish
+from sketchmatch.registry import Kind, default_registry
+
+REGISTRY = default_registry()
+BOX = np.array([[0.0, 0.0], [1.0, 0.0], [1.3, 0.7], [0.0, 1.0]])
+PLACES = [(3.1 * k, 2.7 * (k * k % 5)) for k in range(8)]
+
+
+def scene(things):
+    """Return a scene of boxes: each of a place and a size."""
+    return Scene.from_polygons([size * BOX + PLACES[place] for place, size in things])
+
+
+def histogram(name="constant"):
+    algorithm = REGISTRY.find(Kind.HISTOGRAM, name).algorithm
+    return in_directions(algorithm(), 36)
+
+
+def describe(scene_, memory=None, name="constant"):
+    return finish(described(scene_, histogram(name), REGISTRY, "sketch", memory))
+
+
+THINGS = st.lists(
+    st.tuples(st.integers(0, 7), st.sampled_from([0.7, 1.0, 1.2])),
+    min_size=2,
+    max_size=6,
+    unique_by=lambda thing: thing[0],
+)
+
+
+@pytest.mark.parametrize("name", ["constant", "force", "hybrid", "raster"])
+@given(steps=st.lists(THINGS, min_size=2, max_size=4))
+def test_a_scene_that_changes_is_described_as_if_it_were_new(name, steps):
+    memory = Memory()
+    for things in steps:
+        known = describe(scene(things), memory, name)
+        assert (known.histograms == describe(scene(things), name=name).histograms).all()
+
+
+def counted(monkeypatch):
+    """Return a list that gets the pairs which are computed."""
+    asked, algorithm = [], type(histogram())
+    original = algorithm.describe
+
+    def describe_pairs(self, scene_, pairs):
+        asked.extend(map(tuple, pairs.tolist()))
+        return original(self, scene_, pairs)
+
+    monkeypatch.setattr(algorithm, "describe", describe_pairs)
+    return asked
+
+
+def test_only_pairs_of_what_changed_are_computed(monkeypatch):
+    memory, asked = Memory(), counted(monkeypatch)
+    first = [(0, 1.0), (7, 1.0), (4, 1.0), (2, 1.0)]
+    describe(scene(first), memory)
+    asked.clear()
+    describe(scene([*first[:3], (2, 0.7)]), memory)
+    assert asked == [(0, 3), (1, 3), (2, 3)]
+
+
+def test_nothing_is_computed_twice_for_the_same_scene(monkeypatch):
+    memory, asked = Memory(), counted(monkeypatch)
+    things = scene([(0, 1.0), (7, 1.0)])
+    kept = describe(things, memory)
+    asked.clear()
+    assert describe(scene([(0, 1.0), (7, 1.0)]), memory) is kept
+    assert asked == []
+
+
+def test_other_bounds_make_all_pairs_new(monkeypatch):
+    memory, asked = Memory(), counted(monkeypatch)
+    describe(scene([(0, 1.0), (1, 1.0)]), memory)
+    asked.clear()
+    describe(scene([(0, 1.0), (1, 1.0), (7, 1.0)]), memory)
+    assert len(asked) == 3
+
+
+def test_what_was_used_longest_ago_makes_room():
+    made, told = histogram(), []
+    memory = Memory(2 * 36 * 8, described=lambda *what: told.append(what))
+    scenes = [scene([(0, 1.0), (k, 1.0)]) for k in (1, 2, 3)]
+    first, second, third = (finish(described(each, made, REGISTRY, "map")) for each in scenes)
+    memory.keep(scenes[0], first)
+    memory.keep(scenes[1], second)
+    assert memory.descriptor(scenes[0], made) is first
+    memory.keep(scenes[2], third)
+    assert [memory.descriptor(each, made) for each in scenes] == [first, None, third]
+    assert [each for each, _ in told] == scenes
+
+
+def test_what_is_kept_elsewhere_is_fetched_once_and_not_told():
+    asked, told = [], []
+    things = scene([(0, 1.0), (7, 1.0)])
+
+    def fetch(scene_, histogram_):
+        asked.append((scene_, histogram_.name))
+        return np.full((1, 36), 0.5)
+
+    memory = Memory(fetch=fetch, described=lambda *what: told.append(what))
+    assert memory.descriptor(things, histogram()).histograms.tolist() == [[0.5] * 36]
+    assert memory.descriptor(things, histogram()).scene == things.identity
+    assert asked == [(things, "constant")]
+    assert told == []
