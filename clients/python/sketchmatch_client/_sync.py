@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
 from typing import Any, Self, TypeVar, Unpack
 
@@ -27,6 +27,7 @@ from sketchmatch_client._channel import (
 from sketchmatch_client._match import Match, ProgressCallback
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
 from sketchmatch_client._retry import Attempts, checked_retries
+from sketchmatch_client._transfer import TransferOptions, transfer_request
 from sketchmatch_client.errors import (
     DeadlineExceededError,
     ServerUnavailableError,
@@ -44,6 +45,8 @@ from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceStub
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceStub
 from sketchmatch_proto.v1.source_pb2 import Source
+from sketchmatch_proto.v1.transfer_service_pb2 import Feature, TransferResponse
+from sketchmatch_proto.v1.transfer_service_pb2_grpc import TransferServiceStub
 
 __all__ = ["Client"]
 
@@ -215,6 +218,41 @@ class Client:
         stub = SceneServiceStub(self._channel)
         return self._asked(
             lambda limit: stub.Segment(request, timeout=limit, metadata=self._metadata), timeout
+        )
+
+    def transfer(
+        self,
+        sketch: Source,
+        map: Source,  # noqa: A002
+        features: Iterable[Feature] = (),
+        *,
+        timeout: float | None = None,
+        **options: Unpack[TransferOptions],
+    ) -> TransferResponse:
+        """Carry points, routes and zones from a sketch to a map, back, or to a new map.
+
+        Parameters
+        ----------
+        sketch, map
+            From :mod:`sketchmatch_client.sources`; of two maps the old one is the sketch.
+        features
+            From :mod:`sketchmatch_client.features`. A route that is drawn in a sketch is carried
+            without being asked.
+        timeout
+            Seconds after which the call fails.
+        **options
+            The object map where it is known, direction, radius …, and all that a match takes but
+            ``alternatives``: :class:`TransferOptions`.
+
+        Returns
+        -------
+        TransferResponse
+            The carried features, each point with its standard deviation, and why what was changed.
+        """
+        request = transfer_request(sketch, map, features, **options)
+        stub = TransferServiceStub(self._channel)
+        return self._asked(
+            lambda limit: stub.Transfer(request, timeout=limit, metadata=self._metadata), timeout
         )
 
     def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from contextlib import closing
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 
 from google.protobuf.message import Message
@@ -12,10 +12,14 @@ from sketchmatch.app import requests, responses
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, ServerStoppingError
 from sketchmatch.pipeline.clock import Clock
+from sketchmatch.pipeline.events import MatchEvent, Progress
 from sketchmatch.pipeline.selection import Choice, chosen_algorithms, stage_of
+from sketchmatch.pipeline.slices import retold
 from sketchmatch.registry import Registered, RegisteredReader
+from sketchmatch.transfers.transfer import run_transfer
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest
+from sketchmatch_proto.v1.transfer_service_pb2 import TransferRequest
 
 __all__ = ["Job", "algorithms", "answers", "time_budget"]
 
@@ -58,6 +62,8 @@ def answers(
             return _match(job.id, job.request, setup, begun)
         case SegmentRequest():
             return _segment(job.request, setup)
+        case TransferRequest():
+            return _transfer(job.id, job.request, setup, begun)
     raise TypeError(f"a {type(job.request).__name__} is no request for work")
 
 
@@ -70,7 +76,7 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
     request, profile = job.request, ""
     readers = setup.engine.registry.readers
     match request:
-        case MatchRequest():
+        case MatchRequest() | TransferRequest():
             selection, profile = requests.selection(request), request.pipeline.profile
             types = {
                 "sketch_segmenter": requests.source_type(request.sketch, readers),
@@ -102,7 +108,7 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
 
 def time_budget(job: Job, setup: Setup) -> float | None:
     """Return the seconds that a job may take, or None for no limit."""
-    if isinstance(job.request, MatchRequest):
+    if isinstance(job.request, MatchRequest | TransferRequest):
         return requests.time_budget(job.request, setup.limits)
     return None
 
@@ -116,13 +122,43 @@ def _match(
     writer, clock = responses.ResponseWriter(value), Clock(value.time_budget)
     begun(clock)
     with requests.paths_of(request), closing(engine.match(value, name, clock)) as events:
-        try:
+        with _stopping(clock):
             for event in events:
                 yield writer.response(event)
-        except AnswerUnavailableError:
-            if clock.curtailed:
-                raise ServerStoppingError("the server stopped before any answer") from None
-            raise
+
+
+def _transfer(
+    name: str, request: TransferRequest, setup: Setup, begun: Callable[[Clock], None]
+) -> Generator[Message, None, None]:
+    """Carry features; before the response there is the progress of the match, a sign of life."""
+    engine = setup.engine
+    with engine.limited():
+        value = requests.transfer_request(request, setup.limits, engine.registry.readers)
+    writer, clock = responses.ResponseWriter(value.match), Clock(value.match.time_budget)
+    begun(clock)
+    with (
+        requests.paths_of(request),
+        _stopping(clock),
+        closing(run_transfer(value, engine, name, clock)) as work,
+    ):
+        found = yield from retold(work, lambda event: _progress(event, writer))
+    yield responses.transferred(found)
+
+
+def _progress(event: MatchEvent, writer: responses.ResponseWriter) -> Iterator[Message]:
+    if isinstance(event, Progress):
+        yield writer.response(event)
+
+
+@contextmanager
+def _stopping(clock: Clock) -> Iterator[None]:
+    """Say that the server stopped, where that ended the time."""
+    try:
+        yield
+    except AnswerUnavailableError:
+        if clock.curtailed:
+            raise ServerStoppingError("the server stopped before any answer") from None
+        raise
 
 
 def _segment(request: SegmentRequest, setup: Setup) -> Generator[Message, None, None]:

@@ -13,12 +13,13 @@ from sketchmatch.app.packed import Packed, inflated
 from sketchmatch_proto.v1 import source_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentRequest
+from sketchmatch_proto.v1.transfer_service_pb2 import TransferRequest
 
 __all__ = ["Order"]
 
-_Request: TypeAlias = type[MatchRequest] | type[SegmentRequest]
+_Request: TypeAlias = type[MatchRequest] | type[SegmentRequest] | type[TransferRequest]
 _TYPES: dict[str, _Request] = {
-    kind.DESCRIPTOR.name: kind for kind in (MatchRequest, SegmentRequest)
+    kind.DESCRIPTOR.name: kind for kind in (MatchRequest, SegmentRequest, TransferRequest)
 }
 _SOURCE = source_pb2.Source.DESCRIPTOR
 _FILE = _SOURCE.fields_by_name["file"].number
@@ -35,7 +36,7 @@ class Order:
     id
         A name that no other order of the application has.
     kind
-        Name of the message: MatchRequest or SegmentRequest.
+        Name of the message: MatchRequest, SegmentRequest or TransferRequest.
     data
         The message, perhaps compressed.
     """

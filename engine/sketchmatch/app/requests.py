@@ -30,12 +30,15 @@ from sketchmatch.pipeline.knowledge import Pin
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import STAGES, Choice, Selection
 from sketchmatch.registry import RegisteredReader
+from sketchmatch.transfers.features import Feature, FeatureKind
+from sketchmatch.transfers.transfer import Direction, TransferRequest
 from sketchmatch_proto.v1 import (
     match_pb2,
     match_service_pb2,
     pipeline_pb2,
     scene_service_pb2,
     source_pb2,
+    transfer_service_pb2,
 )
 
 __all__ = [
@@ -47,7 +50,10 @@ __all__ = [
     "source",
     "source_type",
     "time_budget",
+    "transfer_request",
 ]
+
+_Matching = match_service_pb2.MatchRequest | transfer_service_pb2.TransferRequest
 
 _KINDS = "stroke_set, polygon_set, occupancy_grid, map_server_map, image or file"
 _OPTIONS = ("alternatives", "allow_unmatched", "unmatched_price")
@@ -64,7 +70,7 @@ _TYPES: dict[str, type[Source]] = {
 
 
 def match_request(
-    request: match_service_pb2.MatchRequest,
+    request: _Matching,
     limits: RequestLimits,
     readers: Sequence[RegisteredReader] = (),
 ) -> MatchRequest:
@@ -89,7 +95,32 @@ def match_request(
     )
 
 
-def selection(request: match_service_pb2.MatchRequest) -> Selection:
+def transfer_request(
+    request: transfer_service_pb2.TransferRequest,
+    limits: RequestLimits,
+    readers: Sequence[RegisteredReader] = (),
+) -> TransferRequest:
+    """Read a request to carry something, within some limits; ``readers`` are those of plugins.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be used, with the path of the field.
+    """
+    there = transfer_service_pb2.TransferDirection.Name(request.direction)
+    back = there == "TRANSFER_DIRECTION_MAP_TO_SKETCH"
+    pairs = tuple((each.sketch_object, each.map_object) for each in request.object_map)
+    return TransferRequest(
+        match=match_request(request, limits, readers),
+        features=_features(request),
+        object_map=pairs or None,
+        direction=Direction.MAP_TO_SKETCH if back else Direction.SKETCH_TO_MAP,
+        radius=request.radius if request.HasField("radius") else None,
+        allow_unknown=request.allow_unknown,
+    )
+
+
+def selection(request: _Matching) -> Selection:
     """Read what is asked for in each stage."""
     return {stage: choice(getattr(request.pipeline, stage)) for stage in STAGES}
 
@@ -168,7 +199,7 @@ def file_kind(message: source_pb2.Source, readers: Sequence[RegisteredReader]) -
         return None
 
 
-def time_budget(request: match_service_pb2.MatchRequest, limits: RequestLimits) -> float | None:
+def time_budget(request: _Matching, limits: RequestLimits) -> float | None:
     """Read how many seconds a match may take, or None for no limit.
 
     Raises
@@ -190,7 +221,7 @@ def time_budget(request: match_service_pb2.MatchRequest, limits: RequestLimits) 
 
 @contextmanager
 def paths_of(
-    request: match_service_pb2.MatchRequest | scene_service_pb2.SegmentRequest,
+    request: _Matching | scene_service_pb2.SegmentRequest,
 ) -> Iterator[None]:
     """Give errors of the engine, which knows decoded sources alone, the paths of a request."""
     try:
@@ -240,6 +271,36 @@ def _reference(message: match_service_pb2.ObjectReference, field: str) -> int | 
     if kind is None:
         raise InvalidInputError(Reason.MISSING_FIELD, field, "is not set; give index or label")
     return message.index if kind == "index" else message.label
+
+
+def _features(request: transfer_service_pb2.TransferRequest) -> tuple[Feature, ...]:
+    given = request.features
+    lines = (each.route.points for each in given)
+    rings = (ring.points for each in given for ring in each.zone.rings)
+    check_vertices(sum(map(len, lines)) + sum(map(len, rings)), "features")
+    upward = _upward(request.y_axis)
+    return tuple(_feature(each, f"features[{k}]", upward) for k, each in enumerate(given))
+
+
+def _feature(message: transfer_service_pb2.Feature, field: str, upward: float) -> Feature:
+    kind = message.WhichOneof("kind")
+    if kind is None:
+        raise InvalidInputError(Reason.MISSING_FIELD, field, "is not set; give point, route or zone")
+    speeds = None
+    if kind == "point":
+        rings = [_points([message.point], upward)]
+    elif kind == "route":
+        rings = [_points(message.route.points, upward)]
+        if message.route.speeds_meters_per_second:
+            speeds = np.array(message.route.speeds_meters_per_second)
+    else:
+        rings = [_points(ring.points, upward) for ring in message.zone.rings]
+    try:
+        return Feature(FeatureKind(kind), tuple(rings), message.name, speeds)
+    except InvalidInputError as error:
+        path = "speeds_meters_per_second" if error.field == "speeds" else error.field
+        path = f"{field}.{kind}" if kind == "point" else f"{field}.{kind}.{path}"
+        raise InvalidInputError(error.reason, path, error.problem) from None
 
 
 def _stroke_set(message: source_pb2.StrokeSet) -> StrokeSet:

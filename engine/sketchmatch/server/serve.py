@@ -27,7 +27,7 @@ from sketchmatch.server.metrics import Metric, Metrics, MetricsInterceptor
 from sketchmatch.server.monitor import Monitor
 from sketchmatch.server.notify import notify
 from sketchmatch.server.readiness import Readiness
-from sketchmatch.server.services import CatalogService, MatchService, SceneService
+from sketchmatch.server.services import CatalogService, MatchService, SceneService, TransferService
 from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
 from sketchmatch.server.tokens import read_tokens
 from sketchmatch.server.watchdog import watch
@@ -37,6 +37,7 @@ from sketchmatch_proto.v1 import (
     catalog_service_pb2_grpc,
     match_service_pb2,
     scene_service_pb2,
+    transfer_service_pb2,
 )
 
 __all__ = ["ServerSettings", "serve"]
@@ -54,12 +55,13 @@ _SERVICES = (
     match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name,
     scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name,
     catalog_service_pb2.DESCRIPTOR.services_by_name["CatalogService"].full_name,
+    transfer_service_pb2.DESCRIPTOR.services_by_name["TransferService"].full_name,
 )
 
 
 _METHODS = tuple(
     f"/{service.full_name}/{method.name}"
-    for file in (match_service_pb2, scene_service_pb2, catalog_service_pb2)
+    for file in (match_service_pb2, scene_service_pb2, catalog_service_pb2, transfer_service_pb2)
     for service in file.DESCRIPTOR.services_by_name.values()
     for method in service.methods
 )
@@ -332,7 +334,8 @@ def _add_services(
     server: grpc.aio.Server, app: Application, readiness: Readiness, metrics: Metrics
 ) -> None:
     matching, scenes = MatchService(app, metrics.matched), SceneService(app)
-    server.add_generic_rpc_handlers((matching.handler(), scenes.handler()))
+    transfers = TransferService(app)
+    server.add_generic_rpc_handlers((matching.handler(), scenes.handler(), transfers.handler()))
     catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), server)
     health_pb2_grpc.add_HealthServicer_to_server(readiness.servicer, server)
     reflection.enable_server_reflection(

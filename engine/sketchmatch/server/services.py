@@ -1,4 +1,4 @@
-"""The three services of the contract, over the application."""
+"""The services of the contract, over the application."""
 
 from __future__ import annotations
 
@@ -22,13 +22,15 @@ from sketchmatch_proto.v1 import (
     match_pb2,
     match_service_pb2,
     scene_service_pb2,
+    transfer_service_pb2,
 )
 from sketchmatch_proto.v1.match_pb2 import MatchAccepted, MatchResult
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
-__all__ = ["CatalogService", "MatchService", "SceneService", "followed"]
+__all__ = ["CatalogService", "MatchService", "SceneService", "TransferService", "followed"]
 
 _MATCH = match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name
+_TRANSFER = transfer_service_pb2.DESCRIPTOR.services_by_name["TransferService"].full_name
 _SCENE = scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name
 
 _LENGTH_DELIMITED = 2
@@ -91,6 +93,27 @@ class SceneService:
     def handler(self) -> grpc.GenericRpcHandler:
         """Return what answers the calls of the service."""
         return _handler(_SCENE, Segment=grpc.unary_unary_rpc_method_handler(self.Segment))
+
+
+class TransferService:
+    """Carries features from one scene to another; requests and responses pass as they come."""
+
+    def __init__(self, app: Application) -> None:
+        self._app = app
+
+    async def Transfer(self, request: bytes, context: _Context) -> bytes:  # noqa: N802
+        """Carry, and return what became of it: the last that is told."""
+        answer = b""
+        with self._app.running("TransferRequest", request, _caller(context)) as task:
+            note(match=task.id)
+            async with aclosing(followed(task.log)) as told:
+                async for response in told:
+                    answer = response
+        return answer
+
+    def handler(self) -> grpc.GenericRpcHandler:
+        """Return what answers the calls of the service."""
+        return _handler(_TRANSFER, Transfer=grpc.unary_unary_rpc_method_handler(self.Transfer))
 
 
 class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):

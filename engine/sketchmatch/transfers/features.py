@@ -140,9 +140,11 @@ class Carried:
 
     Attributes
     ----------
+    kind, name
+        Of what was given.
     feature
         What it is there. A route may have more points than the one that was given, or fewer where
-        a part of it cannot be reached, and none is left where nothing of it can.
+        a part of it cannot be reached; None where nothing of it can.
     deviations
         For each ring, shape (k,): standard deviations of its points, along each axis.
     sources
@@ -152,6 +154,8 @@ class Carried:
         What was changed, in the order of the points.
     """
 
+    kind: FeatureKind
+    name: str
     feature: Feature | None
     deviations: tuple[FloatArray, ...]
     sources: tuple[FloatArray, ...]

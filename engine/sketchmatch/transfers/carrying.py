@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import FloatArray, Scene
-from sketchmatch.model.text import name as named
-from sketchmatch.transfer.features import Carried, Change, ChangeReason, Feature, FeatureKind
-from sketchmatch.transfer.obstacles import Obstacles
-from sketchmatch.transfer.planning import Landmarks, Way, kept_clear
-from sketchmatch.transfer.warp import Warp, fit_warp
+from sketchmatch.transfers.features import Carried, Change, ChangeReason, Feature, FeatureKind
+from sketchmatch.transfers.obstacles import Obstacles
+from sketchmatch.transfers.planning import Landmarks, Way, kept_clear
+from sketchmatch.transfers.warp import Warp, fit_warp
 
-__all__ = ["Course", "carried", "check_radius", "course_between"]
+__all__ = ["Course", "carried", "course_between"]
 
 _FINE = 1.0 / 400.0
 """How far apart points are carried, as a share of the objects' extent."""
@@ -69,14 +67,17 @@ def course_between(
     Raises
     ------
     InvalidInputError
-        As :func:`~sketchmatch.transfer.warp.fit_warp`.
+        As :func:`~sketchmatch.transfers.warp.fit_warp`.
     """
     drawn, places = _centres(source, [a for a, _ in pairs]), _centres(target, [b for _, b in pairs])
     rings = [ring for feature in features for ring in feature.rings]
     around = np.vstack(rings) if rings else None
     likely = None if weights is None else np.asarray(weights, dtype=np.float64)
     warp = fit_warp(drawn, places, likely, around)
-    names = tuple(named(b, target.labels[b] or source.labels[a]) for a, b in pairs)
+    names = tuple(
+        target.labels[b] or source.labels[a] or f"what is at ({x:.4g}, {y:.4g})"
+        for (a, b), (x, y) in zip(pairs, places, strict=True)
+    )
     return Course(warp, Landmarks(drawn, places, names), _extent(target))
 
 
@@ -103,20 +104,6 @@ def carried(
         Of the target, for sentences.
     """
     return tuple(_carried(feature, course, obstacles, radius, unit) for feature in features)
-
-
-def check_radius(radius: float) -> None:
-    """Refuse a radius that is none.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is negative or not finite.
-    """
-    if not 0.0 <= radius < 1e6:
-        raise InvalidInputError(
-            Reason.INVALID_FIELD, "radius", f"is {radius:g}; give a number from 0 on"
-        )
 
 
 def _carried(
@@ -162,7 +149,7 @@ def _carried_route(
         return _result(feature, [_thinned(way, course.extent * _COARSE)], course)
     way, changes = kept_clear(way, obstacles, radius, course.landmarks, unit)
     if way is None:
-        return Carried(None, (), (), changes)
+        return Carried(feature.kind, feature.name, None, (), (), changes)
     thin = _thinned(way, obstacles.resolution / 4.0, obstacles, radius)
     return _result(feature, [thin], course).changed(*_placed(changes, way, thin))
 
@@ -245,7 +232,7 @@ def _result(feature: Feature, ways: Sequence[Way], course: Course) -> Carried:
         speeds = feature.speeds[np.floor(ways[0].sources).astype(int)]
     there = Feature(feature.kind, tuple(way.points for way in ways), feature.name, speeds)
     deviations = tuple(course.warp.deviations(way.drawn) for way in ways)
-    return Carried(there, deviations, tuple(way.sources for way in ways))
+    return Carried(feature.kind, feature.name, there, deviations, tuple(way.sources for way in ways))
 
 
 def _centres(scene: Scene, indices: Sequence[int]) -> FloatArray:

@@ -12,13 +12,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 import shapely
-from skimage.graph import MCP_Geometric
 
 from sketchmatch.model import BoolArray, FloatArray, IntArray
-from sketchmatch.transfer.features import Change, ChangeReason
-from sketchmatch.transfer.obstacles import Obstacles, Window
+from sketchmatch.transfers.features import Change, ChangeReason
+from sketchmatch.transfers.obstacles import Obstacles, Window
 
 __all__ = ["Landmarks", "Way", "kept_clear"]
 
@@ -28,7 +28,6 @@ _STRAY = 1.0
 _HUG = 0.5
 _SMOOTHINGS = 60
 _MOST_BARRIERS = 6
-_MOST_CELLS = 6_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,24 +276,29 @@ def _cheapest(
     costs = 1.0 + _STRAY * np.minimum(stray / unit, 20.0) ** 2 / 20.0
     costs += _HUG * np.clip(2.0 - room / unit, 0.0, 1.0) ** 2
     costs[~open_] = -1.0
-    # Its labels tell at once where no search would come to an end.
+    if not _joined(open_, ends):
+        return None
+    from skimage.graph import MCP_Geometric
+
     planner = MCP_Geometric(costs, fully_connected=True)
     planner.find_costs([tuple(ends[0])], [tuple(ends[1])])
-    try:
-        path = np.array(planner.traceback(tuple(ends[1])))
-    except ValueError:
-        return None
+    path = np.array(planner.traceback(tuple(ends[1])))
     points = obstacles.places(path + window.low)
     points[0], points[-1] = carried.points[0], carried.points[-1]
     return points if len(points) > 1 else carried.points[[0, -1]]
+
+
+def _joined(open_: BoolArray, ends: IntArray) -> bool:
+    """Whether there is any way between two cells; a search that finds none would visit all."""
+    _, labels = cv2.connectedComponents(open_.astype(np.uint8), connectivity=8)
+    first, second = (labels[tuple(end)] for end in ends)
+    return bool(first == second)
 
 
 def _strayed(
     carried: Way, obstacles: Obstacles, window: Window, shape: tuple[int, ...]
 ) -> FloatArray:
     """Return how far cells are from a carried way."""
-    import cv2
-
     off = (~_drawn(carried.points, obstacles, window, shape)).astype(np.uint8)
     away = cv2.distanceTransform(off, cv2.DIST_L2, cv2.DIST_MASK_5)
     found: FloatArray = away.astype(np.float64) * obstacles.resolution
@@ -305,8 +309,6 @@ def _drawn(
     line: FloatArray, obstacles: Obstacles, window: Window, shape: tuple[int, ...]
 ) -> BoolArray:
     """Return the cells of a window that a line goes through, and such that none gets across."""
-    import cv2
-
     picture = np.zeros(shape, dtype=np.uint8)
     steps = obstacles.cells(line) - window.low
     cv2.polylines(
