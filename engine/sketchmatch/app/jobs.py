@@ -146,8 +146,9 @@ def _transfer(
 
 
 def _progress(event: MatchEvent, writer: responses.ResponseWriter) -> Iterator[Message]:
+    told = writer.response(event)  # of each event: progress names what earlier ones found
     if isinstance(event, Progress):
-        yield writer.response(event)
+        yield told
 
 
 @contextmanager

@@ -198,9 +198,14 @@ def _thinned(
     kept: list[int] = [0]
     for first, last in zip(pinned, pinned[1:], strict=False):
         leg = way.points[first : last + 1]
-        chosen = _simplified(leg, tolerance)
-        if obstacles is not None and not obstacles.line_is_clear(leg[chosen], radius):
-            chosen = list(range(len(leg)))
+        finer = tolerance
+        chosen = _simplified(leg, finer)
+        # Close to obstacles a line may be simplified less.
+        while obstacles is not None and not obstacles.line_is_clear(leg[chosen], radius):
+            finer = finer / 4.0 if finer > tolerance / 100.0 else -1.0
+            chosen = _simplified(leg, finer)
+            if finer < 0.0:
+                break
         kept += [int(first) + k for k in chosen[1:]]
     index = np.array(kept)
     return Way(way.points[index], way.sources[index], way.drawn[index])

@@ -52,6 +52,7 @@ _KINDS = {
 }
 _SEVERAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
 _JSON_SUFFIXES = (".geojson", ".json")
+_REPLACED = ("speed", "speeds", "yaw", "deviation", "deviations", "changes")
 _FREE, _FORBIDDEN = 254, 0
 _OCCUPIED = 65
 
@@ -394,7 +395,7 @@ def _of_mask(grid: OccupancyGrid) -> FeatureFile:
 
 
 def _encoded(carried: Carried, said: Mapping[str, Any], rotation: float) -> dict[str, Any]:
-    kept = {key: value for key, value in said.items() if key not in ("speeds", "yaw")}
+    kept = {key: value for key, value in said.items() if key not in _REPLACED}
     kept.setdefault("name", carried.name)
     if (yaw := _yaw(said, rotation)) is not None:
         kept["yaw"] = round(yaw, 6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -30,6 +31,7 @@ ROUTE = "route"
 """Name of the route that a segmenter found in a sketch."""
 
 _MOST_RADIUS = 1e6
+_UNLIKELY = 0.5
 
 
 class Direction(StrEnum):
@@ -119,6 +121,15 @@ class TransferResult(Tabular):
     def features(self) -> tuple[Feature, ...]:
         """The features where they were carried to, without those of which nothing is left."""
         return tuple(each.feature for each in self.carried if each.feature is not None)
+
+    @property
+    def unsureness(self) -> tuple[bool, float]:
+        """How little it tells: whether it is probably another place, and the mean deviation."""
+        match = self.match
+        likely = None if match is None else match.place_probability
+        known = [ring for each in self.carried for ring in each.deviations]
+        mean = float(np.concatenate(known).mean()) if known else math.inf
+        return likely is not None and likely < _UNLIKELY, mean
 
     def _headline(self) -> str:
         count = len(self.carried)
