@@ -17,6 +17,7 @@ from sketchmatch_proto.v1 import (
     scene_pb2,
     scene_service_pb2,
     source_pb2,
+    transfer_service_pb2,
 )
 
 FOLDER = Path(__file__).with_name("golden")
@@ -32,6 +33,7 @@ FILES = tuple(
         scene_pb2,
         scene_service_pb2,
         source_pb2,
+        transfer_service_pb2,
     )
 )
 """The contract."""

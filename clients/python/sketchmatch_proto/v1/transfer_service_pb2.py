@@ -19,39 +19,39 @@ from sketchmatch_proto.v1 import pipeline_pb2 as sketchmatch_dot_v1_dot_pipeline
 from sketchmatch_proto.v1 import source_pb2 as sketchmatch_dot_v1_dot_source__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n%sketchmatch/v1/transfer_service.proto\x12\x0esketchmatch.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1asketchmatch/v1/match.proto\x1a\"sketchmatch/v1/match_service.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1bsketchmatch/v1/source.proto\"\xb0\x05\n\x0fTransferRequest\x12&\n\x06sketch\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12#\n\x03map\x18\x02 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12*\n\x08pipeline\x18\x03 \x01(\x0b\x32\x18.sketchmatch.v1.Pipeline\x12\x11\n\x04seed\x18\x04 \x01(\x04H\x00\x88\x01\x01\x12.\n\x0btime_budget\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x32\n\x07weights\x18\x06 \x01(\x0b\x32!.sketchmatch.v1.ConfidenceWeights\x12\x1c\n\x0f\x61llow_unmatched\x18\x08 \x01(\x08H\x01\x88\x01\x01\x12\x1c\n\x0funmatched_price\x18\t \x01(\x01H\x02\x88\x01\x01\x12!\n\x04pins\x18\n \x03(\x0b\x32\x13.sketchmatch.v1.Pin\x12*\n\x08synonyms\x18\x0b \x03(\x0b\x32\x18.sketchmatch.v1.Synonyms\x12,\n\nobject_map\x18\x0c \x03(\x0b\x32\x18.sketchmatch.v1.Partners\x12\x34\n\tdirection\x18\r \x01(\x0e\x32!.sketchmatch.v1.TransferDirection\x12)\n\x08\x66\x65\x61tures\x18\x0e \x03(\x0b\x32\x17.sketchmatch.v1.Feature\x12%\n\x06y_axis\x18\x0f \x01(\x0e\x32\x15.sketchmatch.v1.YAxis\x12\x13\n\x06radius\x18\x10 \x01(\x01H\x03\x88\x01\x01\x12\x15\n\rallow_unknown\x18\x11 \x01(\x08\x42\x07\n\x05_seedB\x12\n\x10_allow_unmatchedB\x12\n\x10_unmatched_priceB\t\n\x07_radiusJ\x04\x08\x07\x10\x08\"5\n\x08Partners\x12\x15\n\rsketch_object\x18\x01 \x01(\r\x12\x12\n\nmap_object\x18\x02 \x01(\r\"\x95\x01\n\x07\x46\x65\x61ture\x12\x0c\n\x04name\x18\x01 \x01(\t\x12&\n\x05point\x18\x02 \x01(\x0b\x32\x15.sketchmatch.v1.PointH\x00\x12&\n\x05route\x18\x03 \x01(\x0b\x32\x15.sketchmatch.v1.RouteH\x00\x12$\n\x04zone\x18\x04 \x01(\x0b\x32\x14.sketchmatch.v1.ZoneH\x00\x42\x06\n\x04kind\"P\n\x05Route\x12%\n\x06points\x18\x01 \x03(\x0b\x32\x15.sketchmatch.v1.Point\x12 \n\x18speeds_meters_per_second\x18\x02 \x03(\x01\"+\n\x04Zone\x12#\n\x05rings\x18\x01 \x03(\x0b\x32\x14.sketchmatch.v1.Ring\"x\n\rFeatureChange\x12,\n\x06reason\x18\x01 \x01(\x0e\x32\x1c.sketchmatch.v1.ChangeReason\x12\x13\n\x0b\x66irst_point\x18\x02 \x01(\r\x12\x12\n\nlast_point\x18\x03 \x01(\r\x12\x10\n\x08sentence\x18\x04 \x01(\t\"4\n\rCarriedPoints\x12\x12\n\ndeviations\x18\x01 \x03(\x01\x12\x0f\n\x07sources\x18\x02 \x03(\x01\"\xa7\x01\n\x0e\x43\x61rriedFeature\x12(\n\x07\x66\x65\x61ture\x18\x01 \x01(\x0b\x32\x17.sketchmatch.v1.Feature\x12,\n\x05lines\x18\x02 \x03(\x0b\x32\x1d.sketchmatch.v1.CarriedPoints\x12.\n\x07\x63hanges\x18\x03 \x03(\x0b\x32\x1d.sketchmatch.v1.FeatureChange\x12\r\n\x05\x64rawn\x18\x04 \x01(\x08\"z\n\x04Warp\x12&\n\x04kind\x18\x01 \x01(\x0e\x32\x18.sketchmatch.v1.WarpKind\x12\x18\n\x10rotation_radians\x18\x02 \x01(\x01\x12\r\n\x05scale\x18\x03 \x01(\x01\x12\x10\n\x08residual\x18\x04 \x01(\x01\x12\x0f\n\x07weights\x18\x05 \x03(\x01\"\xef\x01\n\x10TransferResponse\x12\x30\n\x08\x66\x65\x61tures\x18\x01 \x03(\x0b\x32\x1e.sketchmatch.v1.CarriedFeature\x12\"\n\x04warp\x18\x02 \x01(\x0b\x32\x14.sketchmatch.v1.Warp\x12,\n\nobject_map\x18\x03 \x03(\x0b\x32\x18.sketchmatch.v1.Partners\x12+\n\x06scenes\x18\x04 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchScenes\x12*\n\x05match\x18\x05 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchResult*\x83\x01\n\x11TransferDirection\x12\"\n\x1eTRANSFER_DIRECTION_UNSPECIFIED\x10\x00\x12$\n TRANSFER_DIRECTION_SKETCH_TO_MAP\x10\x01\x12$\n TRANSFER_DIRECTION_MAP_TO_SKETCH\x10\x02*\xf8\x01\n\x0c\x43hangeReason\x12\x1d\n\x19\x43HANGE_REASON_UNSPECIFIED\x10\x00\x12\x1a\n\x16\x43HANGE_REASON_OBSTACLE\x10\x01\x12\x1d\n\x19\x43HANGE_REASON_MOVED_START\x10\x02\x12\x1b\n\x17\x43HANGE_REASON_MOVED_END\x10\x03\x12\x1c\n\x18\x43HANGE_REASON_OTHER_SIDE\x10\x04\x12\x1d\n\x19\x43HANGE_REASON_UNREACHABLE\x10\x05\x12\x19\n\x15\x43HANGE_REASON_BLOCKED\x10\x06\x12\x19\n\x15\x43HANGE_REASON_OUTSIDE\x10\x07*k\n\x08WarpKind\x12\x19\n\x15WARP_KIND_UNSPECIFIED\x10\x00\x12\x18\n\x14WARP_KIND_SIMILARITY\x10\x01\x12\x14\n\x10WARP_KIND_AFFINE\x10\x02\x12\x14\n\x10WARP_KIND_SPLINE\x10\x03\x32`\n\x0fTransferService\x12M\n\x08Transfer\x12\x1f.sketchmatch.v1.TransferRequest\x1a .sketchmatch.v1.TransferResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n%sketchmatch/v1/transfer_service.proto\x12\x0esketchmatch.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1asketchmatch/v1/match.proto\x1a\"sketchmatch/v1/match_service.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1bsketchmatch/v1/source.proto\"\xb6\x05\n\x0fTransferRequest\x12&\n\x06sketch\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12#\n\x03map\x18\x02 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12*\n\x08pipeline\x18\x03 \x01(\x0b\x32\x18.sketchmatch.v1.Pipeline\x12\x11\n\x04seed\x18\x04 \x01(\x04H\x00\x88\x01\x01\x12.\n\x0btime_budget\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x32\n\x07weights\x18\x06 \x01(\x0b\x32!.sketchmatch.v1.ConfidenceWeights\x12\x1c\n\x0f\x61llow_unmatched\x18\x08 \x01(\x08H\x01\x88\x01\x01\x12\x1c\n\x0funmatched_price\x18\t \x01(\x01H\x02\x88\x01\x01\x12!\n\x04pins\x18\n \x03(\x0b\x32\x13.sketchmatch.v1.Pin\x12*\n\x08synonyms\x18\x0b \x03(\x0b\x32\x18.sketchmatch.v1.Synonyms\x12,\n\nobject_map\x18\x0c \x03(\x0b\x32\x18.sketchmatch.v1.Partners\x12\x34\n\tdirection\x18\r \x01(\x0e\x32!.sketchmatch.v1.TransferDirection\x12)\n\x08\x66\x65\x61tures\x18\x0e \x03(\x0b\x32\x17.sketchmatch.v1.Feature\x12%\n\x06y_axis\x18\x12 \x01(\x0e\x32\x15.sketchmatch.v1.YAxis\x12\x13\n\x06radius\x18\x10 \x01(\x01H\x03\x88\x01\x01\x12\x15\n\rallow_unknown\x18\x11 \x01(\x08\x42\x07\n\x05_seedB\x12\n\x10_allow_unmatchedB\x12\n\x10_unmatched_priceB\t\n\x07_radiusJ\x04\x08\x07\x10\x08J\x04\x08\x0f\x10\x10\"5\n\x08Partners\x12\x15\n\rsketch_object\x18\x01 \x01(\r\x12\x12\n\nmap_object\x18\x02 \x01(\r\"\x95\x01\n\x07\x46\x65\x61ture\x12\x0c\n\x04name\x18\x01 \x01(\t\x12&\n\x05point\x18\x02 \x01(\x0b\x32\x15.sketchmatch.v1.PointH\x00\x12&\n\x05route\x18\x03 \x01(\x0b\x32\x15.sketchmatch.v1.RouteH\x00\x12$\n\x04zone\x18\x04 \x01(\x0b\x32\x14.sketchmatch.v1.ZoneH\x00\x42\x06\n\x04kind\"P\n\x05Route\x12%\n\x06points\x18\x01 \x03(\x0b\x32\x15.sketchmatch.v1.Point\x12 \n\x18speeds_meters_per_second\x18\x02 \x03(\x01\"+\n\x04Zone\x12#\n\x05rings\x18\x01 \x03(\x0b\x32\x14.sketchmatch.v1.Ring\"x\n\rFeatureChange\x12,\n\x06reason\x18\x01 \x01(\x0e\x32\x1c.sketchmatch.v1.ChangeReason\x12\x13\n\x0b\x66irst_point\x18\x02 \x01(\r\x12\x12\n\nlast_point\x18\x03 \x01(\r\x12\x10\n\x08sentence\x18\x04 \x01(\t\"4\n\rCarriedPoints\x12\x12\n\ndeviations\x18\x01 \x03(\x01\x12\x0f\n\x07sources\x18\x02 \x03(\x01\"\xa7\x01\n\x0e\x43\x61rriedFeature\x12(\n\x07\x66\x65\x61ture\x18\x01 \x01(\x0b\x32\x17.sketchmatch.v1.Feature\x12,\n\x05lines\x18\x02 \x03(\x0b\x32\x1d.sketchmatch.v1.CarriedPoints\x12.\n\x07\x63hanges\x18\x03 \x03(\x0b\x32\x1d.sketchmatch.v1.FeatureChange\x12\r\n\x05\x64rawn\x18\x04 \x01(\x08\"z\n\x04Warp\x12&\n\x04kind\x18\x01 \x01(\x0e\x32\x18.sketchmatch.v1.WarpKind\x12\x18\n\x10rotation_radians\x18\x02 \x01(\x01\x12\r\n\x05scale\x18\x03 \x01(\x01\x12\x10\n\x08residual\x18\x04 \x01(\x01\x12\x0f\n\x07weights\x18\x05 \x03(\x01\"\xef\x01\n\x10TransferResponse\x12\x30\n\x08\x66\x65\x61tures\x18\x01 \x03(\x0b\x32\x1e.sketchmatch.v1.CarriedFeature\x12\"\n\x04warp\x18\x02 \x01(\x0b\x32\x14.sketchmatch.v1.Warp\x12,\n\nobject_map\x18\x03 \x03(\x0b\x32\x18.sketchmatch.v1.Partners\x12+\n\x06scenes\x18\x04 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchScenes\x12*\n\x05match\x18\x05 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchResult*\x83\x01\n\x11TransferDirection\x12\"\n\x1eTRANSFER_DIRECTION_UNSPECIFIED\x10\x00\x12$\n TRANSFER_DIRECTION_SKETCH_TO_MAP\x10\x01\x12$\n TRANSFER_DIRECTION_MAP_TO_SKETCH\x10\x02*\xf8\x01\n\x0c\x43hangeReason\x12\x1d\n\x19\x43HANGE_REASON_UNSPECIFIED\x10\x00\x12\x1a\n\x16\x43HANGE_REASON_OBSTACLE\x10\x01\x12\x1d\n\x19\x43HANGE_REASON_MOVED_START\x10\x02\x12\x1b\n\x17\x43HANGE_REASON_MOVED_END\x10\x03\x12\x1c\n\x18\x43HANGE_REASON_OTHER_SIDE\x10\x04\x12\x1d\n\x19\x43HANGE_REASON_UNREACHABLE\x10\x05\x12\x19\n\x15\x43HANGE_REASON_BLOCKED\x10\x06\x12\x19\n\x15\x43HANGE_REASON_OUTSIDE\x10\x07*k\n\x08WarpKind\x12\x19\n\x15WARP_KIND_UNSPECIFIED\x10\x00\x12\x18\n\x14WARP_KIND_SIMILARITY\x10\x01\x12\x14\n\x10WARP_KIND_AFFINE\x10\x02\x12\x14\n\x10WARP_KIND_SPLINE\x10\x03\x32`\n\x0fTransferService\x12M\n\x08Transfer\x12\x1f.sketchmatch.v1.TransferRequest\x1a .sketchmatch.v1.TransferResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'sketchmatch_proto.v1.transfer_service_pb2', _globals)
 if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
-  _globals['_TRANSFERDIRECTION']._serialized_start=1951
-  _globals['_TRANSFERDIRECTION']._serialized_end=2082
-  _globals['_CHANGEREASON']._serialized_start=2085
-  _globals['_CHANGEREASON']._serialized_end=2333
-  _globals['_WARPKIND']._serialized_start=2335
-  _globals['_WARPKIND']._serialized_end=2442
+  _globals['_TRANSFERDIRECTION']._serialized_start=1957
+  _globals['_TRANSFERDIRECTION']._serialized_end=2088
+  _globals['_CHANGEREASON']._serialized_start=2091
+  _globals['_CHANGEREASON']._serialized_end=2339
+  _globals['_WARPKIND']._serialized_start=2341
+  _globals['_WARPKIND']._serialized_end=2448
   _globals['_TRANSFERREQUEST']._serialized_start=214
-  _globals['_TRANSFERREQUEST']._serialized_end=902
-  _globals['_PARTNERS']._serialized_start=904
-  _globals['_PARTNERS']._serialized_end=957
-  _globals['_FEATURE']._serialized_start=960
-  _globals['_FEATURE']._serialized_end=1109
-  _globals['_ROUTE']._serialized_start=1111
-  _globals['_ROUTE']._serialized_end=1191
-  _globals['_ZONE']._serialized_start=1193
-  _globals['_ZONE']._serialized_end=1236
-  _globals['_FEATURECHANGE']._serialized_start=1238
-  _globals['_FEATURECHANGE']._serialized_end=1358
-  _globals['_CARRIEDPOINTS']._serialized_start=1360
-  _globals['_CARRIEDPOINTS']._serialized_end=1412
-  _globals['_CARRIEDFEATURE']._serialized_start=1415
-  _globals['_CARRIEDFEATURE']._serialized_end=1582
-  _globals['_WARP']._serialized_start=1584
-  _globals['_WARP']._serialized_end=1706
-  _globals['_TRANSFERRESPONSE']._serialized_start=1709
-  _globals['_TRANSFERRESPONSE']._serialized_end=1948
-  _globals['_TRANSFERSERVICE']._serialized_start=2444
-  _globals['_TRANSFERSERVICE']._serialized_end=2540
+  _globals['_TRANSFERREQUEST']._serialized_end=908
+  _globals['_PARTNERS']._serialized_start=910
+  _globals['_PARTNERS']._serialized_end=963
+  _globals['_FEATURE']._serialized_start=966
+  _globals['_FEATURE']._serialized_end=1115
+  _globals['_ROUTE']._serialized_start=1117
+  _globals['_ROUTE']._serialized_end=1197
+  _globals['_ZONE']._serialized_start=1199
+  _globals['_ZONE']._serialized_end=1242
+  _globals['_FEATURECHANGE']._serialized_start=1244
+  _globals['_FEATURECHANGE']._serialized_end=1364
+  _globals['_CARRIEDPOINTS']._serialized_start=1366
+  _globals['_CARRIEDPOINTS']._serialized_end=1418
+  _globals['_CARRIEDFEATURE']._serialized_start=1421
+  _globals['_CARRIEDFEATURE']._serialized_end=1588
+  _globals['_WARP']._serialized_start=1590
+  _globals['_WARP']._serialized_end=1712
+  _globals['_TRANSFERRESPONSE']._serialized_start=1715
+  _globals['_TRANSFERRESPONSE']._serialized_end=1954
+  _globals['_TRANSFERSERVICE']._serialized_start=2450
+  _globals['_TRANSFERSERVICE']._serialized_end=2546
 # @@protoc_insertion_point(module_scope)
