@@ -74,9 +74,7 @@ RESPONSE = TransferResult(
         Carried(
             ZONE,
             "no-go",
-            Feature(
-                ZONE, lines([[2, 12], [8, 12], [8, 20]], [[6, 14], [7, 14], [7, 15]]), "no-go"
-            ),
+            Feature(ZONE, lines([[2, 12], [8, 12], [8, 20]], [[6, 14], [7, 14], [7, 15]]), "no-go"),
             lines([0.5, 0.625, 0.875], [0.125, 0.375, 0.25]),
             lines([0, 1, 2], [0, 1, 2]),
         ),
@@ -156,11 +154,7 @@ def point(x, y):
         ({"zone": {}}, "features[1].zone.rings"),
         ({"zone": {"rings": [{"points": [point(0, 0)]}]}}, "features[1].zone.rings[0]"),
         (
-            {
-                "zone": {
-                    "rings": [{"points": [point(0, 0), point(1, 1), point(1, 0), point(0, 1)]}]
-                }
-            },
+            {"zone": {"rings": [{"points": [point(0, 0), point(1, 1), point(1, 0), point(0, 1)]}]}},
             "features[1].zone.rings",
         ),
     ],

@@ -2,14 +2,14 @@
 
 ``python -m tests.experiments.carrying --sketches 100 --maps 20`` prints a table of
 
-- ways through rooms, drawn by the study's people and by those of both generators, carried through the
-  objects that are the same (the truth, so that no mistake of a match counts): the share of things
-  that they pass on the same side as the true way, how far they are from it in units of a thing's
-  size, how often they go through a thing, and how often the truth lies within one and within two
-  standard deviations of a carried point, along each axis;
-- zones on old maps, carried to new scans of the same places, which begin elsewhere, are turned, and show
-  a tenth of the things elsewhere; found by a match of the maps: how much the carried and the true
-  zone share, as a part of both together.
+- ways through rooms, drawn by the study's people and by those of both generators, carried through
+  the objects that are the same (the truth, so that no mistake of a match counts): the share of
+  things that they pass on the same side as the true way, how far they are from it in units of a
+  thing's size, how often they go through a thing, and how often the truth lies within one and
+  within two standard deviations of a carried point, along each axis;
+- zones on old maps, carried to new scans of the same places, which begin elsewhere, are turned, and
+  show a tenth of the things elsewhere; found by a match of the maps: how much the carried and the
+  true zone share, as a part of both together.
 """
 
 from __future__ import annotations

@@ -15,6 +15,8 @@ Transactions on Graphics 25(3), 2006.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import shapely
 from skimage.graph import route_through_array
@@ -49,7 +51,7 @@ def true_way(scene: Scene, rng: np.random.Generator) -> FloatArray:
         if np.hypot(*(ends[0] - ends[2])) < 0.5 * counts.max():
             continue
         try:
-            legs = [route_through_array(cost, a, b)[0] for a, b in zip(ends, ends[1:])]
+            legs = [route_through_array(cost, a, b)[0] for a, b in pairwise(ends)]
         except ValueError:
             continue
         cells = np.array(legs[0] + legs[1][1:])

@@ -10,7 +10,7 @@ def thin_plate(a, b):
 
 
 def bent(a, b, nodes):
-    """Return the covariance of the spline at two points: what is affine at the nodes is taken off."""
+    """Return the covariance of the spline at two points, without what is affine at the nodes."""
     planes = np.array([[1.0, x, y] for x, y in nodes])
     shares = [np.linalg.pinv(planes).T @ np.array([1.0, *point]) for point in (a, b)]
     total = thin_plate(a, b)
@@ -30,9 +30,10 @@ def near(a, b, reach):
 def krige(nodes, goals, points, weights, *, stretch, bend, shared, reach):
     """Return where points come to, and their variances in units of an object's own variance.
 
-    Unknown for certain are turn, scale and shift alone; the others are drawn from what the arguments
-    say: a stretch v of w = v·conj(z), a spline, displacements that are shared, and others.
+    Of turn, scale and shift nothing is known; the others are drawn from what the arguments say: a
+    stretch v of w = v·conj(z), a spline, displacements that are shared, and others.
     """
+
     def rigid(p):
         return np.array([[p[0], -p[1], 1.0, 0.0], [p[1], p[0], 0.0, 1.0]])
 

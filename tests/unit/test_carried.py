@@ -93,9 +93,7 @@ def test_a_straight_line_gets_no_more_points_than_it_needs():
 
 
 def test_a_bent_line_gets_the_points_that_it_needs():
-    bent = Scene.from_polygons(
-        [box(0, 0), box(9, 0), box(0, 9), box(9, 9), box(4, 5.5, 2, 2)]
-    )
+    bent = Scene.from_polygons([box(0, 0), box(9, 0), box(0, 9), box(9, 9), box(4, 5.5, 2, 2)])
     feature = route((0.5, 5.0), (9.5, 5.0))
     course = course_between(SCENE, bent, SAME, features=[feature])
     (found,) = carried([feature], course)
@@ -118,7 +116,8 @@ def test_a_route_through_a_wall_is_led_through_its_door():
     assert len(through)
     assert ((through[:, 1] > 7.1) & (through[:, 1] < 8.5)).all()
     change = found.changes[0]
-    assert points[change.first][0] < 4.8 < 5.2 < points[change.last][0]
+    assert points[change.first][0] < 4.8
+    assert points[change.last][0] > 5.2
 
 
 def test_a_door_that_is_too_narrow_is_none():
@@ -180,7 +179,7 @@ def test_where_there_is_no_way_on_the_drawn_side_the_other_one_is_said():
     assert distance(found, grid) >= 0.19
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.3))
 def test_no_route_comes_nearer_to_an_obstacle_than_its_radius(seed, radius):
     rng = np.random.default_rng(seed)

@@ -141,7 +141,7 @@ def test_an_object_that_was_moved_takes_nothing_along():
 
 def test_a_doubtful_partner_counts_for_less():
     places = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [2.0, 1.0]])
-    goals = places + [[0, 0], [0, 0], [0, 0], [0, 0], [0.0, 0.6]]
+    goals = np.array([*places[:4], [2.0, 1.6]])
     miss = [
         abs(float(fit_warp(places, goals, np.array([1, 1, 1, 1, likely]))(places[4:])[0, 1]) - 1.0)
         for likely in (0.05, 1.0)
@@ -162,8 +162,8 @@ def test_no_warp_folds(seed, count):
     x, y = (np.linspace(-1.0, 11.0, 90),) * 2
     step = 1e-5
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    dx = (warp(points + [step, 0.0]) - warp(points)) / step
-    dy = (warp(points + [0.0, step]) - warp(points)) / step
+    dx = (warp(points + np.array([step, 0.0])) - warp(points)) / step
+    dy = (warp(points + np.array([0.0, step])) - warp(points)) / step
     assert (dx[:, 0] * dy[:, 1] - dx[:, 1] * dy[:, 0]).min() > 0.0
 
 

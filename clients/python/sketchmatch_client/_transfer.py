@@ -69,7 +69,9 @@ def transfer_request(
     own = {name: given.pop(name) for name in _FIELDS if name in given}
     if given.pop("alternatives", None) is not None:
         raise InvalidRequestError(
-            "alternatives is for a match; a transfer has one answer", "INVALID_FIELD", "alternatives"
+            "alternatives is for a match; a transfer has one answer",
+            "INVALID_FIELD",
+            "alternatives",
         )
     matching = match_request(sketch, map, **given)
     # What both requests have has the same numbers in both.

@@ -102,9 +102,7 @@ def _named(feature: Feature, name: str) -> Feature:
 def _points(given: Iterable[Sequence[float]], field: str) -> list[source_pb2.Point]:
     points = []
     for each in given:
-        with refused_as(
-            "INVALID_FIELD", field, f"has {reprlib.repr(each)}; give points as (x, y)"
-        ):
+        with refused_as("INVALID_FIELD", field, f"has {reprlib.repr(each)}; give points as (x, y)"):
             x, y = each
             points.append(source_pb2.Point(x=x, y=y))
     if not points:

@@ -121,10 +121,13 @@ def _match(
         value = requests.match_request(request, setup.limits, engine.registry.readers)
     writer, clock = responses.ResponseWriter(value), Clock(value.time_budget)
     begun(clock)
-    with requests.paths_of(request), closing(engine.match(value, name, clock)) as events:
-        with _stopping(clock):
-            for event in events:
-                yield writer.response(event)
+    with (
+        requests.paths_of(request),
+        _stopping(clock),
+        closing(engine.match(value, name, clock)) as events,
+    ):
+        for event in events:
+            yield writer.response(event)
 
 
 def _transfer(

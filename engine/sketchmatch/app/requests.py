@@ -285,7 +285,9 @@ def _features(request: transfer_service_pb2.TransferRequest) -> tuple[Feature, .
 def _feature(message: transfer_service_pb2.Feature, field: str, upward: float) -> Feature:
     kind = message.WhichOneof("kind")
     if kind is None:
-        raise InvalidInputError(Reason.MISSING_FIELD, field, "is not set; give point, route or zone")
+        raise InvalidInputError(
+            Reason.MISSING_FIELD, field, "is not set; give point, route or zone"
+        )
     speeds = None
     if kind == "point":
         rings = [_points([message.point], upward)]

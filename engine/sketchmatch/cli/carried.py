@@ -135,7 +135,7 @@ def check_keepout(keepout: Path | None, target: Path) -> None:
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             "--keepout",
-            f"needs a map with cells, and {str(target)!r} has none; drop it, or give the map's .yaml",
+            f"needs a map with cells, and {str(target)!r} has none; give the map's .yaml",
         )
 
 
@@ -161,9 +161,7 @@ def save(
         files.save_text(waypoints, text, "--waypoints")
 
 
-def draw(
-    found: Carriage, names: tuple[str, str], paths: tuple[Path, Path], target: Path
-) -> None:
+def draw(found: Carriage, names: tuple[str, str], paths: tuple[Path, Path], target: Path) -> None:
     """Draw both scenes with what was carried, and save the picture."""
     answer = found.answer
     scale = answer.warp.scale
@@ -254,9 +252,7 @@ def _pairs(answer: TransferResponse) -> list[OverlayMatch]:
 
 def _message(feature: Feature) -> transfer_service_pb2.Feature:
     message = transfer_service_pb2.Feature(name=feature.name)
-    lines = [
-        [source_pb2.Point(x=x, y=y) for x, y in ring.tolist()] for ring in feature.rings
-    ]
+    lines = [[source_pb2.Point(x=x, y=y) for x, y in ring.tolist()] for ring in feature.rings]
     if feature.kind is FeatureKind.POINT:
         message.point.CopyFrom(lines[0][0])
     elif feature.kind is FeatureKind.ROUTE:
@@ -289,9 +285,7 @@ def _carried(message: transfer_service_pb2.CarriedFeature, given: Feature | None
     prefix = "CHANGE_REASON_"
     changes = tuple(
         Change(
-            ChangeReason[
-                transfer_service_pb2.ChangeReason.Name(each.reason).removeprefix(prefix)
-            ],
+            ChangeReason[transfer_service_pb2.ChangeReason.Name(each.reason).removeprefix(prefix)],
             each.first_point,
             each.last_point,
             each.sentence,

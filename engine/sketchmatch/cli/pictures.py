@@ -32,7 +32,15 @@ from sketchmatch_proto.v1.source_pb2 import Point
 if TYPE_CHECKING:
     from sketchmatch.cli.inspection import Description
 
-__all__ = ["check_path", "draw_description", "draw_match", "draw_segmentation", "grid_in", "matched_pairs", "scene_of"]
+__all__ = [
+    "check_path",
+    "draw_description",
+    "draw_match",
+    "draw_segmentation",
+    "grid_in",
+    "matched_pairs",
+    "scene_of",
+]
 
 check_path = check_picture_path
 

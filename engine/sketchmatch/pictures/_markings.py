@@ -126,7 +126,7 @@ def _shade(line: FloatArray, widths: FloatArray, closed: bool) -> shapely.Geomet
     line, widths = line[kept], np.maximum(widths[kept], 0.1)
     circles = shapely.buffer(shapely.points(line), widths, quad_segs=6)
     if len(line) == 1:
-        return circles[0]
+        return shapely.union_all(circles)
     following = np.roll(circles, -1) if closed else circles[1:]
     pairs = zip(circles, following, strict=False)
     return shapely.union_all(

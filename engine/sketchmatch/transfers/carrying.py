@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -196,7 +197,7 @@ def _thinned(
     given = np.flatnonzero(way.sources == np.floor(way.sources))
     pinned = np.unique(np.concatenate([[0], given, [len(way.points) - 1]]))
     kept: list[int] = [0]
-    for first, last in zip(pinned, pinned[1:], strict=False):
+    for first, last in pairwise(pinned.tolist()):
         leg = way.points[first : last + 1]
         finer = tolerance
         chosen = _simplified(leg, finer)
@@ -206,7 +207,7 @@ def _thinned(
             chosen = _simplified(leg, finer)
             if finer < 0.0:
                 break
-        kept += [int(first) + k for k in chosen[1:]]
+        kept += [first + k for k in chosen[1:]]
     index = np.array(kept)
     return Way(way.points[index], way.sources[index], way.drawn[index])
 
@@ -221,7 +222,7 @@ def _simplified(leg: FloatArray, tolerance: float) -> list[int]:
         if b - a < 2:
             continue
         line = shapely.LineString(leg[[a, b]])
-        away = shapely.distance(shapely.points(leg[a + 1 : b]), line)
+        away = np.atleast_1d(shapely.distance(shapely.points(leg[a + 1 : b]), line))
         far = int(np.argmax(away))
         if away[far] > tolerance:
             kept.add(a + 1 + far)
@@ -237,7 +238,9 @@ def _result(feature: Feature, ways: Sequence[Way], course: Course) -> Carried:
         speeds = feature.speeds[np.floor(ways[0].sources).astype(int)]
     there = Feature(feature.kind, tuple(way.points for way in ways), feature.name, speeds)
     deviations = tuple(course.warp.deviations(way.drawn) for way in ways)
-    return Carried(feature.kind, feature.name, there, deviations, tuple(way.sources for way in ways))
+    return Carried(
+        feature.kind, feature.name, there, deviations, tuple(way.sources for way in ways)
+    )
 
 
 def _centres(scene: Scene, indices: Sequence[int]) -> FloatArray:

@@ -84,9 +84,7 @@ class Feature:
         fewest = _FEWEST[self.kind]
         if len(ring) < fewest or (self.kind is FeatureKind.POINT and len(ring) > 1):
             exactly = "" if self.kind is FeatureKind.POINT else " or more"
-            raise _refused(
-                field, f"has {len(ring)} points; a {self.kind} has {fewest}{exactly}"
-            )
+            raise _refused(field, f"has {len(ring)} points; a {self.kind} has {fewest}{exactly}")
         return ring
 
     def _check_speeds(self, count: int) -> None:
@@ -98,7 +96,7 @@ class Feature:
                 "speeds", f"are {speeds.size} for {count} points; give one for each or none"
             )
         if not ((speeds >= 0.0) & np.isfinite(speeds)).all():
-            raise _refused("speeds", "have one that is negative or not finite; give metres a second")
+            raise _refused("speeds", "have one that is negative or not finite; give m/s")
         object.__setattr__(self, "speeds", speeds)
 
 

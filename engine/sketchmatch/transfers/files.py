@@ -1,13 +1,14 @@
 """Points, routes and zones as files: GeoJSON in and out, and what nav2 reads.
 
-In GeoJSON a ``Point`` is a point, a ``LineString`` a route, a ``Polygon`` a zone; each part of what has
-several is one of its own. The coordinates are those of the scene, x right and y up, in its own units.
-The property ``name``, or else ``label``, or else the ``id``, is the name; ``speed``, one number, or
-``speeds``, one for each point, says how fast a route is driven; ``yaw``, in radians, where a robot
-looks at a point; ``keepout: false`` leaves a zone out of the keep-out mask. All properties are kept.
+In GeoJSON a ``Point`` is a point, a ``LineString`` a route, a ``Polygon`` a zone; each part of what
+has several is one of its own. The coordinates are those of the scene, x right and y up, in its own
+units. The property ``name``, or else ``label``, or else the ``id``, is the name; ``speed``, one
+number, or ``speeds``, one for each point, says how fast a route is driven; ``yaw``, in radians,
+where a robot looks at a point; ``keepout: false`` leaves a zone out of the keep-out mask. All
+properties are kept.
 
-A mask of nav2's keep-out filter, which is a map in which the forbidden cells are occupied, is read as
-zones, and a list of waypoints as nav2's panel in RViz saves it as points in their order.
+A mask of nav2's keep-out filter, which is a map in which the forbidden cells are occupied, is read
+as zones, and a list of waypoints as nav2's panel in RViz saves it as points in their order.
 """
 
 from __future__ import annotations
@@ -94,8 +95,9 @@ def read_features(path: str | Path) -> FeatureFile:
         raise InvalidInputError(error.reason, place, error.problem) from None
     if not found.features:
         raise InvalidInputError(
-            _FILE, str(path), "holds no point, route or zone; give one as a Point, LineString or "
-            "Polygon"
+            _FILE,
+            str(path),
+            "holds no point, route or zone; give one as a Point, LineString or Polygon",
         )
     return found
 
@@ -106,8 +108,7 @@ def landmarks_of(grid: OccupancyGrid) -> FeatureFile:
         Feature(FeatureKind.POINT, (np.array([item.point]),), item.name) for item in grid.landmarks
     ]
     properties = [
-        {"name": item.name, **({"type": item.kind} if item.kind else {})}
-        for item in grid.landmarks
+        {"name": item.name, **({"type": item.kind} if item.kind else {})} for item in grid.landmarks
     ]
     return FeatureFile(tuple(features), tuple(properties))
 
@@ -185,8 +186,8 @@ def encode_waypoints(
 ) -> str:
     """Return points and the points of routes, in their order, as nav2's panel in RViz saves them.
 
-    A robot looks along a route, and at a point as its ``yaw`` said, turned by the rotation. Names and
-    speeds stand beside, where there are some.
+    A robot looks along a route, and at a point as its ``yaw`` said, turned by the rotation. Names
+    and speeds stand beside, where there are some.
     """
     lines, count = ["waypoints:"], 0
     for each, said in zip(carried, properties, strict=True):
@@ -338,7 +339,9 @@ def _speeds(said: Mapping[str, Any], count: int) -> FloatArray | None:
 
 
 def _of_waypoints(given: Any) -> FeatureFile:
-    named = mapping(_numbers(given), "waypoints", _FILE, "waypoints by name, as nav2's panel saves them")
+    named = mapping(
+        _numbers(given), "waypoints", _FILE, "waypoints by name, as nav2's panel saves them"
+    )
     features, properties = [], []
     for key, value in named.items():
         field = f"waypoints.{key}"
@@ -383,9 +386,7 @@ def _of_mask(grid: OccupancyGrid) -> FeatureFile:
     features = tuple(
         Feature(
             FeatureKind.ZONE,
-            tuple(
-                shapely.get_coordinates(ring) for ring in (zone.exterior, *zone.interiors)
-            ),
+            tuple(shapely.get_coordinates(ring) for ring in (zone.exterior, *zone.interiors)),
             f"keep-out {k + 1}",
         )
         for k, zone in enumerate(zones)

@@ -60,7 +60,7 @@ class Obstacles:
         low, sides = points.min(axis=0) - margin, extent + 2.0 * margin
         step = max(min(small, 4.0 * radius) / _PER_SPACING, float(extent.max()) / 2000.0)
         step = max(step, math.sqrt(float(sides[0] * sides[1]) / _MOST_CELLS))
-        columns, rows = (int(math.ceil(side / step)) for side in sides)
+        columns, rows = (math.ceil(side / step) for side in sides)
         picture = np.zeros((rows, columns), dtype=np.uint8)
         for item in scene.objects:
             # Every cell that an object reaches into: its outline is drawn, too.
@@ -96,8 +96,7 @@ class Obstacles:
     def inside(self, points: FloatArray) -> BoolArray:
         """Return which points lie on the grid."""
         cells = self.cells(points)
-        within: BoolArray = ((cells >= 0) & (cells < self.blocked.shape)).all(axis=1)
-        return within
+        return np.asarray(((cells >= 0) & (cells < self.blocked.shape)).all(axis=1))
 
     def needed(self, radius: float) -> float:
         """Return how much room a robot of a radius needs in the middle of a cell."""
@@ -120,7 +119,7 @@ class Obstacles:
     def nearest_clear(self, point: FloatArray, radius: float, within: float) -> FloatArray | None:
         """Return the nearest place to a point where a robot may be; None if none is near."""
         (cell,) = self.cells(point[None, :])
-        reach = int(math.ceil(within / self.resolution))
+        reach = math.ceil(within / self.resolution)
         window = Window.around(self, np.array([cell]), reach)
         room = window.of(self.clearance) >= self.needed(radius)
         free = np.argwhere(room) + window.low

@@ -1,9 +1,10 @@
 """Routes kept out of obstacles: planned again where the warp leads into one.
 
 A part of a route that comes too near to obstacles is replaced by the cheapest way between its ends
-(scikit-image's ``MCP_Geometric``, Dijkstra's algorithm on cells), which stays near the carried route
-and rather in the middle of free space, and then is pulled smooth. Objects are passed on the side on
-which they were drawn: the way that led past one on the other side is closed, and planned again.
+(scikit-image's ``MCP_Geometric``, Dijkstra's algorithm on cells), which stays near the carried
+route and rather in the middle of free space, and then is pulled smooth. Objects are passed on the
+side on which they were drawn: the way that led past one on the other side is closed, and planned
+again.
 """
 
 from __future__ import annotations
@@ -122,8 +123,8 @@ def kept_clear(
                 f"What comes after point {len(done.points)} cannot be reached: obstacles leave no "
                 f"way of {radius:g} {unit} to each side; the route ends there."
             )
-            where = len(done.points) - 1
-            changes.append(Change(ChangeReason.UNREACHABLE, where, where, sentence))
+            end = len(done.points) - 1
+            changes.append(Change(ChangeReason.UNREACHABLE, end, end, sentence))
             return _finished(done, changes)
         begin = len(done.points) - 1
         done = done + found
@@ -155,9 +156,7 @@ def _clear_stretches(way: Way, obstacles: Obstacles, radius: float) -> BoolArray
     return clear
 
 
-def _moved(
-    way: Way, given: int, taken: int, reason: ChangeReason, verb: str, unit: str
-) -> Change:
+def _moved(way: Way, given: int, taken: int, reason: ChangeReason, verb: str, unit: str) -> Change:
     away = float(np.hypot(*(way.points[taken] - way.points[given])))
     sentence = f"It {verb} {away:.2g} {unit} from where it was carried to: there are obstacles."
     return Change(reason, 0, 0, sentence)
@@ -222,9 +221,7 @@ def _swept(line: FloatArray, place: FloatArray) -> float:
     return float(np.angle(around[1:] / around[:-1]).sum())
 
 
-def _barrier(
-    carried: Way, landmarks: Landmarks, k: int, obstacles: Obstacles
-) -> FloatArray:
+def _barrier(carried: Way, landmarks: Landmarks, k: int, obstacles: Obstacles) -> FloatArray:
     """Return the line behind an object, seen from where a way should pass it, shape (2, 2)."""
     centre = landmarks.carried[k]
     away = np.hypot(*(carried.points - centre).T)
@@ -246,7 +243,7 @@ def _planned(
     """Return the cheapest way between the ends of a carried part; None if there is none."""
     cells = obstacles.cells(carried.points)
     within = ((cells >= 0) & (cells < obstacles.blocked.shape)).all(axis=1)
-    margin = int(math.ceil(max(_MARGIN, 8.0 * radius) / obstacles.resolution))
+    margin = math.ceil(max(_MARGIN, 8.0 * radius) / obstacles.resolution)
     window = Window.around(obstacles, cells[within], margin)
     whole = Window(np.zeros(2, dtype=np.int64), np.array(obstacles.blocked.shape))
     for each in (window, whole):
@@ -342,10 +339,7 @@ def _legs_clear(
 ) -> BoolArray:
     """Return which points may move: those whose legs to both neighbours stay clear."""
     shares = np.arange(1, 17)[:, None, None] / 16.0
-    legs = [
-        moved[None] + shares * (points[middle + step] - moved)[None] for step in (-1, 1)
-    ]
+    legs = [moved[None] + shares * (points[middle + step] - moved)[None] for step in (-1, 1)]
     samples = np.concatenate([moved[None], *legs])
     clear = obstacles.clear(samples.reshape(-1, 2), radius).reshape(samples.shape[:2])
-    found: BoolArray = clear.all(axis=0)
-    return found
+    return np.asarray(clear.all(axis=0))

@@ -171,9 +171,7 @@ def run_transfer(
     if request.object_map is None:
         sketch, map_, match = yield from _matched(request.match, engine, match_id, clock)
         pairs = tuple(match.object_map.items())
-        weights = [
-            1.0 if line.probability is None else line.probability for line in match.matches
-        ]
+        weights = [1.0 if line.probability is None else line.probability for line in match.matches]
     else:
         sketch, map_ = _segmented(request.match, engine)
         match, pairs, weights = None, request.object_map, [1.0] * len(request.object_map)

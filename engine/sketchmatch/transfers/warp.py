@@ -38,7 +38,7 @@ _FEWEST_SPLINE = 5
 _BENDS = (0.0, *np.logspace(-2.0, 3.0, 11))
 _STRETCHES = (0.0, *np.logspace(-1.0, 4.0, 6))
 _SHARED = (0.95, 0.6, 0.3, 0.0)
-"""Shares of an object's own displacement that go with the things around it; the first by default."""
+"""Shares of an object's own displacement that go with what is around it; the first by default."""
 _REACH = 4.0
 """How far these are, in distances to the nearest object."""
 _DOUBT = 0.3
@@ -54,7 +54,7 @@ _FAR = 1.0
 _COARSEST, _FINEST = 48, 192
 _PART = 2048
 _THINNEST = 0.02
-"""The least area that a piece of the plane may be left with, in shares of what it has on average."""
+"""The least area that a piece of the plane may be left with, as a share of the average."""
 _MIRRORED = 6.0
 """By how much a mirror image's likelihood, as a logarithm, must exceed that of what was given."""
 
@@ -128,7 +128,7 @@ class _Frame:
         reach = _REACH * float(np.median(apart.min(axis=1)))
         np.fill_diagonal(apart, 0.0)
         # A plane through objects on one line is no plane: the least of all that fit is taken.
-        trend = np.linalg.pinv(_planes(places), rcond=1e-6)
+        trend: FloatArray = np.linalg.pinv(_planes(places), rcond=1e-6)
         return cls(middle, spread, places, trend, _thin_plate(apart), reach)
 
     def bend(self, points: ComplexArray) -> tuple[FloatArray, FloatArray]:
@@ -258,8 +258,8 @@ def fit_warp(
     Raises
     ------
     InvalidInputError
-        If there are too few objects, they lie at one place, the target is the source's mirror image,
-        or every warp that fits them folds the plane.
+        If there are too few objects, they lie at one place, the target is the source's mirror
+        image, or every warp that fits them folds the plane.
 
     Examples
     --------
@@ -348,9 +348,7 @@ def _trust(misses: FloatArray) -> FloatArray:
     return trusted
 
 
-def _fitted(
-    frame: _Frame, goals: ComplexArray, weights: FloatArray, certain: FloatArray
-) -> _Shape:
+def _fitted(frame: _Frame, goals: ComplexArray, weights: FloatArray, certain: FloatArray) -> _Shape:
     """Return the likeliest shape of warp, and what each object counts for in it."""
     shape = _likeliest(frame, goals, weights)
     if len(goals) > _FEWEST + 1:
@@ -403,7 +401,7 @@ def _solved(
     matrix[:count, :count] = _covariance(frame, shape)
     matrix[:count, count:] = _rigid(frame.places)
     matrix[count:, :count] = matrix[:count, count:].conj().T
-    inverse = np.linalg.inv(matrix)
+    inverse: ComplexArray = np.linalg.inv(matrix)
     solution = inverse[:, :count] @ goals
     squares = max(0.0, float(np.vdot(goals, solution[:count]).real))
     doubted = _DOUBT_COUNTS * _DOUBT**2 / count
