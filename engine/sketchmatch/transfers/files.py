@@ -166,7 +166,7 @@ def encode_keepout(
         rings = [cells.cells(ring)[:, ::-1].astype(np.int32) for ring in each.feature.rings]
         cv2.fillPoly(shades, rings, _FORBIDDEN)
         cv2.polylines(shades, rings[:1], isClosed=True, color=_FORBIDDEN)
-    rows, columns = shades.shape
+    rows, columns = grid.cells.shape
     x, y, yaw = grid.origin
     lines = [
         f"image: {picture}",
@@ -378,7 +378,7 @@ def _of_mask(grid: OccupancyGrid) -> FeatureFile:
     cells = Obstacles.of_grid(grid, allow_unknown=True)
     lines = [
         shapely.LineString(cells.places(line - 1.0))
-        for line in find_contours(forbidden, 0.5)
+        for line in find_contours(forbidden, 0.5)  # type: ignore[no-untyped-call]
         if len(line) > 3
     ]
     areas = shapely.build_area(shapely.GeometryCollection(lines))

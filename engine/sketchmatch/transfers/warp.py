@@ -128,7 +128,7 @@ class _Frame:
         reach = _REACH * float(np.median(apart.min(axis=1)))
         np.fill_diagonal(apart, 0.0)
         # A plane through objects on one line is no plane: the least of all that fit is taken.
-        trend: FloatArray = np.linalg.pinv(_planes(places), rcond=1e-6)
+        trend = np.asarray(np.linalg.pinv(_planes(places), rcond=1e-6), dtype=np.float64)
         return cls(middle, spread, places, trend, _thin_plate(apart), reach)
 
     def bend(self, points: ComplexArray) -> tuple[FloatArray, FloatArray]:
@@ -401,7 +401,7 @@ def _solved(
     matrix[:count, :count] = _covariance(frame, shape)
     matrix[:count, count:] = _rigid(frame.places)
     matrix[count:, :count] = matrix[:count, count:].conj().T
-    inverse: ComplexArray = np.linalg.inv(matrix)
+    inverse = np.asarray(np.linalg.inv(matrix), dtype=np.complex128)
     solution = inverse[:, :count] @ goals
     squares = max(0.0, float(np.vdot(goals, solution[:count]).real))
     doubted = _DOUBT_COUNTS * _DOUBT**2 / count
