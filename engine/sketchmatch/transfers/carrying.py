@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -79,7 +80,8 @@ def course_between(
         target.labels[b] or source.labels[a] or f"what is at ({x:.4g}, {y:.4g})"
         for (a, b), (x, y) in zip(pairs, places, strict=True)
     )
-    return Course(warp, Landmarks(drawn, places, names), _extent(target))
+    sizes = np.array([math.sqrt(target.objects[b].area) for _, b in pairs])
+    return Course(warp, Landmarks(drawn, places, sizes, names), _extent(target))
 
 
 def carried(
@@ -151,7 +153,7 @@ def _carried_route(
     way, changes = kept_clear(way, obstacles, radius, course.landmarks, unit)
     if way is None:
         return Carried(feature.kind, feature.name, None, (), (), changes)
-    thin = _thinned(way, obstacles.resolution / 4.0, obstacles, radius)
+    thin = _thinned(way, obstacles.resolution / 2.0, obstacles, radius)
     return _result(feature, [thin], course).changed(*_placed(changes, way, thin))
 
 

@@ -152,6 +152,10 @@ class Window:
         high = np.clip(cells.max(axis=0) + margin + 1, 0, most)
         return cls(low, high)
 
+    def is_all_of(self, obstacles: Obstacles) -> bool:
+        """Whether it is the whole grid."""
+        return not self.low.any() and tuple(self.high) == obstacles.blocked.shape
+
     def of(self, array: FloatArray) -> FloatArray:
         """Return that part of an array of the whole grid."""
         return array[self.low[0] : self.high[0], self.low[1] : self.high[1]]

@@ -27,8 +27,14 @@ _MARGIN = 2.0
 """Metres, or radii times 8, around a part that is planned again, at first."""
 _STRAY = 1.0
 _HUG = 0.5
-_SMOOTHINGS = 60
+_SMOOTHINGS = 40
+_SLACK = 0.5
+"""In cells: how much farther away a line stays that is pulled smooth, to be simplified."""
+_SHARES = np.arange(1, 17)[:, None, None] / 16.0
+"""Where a leg is looked at."""
 _MOST_BARRIERS = 6
+_MANY_CELLS = 400_000
+"""More than these are first searched by blocks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +45,15 @@ class Landmarks:
     ----------
     drawn, carried
         Shape (n, 2), where they were drawn, and where they are.
+    sizes
+        Shape (n,), the roots of the areas that they have there.
     names
         For people.
     """
 
     drawn: FloatArray
     carried: FloatArray
+    sizes: FloatArray
     names: tuple[str, ...]
 
 
@@ -114,7 +123,9 @@ def kept_clear(
     at = first
     while at < last:
         if clear[at + 1]:
-            done, at = done + way.part(at + 1, at + 1), at + 1
+            blocked = np.flatnonzero(~clear[at + 1 : last + 1])
+            until = at + int(blocked[0]) if blocked.size else last
+            done, at = done + way.part(at + 1, until), until
             continue
         beyond = at + 1 + int(np.argmax(clear[at + 1 :]))
         found, sides = _around(way, at, beyond, obstacles, radius, landmarks)
@@ -128,8 +139,8 @@ def kept_clear(
             return _finished(done, changes)
         begin = len(done.points) - 1
         done = done + found
-        named = _nearest_name(way.part(at, beyond), landmarks)
-        sentence = f"Led around {named}, to stay {radius:g} {unit} away from obstacles."
+        named = _named(way.part(at, beyond), landmarks)
+        sentence = f"Led around{named}, to stay {radius:g} {unit} away from obstacles."
         changes.append(Change(ChangeReason.OBSTACLE, begin, len(done.points) - 1, sentence))
         changes += [replace(each, first=begin, last=len(done.points) - 1) for each in sides]
         at = beyond
@@ -149,10 +160,9 @@ def _finished(done: Way, changes: list[Change]) -> tuple[Way | None, tuple[Chang
 def _clear_stretches(way: Way, obstacles: Obstacles, radius: float) -> BoolArray:
     """Return which points are clear; a point after a leg that is not clear counts as none."""
     clear = obstacles.clear(way.points, radius)
-    for k in np.flatnonzero(clear[:-1] & clear[1:]):
-        leg = way.points[k : k + 2]
-        if np.hypot(*(leg[1] - leg[0])) > 0.5 * obstacles.resolution:
-            clear[k + 1] = clear[k + 1] and obstacles.line_is_clear(leg, radius)
+    legs = way.points[:-1] + _SHARES * (way.points[1:] - way.points[:-1])
+    passed = obstacles.clear(legs.reshape(-1, 2), radius).reshape(legs.shape[:2]).all(axis=0)
+    clear[1:] &= passed | ~clear[:-1]
     return clear
 
 
@@ -162,13 +172,12 @@ def _moved(way: Way, given: int, taken: int, reason: ChangeReason, verb: str, un
     return Change(reason, 0, 0, sentence)
 
 
-def _nearest_name(part: Way, landmarks: Landmarks) -> str:
-    """Return what a part of a way leads around, for people."""
-    if not len(landmarks.carried):
-        return "an obstacle"
+def _named(part: Way, landmarks: Landmarks) -> str:
+    """Return which object a part of a way led into, for people; nothing where it is none."""
     line = shapely.LineString(part.points)
-    away = shapely.distance(shapely.points(landmarks.carried), line)
-    return landmarks.names[int(np.argmin(away))]
+    away = shapely.distance(shapely.points(landmarks.carried), line) / landmarks.sizes
+    nearest = int(np.argmin(away))
+    return f" {landmarks.names[nearest]}" if away[nearest] <= 1.0 else ""
 
 
 def _around(
@@ -244,13 +253,12 @@ def _planned(
     cells = obstacles.cells(carried.points)
     within = ((cells >= 0) & (cells < obstacles.blocked.shape)).all(axis=1)
     margin = math.ceil(max(_MARGIN, 8.0 * radius) / obstacles.resolution)
-    window = Window.around(obstacles, cells[within], margin)
-    whole = Window(np.zeros(2, dtype=np.int64), np.array(obstacles.blocked.shape))
-    for each in (window, whole):
-        found = _cheapest(carried, cells, each, obstacles, radius, barriers)
-        if found is not None:
+    while True:
+        window = Window.around(obstacles, cells[within], margin)
+        found = _cheapest(carried, cells, window, obstacles, radius, barriers)
+        if found is not None or window.is_all_of(obstacles):
             return found
-    return None
+        margin *= 4
 
 
 def _cheapest(
@@ -272,17 +280,53 @@ def _cheapest(
     unit = max(radius, 2.0 * obstacles.resolution)
     costs = 1.0 + _STRAY * np.minimum(stray / unit, 20.0) ** 2 / 20.0
     costs += _HUG * np.clip(2.0 - room / unit, 0.0, 1.0) ** 2
-    costs[~open_] = -1.0
     if not _joined(open_, ends):
         return None
+    costs[~open_] = -1.0
+    path = _path(costs, ends)
+    points = obstacles.places(path + window.low)
+    points[0], points[-1] = carried.points[0], carried.points[-1]
+    return points if len(points) > 1 else carried.points[[0, -1]]
+
+
+def _path(costs: FloatArray, ends: IntArray) -> IntArray:
+    """Return the cells of the cheapest way; on many cells, near the cheapest of coarser ones."""
+    coarse = math.isqrt(costs.size // _MANY_CELLS)
+    if coarse > 1:
+        corridor = _corridor(costs, ends, coarse)
+        if corridor is not None and _joined(corridor, ends):
+            costs = np.where(corridor, costs, -1.0)
+    return _searched(costs, ends)
+
+
+def _corridor(costs: FloatArray, ends: IntArray, size: int) -> BoolArray | None:
+    """Return what is near the cheapest way over blocks of cells that are wholly open."""
+    rows, columns = (-(-side // size) for side in costs.shape)
+    margins = [
+        (0, count * size - side) for count, side in zip((rows, columns), costs.shape, strict=True)
+    ]
+    blocks = np.pad(costs, margins, constant_values=-1.0).reshape(rows, size, columns, size)
+    coarse = np.where(blocks.min(axis=(1, 3)) < 0.0, -1.0, blocks[:, 0, :, 0])
+    first, last = ends // size
+    for end in (first, last):
+        near = coarse[max(0, end[0] - 1) : end[0] + 2, max(0, end[1] - 1) : end[1] + 2]
+        near[near < 0.0] = coarse.max()
+    if not _joined(coarse > 0.0, np.array([first, last])):
+        return None
+    path = _searched(coarse, np.array([first, last]))
+    drawn = np.zeros((rows, columns), dtype=np.uint8)
+    drawn[tuple(path.T)] = 1
+    wide = cv2.dilate(drawn, np.ones((5, 5), dtype=np.uint8)).astype(bool)
+    fine = wide.repeat(size, axis=0).repeat(size, axis=1)[: costs.shape[0], : costs.shape[1]]
+    return np.asarray(fine & (costs > 0.0))
+
+
+def _searched(costs: FloatArray, ends: IntArray) -> IntArray:
     from skimage.graph import MCP_Geometric
 
     planner = MCP_Geometric(costs, fully_connected=True)
     planner.find_costs([tuple(ends[0])], [tuple(ends[1])])
-    path = np.array(planner.traceback(tuple(ends[1])))
-    points = obstacles.places(path + window.low)
-    points[0], points[-1] = carried.points[0], carried.points[-1]
-    return points if len(points) > 1 else carried.points[[0, -1]]
+    return np.array(planner.traceback(tuple(ends[1])), dtype=np.int64)
 
 
 def _joined(open_: BoolArray, ends: IntArray) -> bool:
@@ -316,6 +360,7 @@ def _drawn(
 
 def _smoothed(line: FloatArray, obstacles: Obstacles, radius: float) -> FloatArray:
     """Return a line pulled smooth between its ends, as far as it stays clear."""
+    room = obstacles.needed(radius) + _SLACK * obstacles.resolution
     points = shapely.get_coordinates(
         shapely.segmentize(shapely.LineString(line), 2.0 * obstacles.resolution)
     )
@@ -325,7 +370,7 @@ def _smoothed(line: FloatArray, obstacles: Obstacles, radius: float) -> FloatArr
             if not len(middle):
                 continue
             moved = 0.5 * points[middle] + 0.25 * (points[middle - 1] + points[middle + 1])
-            kept = _legs_clear(points, middle, moved, obstacles, radius)
+            kept = _legs_clear(points, middle, moved, obstacles, room)
             points[middle[kept]] = moved[kept]
     return points
 
@@ -338,8 +383,7 @@ def _legs_clear(
     radius: float,
 ) -> BoolArray:
     """Return which points may move: those whose legs to both neighbours stay clear."""
-    shares = np.arange(1, 17)[:, None, None] / 16.0
-    legs = [moved[None] + shares * (points[middle + step] - moved)[None] for step in (-1, 1)]
+    legs = [moved[None] + _SHARES * (points[middle + step] - moved)[None] for step in (-1, 1)]
     samples = np.concatenate([moved[None], *legs])
     clear = obstacles.clear(samples.reshape(-1, 2), radius).reshape(samples.shape[:2])
     return np.asarray(clear.all(axis=0))
