@@ -4,7 +4,8 @@
 
 - ways through rooms, drawn by the study's people and by those of both generators, carried through
   the objects that are the same (the truth, so that no mistake of a match counts): the share of
-  things that they pass on the same side as the true way, how far they are from it in units of a
+  things that they pass on the same side as the true way, and of those that it passes closely; how
+  much of that a similarity would do, too; how far they are from the true way in units of a
   thing's size, how often they go through a thing, and how often the truth lies within one and
   within two standard deviations of a carried point, along each axis;
 - zones on old maps, carried to new scans of the same places, which begin elsewhere, are turned, and
@@ -41,7 +42,9 @@ PEOPLE = ("study", *KINDS)
 """Who draws."""
 
 _PASSING = math.pi / 4.0
-_RADIUS = 0.06
+_RADIUS = 0.04
+_CLOSE = 0.5
+"""Of a thing's size: nearer than this to its outline a way passes it close by."""
 _MOVED = 0.1
 
 
@@ -60,10 +63,14 @@ class WayCase:
 class Ways:
     """What was found of ways."""
 
+    ways: int = 0
     passings: int = 0
     same_side: int = 0
     through: int = 0
-    ways: int = 0
+    close: int = 0
+    close_same_side: int = 0
+    stiff_same_side: int = 0
+    stiff_through: int = 0
     undrawable: int = 0
     away: list[float] = field(default_factory=list)
     standardised: list[FloatArray] = field(default_factory=list)
@@ -74,9 +81,11 @@ class Ways:
         within = [float((misses < k).mean()) for k in (1.0, 2.0)]
         return (
             f"{name:8} {self.ways:5} ways {self.passings:5} passings, same side "
-            f"{self.same_side / self.passings:.3f}, through {self.through}, median away "
+            f"{self.same_side / self.passings:.4f}, of {self.close} close ones "
+            f"{self.close_same_side / self.close:.4f}, through {self.through}, median away "
             f"{np.median(self.away):.3f} sizes, within 1 σ {within[0]:.2f}, 2 σ {within[1]:.2f}; "
-            f"{self.undrawable} could not be drawn"
+            f"by a similarity alone {self.stiff_same_side / self.passings:.4f}, through "
+            f"{self.stiff_through}; {self.undrawable} could not be drawn"
         )
 
 
@@ -128,13 +137,38 @@ def _measure(case: WayCase, found: Ways) -> None:
     found.away.append(float(np.median(np.hypot(*(points - true).T))) / size)
     warped, deviations = course.warp(case.drawn), course.warp.deviations(case.drawn)
     found.standardised.append((np.abs(warped - case.way) / deviations[:, None]).ravel())
-    line = shapely.LineString(points)
-    found.through += any(item.polygon.intersects(line) for item in case.map.objects)
+    stiff = _by_similarity(case)
+    found.through += _goes_through(points, case.map)
+    found.stiff_through += _goes_through(stiff, case.map)
+    true_line = shapely.LineString(case.way)
     for item in case.map.objects:
-        turn = swept(case.way, np.array(item.centroid))
-        if abs(turn) > _PASSING:
-            found.passings += 1
-            found.same_side += abs(swept(points, np.array(item.centroid)) - turn) < math.pi
+        centre = np.array(item.centroid)
+        turn = swept(case.way, centre)
+        if abs(turn) <= _PASSING:
+            continue
+        close = item.polygon.distance(true_line) < _CLOSE * math.sqrt(item.area)
+        same = abs(swept(points, centre) - turn) < math.pi
+        found.passings += 1
+        found.same_side += same
+        found.close += close
+        found.close_same_side += close and same
+        found.stiff_same_side += abs(swept(stiff, centre) - turn) < math.pi
+
+
+def _by_similarity(case: WayCase) -> FloatArray:
+    """Return the drawn way as turned, scaled and shifted alone, by least squares."""
+    drawn = np.array([item.centroid for item in case.sketch.objects]) @ [1.0, 1j]
+    places = np.array([case.map.objects[k].centroid for k in case.truth]) @ [1.0, 1j]
+    turn, shift = np.linalg.lstsq(
+        np.stack([drawn, np.ones_like(drawn)], axis=1), places, rcond=None
+    )[0]
+    carried_ = turn * (case.drawn @ [1.0, 1j]) + shift
+    return np.stack([carried_.real, carried_.imag], axis=1)
+
+
+def _goes_through(points: FloatArray, scene: Scene) -> bool:
+    line = shapely.LineString(points)
+    return any(item.polygon.intersects(line) for item in scene.objects)
 
 
 def carried_zones(numbers: range, zones: int = 6) -> Iterator[list[float]]:

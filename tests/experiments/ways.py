@@ -35,7 +35,7 @@ _AHEAD = 1e-9
 
 def true_way(scene: Scene, rng: np.random.Generator) -> FloatArray:
     """Return a way across a place, shape (k, 2), clear of all things in it."""
-    clear = 0.12 * spacing(scene)
+    clear = 0.05 * spacing(scene)
     x0, y0, x1, y1 = scene.bounds
     low, high = np.array([x0, y0]) - 3.0 * clear, np.array([x1, y1]) + 3.0 * clear
     step = float((high - low).max()) / _CELLS

@@ -190,6 +190,7 @@ def draw(found: Carriage, names: tuple[str, str], paths: tuple[Path, Path], targ
         alert=_doubt(answer),
         footnote="Shades: within two standard deviations of where it was drawn and carried to.",
         underlay=grid_in(paths[1]),
+        sketch_underlay=grid_in(paths[0]),
         names=names,
         markings=sides,
     )

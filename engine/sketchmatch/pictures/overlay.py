@@ -38,9 +38,6 @@ __all__ = [
 
 _FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
 
-_SKETCH = "Sketch"
-"""The panel with paper and pen."""
-
 _OVERLAY, _SINGLE = 1600.0, 1000.0
 
 
@@ -103,7 +100,8 @@ def draw_overlay(
     underlay: OccupancyGrid | None = None,
     metres: bool | None = None,
     route: FloatArray | None = None,
-    names: tuple[str, str] = (_SKETCH, "Map"),
+    names: tuple[str, str] = ("Sketch", "Map"),
+    sketch_underlay: OccupancyGrid | None = None,
     markings: tuple[Sequence[Marking], Sequence[Marking]] = ((), ()),
     width: int = 1600,
 ) -> Image.Image:
@@ -132,6 +130,8 @@ def draw_overlay(
         Shape (k, 2), two points or more: a way through the sketch, drawn as a light dashed arrow.
     names
         What the two scenes are called.
+    sketch_underlay
+        The grid that the sketch was made from, where it is a map too.
     markings
         Points, routes and zones in both, with how sure their places are: a shade reaches to two
         standard deviations.
@@ -160,7 +160,8 @@ def draw_overlay(
             names[0],
             sketch,
             drawn,
-            pen=names[0] == _SKETCH,
+            sketch_underlay,
+            pen=sketch_underlay is None,
             route=route,
             badge=badge,
             markings=markings[0],
