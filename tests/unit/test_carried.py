@@ -199,6 +199,19 @@ def test_no_route_comes_nearer_to_an_obstacle_than_its_radius(seed, radius):
     assert (np.diff(order) >= -1e-9).all()
 
 
+@pytest.mark.parametrize(
+    "points", [[(2, 2), (2, 2), (8, 2)], [(2, 2), (8, 8), (2, 2)], [(2, 2)] * 3]
+)
+def test_a_route_may_stand_still_and_come_back(points):
+    grid = floor(walls=[np.s_[40:60, 40:60]])
+    found, _ = led(route(*points), grid)
+    assert distance(found, grid) >= 0.19
+    assert found.feature.points[[0, -1]] == pytest.approx(np.array(points)[[0, -1]], abs=1e-6)
+    given_ = [k for k in found.sources[0] if k == int(k)]
+    assert given_[0] == 0
+    assert given_[-1] == 2
+
+
 def test_a_grid_may_lie_turned_anywhere():
     angle = 0.5
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])

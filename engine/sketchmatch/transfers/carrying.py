@@ -116,10 +116,17 @@ def _carried(
         return _carried_route(feature, course, obstacles, radius, unit)
     ways = [_dense(ring, course, feature.kind is FeatureKind.ZONE) for ring in feature.rings]
     thin = [_thinned(way, course.extent * _COARSE) for way in ways]
+    if feature.kind is FeatureKind.ZONE and not _is_area(thin):
+        thin = ways  # as narrow as it was simplified by
     found = _result(feature, thin, course)
     if obstacles is None:
         return found
     return found.changed(*_noted(feature, found, obstacles, radius, unit))
+
+
+def _is_area(ways: Sequence[Way]) -> bool:
+    outline, *holes = (way.points for way in ways)
+    return bool(shapely.Polygon(outline, holes).is_valid)
 
 
 def _noted(

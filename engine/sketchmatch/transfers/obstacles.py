@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import shapely
 
 from sketchmatch.model import BoolArray, FloatArray, IntArray, OccupancyGrid, Scene
 from sketchmatch.model.caching import cached_property
 
-__all__ = ["Obstacles", "Window"]
+__all__ = ["Obstacles", "Window", "sampled"]
 
 _OCCUPIED = 65
 """Percent, from which a cell is an obstacle: the usual threshold of map_server."""
@@ -112,9 +111,7 @@ class Obstacles:
 
     def line_is_clear(self, points: FloatArray, radius: float) -> bool:
         """Whether a line through points stays clear all along."""
-        step = self.resolution / _SAMPLES
-        line = shapely.segmentize(shapely.LineString(points), step)
-        return bool(self.clear(shapely.get_coordinates(line), radius).all())
+        return bool(self.clear(sampled(points, self.resolution / _SAMPLES), radius).all())
 
     def nearest_clear(self, point: FloatArray, radius: float, within: float) -> FloatArray | None:
         """Return the nearest place to a point where a robot may be; None if none is near."""
@@ -129,6 +126,17 @@ class Obstacles:
         away = np.hypot(*(places - point).T)
         best = int(np.argmin(away))
         return places[best] if away[best] <= within else None
+
+
+def sampled(points: FloatArray, step: float) -> FloatArray:
+    """Return points along a line, no farther apart than a step; its own points are among them."""
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    counts = np.maximum(1, np.ceil(lengths / step)).astype(np.int64)
+    legs = np.repeat(np.arange(len(counts)), counts)
+    firsts = np.repeat(np.cumsum(counts) - counts, counts)
+    shares = (np.arange(len(legs)) - firsts) / counts[legs]
+    between = points[legs] + shares[:, None] * (points[legs + 1] - points[legs])
+    return np.vstack([between, points[-1:]])
 
 
 @dataclass(frozen=True, eq=False)

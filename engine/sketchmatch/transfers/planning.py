@@ -19,7 +19,7 @@ import shapely
 
 from sketchmatch.model import BoolArray, FloatArray, IntArray
 from sketchmatch.transfers.features import Change, ChangeReason
-from sketchmatch.transfers.obstacles import Obstacles, Window
+from sketchmatch.transfers.obstacles import Obstacles, Window, sampled
 
 __all__ = ["Landmarks", "Way", "kept_clear"]
 
@@ -240,7 +240,7 @@ def _barrier(carried: Way, landmarks: Landmarks, k: int, obstacles: Obstacles) -
     if np.hypot(*back) < obstacles.resolution:
         along = carried.points[-1] - carried.points[0]
         left = np.sign(_swept(carried.drawn, landmarks.drawn[k])) or 1.0
-        back = left * np.array([-along[1], along[0]])
+        back = left * np.array([-along[1], along[0]]) if along.any() else np.array([1.0, 0.0])
     length = float(np.hypot(*np.ptp(carried.points, axis=0))) + _MARGIN
     end: FloatArray = centre + back / np.hypot(*back) * 2.0 * length
     return np.stack([centre, end])
@@ -361,9 +361,7 @@ def _drawn(
 def _smoothed(line: FloatArray, obstacles: Obstacles, radius: float) -> FloatArray:
     """Return a line pulled smooth between its ends, as far as it stays clear."""
     room = obstacles.needed(radius) + _SLACK * obstacles.resolution
-    points = shapely.get_coordinates(
-        shapely.segmentize(shapely.LineString(line), 2.0 * obstacles.resolution)
-    )
+    points = sampled(line, 2.0 * obstacles.resolution)
     for _ in range(_SMOOTHINGS):
         for odd in (1, 2):
             middle = np.arange(odd, len(points) - 1, 2)
