@@ -139,6 +139,19 @@ def test_an_object_that_was_moved_takes_nothing_along():
     assert warp(places[others]) == pytest.approx(turned(places[others]), abs=0.3)
 
 
+def test_between_maps_a_thing_that_was_moved_a_little_stands_out():
+    rng = np.random.default_rng(7)
+    places = strewn(rng, 7)
+    goals = turned(places, scale=1.0) + rng.normal(0.0, 0.02, places.shape)
+    goals[3] += (0.5, 0.4)
+    mapped, drawn = (fit_warp(places, goals, doubt=each) for each in (warps.MAPPED, warps.DRAWN))
+    others = np.delete(np.arange(7), 3)
+    missed = np.abs(mapped(places[others]) - turned(places[others], scale=1.0))
+    assert missed.max() < 0.08
+    assert mapped.weights[3] < 0.3 < drawn.weights[3]
+    assert mapped.deviations(places).mean() < drawn.deviations(places).mean()
+
+
 def test_a_doubtful_partner_counts_for_less():
     places = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [2.0, 1.0]])
     goals = np.array([*places[:4], [2.0, 1.6]])

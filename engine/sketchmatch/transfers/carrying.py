@@ -14,7 +14,7 @@ from sketchmatch.model import FloatArray, Scene
 from sketchmatch.transfers.features import Carried, Change, ChangeReason, Feature, FeatureKind
 from sketchmatch.transfers.obstacles import Obstacles
 from sketchmatch.transfers.planning import Landmarks, Way, kept_clear
-from sketchmatch.transfers.warp import Warp, fit_warp
+from sketchmatch.transfers.warp import DRAWN, Warp, fit_warp
 
 __all__ = ["Course", "carried", "course_between"]
 
@@ -52,6 +52,7 @@ def course_between(
     pairs: Sequence[tuple[int, int]],
     weights: Sequence[float] | None = None,
     features: Sequence[Feature] = (),
+    doubt: float = DRAWN,
 ) -> Course:
     """Return how features get from one scene to another, through pairs of their objects.
 
@@ -65,6 +66,8 @@ def course_between(
         How likely each pair is, 0 … 1; all certain when left out.
     features
         What is to be carried: there the warp must not fold.
+    doubt
+        As :func:`~sketchmatch.transfers.warp.fit_warp` takes it.
 
     Raises
     ------
@@ -75,7 +78,7 @@ def course_between(
     rings = [ring for feature in features for ring in feature.rings]
     around = np.vstack(rings) if rings else None
     likely = None if weights is None else np.asarray(weights, dtype=np.float64)
-    warp = fit_warp(drawn, places, likely, around)
+    warp = fit_warp(drawn, places, likely, around, doubt)
     names = tuple(
         target.labels[b] or source.labels[a] or f"what is at ({x:.4g}, {y:.4g})"
         for (a, b), (x, y) in zip(pairs, places, strict=True)

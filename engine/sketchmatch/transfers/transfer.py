@@ -23,7 +23,7 @@ from sketchmatch.pipeline.result import MatchResult
 from sketchmatch.transfers.carrying import Course, carried, course_between
 from sketchmatch.transfers.features import Carried, Feature, FeatureKind
 from sketchmatch.transfers.obstacles import Obstacles
-from sketchmatch.transfers.warp import Warp
+from sketchmatch.transfers.warp import DRAWN, MAPPED, Warp
 
 __all__ = ["ROUTE", "Direction", "TransferRequest", "TransferResult", "run_transfer"]
 
@@ -181,10 +181,12 @@ def run_transfer(
     features = (*drawn, *request.features)
     if not features:
         raise _refused("features", "is empty, and the sketch has no route; give something to carry")
+    grids = (request.match.sketch, request.match.map)
+    doubt = MAPPED if all(isinstance(each, OccupancyGrid) for each in grids) else DRAWN
     source, target = (sketch, map_) if forth else (map_, sketch)
     ways = pairs if forth else tuple((b, a) for a, b in pairs)
     try:
-        course = course_between(source.scene, target.scene, ways, weights, features)
+        course = course_between(source.scene, target.scene, ways, weights, features, doubt)
     except InvalidInputError as error:
         raise InvalidInputError(error.reason, "object_map", error.problem) from None
     given = request.match.map if forth else request.match.sketch

@@ -30,7 +30,7 @@ from sketchmatch.model import FloatArray
 from sketchmatch.model.arrays import ComplexArray
 from sketchmatch.model.caching import cached_property
 
-__all__ = ["Warp", "WarpKind", "fit_warp"]
+__all__ = ["DRAWN", "MAPPED", "Warp", "WarpKind", "fit_warp"]
 
 _FEWEST = 2
 _FEWEST_AFFINE = 4
@@ -41,10 +41,11 @@ _SHARED = (0.95, 0.6, 0.3, 0.0)
 """Shares of an object's own displacement that go with what is around it; the first by default."""
 _REACH = 4.0
 """How far these are, in distances to the nearest object."""
-_DOUBT = 0.3
-"""What is expected of the objects' own displacements before any is seen, in units of the spread
-divided by the root of their number, and _DOUBT_COUNTS what that counts for, in coordinates."""
+DRAWN, MAPPED = 0.3, 0.04
+"""What is expected of objects' own displacements before any is seen, in units of the spread divided
+by the root of their number: of things that somebody drew, and of things on maps of one place."""
 _DOUBT_COUNTS = 2.0
+"""What that counts for, in coordinates."""
 _TAIL = 4.0
 _ROUNDS = 8
 _LEAST_WEIGHT = 1e-3
@@ -107,6 +108,8 @@ class _Frame:
         Shape (n, n), of the thin-plate spline.
     reach
         How far an object's own displacement goes.
+    expected
+        The variance that an object's own displacement is expected to have, along each axis.
     bent, near
         Shape (n, n), covariances of the objects' places: of the spline, and of what they share.
     """
@@ -117,9 +120,10 @@ class _Frame:
     trend: FloatArray
     bending: FloatArray
     reach: float
+    expected: float
 
     @classmethod
-    def around(cls, sources: ComplexArray) -> _Frame:
+    def around(cls, sources: ComplexArray, doubt: float = DRAWN) -> _Frame:
         middle = complex(sources.mean())
         spread = float(np.sqrt(np.mean(np.abs(sources - middle) ** 2)))
         places = (sources - middle) / spread
@@ -129,7 +133,9 @@ class _Frame:
         np.fill_diagonal(apart, 0.0)
         # A plane through objects on one line is no plane: the least of all that fit is taken.
         trend = np.asarray(np.linalg.pinv(_planes(places), rcond=1e-6), dtype=np.float64)
-        return cls(middle, spread, places, trend, _thin_plate(apart), reach)
+        return cls(
+            middle, spread, places, trend, _thin_plate(apart), reach, doubt**2 / len(sources)
+        )
 
     def bend(self, points: ComplexArray) -> tuple[FloatArray, FloatArray]:
         """Return covariances (m, n) of the spline at points and objects, and its variances (m,)."""
@@ -243,6 +249,7 @@ def fit_warp(
     targets: FloatArray,
     weights: FloatArray | None = None,
     around: FloatArray | None = None,
+    doubt: float = DRAWN,
 ) -> Warp:
     """Fit the warp that carries the objects of one scene to their partners in another.
 
@@ -254,6 +261,9 @@ def fit_warp(
         Shape (n,), how likely each is its partner, 0 … 1; all certain when left out.
     around
         Shape (m, 2), points that are to be carried: there the warp must not fold, either.
+    doubt
+        How far objects are expected to be displaced, each for itself: ``DRAWN``, or ``MAPPED``
+        where both sides are maps. The more objects there are, the less it counts.
 
     Raises
     ------
@@ -271,11 +281,11 @@ def fit_warp(
     given, wanted = _complex(sources), _complex(targets)
     certain = np.ones(len(given)) if weights is None else np.clip(weights, _LEAST_WEIGHT, 1.0)
     _check(given, wanted)
-    frame = _Frame.around(given)
+    frame = _Frame.around(given, doubt)
     middle = complex(wanted.mean())
     unit = float(np.sqrt(np.mean(np.abs(wanted - middle) ** 2)))
     goals = (wanted - middle) / unit
-    fitted = _fitted(frame, goals, certain * _agreeing(frame.places, goals, certain), certain)
+    fitted = _fitted(frame, goals, certain * _agreeing(frame, goals, certain), certain)
     near = given if around is None else np.concatenate([given, _complex(around)])
     lattice = _lattice((near - frame.middle) / frame.spread, frame.reach)
     for stiffer in _stiffer(fitted):
@@ -309,10 +319,10 @@ def _check(given: ComplexArray, wanted: ComplexArray) -> None:
             )
 
 
-def _agreeing(given: ComplexArray, wanted: ComplexArray, certain: FloatArray) -> FloatArray:
+def _agreeing(frame: _Frame, goals: ComplexArray, certain: FloatArray) -> FloatArray:
     """Return how far each object agrees with the pose that most of them agree on."""
-    score, misses = _consensus(given, wanted, certain)
-    mirrored, _ = _consensus(given.conj(), wanted, certain)
+    score, misses = _consensus(frame.places, goals, certain, frame.expected)
+    mirrored, _ = _consensus(frame.places.conj(), goals, certain, frame.expected)
     if mirrored - score > _MIRRORED:
         raise InvalidInputError(
             Reason.INVALID_FIELD,
@@ -324,7 +334,7 @@ def _agreeing(given: ComplexArray, wanted: ComplexArray, certain: FloatArray) ->
 
 
 def _consensus(
-    given: ComplexArray, wanted: ComplexArray, certain: FloatArray
+    given: ComplexArray, wanted: ComplexArray, certain: FloatArray, expected: float
 ) -> tuple[float, FloatArray]:
     """Return the logarithmic likelihood of the best pose through two objects, and its misses."""
     first, second = np.triu_indices(len(given), 1)
@@ -336,7 +346,7 @@ def _consensus(
     turns = (wanted[second] - wanted[first]) / (given[second] - given[first])
     shifts = wanted[first] - turns * given[first]
     misses = np.abs(turns[:, None] * given + shifts[:, None] - wanted) ** 2
-    misses /= 2.0 * _DOUBT**2 / len(given)
+    misses /= 2.0 * expected
     scores = -0.5 * (_TAIL + 2.0) * np.log1p(misses / _TAIL) @ certain
     best = int(np.argmax(scores))
     return float(scores[best]), misses[best]
@@ -377,7 +387,7 @@ def _likelihood(frame: _Frame, goals: ComplexArray, shape: _Shape) -> float:
     seen = np.linalg.solve(factor, goals)
     basis, upper = np.linalg.qr(rigid)
     left = seen - basis @ (basis.conj().T @ seen)
-    squares = float(np.vdot(left, left).real) + _DOUBT_COUNTS * _DOUBT**2 / count
+    squares = float(np.vdot(left, left).real) + _DOUBT_COUNTS * frame.expected
     freedom = 2.0 * (count - 2) + _DOUBT_COUNTS
     spent = np.log(np.abs(np.diag(factor))).sum() + np.log(np.abs(np.diag(upper))).sum()
     return -0.5 * freedom * math.log(squares) - 2.0 * float(spent)
@@ -404,7 +414,7 @@ def _solved(
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.complex128)
     solution = inverse[:, :count] @ goals
     squares = max(0.0, float(np.vdot(goals, solution[:count]).real))
-    doubted = _DOUBT_COUNTS * _DOUBT**2 / count
+    doubted = _DOUBT_COUNTS * frame.expected
     return inverse, solution, (squares + doubted) / (2.0 * (count - 2) + _DOUBT_COUNTS)
 
 
