@@ -58,7 +58,9 @@ def true_way(scene: Scene, rng: np.random.Generator) -> FloatArray:
         way = shapely.LineString(low + step * cells).simplify(step)
         if way.length > 0.5 * (high - low).max():
             along = np.linspace(0.0, 1.0, _POINTS)
-            return shapely.get_coordinates(shapely.line_interpolate_point(way, along, True))
+            return shapely.get_coordinates(
+                shapely.line_interpolate_point(way, along, normalized=True)
+            )
 
 
 def drawn_way(
