@@ -26,7 +26,6 @@ from sketchmatch_proto.v1.transfer_service_pb2 import TransferResponse
 
 __all__ = [
     "Carriage",
-    "InvalidRequestError",
     "check_keepout",
     "draw",
     "messages",

@@ -182,6 +182,7 @@ def carry(
     from sketchmatch.cli.answering import answerer
     from sketchmatch.cli.sources import in_metres, source_of
     from sketchmatch.transfers import files
+    from sketchmatch_client import InvalidRequestError
 
     options.refuse_config(config, server)
     files.check_targets(out, keepout, waypoints)
@@ -212,7 +213,7 @@ def carry(
                     answers.append(
                         asked.transfer(*sources, carried.messages(given.features), **chosen)
                     )
-            except (InvalidInputError, carried.InvalidRequestError) as error:
+            except (InvalidInputError, InvalidRequestError) as error:
                 problems.append(error)
         if not answers:
             raise problems[0]
