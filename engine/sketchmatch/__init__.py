@@ -19,35 +19,46 @@ if TYPE_CHECKING:
     from sketchmatch.pipeline.result import MatchResult
     from sketchmatch.pipeline.words import DirectionalRelation, directional_relation
     from sketchmatch.public import (
+        carry,
         compare,
         force_histogram,
         label_force_histograms,
         match,
         read_scene,
+        transfer,
     )
+    from sketchmatch.transfers.features import Feature
+    from sketchmatch.transfers.transfer import TransferResult
 
 __all__ = [
     "Comparison",
     "DirectionalRelation",
     "Engine",
+    "Feature",
     "InvalidInputError",
     "MatchResult",
     "Pin",
     "Progress",
     "Scene",
     "SketchmatchError",
+    "TransferResult",
+    "carry",
     "compare",
     "directional_relation",
     "force_histogram",
     "label_force_histograms",
     "match",
     "read_scene",
+    "transfer",
 ]
 __version__ = "0.1.0"
 
 _HOMES = {
     "Comparison": "sketchmatch.pipeline.compare",
     "Engine": "sketchmatch.pipeline.engine",
+    "Feature": "sketchmatch.transfers.features",
+    "TransferResult": "sketchmatch.transfers.transfer",
+    "carry": "sketchmatch.public",
     "compare": "sketchmatch.public",
     "DirectionalRelation": "sketchmatch.pipeline.words",
     "InvalidInputError": "sketchmatch.errors",
@@ -61,6 +72,7 @@ _HOMES = {
     "label_force_histograms": "sketchmatch.public",
     "match": "sketchmatch.public",
     "read_scene": "sketchmatch.public",
+    "transfer": "sketchmatch.public",
 }
 
 

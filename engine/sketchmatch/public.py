@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,6 +23,7 @@ from sketchmatch.io import read_source
 from sketchmatch.model import (
     BoolArray,
     FloatArray,
+    OccupancyGrid,
     RequestWeights,
     Scene,
     SceneObject,
@@ -33,14 +34,24 @@ from sketchmatch.model.labels import Synonyms
 from sketchmatch.model.limits import source_limits
 from sketchmatch.pipeline.compare import Comparison
 from sketchmatch.pipeline.engine import Engine
-from sketchmatch.pipeline.events import Finished, Progress
+from sketchmatch.pipeline.events import Finished, MatchEvent, Progress
 from sketchmatch.pipeline.knowledge import Pin
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import MatchResult
 from sketchmatch.pipeline.selection import SIDES, STAGES, Choice, Selection, fault_of
-from sketchmatch.pipeline.slices import finish
+from sketchmatch.pipeline.slices import finish, retold
+from sketchmatch.transfers.features import Feature
+from sketchmatch.transfers.transfer import TransferRequest, TransferResult, run_transfer
 
-__all__ = ["compare", "force_histogram", "label_force_histograms", "match", "read_scene"]
+__all__ = [
+    "carry",
+    "compare",
+    "force_histogram",
+    "label_force_histograms",
+    "match",
+    "read_scene",
+    "transfer",
+]
 
 
 def match(
@@ -171,6 +182,154 @@ def match(
         if isinstance(event, Progress) and on_progress is not None:
             on_progress(event)
     raise AssertionError("a match ends with a result or an error")
+
+
+def transfer(
+    sketch: Scene | Source | str | Path,
+    map: Scene | Source | str | Path,  # noqa: A002
+    features: Iterable[Feature] = (),
+    *,
+    object_map: Mapping[int, int] | None = None,
+    direction: str = "sketch-to-map",
+    radius: float | None = None,
+    allow_unknown: bool = False,
+    profile: str | None = None,
+    sketch_segmenter: str | None = None,
+    map_segmenter: str | None = None,
+    params: Mapping[str, Mapping[str, Any]] | None = None,
+    seed: int = 0,
+    time_budget: float | None = None,
+    pins: Mapping[int | str, int | str | None] | Iterable[Pin] | None = None,
+    synonyms: Synonyms | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+    config: str | Path | None = None,
+) -> TransferResult:
+    """Carry points, routes and zones from a sketch to a map, or back, through the matched objects.
+
+    Parameters
+    ----------
+    sketch, map
+        As for :func:`match`.
+    features
+        What is carried, in the coordinates of the scene that it is from, y upwards. A route that is
+        drawn in the sketch is carried without being asked.
+    object_map
+        Which sketched object is which mapped one, where that is known, e.g.
+        ``match(…).object_map``: then nothing is matched.
+    direction
+        ``"sketch-to-map"`` or ``"map-to-sketch"``.
+    radius
+        How far routes are kept away from obstacles: half the width of the robot. On a grid 0 when
+        left out; elsewhere routes are not kept out of objects then.
+    allow_unknown
+        Whether cells that nobody has seen are no obstacles.
+    profile, sketch_segmenter, map_segmenter, params, seed, time_budget, pins, synonyms
+        As for :func:`match`.
+    on_progress
+        Called with the state of the match.
+    config
+        As for :func:`match`.
+
+    Returns
+    -------
+    TransferResult
+        ``carried`` has each feature where it was carried to, the standard deviation of each of its
+        points, and what was changed about it and why.
+
+    Raises
+    ------
+    InvalidInputError
+        If something cannot be used, or the matched objects lie so that every warp folds the plane
+        or mirrors it.
+    AnswerUnavailableError
+        If the time budget ends before there is any map.
+
+    Examples
+    --------
+    >>> box, bar, dot = [[0, 0], [2, 0], [2, 2]], [[5, 0], [9, 0], [9, 1]], [[1, 6], [2, 6], [2, 7]]
+    >>> scene = Scene.from_polygons([box, bar, dot])
+    >>> turned = Scene.from_polygons([[[-y, x] for x, y in p] for p in (dot, box, bar)])
+    >>> found = transfer(scene, turned, [Feature("point", ([[3.0, 1.0]],), "here")])
+    >>> found.features[0].points.round(6).tolist()
+    [[-1.0, 3.0]]
+    """
+    engine = _engine(config)
+    names = {"sketch_segmenter": sketch_segmenter, "map_segmenter": map_segmenter}
+    with engine.limited():
+        matching = MatchRequest(
+            sketch=_loaded("sketch", sketch, engine),
+            map=_loaded("map", map, engine),
+            selection=_selection(names, params or {}),
+            seed=seed,
+            time_budget=time_budget,
+            profile=profile or "",
+            pins=_pins(pins),
+            synonyms=() if synonyms is None else synonyms,  # type: ignore[arg-type]  # it checks
+        )
+    request = TransferRequest(
+        matching,
+        tuple(features),
+        None if object_map is None else tuple(object_map.items()),
+        direction,  # type: ignore[arg-type]  # it checks
+        radius,
+        allow_unknown,
+    )
+    return finish(_told(run_transfer(request, engine), on_progress))
+
+
+def carry(
+    features: Iterable[Feature],
+    old: Scene | Source | str | Path,
+    new: Scene | Source | str | Path,
+    *,
+    segmenter: str | None = None,
+    **options: Any,
+) -> TransferResult:
+    """Carry points, routes and zones of an old map to a new one of the same place.
+
+    Parameters
+    ----------
+    features
+        What is carried, in the coordinates of the old map.
+    old, new
+        The maps, as :func:`match` takes them. The new one may begin elsewhere, be turned, and show
+        some things where they were not.
+    segmenter
+        Finds the objects on both maps. Left out, two grids are compared by their objects and by
+        their rooms, and what tells more is taken.
+    **options
+        As for :func:`transfer`.
+
+    Returns
+    -------
+    TransferResult
+        As :func:`transfer`; the old map is its sketch.
+
+    Raises
+    ------
+    InvalidInputError
+        As :func:`transfer`.
+    """
+    given = tuple(features)
+    engine = _engine(options.get("config"))
+    with engine.limited():
+        maps = _loaded("old", old, engine), _loaded("new", new, engine)
+    known = options.get("object_map") is not None or options.get("pins") is not None
+    names: tuple[str | None, ...] = (segmenter,)
+    if segmenter is None and not known and all(isinstance(each, OccupancyGrid) for each in maps):
+        names = (None, "rooms")
+    found: list[TransferResult] = []
+    problems: list[InvalidInputError] = []
+    for name in names:
+        try:
+            found.append(
+                transfer(*maps, given, sketch_segmenter=name, map_segmenter=name, **options)
+            )
+        except InvalidInputError as error:
+            problems.append(error)
+    if not found:
+        raise problems[0]
+    return min(found, key=lambda each: each.unsureness)
 
 
 def read_scene(
@@ -372,6 +531,20 @@ def label_force_histograms(labels: Any, *, r: float = 0.0, directions: int = 180
 
 
 _PAIR = object_pairs(2)
+
+
+def _told(
+    work: Generator[MatchEvent, None, TransferResult],
+    on_progress: Callable[[Progress], None] | None,
+) -> Generator[MatchEvent, None, TransferResult]:
+    """Go on with a transfer, calling back with its progress."""
+
+    def tell(event: MatchEvent) -> tuple[MatchEvent, ...]:
+        if isinstance(event, Progress) and on_progress is not None:
+            on_progress(event)
+        return (event,)
+
+    return retold(work, tell)
 
 
 def _engine(config: str | Path | None = None) -> Engine:

@@ -8,7 +8,13 @@ from hypothesis import strategies as st
 
 from sketchmatch.app.orders import Order
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch_client import match_request, segment_request, sources
+from sketchmatch_client import (
+    features,
+    match_request,
+    segment_request,
+    sources,
+    transfer_request,
+)
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 
 SCENE = sources.polygons([[[0, 0], [2, 0], [2, 2], [0, 2]], [[5, 0], [9, 0], [9, 1]]])
@@ -47,6 +53,15 @@ def test_an_outline_of_a_segmentation_names_the_form_of_its_source():
     assert request.source.WhichOneof("kind") == "polygon_set"
     assert not request.source.polygon_set.polygons
     assert request.segmenter.name == "polygons"
+
+
+def test_an_outline_of_a_transfer_keeps_what_is_carried():
+    whole = transfer_request(SCENE, FILE, [features.point(1, 2, "dock")], y_axis="down")
+    request = Order("", "TransferRequest", whole.SerializeToString()).outline(LIMIT).request
+    assert not request.sketch.polygon_set.polygons
+    assert request.map == FILE
+    assert request.features == whole.features
+    assert request.y_axis == whole.y_axis
 
 
 @given(st.binary(max_size=60))

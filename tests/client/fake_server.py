@@ -19,6 +19,8 @@ from sketchmatch_proto.v1 import (
     match_service_pb2_grpc,
     scene_service_pb2,
     scene_service_pb2_grpc,
+    transfer_service_pb2,
+    transfer_service_pb2_grpc,
 )
 
 EVENTS = (
@@ -43,6 +45,7 @@ EVENTS = (
 class FakeServer(
     match_service_pb2_grpc.MatchServiceServicer,
     scene_service_pb2_grpc.SceneServiceServicer,
+    transfer_service_pb2_grpc.TransferServiceServicer,
     catalog_service_pb2_grpc.CatalogServiceServicer,
 ):
     """Answers every method, keeps the requests, fails if ``error`` is set."""
@@ -59,6 +62,7 @@ class FakeServer(
             algorithms=[catalog_service_pb2.Algorithm(name="easm")]
         )
         self.info = catalog_service_pb2.GetServerInfoResponse(api_version="sketchmatch.v1")
+        self.transferred = transfer_service_pb2.TransferResponse()
         self.error: status_pb2.Status | None = None
         self.fails = 1_000_000  # times
         self.breaks_off = False
@@ -79,6 +83,10 @@ class FakeServer(
         if self.segments is not None:
             return self.segments
         return scene_service_pb2.SegmentResponse(segmenter=request.segmenter, warnings=["w"])
+
+    def Transfer(self, request, context):
+        self._take(request, context)
+        return self.transferred
 
     def ListAlgorithms(self, request, context):
         self._take(request, context)
@@ -113,6 +121,7 @@ def running(*options: tuple[str, int]) -> Iterator[FakeServer]:
     server = grpc.server(futures.ThreadPoolExecutor(8), options=options)
     match_service_pb2_grpc.add_MatchServiceServicer_to_server(fake, server)
     scene_service_pb2_grpc.add_SceneServiceServicer_to_server(fake, server)
+    transfer_service_pb2_grpc.add_TransferServiceServicer_to_server(fake, server)
     catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(fake, server)
     health_pb2_grpc.add_HealthServicer_to_server(fake.health, server)
     fake.address = f"127.0.0.1:{server.add_insecure_port('127.0.0.1:0')}"

@@ -11,6 +11,7 @@ from sketchmatch_client import (
     Client,
     MatchOptions,
     MatchRow,
+    TransferOptions,
     sources,
 )
 from tests.client.fake_server import EVENTS
@@ -20,7 +21,7 @@ README = (ROOT / "clients" / "python" / "README.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=["one call", "asyncio", "anyio", "tls"])
+@pytest.mark.parametrize("example", EXAMPLES, ids=["one call", "asyncio", "anyio", "carry", "tls"])
 def test_the_examples_run(example, server, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "room.yaml").write_text("image: room.pgm\n", encoding="utf-8")
@@ -75,6 +76,12 @@ def test_every_way_into_a_server_is_listed():
     for name in AccessOptions.__annotations__:
         assert f"`{name}`" in table
         assert f"`SKETCHMATCH_{name.upper()}`" in table
+
+
+def test_every_option_of_a_transfer_is_listed():
+    section = README.partition("\n## Carry routes and zones\n")[2].partition("\n## ")[0]
+    for name in TransferOptions.__annotations__.keys() - MatchOptions.__annotations__.keys():
+        assert f"| `{name}` |" in section
 
 
 def test_every_option_is_listed():

@@ -18,6 +18,7 @@ from sketchmatch_proto.v1 import (
     scene_service_pb2,
     sketch_service_pb2,
     source_pb2,
+    transfer_service_pb2,
 )
 
 FOLDER = Path(__file__).with_name("golden")
@@ -34,6 +35,7 @@ FILES = tuple(
         scene_service_pb2,
         sketch_service_pb2,
         source_pb2,
+        transfer_service_pb2,
     )
 )
 """The contract."""

@@ -91,7 +91,9 @@ def method_comments(tmp_path_factory) -> dict[str, str]:
 
 
 def test_every_method_lists_its_error_codes(method_comments):
-    assert {"Match", "Segment", "ListAlgorithms", "GetServerInfo"} <= set(method_comments)
+    assert {"Match", "Segment", "Transfer", "ListAlgorithms", "GetServerInfo"} <= set(
+        method_comments
+    )
     for method, comment in method_comments.items():
         codes = re.findall(r"^ \* `([A-Z_]+)`: ", comment, re.MULTILINE)
         assert {"UNAVAILABLE", "DEADLINE_EXCEEDED", "UNAUTHENTICATED"} <= set(codes), method

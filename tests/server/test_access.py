@@ -237,6 +237,7 @@ REFUSED = grpc.StatusCode.UNAUTHENTICATED
     [
         "/sketchmatch.v1.MatchService/Match",
         "/sketchmatch.v1.SceneService/Segment",
+        "/sketchmatch.v1.TransferService/Transfer",
         "/sketchmatch.v1.CatalogService/ListAlgorithms",
         "/sketchmatch.v1.CatalogService/GetServerInfo",
         "/sketchmatch.v1.CatalogService/NoSuchMethod",

@@ -14,7 +14,13 @@ from grpc_reflection.v1alpha import reflection_pb2
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sketchmatch_client import Client, match_request, segment_request
+from sketchmatch_client import (
+    Client,
+    features,
+    match_request,
+    segment_request,
+    transfer_request,
+)
 from sketchmatch_proto.v1 import catalog_service_pb2, match_service_pb2, scene_service_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 from tests.processes import server
@@ -23,10 +29,13 @@ from tests.server.harness import ENDLESS, scene, serving
 OURS = {
     "/sketchmatch.v1.MatchService/Match": match_request(scene(3), scene(3)),
     "/sketchmatch.v1.SceneService/Segment": segment_request(scene(3), None, None, None),
+    "/sketchmatch.v1.TransferService/Transfer": transfer_request(
+        scene(3), scene(3), [features.point(1, 2)]
+    ),
     "/sketchmatch.v1.CatalogService/ListAlgorithms": catalog_service_pb2.ListAlgorithmsRequest(),
     "/sketchmatch.v1.CatalogService/GetServerInfo": catalog_service_pb2.GetServerInfoRequest(),
 }
-ADMITTED = [*OURS][:2]
+ADMITTED = [*OURS][:3]
 """They are opened once there is a place for them."""
 
 HEALTH = "/grpc.health.v1.Health/Check"

@@ -7,7 +7,13 @@ from contextlib import aclosing
 
 import pytest
 
-from sketchmatch_client import AsyncClient, CallCancelledError, Client, DeadlineExceededError
+from sketchmatch_client import (
+    AsyncClient,
+    CallCancelledError,
+    Client,
+    DeadlineExceededError,
+    features,
+)
 from tests.pace import slowness, within
 from tests.server import probes
 from tests.server.harness import ENDLESS, in_loop, kinds, scene, serving, when_there_is_room
@@ -85,6 +91,25 @@ def test_a_deadline_stops_the_search_within_100_ms(recorded):
 
     with Client(recorded) as client:
         assert_prompt([latency(client) for _ in range(5)])
+
+
+@pytest.mark.parametrize("leaves", ["deadline", "cancel"])
+def test_a_transfer_that_is_left_stops_its_search(recorded, leaves):
+    given = (scene(30), scene(30, 1), [features.point(1, 1)])
+
+    async def left():
+        async with AsyncClient(recorded) as client:
+            limit = 1.0 if leaves == "deadline" else None
+            task = asyncio.create_task(client.transfer(*given, timeout=limit, **OPTIONS))
+            await asyncio.to_thread(probes.started.get, timeout=60)
+            if leaves == "cancel":
+                task.cancel()
+            expected = DeadlineExceededError if limit else asyncio.CancelledError
+            with pytest.raises(expected):
+                await task
+        return await asyncio.to_thread(probes.ended.get, timeout=5 * slowness())
+
+    in_loop(left()).result(60)
 
 
 def test_a_client_that_vanishes_stops_its_search(recorded):

@@ -45,6 +45,8 @@ def test_the_package_loads_nothing_but_itself():
         ["--help"],
         ["--version"],
         ["match", "--help"],
+        ["transfer", "--help"],
+        ["carry", "--help"],
         ["serve", "--help"],
         ["plugins", "list", "--help"],
     ],

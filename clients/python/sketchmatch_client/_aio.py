@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Mapping
 from contextlib import aclosing
 from functools import cached_property
 from types import TracebackType
@@ -33,6 +33,7 @@ from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, t
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
 from sketchmatch_client._retry import Attempts, checked_retries
 from sketchmatch_client._sketch import AsyncSketch, create_request
+from sketchmatch_client._transfer import TransferOptions, transfer_request
 from sketchmatch_client.errors import (
     DeadlineExceededError,
     ServerUnavailableError,
@@ -60,11 +61,14 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
 from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceStub
 from sketchmatch_proto.v1.sketch_service_pb2_grpc import SketchServiceStub
 from sketchmatch_proto.v1.source_pb2 import Source
+from sketchmatch_proto.v1.transfer_service_pb2 import Feature, TransferResponse
+from sketchmatch_proto.v1.transfer_service_pb2_grpc import TransferServiceStub
 
 if TYPE_CHECKING:  # these exist for type checkers alone
     from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceAsyncStub
     from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceAsyncStub
     from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceAsyncStub
+    from sketchmatch_proto.v1.transfer_service_pb2_grpc import TransferServiceAsyncStub
 
 __all__ = ["AsyncClient"]
 
@@ -221,6 +225,22 @@ class AsyncClient:
         request = create_request(map, y_axis, **options)
         made = await self._sketched("CreateSketch", request, timeout)
         return AsyncSketch(self, made.sketch_id)
+
+    async def transfer(
+        self,
+        sketch: Source,
+        map: Source,  # noqa: A002
+        features: Iterable[Feature] = (),
+        *,
+        timeout: float | None = None,
+        **options: Unpack[TransferOptions],
+    ) -> TransferResponse:
+        """Carry points, routes and zones; see :meth:`Client.transfer`."""
+        request = transfer_request(sketch, map, features, **options)
+        stub = cast("TransferServiceAsyncStub", TransferServiceStub(self._channel))
+        return await self._asked(
+            lambda limit: stub.Transfer(request, timeout=limit, metadata=self._metadata), timeout
+        )
 
     async def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""

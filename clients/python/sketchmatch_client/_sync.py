@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
 from typing import Any, Self, TypeVar, Unpack
 
@@ -30,6 +30,7 @@ from sketchmatch_client._match import Match, ProgressCallback
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
 from sketchmatch_client._retry import Attempts, checked_retries
 from sketchmatch_client._sketch import Sketch, create_request
+from sketchmatch_client._transfer import TransferOptions, transfer_request
 from sketchmatch_client.errors import (
     DeadlineExceededError,
     ServerUnavailableError,
@@ -56,6 +57,8 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
 from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceStub
 from sketchmatch_proto.v1.sketch_service_pb2_grpc import SketchServiceStub
 from sketchmatch_proto.v1.source_pb2 import Source
+from sketchmatch_proto.v1.transfer_service_pb2 import Feature, TransferResponse
+from sketchmatch_proto.v1.transfer_service_pb2_grpc import TransferServiceStub
 
 __all__ = ["Client"]
 
@@ -327,6 +330,41 @@ class Client:
         request = create_request(map, y_axis, **options)
         made = self._sketched("CreateSketch", request, timeout)
         return Sketch(self, made.sketch_id)
+
+    def transfer(
+        self,
+        sketch: Source,
+        map: Source,  # noqa: A002
+        features: Iterable[Feature] = (),
+        *,
+        timeout: float | None = None,
+        **options: Unpack[TransferOptions],
+    ) -> TransferResponse:
+        """Carry points, routes and zones from a sketch to a map, back, or to a new map.
+
+        Parameters
+        ----------
+        sketch, map
+            From :mod:`sketchmatch_client.sources`; of two maps the old one is the sketch.
+        features
+            From :mod:`sketchmatch_client.features`. A route that is drawn in a sketch is carried
+            without being asked.
+        timeout
+            Seconds after which the call fails.
+        **options
+            The object map where it is known, direction, radius …, and all that a match takes but
+            ``alternatives``: :class:`TransferOptions`.
+
+        Returns
+        -------
+        TransferResponse
+            The carried features, each point with its standard deviation, and why what was changed.
+        """
+        request = transfer_request(sketch, map, features, **options)
+        stub = TransferServiceStub(self._channel)
+        return self._asked(
+            lambda limit: stub.Transfer(request, timeout=limit, metadata=self._metadata), timeout
+        )
 
     def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from contextlib import closing
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -31,11 +31,12 @@ from sketchmatch.model import Scene, SceneDescriptor
 from sketchmatch.model import Source as AnySource
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.describe import in_directions
-from sketchmatch.pipeline.events import Accepted
+from sketchmatch.pipeline.events import Accepted, MatchEvent, Progress
 from sketchmatch.pipeline.former import Former
 from sketchmatch.pipeline.selection import Choice, chosen_algorithms, stage_of
-from sketchmatch.pipeline.slices import finish
+from sketchmatch.pipeline.slices import finish, retold
 from sketchmatch.registry import Registered, RegisteredReader
+from sketchmatch.transfers.transfer import run_transfer
 from sketchmatch_proto.v1.match_pb2 import AlternativeMap, MatchResult
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from sketchmatch_proto.v1.scene_service_pb2 import (
@@ -46,6 +47,7 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
 )
 from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest, SketchObjects
 from sketchmatch_proto.v1.source_pb2 import Source
+from sketchmatch_proto.v1.transfer_service_pb2 import TransferRequest
 
 __all__ = ["Job", "algorithms", "answers", "time_budget"]
 
@@ -97,6 +99,8 @@ def answers(
             return _put_scene(job.request, setup)
         case CreateSketchRequest():
             return _map_of_sketch(job, job.request, setup)
+        case TransferRequest():
+            return _transfer(job, job.request, setup, begun)
     raise TypeError(f"a {type(job.request).__name__} is no request for work")
 
 
@@ -111,7 +115,7 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
         request = request.match
     readers = setup.engine.registry.readers
     match request:
-        case MatchRequest():
+        case MatchRequest() | TransferRequest():
             selection, profile = requests.selection(request), request.pipeline.profile
             types = {
                 "sketch_segmenter": requests.source_type(request.sketch, readers),
@@ -143,7 +147,7 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
 
 def time_budget(job: Job, setup: Setup) -> float | None:
     """Return the seconds that a job may take, or None for no limit."""
-    if isinstance(job.request, MatchRequest):
+    if isinstance(job.request, MatchRequest | TransferRequest):
         return requests.time_budget(job.request, setup.limits)
     return None
 
@@ -160,14 +164,50 @@ def _match(
         value = replace(value, former=_former(*job.former))
     writer, clock = responses.ResponseWriter(value), Clock(value.time_budget)
     begun(clock)
-    with requests.paths_of(request), closing(engine.match(value, job.id, clock)) as events:
-        try:
-            for event in events:
-                yield writer.response(event)
-        except AnswerUnavailableError:
-            if clock.curtailed:
-                raise ServerStoppingError("the server stopped before any answer") from None
-            raise
+    with (
+        requests.paths_of(request),
+        _stopping(clock),
+        closing(engine.match(value, job.id, clock)) as events,
+    ):
+        for event in events:
+            yield writer.response(event)
+
+
+def _transfer(
+    job: Job, request: TransferRequest, setup: Setup, begun: Callable[[Clock], None]
+) -> Generator[Message, None, None]:
+    """Carry features; before the response there is the progress of the match, a sign of life."""
+    engine = setup.engine
+    with engine.limited():
+        value = requests.transfer_request(
+            request, setup.limits, engine.registry.readers, _stored(job, setup)
+        )
+    writer, clock = responses.ResponseWriter(value.match), Clock(value.match.time_budget)
+    begun(clock)
+    with (
+        requests.paths_of(request),
+        _stopping(clock),
+        closing(run_transfer(value, engine, job.id, clock)) as work,
+    ):
+        found = yield from retold(work, lambda event: _progress(event, writer))
+    yield responses.transferred(found)
+
+
+def _progress(event: MatchEvent, writer: responses.ResponseWriter) -> Iterator[Message]:
+    told = writer.response(event)  # of each event: progress names what earlier ones found
+    if isinstance(event, Progress):
+        yield told
+
+
+@contextmanager
+def _stopping(clock: Clock) -> Iterator[None]:
+    """Say that the server stopped, where that ended the time."""
+    try:
+        yield
+    except AnswerUnavailableError:
+        if clock.curtailed:
+            raise ServerStoppingError("the server stopped before any answer") from None
+        raise
 
 
 def _stored(job: Job, setup: Setup) -> requests.Stored:

@@ -14,17 +14,23 @@ from sketchmatch_proto.v1 import source_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from sketchmatch_proto.v1.scene_service_pb2 import PutSceneRequest, SegmentRequest
 from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest
+from sketchmatch_proto.v1.transfer_service_pb2 import TransferRequest
 
 __all__ = ["Order"]
 
 _Request: TypeAlias = (
-    type[MatchRequest] | type[SegmentRequest] | type[PutSceneRequest] | type[CreateSketchRequest]
+    type[MatchRequest]
+    | type[SegmentRequest]
+    | type[PutSceneRequest]
+    | type[CreateSketchRequest]
+    | type[TransferRequest]
 )
 _KINDS: tuple[_Request, ...] = (
     MatchRequest,
     SegmentRequest,
     PutSceneRequest,
     CreateSketchRequest,
+    TransferRequest,
 )
 _TYPES = {kind.DESCRIPTOR.name: kind for kind in _KINDS}
 _MATCH = MatchRequest.DESCRIPTOR
@@ -43,7 +49,8 @@ class Order:
     id
         A name that no other order of the application has.
     kind
-        Name of the message: MatchRequest, SegmentRequest, PutSceneRequest or CreateSketchRequest.
+        Name of the message: MatchRequest, SegmentRequest, PutSceneRequest, CreateSketchRequest or
+        TransferRequest.
     data
         The message, perhaps compressed.
     caller

@@ -31,12 +31,15 @@ from sketchmatch.pipeline.knowledge import Pin
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import STAGES, Choice, Selection
 from sketchmatch.registry import RegisteredReader
+from sketchmatch.transfers.features import Feature, FeatureKind
+from sketchmatch.transfers.transfer import Direction, TransferRequest
 from sketchmatch_proto.v1 import (
     match_pb2,
     match_service_pb2,
     pipeline_pb2,
     scene_service_pb2,
     source_pb2,
+    transfer_service_pb2,
 )
 
 __all__ = [
@@ -50,10 +53,12 @@ __all__ = [
     "source",
     "source_type",
     "time_budget",
+    "transfer_request",
 ]
 
 Stored: TypeAlias = Callable[[str, str], Segmentation]
 """Finds a stored scene by its name; the other text is the path of the field that names it."""
+_Matching = match_service_pb2.MatchRequest | transfer_service_pb2.TransferRequest
 
 _KINDS = "stroke_set, polygon_set, occupancy_grid, map_server_map, image or file"
 _OPTIONS = ("alternatives", "allow_unmatched", "unmatched_price")
@@ -70,7 +75,7 @@ _TYPES: dict[str, type[Source]] = {
 
 
 def match_request(
-    request: match_service_pb2.MatchRequest,
+    request: _Matching,
     limits: RequestLimits,
     readers: Sequence[RegisteredReader] = (),
     stored: Stored | None = None,
@@ -109,7 +114,7 @@ def match_request(
 
 
 def _side(
-    request: match_service_pb2.MatchRequest,
+    request: _Matching,
     side: Literal["sketch", "map"],
     readers: Sequence[RegisteredReader],
     stored: Stored | None,
@@ -121,7 +126,33 @@ def _side(
     return source(message, side, request.HasField(side), readers)
 
 
-def selection(request: match_service_pb2.MatchRequest) -> Selection:
+def transfer_request(
+    request: transfer_service_pb2.TransferRequest,
+    limits: RequestLimits,
+    readers: Sequence[RegisteredReader] = (),
+    stored: Stored | None = None,
+) -> TransferRequest:
+    """Read a request to carry something, within some limits; see :func:`match_request`.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be used, with the path of the field.
+    """
+    there = transfer_service_pb2.TransferDirection.Name(request.direction)
+    back = there == "TRANSFER_DIRECTION_MAP_TO_SKETCH"
+    pairs = tuple((each.sketch_object, each.map_object) for each in request.object_map)
+    return TransferRequest(
+        match=match_request(request, limits, readers, stored),
+        features=_features(request),
+        object_map=pairs or None,
+        direction=Direction.MAP_TO_SKETCH if back else Direction.SKETCH_TO_MAP,
+        radius=request.radius if request.HasField("radius") else None,
+        allow_unknown=request.allow_unknown,
+    )
+
+
+def selection(request: _Matching) -> Selection:
     """Read what is asked for in each stage."""
     return {stage: choice(getattr(request.pipeline, stage)) for stage in STAGES}
 
@@ -222,7 +253,7 @@ def file_kind(message: source_pb2.Source, readers: Sequence[RegisteredReader]) -
         return None
 
 
-def time_budget(request: match_service_pb2.MatchRequest, limits: RequestLimits) -> float | None:
+def time_budget(request: _Matching, limits: RequestLimits) -> float | None:
     """Read how many seconds a match may take, or None for no limit.
 
     Raises
@@ -244,9 +275,7 @@ def time_budget(request: match_service_pb2.MatchRequest, limits: RequestLimits) 
 
 @contextmanager
 def paths_of(
-    request: match_service_pb2.MatchRequest
-    | scene_service_pb2.SegmentRequest
-    | scene_service_pb2.PutSceneRequest,
+    request: _Matching | scene_service_pb2.SegmentRequest | scene_service_pb2.PutSceneRequest,
 ) -> Iterator[None]:
     """Give errors of the engine, which knows decoded sources alone, the paths of a request."""
     try:
@@ -307,6 +336,38 @@ def _reference(message: match_service_pb2.ObjectReference, field: str) -> int | 
     if kind is None:
         raise InvalidInputError(Reason.MISSING_FIELD, field, "is not set; give index or label")
     return message.index if kind == "index" else message.label
+
+
+def _features(request: transfer_service_pb2.TransferRequest) -> tuple[Feature, ...]:
+    given = request.features
+    lines = (each.route.points for each in given)
+    rings = (ring.points for each in given for ring in each.zone.rings)
+    check_vertices(sum(map(len, lines)) + sum(map(len, rings)), "features")
+    upward = _upward(request.y_axis)
+    return tuple(_feature(each, f"features[{k}]", upward) for k, each in enumerate(given))
+
+
+def _feature(message: transfer_service_pb2.Feature, field: str, upward: float) -> Feature:
+    kind = message.WhichOneof("kind")
+    if kind is None:
+        raise InvalidInputError(
+            Reason.MISSING_FIELD, field, "is not set; give point, route or zone"
+        )
+    speeds = None
+    if kind == "point":
+        rings = [_points([message.point], upward)]
+    elif kind == "route":
+        rings = [_points(message.route.points, upward)]
+        if message.route.speeds_meters_per_second:
+            speeds = np.array(message.route.speeds_meters_per_second)
+    else:
+        rings = [_points(ring.points, upward) for ring in message.zone.rings]
+    try:
+        return Feature(FeatureKind(kind), tuple(rings), message.name, speeds)
+    except InvalidInputError as error:
+        path = "speeds_meters_per_second" if error.field == "speeds" else error.field
+        path = f"{field}.{kind}" if kind == "point" else f"{field}.{kind}.{path}"
+        raise InvalidInputError(error.reason, path, error.problem) from None
 
 
 def _stroke_set(message: source_pb2.StrokeSet) -> StrokeSet:

@@ -40,6 +40,8 @@ from sketchmatch.pipeline.selection import (
     default_parameters,
 )
 from sketchmatch.registry import Kind, PluginStatus, Registered, RegisteredReader, Registry
+from sketchmatch.transfers.features import Carried, Feature, FeatureKind
+from sketchmatch.transfers.transfer import TransferResult
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     match_pb2,
@@ -48,6 +50,7 @@ from sketchmatch_proto.v1 import (
     scene_pb2,
     scene_service_pb2,
     source_pb2,
+    transfer_service_pb2,
 )
 
 __all__ = [
@@ -60,6 +63,7 @@ __all__ = [
     "selection",
     "server_info",
     "stored_scene",
+    "transferred",
 ]
 
 _SOURCE_KINDS = {
@@ -401,3 +405,61 @@ def _plugin(status: PluginStatus) -> catalog_service_pb2.Plugin:
         state=catalog_service_pb2.PluginState.Value(f"PLUGIN_STATE_{status.state}"),
         reason=status.reason,
     )
+
+
+def transferred(value: TransferResult) -> transfer_service_pb2.TransferResponse:
+    """Return what became of a transfer as a message."""
+    warp = value.warp
+    return transfer_service_pb2.TransferResponse(
+        features=[_carried(each, k < value.drawn) for k, each in enumerate(value.carried)],
+        warp=transfer_service_pb2.Warp(
+            kind=transfer_service_pb2.WarpKind.Value(f"WARP_KIND_{warp.kind.name}"),
+            rotation_radians=warp.rotation,
+            scale=warp.scale,
+            residual=warp.residual,
+            weights=warp.weights,
+        ),
+        object_map=[
+            transfer_service_pb2.Partners(sketch_object=a, map_object=b)
+            for a, b in value.object_map
+        ],
+        scenes=_scenes(Segmented(value.sketch, value.map)),
+        match=None if value.match is None else result(value.match),
+    )
+
+
+def _carried(value: Carried, drawn: bool) -> transfer_service_pb2.CarriedFeature:
+    return transfer_service_pb2.CarriedFeature(
+        feature=_feature(value.feature, value.name),
+        lines=[
+            transfer_service_pb2.CarriedPoints(deviations=deviations, sources=sources)
+            for deviations, sources in zip(value.deviations, value.sources, strict=True)
+        ],
+        changes=[
+            transfer_service_pb2.FeatureChange(
+                reason=transfer_service_pb2.ChangeReason.Value(f"CHANGE_REASON_{each.reason.name}"),
+                first_point=each.first,
+                last_point=each.last,
+                sentence=each.sentence,
+            )
+            for each in value.changes
+        ],
+        drawn=drawn,
+    )
+
+
+def _feature(value: Feature | None, name: str) -> transfer_service_pb2.Feature:
+    message = transfer_service_pb2.Feature(name=name)
+    if value is None:
+        return message
+    match value.kind:
+        case FeatureKind.POINT:
+            message.point.CopyFrom(_points(value.points)[0])
+        case FeatureKind.ROUTE:
+            message.route.points.extend(_points(value.points))
+            if value.speeds is not None:
+                message.route.speeds_meters_per_second.extend(value.speeds)
+        case FeatureKind.ZONE:
+            rings = [source_pb2.Ring(points=_points(ring)) for ring in value.rings]
+            message.zone.rings.extend(rings)
+    return message

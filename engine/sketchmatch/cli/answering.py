@@ -5,7 +5,7 @@ Either takes the client's options and gives the contract's messages.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Unpack, cast
@@ -18,13 +18,16 @@ from sketchmatch_client import (
     Client,
     InvalidRequestError,
     MatchOptions,
+    TransferOptions,
     match_request,
     segment_request,
+    transfer_request,
 )
 from sketchmatch_proto.v1.catalog_service_pb2 import ListAlgorithmsResponse
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 from sketchmatch_proto.v1.scene_service_pb2 import SegmentResponse
 from sketchmatch_proto.v1.source_pb2 import Source
+from sketchmatch_proto.v1.transfer_service_pb2 import Feature, TransferResponse
 
 if TYPE_CHECKING:
     from sketchmatch.app.application import Application
@@ -52,6 +55,15 @@ class Answerer(Protocol):
         profile: str | None = None,
     ) -> SegmentResponse:
         """Find the objects of one source."""
+
+    def transfer(
+        self,
+        sketch: Source,
+        map: Source,  # noqa: A002
+        features: Iterable[Feature] = (),
+        **options: Unpack[TransferOptions],
+    ) -> TransferResponse:
+        """Carry features from one scene to the other."""
 
     def algorithms(self) -> ListAlgorithmsResponse:
         """Return what there is to choose from."""
@@ -164,6 +176,20 @@ class _Here:
     ) -> SegmentResponse:
         (response,) = self._app.answers(segment_request(source, segmenter, params, profile))
         return cast(SegmentResponse, response)
+
+    def transfer(
+        self,
+        sketch: Source,
+        map: Source,  # noqa: A002
+        features: Iterable[Feature] = (),
+        **options: Unpack[TransferOptions],
+    ) -> TransferResponse:
+        from sketchmatch.pipeline.warmup import announcing_compilation
+
+        request = transfer_request(sketch, map, features, **options)
+        with announcing_compilation(say), closing(self._app.answers(request)) as responses:
+            *_, response = responses
+        return cast(TransferResponse, response)
 
     def algorithms(self) -> ListAlgorithmsResponse:
         return self._app.algorithms()

@@ -28,6 +28,7 @@ from sketchmatch.cli import (
     serve,
     status,
     tokens,
+    transfer,
 )
 from sketchmatch.errors import (
     AnswerUnavailableError,
@@ -50,6 +51,8 @@ app.command("match")(match.match)
 app.command("segment")(segment.segment)
 app.command("describe")(describe.describe)
 app.command("relate")(relate.relate)
+app.command("transfer")(transfer.transfer)
+app.command("carry")(transfer.carry)
 app.command("serve")(serve.serve)
 app.command("health")(health.health)
 app.command("status")(status.status)

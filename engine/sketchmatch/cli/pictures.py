@@ -33,37 +33,49 @@ from sketchmatch_proto.v1.source_pb2 import Point
 if TYPE_CHECKING:
     from sketchmatch.cli.inspection import Description
 
-__all__ = ["check_path", "draw_description", "draw_match", "draw_segmentation", "scene_of"]
+__all__ = [
+    "check_path",
+    "draw_description",
+    "draw_match",
+    "draw_segmentation",
+    "grid_in",
+    "matched_pairs",
+    "scene_of",
+]
 
 check_path = check_picture_path
 
 
 def draw_match(match: Match, map_path: Path, target: Path, metres: bool) -> None:
     """Draw both scenes of a match, a robot's map under its objects, and save the picture."""
-    pairs = [
-        OverlayMatch(
-            line.sketch_object, line.map_object, line.probability, likely(line.probability)
-        )
-        if line.HasField("probability")
-        else OverlayMatch(line.sketch_object, line.map_object, line.confidence)
-        for line in match.result.object_matches
-    ]
     picture = draw_overlay(
         scene_of(match.scenes.sketch),
         scene_of(match.scenes.map),
-        pairs,
+        matched_pairs(match.result),
         facts=facts(match.result, metres),
         alert=doubt(match),
         footnote=_meaning(match.result),
-        underlay=None if is_kept(map_path) else _grid(map_path),
+        underlay=None if is_kept(map_path) else grid_in(map_path),
         route=_way(match.scenes.sketch_route),
     )
     save_overlay(target, picture)
 
 
+def matched_pairs(result: match_pb2.MatchResult) -> list[OverlayMatch]:
+    """Return the lines of an object map as pictures show them."""
+    return [
+        OverlayMatch(
+            line.sketch_object, line.map_object, line.probability, likely(line.probability)
+        )
+        if line.HasField("probability")
+        else OverlayMatch(line.sketch_object, line.map_object, line.confidence)
+        for line in result.object_matches
+    ]
+
+
 def draw_segmentation(response: SegmentResponse, source: Path, target: Path, pen: bool) -> None:
     """Draw the objects of one scene, by a pen or not, numbered, and the route; save the picture."""
-    grid = _grid(source)
+    grid = grid_in(source)
     route = _way(response.route)
     picture = draw_scene(scene_of(response.scene), underlay=grid, pen=pen, route=route)
     save_overlay(target, picture)
@@ -91,7 +103,7 @@ def draw_description(found: Description, source: Path, target: Path) -> None:
         relations,
         left_out=[found.pairs[k] for k in left_out],
         caption=f"{kind}, each drawn to its own peak; an arrow marks the main direction",
-        underlay=_grid(source),
+        underlay=grid_in(source),
         pen=isinstance(found.source, StrokeSet),
     )
     save_overlay(target, picture, "--plot")
@@ -128,7 +140,7 @@ def _way(points: Sequence[Point]) -> FloatArray | None:
     return np.array([(point.x, point.y) for point in points]) if points else None
 
 
-def _grid(path: Path) -> OccupancyGrid | None:
+def grid_in(path: Path) -> OccupancyGrid | None:
     """Return the robot's map in a file, if it is one."""
     if (files := read_map_files(path)) is not None:
         return files.grid()

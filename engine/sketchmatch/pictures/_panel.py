@@ -11,6 +11,7 @@ import shapely
 
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene
 from sketchmatch.pictures._canvas import Box, Canvas, printable
+from sketchmatch.pictures._markings import Marking, draw_markings
 from sketchmatch.pictures._palette import Colour, mixed, readable_on
 from sketchmatch.pictures._places import Place, badge_places, label_places
 from sketchmatch.pictures._underlay import known_area, painted_cells
@@ -62,6 +63,8 @@ class Panel:
         Height of the numbers' badges.
     route
         The way through the scene, shape (k, 2), or None.
+    markings
+        Points, routes and zones over the objects.
     """
 
     name: str
@@ -72,6 +75,7 @@ class Panel:
     metres: bool = False
     badge: float = 28.0
     route: FloatArray | None = None
+    markings: Sequence[Marking] = ()
 
     def colour(self, index: int) -> Colour:
         """Return an object's colour."""
@@ -80,8 +84,9 @@ class Panel:
     def area(self) -> Box:
         """Return what is worth showing, in scene units: what is drawn and the room around it."""
         x0, y0, x1, y1 = self.scene.bounds
-        if self.route is not None:
-            (u0, v0), (u1, v1) = self.route.min(axis=0).tolist(), self.route.max(axis=0).tolist()
+        lines = [ring for each in self.markings for ring in each.rings]
+        for line in lines if self.route is None else [self.route, *lines]:
+            (u0, v0), (u1, v1) = line.min(axis=0).tolist(), line.max(axis=0).tolist()
             x0, y0, x1, y1 = min(x0, u0), min(y0, v0), max(x1, u1), max(y1, v1)
         if self.underlay is None:
             return (x0, y0, x1, y1)
@@ -128,6 +133,7 @@ def draw_panel(canvas: Canvas, panel: Panel, box: Box) -> None:
         draw_object(canvas, rings[k], colour, pen=pen, over_cells=over_cells)
     if panel.route is not None:
         _draw_route(canvas, frame.rings([panel.route])[0])
+    draw_markings(canvas, panel.markings, frame.rings, frame.scale, box)
     if panel.metres:
         _draw_scale_bar(canvas, frame.scale, box)
     _draw_names(canvas, panel, [shapely.Polygon(ring[0], ring[1:]) for ring in rings], box)

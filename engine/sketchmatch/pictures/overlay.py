@@ -18,6 +18,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io._targets import check_target, writing
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene
 from sketchmatch.pictures._canvas import printable
+from sketchmatch.pictures._markings import Marking
 from sketchmatch.pictures._page import Entry, Page
 from sketchmatch.pictures._palette import pair_colour
 from sketchmatch.pictures._panel import Panel, badge_size
@@ -25,6 +26,7 @@ from sketchmatch.pictures._plots import MOST_PLOTS, Plot, RelationsPage
 
 __all__ = [
     "MOST_PLOTS",
+    "Marking",
     "OverlayMatch",
     "OverlayRelation",
     "check_picture_path",
@@ -98,6 +100,9 @@ def draw_overlay(
     underlay: OccupancyGrid | None = None,
     metres: bool | None = None,
     route: FloatArray | None = None,
+    names: tuple[str, str] = ("Sketch", "Map"),
+    sketch_underlay: OccupancyGrid | None = None,
+    markings: tuple[Sequence[Marking], Sequence[Marking]] = ((), ()),
     width: int = 1600,
 ) -> Image.Image:
     """Draw both scenes side by side, matched objects in the same colour.
@@ -123,6 +128,13 @@ def draw_overlay(
         Whether the map is in metres and gets a scale bar; with an underlay when left out.
     route
         Shape (k, 2), two points or more: a way through the sketch, drawn as a light dashed arrow.
+    names
+        What the two scenes are called.
+    sketch_underlay
+        The grid that the sketch was made from, where it is a map too.
+    markings
+        Points, routes and zones in both, with how sure their places are: a shade reaches to two
+        standard deviations.
     width
         Of the picture, in pixels, 400 … 6400. The height follows from the content.
 
@@ -144,8 +156,25 @@ def draw_overlay(
     mapped = {match.map_object: colour for match, colour in zip(matches, colours, strict=True)}
     badge = badge_size(max(len(sketch), len(map)))
     panels = [
-        Panel("Sketch", sketch, drawn, pen=True, route=route, badge=badge),
-        Panel("Map", map, mapped, underlay, metres=_in_metres(metres, underlay), badge=badge),
+        Panel(
+            names[0],
+            sketch,
+            drawn,
+            sketch_underlay,
+            pen=sketch_underlay is None,
+            route=route,
+            badge=badge,
+            markings=markings[0],
+        ),
+        Panel(
+            names[1],
+            map,
+            mapped,
+            underlay,
+            metres=_in_metres(metres, underlay),
+            badge=badge,
+            markings=markings[1],
+        ),
     ]
     entries = [
         Entry(

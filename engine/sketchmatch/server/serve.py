@@ -28,7 +28,7 @@ from sketchmatch.server.metrics import Metric, Metrics, MetricsInterceptor
 from sketchmatch.server.monitor import Monitor
 from sketchmatch.server.notify import notify
 from sketchmatch.server.readiness import Readiness
-from sketchmatch.server.services import CatalogService, MatchService, SceneService
+from sketchmatch.server.services import CatalogService, MatchService, SceneService, TransferService
 from sketchmatch.server.sketching import SketchService
 from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
 from sketchmatch.server.tokens import read_tokens
@@ -40,6 +40,7 @@ from sketchmatch_proto.v1 import (
     match_service_pb2,
     scene_service_pb2,
     sketch_service_pb2,
+    transfer_service_pb2,
 )
 
 __all__ = ["ServerSettings", "serve"]
@@ -58,12 +59,19 @@ _SERVICES = (
     scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name,
     catalog_service_pb2.DESCRIPTOR.services_by_name["CatalogService"].full_name,
     sketch_service_pb2.DESCRIPTOR.services_by_name["SketchService"].full_name,
+    transfer_service_pb2.DESCRIPTOR.services_by_name["TransferService"].full_name,
 )
 
 
 _METHODS = tuple(
     f"/{service.full_name}/{method.name}"
-    for file in (match_service_pb2, scene_service_pb2, catalog_service_pb2, sketch_service_pb2)
+    for file in (
+        match_service_pb2,
+        scene_service_pb2,
+        catalog_service_pb2,
+        sketch_service_pb2,
+        transfer_service_pb2,
+    )
     for service in file.DESCRIPTOR.services_by_name.values()
     for method in service.methods
 )
@@ -353,8 +361,9 @@ def _add_services(
     server: grpc.aio.Server, app: Application, readiness: Readiness, metrics: Metrics
 ) -> None:
     matching, scenes = MatchService(app, metrics.matched), SceneService(app)
-    server.add_generic_rpc_handlers((matching.handler(), scenes.handler()))
-    server.add_generic_rpc_handlers((SketchService(app).handler(),))
+    others = TransferService(app), SketchService(app)
+    handlers = (each.handler() for each in (matching, scenes, *others))
+    server.add_generic_rpc_handlers(tuple(handlers))
     catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), server)
     health_pb2_grpc.add_HealthServicer_to_server(readiness.servicer, server)
     reflection.enable_server_reflection(

@@ -21,6 +21,7 @@ from sketchmatch_proto.v1 import (
     match_pb2,
     match_service_pb2,
     scene_service_pb2,
+    transfer_service_pb2,
 )
 from sketchmatch_proto.v1.match_pb2 import MatchAccepted, MatchResult
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
@@ -36,12 +37,14 @@ __all__ = [
     "CatalogService",
     "MatchService",
     "SceneService",
+    "TransferService",
     "answering",
     "caller_from",
     "handler_of",
 ]
 
 _MATCH = match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name
+_TRANSFER = transfer_service_pb2.DESCRIPTOR.services_by_name["TransferService"].full_name
 _SCENE = scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name
 
 _LENGTH_DELIMITED = 2
@@ -119,6 +122,27 @@ class SceneService:
             UpdateScene=answering(UpdateSceneRequest, self._app.scenes.update),
             DeleteScene=answering(DeleteSceneRequest, self._app.scenes.delete),
         )
+
+
+class TransferService:
+    """Carries features from one scene to another; requests and responses pass as they come."""
+
+    def __init__(self, app: Application) -> None:
+        self._app = app
+
+    async def Transfer(self, request: bytes, context: _Context) -> bytes:  # noqa: N802
+        """Carry, and return what became of it: the last that is told."""
+        answer = b""
+        with self._app.running("TransferRequest", request, caller_from(context)) as task:
+            note(match=task.id)
+            async with aclosing(followed(task.log)) as told:
+                async for response in told:
+                    answer = response
+        return answer
+
+    def handler(self) -> grpc.GenericRpcHandler:
+        """Return what answers the calls of the service."""
+        return handler_of(_TRANSFER, Transfer=grpc.unary_unary_rpc_method_handler(self.Transfer))
 
 
 class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):

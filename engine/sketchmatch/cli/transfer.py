@@ -1,0 +1,224 @@
+"""``sketchmatch transfer`` and ``sketchmatch carry``."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sketchmatch.cli import options
+from sketchmatch.cli.output import answering
+from sketchmatch.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from sketchmatch_client import TransferOptions
+
+__all__ = ["carry", "transfer"]
+
+
+class _Direction(StrEnum):
+    SKETCH_TO_MAP = "sketch-to-map"
+    MAP_TO_SKETCH = "map-to-sketch"
+
+
+_Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="FILE", help="Save what was carried, in .geojson."),
+]
+_Keepout = Annotated[
+    Path | None,
+    typer.Option(
+        "--keepout",
+        metavar="FILE",
+        help="Save the zones as a mask for nav2's keep-out filter: .yaml, and a .pgm beside it.",
+    ),
+]
+_Waypoints = Annotated[
+    Path | None,
+    typer.Option(
+        "--waypoints",
+        metavar="FILE",
+        help="Save points and routes as waypoints in .yaml, as nav2's panel in RViz does.",
+    ),
+]
+_Radius = Annotated[
+    float | None,
+    typer.Option(
+        metavar="METRES",
+        min=0.0,
+        help="How far routes are kept away from obstacles: half the robot's width; 0 on a grid.",
+    ),
+]
+_AllowUnknown = Annotated[
+    bool, typer.Option("--allow-unknown", help="Let routes go where nobody has seen the floor.")
+]
+
+
+@answering
+@options.asking
+def transfer(
+    sketch: Annotated[
+        Path, typer.Argument(metavar="SKETCH", help="A sketch, as `match` takes it.")
+    ],
+    map_: Annotated[Path, typer.Argument(metavar="MAP", help="A map, as `match` takes it.")],
+    features: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[FEATURES]",
+            help="Points, routes and zones: GeoJSON in the sketch's coordinates, y upwards; a "
+            "keep-out mask or waypoints of nav2. A route that is drawn in the sketch needs none.",
+        ),
+    ] = None,
+    server: options.Server = None,
+    access: options.Access = options.Access(),  # noqa: B008
+    config: options.Config = None,
+    profile: options.Profile = "",
+    sketch_segmenter: options.SketchSegmenter = "",
+    map_segmenter: options.MapSegmenter = "",
+    settings: options.Settings = None,
+    pin: options.Pins = None,
+    no_pin: options.Exclusions = None,
+    synonyms: options.Synonyms = None,
+    direction: Annotated[
+        _Direction, typer.Option(help="From where to where.")
+    ] = _Direction.SKETCH_TO_MAP,
+    radius: _Radius = None,
+    allow_unknown: _AllowUnknown = False,
+    out: _Out = None,
+    keepout: _Keepout = None,
+    waypoints: _Waypoints = None,
+    json: options.Json = False,
+    overlay: options.Overlay = None,
+    verbose: options.Verbose = False,
+) -> None:
+    """Carry points, routes and zones from a sketch to a map, or back.
+
+    Routes are kept out of what a robot's map says is occupied or unknown, and planned again where
+    they lead into it. Every point has a standard deviation. On a terminal there is a table; in a
+    pipe tab-separated lines: name, kind, standard deviation, points, changes.
+    """
+    from sketchmatch.cli import carried, pictures, places
+    from sketchmatch.cli.answering import answerer
+    from sketchmatch.cli.sources import source_of
+    from sketchmatch.transfers import files
+
+    options.refuse_config(config, server)
+    files.check_targets(out, keepout, waypoints)
+    if overlay is not None:
+        pictures.check_path(overlay)
+    known = options.parse_pins(pin, no_pin)
+    forth = direction is _Direction.SKETCH_TO_MAP
+    carried.check_keepout(keepout, map_ if forth else sketch)
+    chosen: TransferOptions = {
+        "sketch_segmenter": sketch_segmenter,
+        "map_segmenter": map_segmenter,
+        "params": options.parse_settings(settings),
+        "pins": list(known.values()),
+        "synonyms": options.parse_synonyms(synonyms),
+        "profile": profile,
+        "direction": direction.value,
+        "radius": radius,
+        "allow_unknown": allow_unknown,
+    }
+    given = files.FeatureFile((), ()) if features is None else files.read_features(features)
+    with (
+        places.places_in(sketch=sketch, map=map_),
+        options.pins_as_typed(list(known)),
+        answerer(server, config, access) as asked,
+    ):
+        sources = source_of(sketch, "sketch"), source_of(map_, "map")
+        with carried.places_of(features):
+            answer = asked.transfer(*sources, carried.messages(given.features), **chosen)
+    found = carried.Carriage.of(answer, given, forth)
+    target = map_ if forth else sketch
+    carried.save(found, target, out, keepout, waypoints)
+    if overlay is not None:
+        carried.draw(found, ("Sketch", "Map"), (sketch, map_), overlay)
+    carried.show(found, json, verbose)
+
+
+@answering
+@options.asking
+def carry(
+    features: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FEATURES",
+            help="Zones, routes and points on the old map: GeoJSON, a keep-out mask of nav2, or "
+            "waypoints as its panel in RViz saves them.",
+        ),
+    ],
+    old: Annotated[Path, typer.Argument(metavar="OLD", help="The old map, as `match` takes it.")],
+    new: Annotated[Path, typer.Argument(metavar="NEW", help="The new map of the same place.")],
+    server: options.Server = None,
+    access: options.Access = options.Access(),  # noqa: B008
+    config: options.Config = None,
+    profile: options.Profile = "",
+    segmenter: Annotated[
+        str,
+        typer.Option(
+            help="Segmenter of both maps; rooms or objects, whichever tells more, by default."
+        ),
+    ] = "",
+    pin: options.Pins = None,
+    no_pin: options.Exclusions = None,
+    radius: _Radius = None,
+    allow_unknown: _AllowUnknown = False,
+    out: _Out = None,
+    keepout: _Keepout = None,
+    waypoints: _Waypoints = None,
+    json: options.Json = False,
+    overlay: options.Overlay = None,
+    verbose: options.Verbose = False,
+) -> None:
+    """Carry names, zones, routes and points of an old map to a new one of the same place.
+
+    The new map may begin elsewhere, be turned, and show some things where they were not. What the
+    old map's own file names is carried with the rest. What cannot be carried is said.
+    """
+    from sketchmatch.cli import carried, pictures, places
+    from sketchmatch.cli.answering import answerer
+    from sketchmatch.cli.sources import in_metres, source_of
+    from sketchmatch.transfers import files
+    from sketchmatch_client import InvalidRequestError
+
+    options.refuse_config(config, server)
+    files.check_targets(out, keepout, waypoints)
+    if overlay is not None:
+        pictures.check_path(overlay)
+    carried.check_keepout(keepout, new)
+    known = options.parse_pins(pin, no_pin)
+    given = files.read_features(features) + carried.named_in(old)
+    with (
+        places.places_in(sketch=old, map=new),
+        options.pins_as_typed(list(known)),
+        answerer(server, config, access) as asked,
+    ):
+        sources = source_of(old, "old map"), source_of(new, "new map")
+        grids = all(map(in_metres, sources))
+        answers, problems = [], []
+        for name in carried.segmenters(segmenter, grids and not known):
+            chosen: TransferOptions = {
+                "sketch_segmenter": name,
+                "map_segmenter": name,
+                "pins": list(known.values()),
+                "profile": profile,
+                "radius": radius,
+                "allow_unknown": allow_unknown,
+            }
+            try:
+                with carried.places_of(features):
+                    answers.append(
+                        asked.transfer(*sources, carried.messages(given.features), **chosen)
+                    )
+            except (InvalidInputError, InvalidRequestError) as error:
+                problems.append(error)
+        if not answers:
+            raise problems[0]
+    found = carried.Carriage.of(min(answers, key=carried.unsureness), given, forth=True)
+    carried.save(found, new, out, keepout, waypoints)
+    if overlay is not None:
+        carried.draw(found, ("Old map", "New map"), (old, new), overlay)
+    carried.show(found, json, verbose)

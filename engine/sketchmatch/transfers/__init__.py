@@ -1,0 +1,1 @@
+"""Points, routes and zones carried from one scene to another, through the objects of both."""

@@ -1,0 +1,175 @@
+"""What is carried from one scene to another: points, routes and zones, and what became of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+import shapely
+
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.model import FloatArray
+from sketchmatch.model.arrays import frozen_floats
+from sketchmatch.model.labels import cleaned_label
+
+__all__ = ["Carried", "Change", "ChangeReason", "Feature", "FeatureKind"]
+
+_FARTHEST = 1e9
+_FEWEST = {"point": 1, "route": 2, "zone": 3}
+
+
+class FeatureKind(StrEnum):
+    """What a feature is."""
+
+    POINT = "point"
+    ROUTE = "route"
+    ZONE = "zone"
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """A point, a route or a zone with a name.
+
+    Attributes
+    ----------
+    kind
+        Which of them it is.
+    rings
+        One line of one point; or one line of two or more, the route in its order; or the outline of
+        a zone and its holes, each of three or more. Each of shape (k, 2), y up.
+    name
+        For people.
+    speeds
+        Shape (k,), how fast a route is driven from each of its points on, or None.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is not what its kind says, with a path within it.
+    """
+
+    kind: FeatureKind
+    rings: tuple[FloatArray, ...]
+    name: str = ""
+    speeds: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        kind = FeatureKind(self.kind)
+        object.__setattr__(self, "kind", kind)
+        object.__setattr__(self, "name", cleaned_label(self.name))
+        if len(self.rings) < 1 or (kind is not FeatureKind.ZONE and len(self.rings) > 1):
+            raise _refused("rings", f"are {len(self.rings)}; give a {kind} one line of points")
+        rings = tuple(self._checked(ring, k) for k, ring in enumerate(self.rings))
+        object.__setattr__(self, "rings", rings)
+        if kind is FeatureKind.ZONE and not shapely.Polygon(rings[0], rings[1:]).is_valid:
+            raise _refused("rings", "cross themselves or each other; draw a zone without crossing")
+        if self.speeds is not None:
+            self._check_speeds(len(rings[0]))
+
+    @property
+    def points(self) -> FloatArray:
+        """The first line, shape (k, 2): all there is of a point or a route."""
+        return self.rings[0]
+
+    def _checked(self, given: FloatArray, k: int) -> FloatArray:
+        field = f"rings[{k}]" if self.kind is FeatureKind.ZONE else "points"
+        ring = frozen_floats(given)
+        if ring.ndim != 2 or ring.shape[1] != 2:
+            raise _refused(field, "is not a list of [x, y] pairs of numbers")
+        if not (np.abs(ring) <= _FARTHEST).all():
+            raise _refused(field, "has a point that is not finite, or too far away")
+        if self.kind is FeatureKind.ZONE and len(ring) > 1 and (ring[0] == ring[-1]).all():
+            ring = frozen_floats(ring[:-1])
+        fewest = _FEWEST[self.kind]
+        if len(ring) < fewest or (self.kind is FeatureKind.POINT and len(ring) > 1):
+            exactly = "" if self.kind is FeatureKind.POINT else " or more"
+            raise _refused(field, f"has {len(ring)} points; a {self.kind} has {fewest}{exactly}")
+        return ring
+
+    def _check_speeds(self, count: int) -> None:
+        speeds = frozen_floats(self.speeds)
+        if self.kind is not FeatureKind.ROUTE:
+            raise _refused("speeds", f"are given for a {self.kind}; only routes have some")
+        if speeds.shape != (count,):
+            raise _refused(
+                "speeds", f"are {speeds.size} for {count} points; give one for each or none"
+            )
+        if not ((speeds >= 0.0) & np.isfinite(speeds)).all():
+            raise _refused("speeds", "have one that is negative or not finite; give m/s")
+        object.__setattr__(self, "speeds", speeds)
+
+
+class ChangeReason(StrEnum):
+    """Why something was not left as the warp carried it."""
+
+    OBSTACLE = "obstacle"
+    MOVED_START = "moved_start"
+    MOVED_END = "moved_end"
+    OTHER_SIDE = "other_side"
+    UNREACHABLE = "unreachable"
+    BLOCKED = "blocked"
+    OUTSIDE = "outside"
+
+
+@dataclass(frozen=True)
+class Change:
+    """What was changed about a feature, or could not be had.
+
+    Attributes
+    ----------
+    reason
+        Of which kind it is.
+    first, last
+        From which to which of the carried points.
+    sentence
+        For people.
+    """
+
+    reason: ChangeReason
+    first: int
+    last: int
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """A feature where it was carried to.
+
+    Attributes
+    ----------
+    kind, name
+        Of what was given.
+    feature
+        What it is there. A route may have more points than the one that was given, or fewer where
+        a part of it cannot be reached; None where nothing of it can.
+    deviations
+        For each ring, shape (k,): standard deviations of its points, along each axis.
+    sources
+        For each ring, shape (k,): which given point each carried one is, or comes after; as numbers
+        with a fraction for points in between.
+    changes
+        What was changed, in the order of the points.
+    """
+
+    kind: FeatureKind
+    name: str
+    feature: Feature | None
+    deviations: tuple[FloatArray, ...]
+    sources: tuple[FloatArray, ...]
+    changes: tuple[Change, ...] = ()
+
+    @property
+    def deviation(self) -> float:
+        """The median of the standard deviations; nan where nothing was carried."""
+        if self.feature is None:
+            return float("nan")
+        return float(np.median(np.concatenate(self.deviations)))
+
+    def changed(self, *changes: Change) -> Carried:
+        """Return it with more changes."""
+        return replace(self, changes=(*self.changes, *changes))
+
+
+def _refused(field: str, problem: str) -> InvalidInputError:
+    return InvalidInputError(Reason.INVALID_FIELD, field, problem)

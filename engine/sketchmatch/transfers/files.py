@@ -1,0 +1,445 @@
+"""Points, routes and zones as files: GeoJSON in and out, and what nav2 reads.
+
+In GeoJSON a ``Point`` is a point, a ``LineString`` a route, a ``Polygon`` a zone; each part of what
+has several is one of its own. The coordinates are those of the scene, x right and y up, in its own
+units. The property ``name``, or else ``label``, or else the ``id``, is the name; ``speed``, one
+number, or ``speeds``, one for each point, says how fast a route is driven; ``yaw``, in radians,
+where a robot looks at a point; ``keepout: false`` leaves a zone out of the keep-out mask. All
+properties are kept.
+
+A mask of nav2's keep-out filter, which is a map in which the forbidden cells are occupied, is read
+as zones, and a list of waypoints as nav2's panel in RViz saves it as points in their order.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import shapely
+
+from sketchmatch.api.documents import decode_text, load_json, mapping, number, plain_name, sequence
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io._targets import check_target, writing
+from sketchmatch.io.files import read_bytes, read_map_files
+from sketchmatch.model import FloatArray, OccupancyGrid
+from sketchmatch.transfers.features import Carried, Feature, FeatureKind
+from sketchmatch.transfers.obstacles import Obstacles
+from sketchmatch_map_files import YAML_SUFFIXES, MapFileError, parse, text_of
+
+__all__ = [
+    "FeatureFile",
+    "check_targets",
+    "encode_carried",
+    "encode_keepout",
+    "encode_waypoints",
+    "landmarks_of",
+    "read_features",
+    "save_keepout",
+    "save_text",
+]
+
+_FILE = Reason.INVALID_FILE
+_KINDS = {
+    "Point": FeatureKind.POINT,
+    "LineString": FeatureKind.ROUTE,
+    "Polygon": FeatureKind.ZONE,
+}
+_SEVERAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
+_JSON_SUFFIXES = (".geojson", ".json")
+_REPLACED = ("speed", "speeds", "yaw", "deviation", "deviations", "changes")
+_FREE, _FORBIDDEN = 254, 0
+_OCCUPIED = 65
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureFile:
+    """What stands in a file.
+
+    Attributes
+    ----------
+    features
+        The points, routes and zones, in their order.
+    properties
+        What else is said of each.
+    """
+
+    features: tuple[Feature, ...]
+    properties: tuple[Mapping[str, Any], ...]
+
+    def __add__(self, other: FeatureFile) -> FeatureFile:
+        return FeatureFile(self.features + other.features, self.properties + other.properties)
+
+
+def read_features(path: str | Path) -> FeatureFile:
+    """Read points, routes and zones from GeoJSON, a keep-out mask or a list of waypoints.
+
+    Raises
+    ------
+    InvalidInputError
+        In one sentence that begins with the path, if the file cannot be used.
+    """
+    path = Path(path)
+    try:
+        found = _read(path)
+    except InvalidInputError as error:
+        if error.field.startswith(str(path)):
+            raise
+        place = f"{path}: {error.field}" if error.field else str(path)
+        raise InvalidInputError(error.reason, place, error.problem) from None
+    if not found.features:
+        raise InvalidInputError(
+            _FILE,
+            str(path),
+            "holds no point, route or zone; give one as a Point, LineString or Polygon",
+        )
+    return found
+
+
+def landmarks_of(grid: OccupancyGrid) -> FeatureFile:
+    """Return the names that a map's own file gives to places of it."""
+    features = [
+        Feature(FeatureKind.POINT, (np.array([item.point]),), item.name) for item in grid.landmarks
+    ]
+    properties = [
+        {"name": item.name, **({"type": item.kind} if item.kind else {})} for item in grid.landmarks
+    ]
+    return FeatureFile(tuple(features), tuple(properties))
+
+
+def encode_carried(
+    carried: Sequence[Carried], properties: Sequence[Mapping[str, Any]], rotation: float
+) -> str:
+    """Return carried features as GeoJSON, with what each had, its deviations and changes.
+
+    Parameters
+    ----------
+    carried
+        The features, in their order. What could not be carried has no geometry.
+    properties
+        What else is said of each.
+    rotation
+        By how much the whole was turned, in radians: so is every ``yaw``.
+    """
+    features = ",\n".join(
+        json.dumps(_encoded(each, said, rotation), ensure_ascii=False, allow_nan=False)
+        for each, said in zip(carried, properties, strict=True)
+    )
+    return f'{{"type": "FeatureCollection", "crs": null, "features": [\n{features}\n]}}\n'
+
+
+def encode_keepout(
+    carried: Sequence[Carried],
+    properties: Sequence[Mapping[str, Any]],
+    grid: OccupancyGrid,
+    picture: str,
+) -> tuple[str, bytes]:
+    """Return the mask of nav2's keep-out filter for all zones, over the cells of a map.
+
+    Parameters
+    ----------
+    carried, properties
+        As :func:`encode_carried` takes them; zones with ``keepout: false`` are left out.
+    grid
+        The map; every cell of it that a zone covers, or a part of it, is forbidden.
+    picture
+        Name of the picture's file.
+
+    Returns
+    -------
+    str, bytes
+        The YAML, and its picture as PGM.
+    """
+    cells = Obstacles.of_grid(grid, allow_unknown=True)
+    shades = np.full(grid.cells.shape, _FREE, dtype=np.uint8)
+    for each, said in zip(carried, properties, strict=True):
+        if each.kind is not FeatureKind.ZONE or each.feature is None:
+            continue
+        if said.get("keepout") is False:
+            continue
+        rings = [cells.cells(ring)[:, ::-1].astype(np.int32) for ring in each.feature.rings]
+        cv2.fillPoly(shades, rings, _FORBIDDEN)
+        cv2.polylines(shades, rings[:1], isClosed=True, color=_FORBIDDEN)
+    rows, columns = grid.cells.shape
+    x, y, yaw = grid.origin
+    lines = [
+        f"image: {picture}",
+        "mode: trinary",
+        f"resolution: {grid.resolution:.12g}",
+        f"origin: [{x:.12g}, {y:.12g}, {yaw:.12g}]",
+        "negate: 0",
+        "occupied_thresh: 0.65",
+        "free_thresh: 0.25",
+    ]
+    header = f"P5\n{columns} {rows}\n255\n".encode("ascii")
+    return "\n".join(lines) + "\n", header + shades[::-1].tobytes()
+
+
+def encode_waypoints(
+    carried: Sequence[Carried], properties: Sequence[Mapping[str, Any]], rotation: float
+) -> str:
+    """Return points and the points of routes, in their order, as nav2's panel in RViz saves them.
+
+    A robot looks along a route, and at a point as its ``yaw`` said, turned by the rotation. Names
+    and speeds stand beside, where there are some.
+    """
+    lines, count = ["waypoints:"], 0
+    for each, said in zip(carried, properties, strict=True):
+        if each.feature is None or each.kind is FeatureKind.ZONE:
+            continue
+        points = each.feature.points
+        headings = _headings(points) if len(points) > 1 else [_yaw(said, rotation) or 0.0]
+        for k, (point, heading) in enumerate(zip(points, headings, strict=True)):
+            w, z = math.cos(heading / 2.0), math.sin(heading / 2.0)
+            lines += [
+                f"  waypoint{count}:",
+                f"    pose: [{point[0]:.6f}, {point[1]:.6f}, 0.0]",
+                f"    orientation: [{w:.6f}, 0.0, 0.0, {z:.6f}]",
+            ]
+            if each.name:
+                lines.append(f"    name: {json.dumps(each.name)}")
+            if each.feature.speeds is not None:
+                lines.append(f"    speed: {each.feature.speeds[k]:.6g}")
+            count += 1
+    return "\n".join(lines if count else ["waypoints: {}"]) + "\n"
+
+
+def check_targets(out: Path | None, keepout: Path | None, waypoints: Path | None) -> None:
+    """Refuse paths that nothing can be saved under, before any work is done."""
+    if out is not None:
+        check_target(out, "--out", _JSON_SUFFIXES, ".geojson")
+    for path, field in ((keepout, "--keepout"), (waypoints, "--waypoints")):
+        if path is not None:
+            check_target(path, field, YAML_SUFFIXES, ".yaml")
+
+
+def save_text(path: Path, text: str, field: str) -> None:
+    """Save a text."""
+    with writing(path, field):
+        path.write_bytes(text.encode("utf-8", "backslashreplace"))
+
+
+def save_keepout(path: Path, document: str, picture: bytes, field: str) -> None:
+    """Save a mask: the YAML under its path, the picture beside it."""
+    with writing(path, field):
+        path.with_suffix(".pgm").write_bytes(picture)
+        path.write_text(document, encoding="utf-8")
+
+
+def _read(path: Path) -> FeatureFile:
+    if path.suffix.lower() not in YAML_SUFFIXES:
+        return _of_geojson(load_json(decode_text(read_bytes(path))))
+    try:
+        values = parse(text_of(read_bytes(path))).values
+    except MapFileError as error:
+        raise InvalidInputError(_FILE, "", str(error)) from None
+    if isinstance(values, dict) and "waypoints" in values:
+        return _of_waypoints(values["waypoints"])
+    files = read_map_files(path)
+    if files is None:
+        raise InvalidInputError(
+            _FILE, "", "is neither the mask of a keep-out filter nor a list of waypoints; give one"
+        )
+    return _of_mask(files.grid())
+
+
+def _of_geojson(document: Any) -> FeatureFile:
+    features: list[Feature] = []
+    properties: list[Mapping[str, Any]] = []
+    kind = mapping(document, "", _FILE, "GeoJSON").get("type")
+    members = [document]
+    if kind == "FeatureCollection":
+        members = sequence(document.get("features"), "features", _FILE, "a list of features")
+    for k, member in enumerate(members):
+        field = f"features[{k}]" if members is not None and kind == "FeatureCollection" else ""
+        said: Mapping[str, Any] = {}
+        geometry: Any = mapping(member, field, _FILE, "a feature")
+        if geometry.get("type") == "Feature":
+            given = geometry.get("properties")
+            said = given if isinstance(given, dict) else {}
+            name = next(
+                (
+                    text
+                    for text in map(
+                        plain_name, (said.get("name"), said.get("label"), geometry.get("id"))
+                    )
+                    if text
+                ),
+                "",
+            )
+            geometry = geometry.get("geometry")
+            field = f"{field}.geometry" if field else "geometry"
+        else:
+            name = ""
+        if geometry is None:
+            continue
+        for part, at in _parts(mapping(geometry, field, _FILE, "a geometry"), field):
+            features.append(_of_part(part, at, name, said))
+            properties.append(said)
+    return FeatureFile(tuple(features), tuple(properties))
+
+
+def _parts(geometry: dict[str, Any], field: str) -> list[tuple[dict[str, Any], str]]:
+    kind, at = geometry.get("type"), f"{field}.coordinates" if field else "coordinates"
+    if kind in _KINDS:
+        return [(geometry, at)]
+    if kind in _SEVERAL:
+        several = sequence(geometry.get("coordinates"), at, _FILE, "a list of parts")
+        return [
+            ({"type": _SEVERAL[kind], "coordinates": each}, f"{at}[{k}]")
+            for k, each in enumerate(several)
+        ]
+    raise InvalidInputError(
+        _FILE,
+        f"{field}.type" if field else "type",
+        "is no geometry that can be carried; give a Point, LineString or Polygon",
+    )
+
+
+def _of_part(part: dict[str, Any], at: str, name: str, said: Mapping[str, Any]) -> Feature:
+    kind, given = _KINDS[part["type"]], part.get("coordinates")
+    if kind is FeatureKind.POINT:
+        rings = [_line([given], at)]
+    elif kind is FeatureKind.ROUTE:
+        rings = [_line(given, at)]
+    else:
+        lines = sequence(given, at, _FILE, "a list of rings")
+        rings = [_line(each, f"{at}[{k}]") for k, each in enumerate(lines)]
+    try:
+        speeds = _speeds(said, len(rings[0])) if kind is FeatureKind.ROUTE else None
+        return Feature(kind, tuple(rings), name, speeds)
+    except InvalidInputError as error:
+        raise InvalidInputError(_FILE, at, error.problem) from None
+
+
+def _line(given: Any, field: str) -> FloatArray:
+    rows = []
+    for k, position in enumerate(sequence(given, field, _FILE, "a list of [x, y] positions")):
+        at = f"{field}[{k}]"
+        pair = sequence(position, at, _FILE, "a position [x, y]")
+        if len(pair) < 2:
+            raise InvalidInputError(_FILE, at, "has fewer than two numbers; give [x, y]")
+        rows.append([number(pair[i], f"{at}[{i}]", _FILE) for i in (0, 1)])
+    return np.array(rows, dtype=np.float64).reshape(-1, 2)
+
+
+def _speeds(said: Mapping[str, Any], count: int) -> FloatArray | None:
+    if said.get("speeds") is not None:
+        given = sequence(said["speeds"], "speeds", _FILE, "a list of numbers")
+        return np.array([number(each, "speeds", _FILE) for each in given])
+    if said.get("speed") is not None:
+        return np.full(count, number(said["speed"], "speed", _FILE))
+    return None
+
+
+def _of_waypoints(given: Any) -> FeatureFile:
+    named = mapping(
+        _numbers(given), "waypoints", _FILE, "waypoints by name, as nav2's panel saves them"
+    )
+    features, properties = [], []
+    for key, value in named.items():
+        field = f"waypoints.{key}"
+        item = mapping(value, field, _FILE, "pose and orientation")
+        place = _line([item.get("pose")], f"{field}.pose")
+        name = plain_name(item.get("name")) or str(key)
+        said: dict[str, Any] = {"name": name}
+        turned = item.get("orientation")
+        if isinstance(turned, list) and len(turned) == 4:
+            w, _, _, z = (number(each, f"{field}.orientation", _FILE) for each in turned)
+            said["yaw"] = 2.0 * math.atan2(z, w)
+        features.append(Feature(FeatureKind.POINT, (place,), name))
+        properties.append(said)
+    return FeatureFile(tuple(features), tuple(properties))
+
+
+def _numbers(value: Any) -> Any:
+    """Return what stands in a YAML with its texts as numbers where they are some."""
+    if isinstance(value, dict):
+        return {key: _numbers(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_numbers(each) for each in value]
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return value
+
+
+def _of_mask(grid: OccupancyGrid) -> FeatureFile:
+    """Return what is forbidden as zones."""
+    from skimage.measure import find_contours
+
+    forbidden = np.pad(grid.cells >= _OCCUPIED, 1).astype(np.float64)
+    cells = Obstacles.of_grid(grid, allow_unknown=True)
+    lines = [
+        shapely.LineString(cells.places(line - 1.0))
+        for line in find_contours(forbidden, 0.5)  # type: ignore[no-untyped-call]
+        if len(line) > 3
+    ]
+    areas = shapely.build_area(shapely.GeometryCollection(lines))
+    zones = [shapely.simplify(each, grid.resolution / 2.0) for each in shapely.get_parts(areas)]
+    features = tuple(
+        Feature(
+            FeatureKind.ZONE,
+            tuple(shapely.get_coordinates(ring) for ring in (zone.exterior, *zone.interiors)),
+            f"keep-out {k + 1}",
+        )
+        for k, zone in enumerate(zones)
+        if zone.geom_type == "Polygon" and zone.is_valid and not zone.is_empty
+    )
+    return FeatureFile(features, tuple({"name": each.name} for each in features))
+
+
+def _encoded(carried: Carried, said: Mapping[str, Any], rotation: float) -> dict[str, Any]:
+    kept = {key: value for key, value in said.items() if key not in _REPLACED}
+    kept.setdefault("name", carried.name)
+    if (yaw := _yaw(said, rotation)) is not None:
+        kept["yaw"] = round(yaw, 6)
+    if carried.feature is not None:
+        if carried.feature.speeds is not None:
+            kept["speeds"] = [round(float(each), 6) for each in carried.feature.speeds]
+        kept["deviation"] = round(carried.deviation, 6)
+        kept["deviations"] = [
+            [round(float(each), 6) for each in ring] for ring in carried.deviations
+        ]
+    if carried.changes:
+        kept["changes"] = [
+            {
+                "reason": str(each.reason),
+                "first": each.first,
+                "last": each.last,
+                "sentence": each.sentence,
+            }
+            for each in carried.changes
+        ]
+    return {"type": "Feature", "properties": kept, "geometry": _geometry(carried.feature)}
+
+
+def _geometry(feature: Feature | None) -> dict[str, Any] | None:
+    if feature is None:
+        return None
+    lines = [ring.tolist() for ring in feature.rings]
+    if feature.kind is FeatureKind.POINT:
+        return {"type": "Point", "coordinates": lines[0][0]}
+    if feature.kind is FeatureKind.ROUTE:
+        return {"type": "LineString", "coordinates": lines[0]}
+    return {"type": "Polygon", "coordinates": [[*line, line[0]] for line in lines]}
+
+
+def _headings(points: FloatArray) -> list[float]:
+    """Return where each point of a route looks: to the next, and the last as the one before."""
+    steps = np.diff(points, axis=0)
+    found = np.arctan2(steps[:, 1], steps[:, 0]).tolist()
+    return [*found, found[-1]]
+
+
+def _yaw(said: Mapping[str, Any], rotation: float) -> float | None:
+    given = said.get("yaw")
+    if isinstance(given, bool) or not isinstance(given, int | float) or not math.isfinite(given):
+        return None
+    return math.remainder(float(given) + rotation, 2.0 * math.pi)

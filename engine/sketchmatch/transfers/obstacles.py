@@ -1,0 +1,169 @@
+"""Where a robot of some radius may be on a grid, and ways between two places there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from sketchmatch.model import BoolArray, FloatArray, IntArray, OccupancyGrid, Scene
+from sketchmatch.model.caching import cached_property
+
+__all__ = ["Obstacles", "Window", "sampled"]
+
+_OCCUPIED = 65
+"""Percent, from which a cell is an obstacle: the usual threshold of map_server."""
+_CORNER = math.sqrt(0.5)
+_NO_NEARER = 0.5
+"""In cells: how far from obstacles a way stays that need not keep away, lest it cut a corner."""
+_SAMPLES = 4.0
+_MOST_CELLS = 4_000_000
+_PER_SPACING = 24.0
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Cells that are free or not.
+
+    Attributes
+    ----------
+    blocked
+        Shape (rows, columns), row 0 the lowest.
+    resolution
+        Side of a cell.
+    origin
+        Pose (x, y, yaw) of the lower left corner of cell (0, 0).
+    """
+
+    blocked: BoolArray
+    resolution: float
+    origin: tuple[float, float, float]
+
+    @classmethod
+    def of_grid(cls, grid: OccupancyGrid, allow_unknown: bool) -> Obstacles:
+        """Return what is occupied on a grid, and what is unknown unless that is allowed."""
+        occupied = grid.cells >= _OCCUPIED
+        blocked = occupied if allow_unknown else occupied | (grid.cells < 0)
+        return cls(blocked, grid.resolution, grid.origin)
+
+    @classmethod
+    def of_scene(cls, scene: Scene, around: FloatArray, radius: float) -> Obstacles:
+        """Return the objects of a scene as cells, with room for a way around points."""
+        x0, y0, x1, y1 = scene.bounds
+        points = np.vstack([around.reshape(-1, 2), [(x0, y0), (x1, y1)]])
+        small = math.sqrt(min(item.area for item in scene.objects))
+        extent = np.ptp(points, axis=0)
+        margin = 4.0 * radius + small
+        low, sides = points.min(axis=0) - margin, extent + 2.0 * margin
+        step = max(min(small, 4.0 * radius) / _PER_SPACING, float(extent.max()) / 2000.0)
+        step = max(step, math.sqrt(float(sides[0] * sides[1]) / _MOST_CELLS))
+        columns, rows = (math.ceil(side / step) for side in sides)
+        picture = np.zeros((rows, columns), dtype=np.uint8)
+        for item in scene.objects:
+            # Every cell that an object reaches into: its outline is drawn, too.
+            rings = [np.floor((ring - low) / step).astype(np.int32) for ring in item.rings]
+            cv2.fillPoly(picture, rings, 1)
+            cv2.polylines(picture, rings, isClosed=True, color=1)
+        return cls(picture.astype(bool), step, (float(low[0]), float(low[1]), 0.0))
+
+    @cached_property
+    def clearance(self) -> FloatArray:
+        """How far the obstacles are at least from anywhere in each cell's middle."""
+        free = np.pad((~self.blocked).astype(np.uint8), 1)
+        away = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+        clear: FloatArray = (away.astype(np.float64) - _CORNER) * self.resolution
+        return clear
+
+    def cells(self, points: FloatArray) -> IntArray:
+        """Return row and column of the cells of points, shape (m, 2), perhaps beyond the grid."""
+        x, y, yaw = self.origin
+        c, s = math.cos(yaw), math.sin(yaw)
+        local = (points - (x, y)) @ np.array([[c, -s], [s, c]]) / self.resolution
+        found: IntArray = np.floor(local[:, ::-1]).astype(np.int64)
+        return found
+
+    def places(self, cells: IntArray) -> FloatArray:
+        """Return the middles of cells, shape (m, 2)."""
+        x, y, yaw = self.origin
+        c, s = math.cos(yaw), math.sin(yaw)
+        local = (cells[:, ::-1] + 0.5) * self.resolution
+        found: FloatArray = local @ np.array([[c, s], [-s, c]]) + (x, y)
+        return found
+
+    def inside(self, points: FloatArray) -> BoolArray:
+        """Return which points lie on the grid."""
+        cells = self.cells(points)
+        return np.asarray(((cells >= 0) & (cells < self.blocked.shape)).all(axis=1))
+
+    def needed(self, radius: float) -> float:
+        """Return how much room a robot of a radius needs in the middle of a cell."""
+        return max(radius, _NO_NEARER * self.resolution - 1e-9)
+
+    def clear(self, points: FloatArray, radius: float) -> BoolArray:
+        """Return at which points a robot of a radius may be; nowhere beyond the grid."""
+        found = np.zeros(len(points), dtype=bool)
+        within = self.inside(points)
+        rows, columns = self.cells(points[within]).T
+        found[within] = self.clearance[rows, columns] >= self.needed(radius)
+        return found
+
+    def line_is_clear(self, points: FloatArray, radius: float) -> bool:
+        """Whether a line through points stays clear all along."""
+        return bool(self.clear(sampled(points, self.resolution / _SAMPLES), radius).all())
+
+    def nearest_clear(self, point: FloatArray, radius: float, within: float) -> FloatArray | None:
+        """Return the nearest place to a point where a robot may be; None if none is near."""
+        (cell,) = self.cells(point[None, :])
+        reach = math.ceil(within / self.resolution)
+        window = Window.around(self, np.array([cell]), reach)
+        room = window.of(self.clearance) >= self.needed(radius)
+        free = np.argwhere(room) + window.low
+        if not len(free):
+            return None
+        places = self.places(free)
+        away = np.hypot(*(places - point).T)
+        best = int(np.argmin(away))
+        return places[best] if away[best] <= within else None
+
+
+def sampled(points: FloatArray, step: float) -> FloatArray:
+    """Return points along a line, no farther apart than a step; its own points are among them."""
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    counts = np.maximum(1, np.ceil(lengths / step)).astype(np.int64)
+    legs = np.repeat(np.arange(len(counts)), counts)
+    firsts = np.repeat(np.cumsum(counts) - counts, counts)
+    shares = (np.arange(len(legs)) - firsts) / counts[legs]
+    between = points[legs] + shares[:, None] * (points[legs + 1] - points[legs])
+    return np.vstack([between, points[-1:]])
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A part of a grid.
+
+    Attributes
+    ----------
+    low, high
+        Row and column of its first cell, and of the first one beyond it.
+    """
+
+    low: IntArray
+    high: IntArray
+
+    @classmethod
+    def around(cls, obstacles: Obstacles, cells: IntArray, margin: int) -> Window:
+        """Return the part around cells."""
+        most = np.array(obstacles.blocked.shape)
+        low = np.clip(cells.min(axis=0) - margin, 0, most)
+        high = np.clip(cells.max(axis=0) + margin + 1, 0, most)
+        return cls(low, high)
+
+    def is_all_of(self, obstacles: Obstacles) -> bool:
+        """Whether it is the whole grid."""
+        return not self.low.any() and tuple(self.high) == obstacles.blocked.shape
+
+    def of(self, array: FloatArray) -> FloatArray:
+        """Return that part of an array of the whole grid."""
+        return array[self.low[0] : self.high[0], self.low[1] : self.high[1]]

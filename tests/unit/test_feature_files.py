@@ -1,0 +1,233 @@
+"""Points, routes and zones in files: GeoJSON, and what nav2 reads."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from sketchmatch.errors import InvalidInputError
+from sketchmatch.io.ros_map import decode_map_server
+from sketchmatch.model import Landmark, OccupancyGrid
+from sketchmatch.transfers.features import Carried, Change, ChangeReason, Feature
+from sketchmatch.transfers.files import (
+    encode_carried,
+    encode_keepout,
+    encode_waypoints,
+    landmarks_of,
+    read_features,
+)
+
+ZONE = np.array([[1.0, 1.0], [3.0, 1.0], [3.0, 2.5], [1.0, 2.5]])
+HOLE = np.array([[1.5, 1.5], [2.0, 1.5], [2.0, 2.0]])
+
+
+def kept(kind, *rings, name="", speeds=None, changes=()):
+    """Return a feature that came to where it was."""
+    feature = Feature(kind, tuple(np.array(ring) for ring in rings), name, speeds)
+    lengths = [len(ring) for ring in feature.rings]
+    return Carried(
+        feature.kind,
+        name,
+        feature,
+        tuple(np.full(n, 0.25) for n in lengths),
+        tuple(np.arange(float(n)) for n in lengths),
+        changes,
+    )
+
+
+def written(tmp_path, document, name="features.geojson"):
+    path = tmp_path / name
+    path.write_text(document if isinstance(document, str) else json.dumps(document), "utf-8")
+    return path
+
+
+def feature(kind, coordinates, **properties):
+    geometry = {"type": kind, "coordinates": coordinates}
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+def collection(*features):
+    return {"type": "FeatureCollection", "features": list(features)}
+
+
+def test_geojson_is_read_kind_by_kind(tmp_path):
+    ring = [*ZONE.tolist(), ZONE[0].tolist()]
+    document = collection(
+        feature("Point", [1, 2, 9], name="dock", yaw=0.5),
+        feature("LineString", [[0, 0], [1, 0], [2, 1]], label="patrol", speed=0.5),
+        feature("LineString", [[0, 0], [1, 0]], speeds=[0.5, 0.25]),
+        feature("Polygon", [ring, HOLE.tolist()], name="no-go"),
+        feature("MultiPolygon", [[ring], [(ZONE + 5).tolist()]], name="both"),
+        {"type": "Feature", "properties": None, "geometry": None},
+    )
+    found = read_features(written(tmp_path, document))
+    kinds = [str(each.kind) for each in found.features]
+    assert kinds == ["point", "route", "route", "zone", "zone", "zone"]
+    assert [each.name for each in found.features] == ["dock", "patrol", "", "no-go", "both", "both"]
+    assert found.features[0].points.tolist() == [[1.0, 2.0]]
+    assert found.features[1].speeds.tolist() == [0.5, 0.5, 0.5]
+    assert found.features[2].speeds.tolist() == [0.5, 0.25]
+    assert [ring.tolist() for ring in found.features[3].rings] == [ZONE.tolist(), HOLE.tolist()]
+    assert found.features[5].points.tolist() == (ZONE + 5).tolist()
+    assert found.properties[0] == {"name": "dock", "yaw": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("document", "words"),
+    [
+        ("{", "is not JSON"),
+        ([], r"is a list of 0; give GeoJSON"),
+        ({"type": "Curve"}, "type is no geometry"),
+        (collection(), "holds no point, route or zone"),
+        (collection(feature("Point", [1])), r"features\[0\]\.geometry\.coordinates\[0\] has fewer"),
+        (collection(feature("LineString", [[1, 2]])), "has 1 points; a route has 2 or more"),
+        (
+            collection(feature("Polygon", [[[0, 0], [1, "x"], [1, 1]]])),
+            r"coordinates\[0\]\[1\]\[1\] is \"x\"; give a finite number",
+        ),
+        (
+            collection(feature("LineString", [[0, 0], [1, 0]], speeds=[1])),
+            "are 1 for 2 points",
+        ),
+        (collection(3), r"features\[0\] is 3; give a feature"),
+    ],
+)
+def test_geojson_that_cannot_be_carried_is_refused_in_a_sentence(tmp_path, document, words):
+    path = written(tmp_path, document)
+    with pytest.raises(InvalidInputError, match=words) as refused:
+        read_features(path)
+    assert refused.value.field.startswith(str(path))
+
+
+def test_what_was_carried_is_written_with_what_it_had_and_reads_back(tmp_path):
+    changes = (Change(ChangeReason.OBSTACLE, 0, 1, "Led around sofa."),)
+    carried = [
+        kept(
+            "route", [[0, 0], [2, 1]], name="patrol", speeds=np.array([0.5, 0.1]), changes=changes
+        ),
+        kept("zone", ZONE, HOLE, name="no-go"),
+        kept("point", [[4, 5]], name="dock"),
+        Carried("route", "attic", None, (), (), changes),
+    ]
+    said = [{"name": "patrol", "speed": 0.5}, {"colour": "red"}, {"yaw": 3.0}, {"changes": 7}]
+    text = encode_carried(carried, said, math.pi / 2)
+    patrol, zone, dock, attic = json.loads(text)["features"]
+    assert patrol["properties"] == {
+        "name": "patrol",
+        "speeds": [0.5, 0.1],
+        "deviation": 0.25,
+        "deviations": [[0.25, 0.25]],
+        "changes": [{"reason": "obstacle", "first": 0, "last": 1, "sentence": "Led around sofa."}],
+    }
+    assert zone["properties"]["colour"] == "red"
+    assert dock["properties"]["yaw"] == pytest.approx(3.0 + math.pi / 2 - 2 * math.pi, abs=1e-5)
+    assert attic["geometry"] is None
+    assert attic["properties"]["changes"][0]["reason"] == "obstacle"
+    found = read_features(written(tmp_path, text))
+    assert [each.name for each in found.features] == ["patrol", "no-go", "dock"]
+    for each, was in zip(found.features, carried, strict=False):
+        assert [r.tolist() for r in each.rings] == [r.tolist() for r in was.feature.rings]
+
+
+GRID = OccupancyGrid(np.zeros((40, 60), dtype=np.int8), 0.1, (-1.0, -0.5, 0.0))
+
+
+def mask(*carried, properties=None):
+    said = [{}] * len(carried) if properties is None else properties
+    text, picture = encode_keepout(carried, said, GRID, "mask.pgm")
+    return decode_map_server(text, picture), text, picture
+
+
+def test_a_keepout_mask_forbids_each_cell_that_a_zone_reaches_into():
+    found, text, _ = mask(kept("zone", ZONE), kept("route", [[0, 0], [1, 1]]))
+    assert (found.resolution, found.origin, found.cells.shape) == (0.1, GRID.origin, (40, 60))
+    assert "image: mask.pgm\n" in text
+    rows, columns = np.mgrid[:40, :60]
+    cells = shapely.box(
+        columns / 10 - 1.0, rows / 10 - 0.5, (columns + 1) / 10 - 1.0, (rows + 1) / 10 - 0.5
+    )
+    zone = shapely.Polygon(ZONE)
+    forbidden = found.cells == 100
+    assert forbidden[shapely.intersects(zone.buffer(-1e-6), cells)].all()
+    assert not forbidden[shapely.distance(zone, cells) > 0.1].any()
+    assert (found.cells[~forbidden] == 0).all()
+
+
+def test_a_zone_that_is_none_to_keep_out_of_is_left_out_of_the_mask():
+    found, _, _ = mask(kept("zone", ZONE), properties=[{"keepout": False}])
+    assert (found.cells == 0).all()
+
+
+def test_a_mask_is_read_as_zones(tmp_path):
+    ring = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]])
+    hole = np.array([[1.0, 0.6], [2.0, 0.6], [2.0, 1.4], [1.0, 1.4]])
+    other = np.array([[3.5, 0.5], [4.7, 0.5], [4.7, 2.5], [3.5, 2.5]])
+    _, text, picture = mask(kept("zone", ring, hole), kept("zone", other))
+    (tmp_path / "mask.pgm").write_bytes(picture)
+    found = read_features(written(tmp_path, text, "mask.yaml"))
+    areas = [shapely.Polygon(each.rings[0], each.rings[1:]) for each in found.features]
+    assert sorted(len(each.rings) for each in found.features) == [1, 2]
+    for true in (shapely.Polygon(ring, [hole]), shapely.Polygon(other)):
+        best = max(areas, key=lambda each: true.intersection(each).area)
+        shared = true.intersection(best).area / true.union(best).area
+        assert shared > 0.8
+
+
+def test_waypoints_are_written_in_order_and_read_back(tmp_path):
+    carried = [
+        kept("point", [[4, 5]], name="dock"),
+        kept("zone", ZONE),
+        kept("route", [[0, 0], [0, 2], [-1, 2]], speeds=np.array([0.5, 0.25, 0.1])),
+    ]
+    text = encode_waypoints(carried, [{"yaw": 0.5}, {}, {}], 0.25)
+    assert text.splitlines()[:4] == [
+        "waypoints:",
+        "  waypoint0:",
+        "    pose: [4.000000, 5.000000, 0.0]",
+        "    orientation: [0.930508, 0.0, 0.0, 0.366273]",
+    ]
+    assert [line for line in text.splitlines() if "speed" in line] == [
+        "    speed: 0.5",
+        "    speed: 0.25",
+        "    speed: 0.1",
+    ]
+    found = read_features(written(tmp_path, text, "waypoints.yaml"))
+    assert [each.points[0].tolist() for each in found.features] == [
+        [4.0, 5.0],
+        [0.0, 0.0],
+        [0.0, 2.0],
+        [-1.0, 2.0],
+    ]
+    assert [each.name for each in found.features] == ["dock", "waypoint1", "waypoint2", "waypoint3"]
+    headings = [said["yaw"] for said in found.properties]
+    expected = [0.75, math.pi / 2, math.pi, math.pi]
+    assert np.cos(headings) == pytest.approx(np.cos(expected), abs=1e-5)
+    assert np.sin(headings) == pytest.approx(np.sin(expected), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("waypoints: [1, 2]", "waypoints is a list of 2; give waypoints by name"),
+        ("waypoints: {a: {pose: [1, x, 0]}}", r"waypoints\.a\.pose\[0\]\[1\] is \"x\""),
+        ("waypoints: {}", "holds no point, route or zone"),
+        ("key: [", "YAML"),
+    ],
+)
+def test_a_yaml_that_is_neither_waypoints_nor_a_mask_is_refused(tmp_path, text, words):
+    path = written(tmp_path, text, "given.yaml")
+    with pytest.raises(InvalidInputError, match=words) as refused:
+        read_features(path)
+    assert refused.value.field.startswith(str(path))
+
+
+def test_what_a_map_names_are_points():
+    grid = OccupancyGrid(
+        np.zeros((2, 2)), 1.0, landmarks=(Landmark("desk", (1.0, 2.0), "furniture"),)
+    )
+    found = landmarks_of(grid)
+    assert found.features[0].name == "desk"
+    assert found.features[0].points.tolist() == [[1.0, 2.0]]
+    assert found.properties == ({"name": "desk", "type": "furniture"},)
