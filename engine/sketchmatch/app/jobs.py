@@ -26,6 +26,7 @@ from sketchmatch.errors import (
     InvalidInputError,
     Reason,
     ServerStoppingError,
+    StoreError,
 )
 from sketchmatch.model import Scene, SceneDescriptor
 from sketchmatch.model import Source as AnySource
@@ -182,6 +183,7 @@ def _transfer(
         value = requests.transfer_request(
             request, setup.limits, engine.registry.readers, _stored(job, setup)
         )
+        value = replace(value, sources=_sources_of_stored(request, setup))
     writer, clock = responses.ResponseWriter(value.match), Clock(value.match.time_budget)
     begun(clock)
     with (
@@ -191,6 +193,22 @@ def _transfer(
     ):
         found = yield from retold(work, lambda event: _progress(event, writer))
     yield responses.transferred(found)
+
+
+def _sources_of_stored(
+    request: TransferRequest, setup: Setup
+) -> tuple[AnySource | None, AnySource | None]:
+    """Return what the stored scenes that a request names were found in: walls are no objects."""
+
+    def source(side: Source, name: str) -> AnySource | None:
+        if setup.shelf is None or side.WhichOneof("kind") != "stored_scene":
+            return None
+        kept = setup.shelf.source(side.stored_scene)
+        if kept is None:
+            raise StoreError(f"what {name}.stored_scene was found in cannot be read; put it again")
+        return requests.source(kept, name, True, setup.engine.registry.readers)
+
+    return source(request.sketch, "sketch"), source(request.map, "map")
 
 
 def _progress(event: MatchEvent, writer: responses.ResponseWriter) -> Iterator[Message]:

@@ -391,6 +391,12 @@ class Shelf:
         found = self._found("SELECT record FROM scenes WHERE name = ?", name)
         return None if found is None else bytes(found[0])
 
+    def source(self, name: str) -> source_pb2.Source | None:
+        """Return what a scene was found in, or None where it is not kept."""
+        query = "SELECT source FROM contents JOIN scenes USING (content) WHERE name = ?"
+        found = self._found(query, name)
+        return None if found is None else source_pb2.Source.FromString(zlib.decompress(found[0]))
+
     def histograms(self, scene: Scene, histogram: Histogram) -> FloatArray | None:
         """Return the histograms of a scene, or None where they are not kept."""
         found = self._found(

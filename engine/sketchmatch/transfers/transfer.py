@@ -61,6 +61,8 @@ class TransferRequest:
         are not kept out of objects.
     allow_unknown
         Whether cells that nobody has seen are no obstacles.
+    sources
+        What sketch and map were found in, where they are segmented already.
 
     Raises
     ------
@@ -74,6 +76,7 @@ class TransferRequest:
     direction: Direction = Direction.SKETCH_TO_MAP
     radius: float | None = None
     allow_unknown: bool = False
+    sources: tuple[Source | None, Source | None] = (None, None)
 
     def __post_init__(self) -> None:
         try:
@@ -181,15 +184,18 @@ def run_transfer(
     features = (*drawn, *request.features)
     if not features:
         raise _refused("features", "is empty, and the sketch has no route; give something to carry")
-    grids = (request.match.sketch, request.match.map)
-    doubt = MAPPED if all(isinstance(each, OccupancyGrid) for each in grids) else DRAWN
+    sides = (
+        request.sources[0] or request.match.sketch,
+        request.sources[1] or request.match.map,
+    )
+    doubt = MAPPED if all(isinstance(each, OccupancyGrid) for each in sides) else DRAWN
     source, target = (sketch, map_) if forth else (map_, sketch)
     ways = pairs if forth else tuple((b, a) for a, b in pairs)
     try:
         course = course_between(source.scene, target.scene, ways, weights, features, doubt)
     except InvalidInputError as error:
         raise InvalidInputError(error.reason, "object_map", error.problem) from None
-    given = request.match.map if forth else request.match.sketch
+    given = sides[1] if forth else sides[0]
     obstacles = _obstacles(request, given, target.scene, course, features)
     unit = "m" if isinstance(given, OccupancyGrid) else "units"
     found: list[Carried] = []
@@ -216,7 +222,7 @@ def _matched(
 
 def _segmented(request: MatchRequest, engine: Engine) -> tuple[Segmentation, Segmentation]:
     given = (request.sketch, request.map)
-    sources = [None if isinstance(each, Scene) else each for each in given]
+    sources = [None if isinstance(each, Scene | Segmentation) else each for each in given]
     pipeline = engine.resolve(request.selection, sources[0], sources[1], request.profile)
     sketch = engine.segment_side("sketch", request.sketch, pipeline)
     return sketch, engine.segment_side("map", request.map, pipeline)
@@ -231,7 +237,7 @@ def _drawn_route(sketch: Segmentation) -> tuple[Feature, ...]:
 
 def _obstacles(
     request: TransferRequest,
-    given: Source | Scene,
+    given: Source | Scene | Segmentation,
     target: Scene,
     course: Course,
     features: Sequence[Feature],
