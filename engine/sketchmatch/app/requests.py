@@ -274,7 +274,9 @@ def _polygon_set(message: source_pb2.PolygonSet) -> PolygonSet:
     return PolygonSet(
         tuple(
             LabelledPolygon(
-                tuple(_points(ring.points, upward) for ring in polygon.rings), polygon.label
+                tuple(_points(ring.points, upward) for ring in polygon.rings),
+                polygon.label,
+                polygon.certainty if polygon.HasField("certainty") else 1.0,
             )
             for polygon in message.polygons
         )

@@ -106,6 +106,7 @@ def scene_of(message: scene_pb2.Scene) -> Scene:
                     for ring in item.rings
                 ),
                 item.label,
+                item.certainty if item.HasField("certainty") else 1.0,
             )
             for item in message.objects
         )

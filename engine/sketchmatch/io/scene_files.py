@@ -15,8 +15,8 @@ __all__ = ["check_scene_path", "encode_geojson", "save_scene"]
 def encode_geojson(scene: Scene) -> str:
     """Return a scene as a GeoJSON ``FeatureCollection`` that reads back as the very same scene.
 
-    Each object is a ``Polygon`` with its holes and the property ``label``, in the scene's order
-    and coordinates.
+    Each object is a ``Polygon`` with its holes and the property ``label``, and ``certainty`` where
+    that is below 1, in the scene's order and coordinates.
 
     Examples
     --------
@@ -65,7 +65,10 @@ def save_scene(path: str | Path, scene: Scene, field: str = "out") -> None:
 def _feature(item: SceneObject) -> dict[str, Any]:
     return {
         "type": "Feature",
-        "properties": {"label": item.label},
+        "properties": {
+            "label": item.label,
+            **({"certainty": item.certainty} if item.certainty < 1.0 else {}),
+        },
         "geometry": {"type": "Polygon", "coordinates": [_closed(ring) for ring in item.rings]},
     }
 

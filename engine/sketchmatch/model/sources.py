@@ -93,10 +93,14 @@ class StrokeSet:
 
 @dataclass(frozen=True, eq=False)
 class LabelledPolygon:
-    """One polygon as it came: outer ring, then holes, each of shape (k, 2), y up."""
+    """One polygon as it came: outer ring, then holes, each of shape (k, 2), y up.
+
+    ``certainty`` is how sure it is that it is one thing, above 0 and up to 1.
+    """
 
     rings: tuple[FloatArray, ...]
     label: str = ""
+    certainty: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", cleaned_label(self.label))

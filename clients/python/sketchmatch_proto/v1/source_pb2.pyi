@@ -216,8 +216,13 @@ class LabelledPolygon(google.protobuf.message.Message):
 
     RINGS_FIELD_NUMBER: builtins.int
     LABEL_FIELD_NUMBER: builtins.int
+    CERTAINTY_FIELD_NUMBER: builtins.int
     label: builtins.str
     """A name for people. It never influences a match."""
+    certainty: builtins.float
+    """How sure it is that this is one thing, above 0 and up to 1; not set: 1. It never influences a
+    match.
+    """
     @property
     def rings(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Ring]:
         """The outer ring, then its holes, if any. Either orientation is accepted."""
@@ -227,8 +232,11 @@ class LabelledPolygon(google.protobuf.message.Message):
         *,
         rings: collections.abc.Iterable[global___Ring] | None = ...,
         label: builtins.str = ...,
+        certainty: builtins.float | None = ...,
     ) -> None: ...
-    def ClearField(self, field_name: typing.Literal["label", b"label", "rings", b"rings"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_certainty", b"_certainty", "certainty", b"certainty"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_certainty", b"_certainty", "certainty", b"certainty", "label", b"label", "rings", b"rings"]) -> None: ...
+    def WhichOneof(self, oneof_group: typing.Literal["_certainty", b"_certainty"]) -> typing.Literal["certainty"] | None: ...
 
 global___LabelledPolygon = LabelledPolygon
 

@@ -1,0 +1,204 @@
+"""What stands at a wall: pockets of a room's outline that jut into it.
+
+Between two corners of a room's outline that are near each other lies a pocket: what the outline
+goes around in between. A pocket is a thing if it hangs on the wall by a neck, as a shelf does that
+touches it with one corner, or if it leans against a wall that runs on straight behind it and fills
+its width and depth as a box does; a corner of the building fills one half.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Iterator
+from typing import NamedTuple, cast
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.polygon import orient
+
+from sketchmatch.model import FloatArray
+
+__all__ = ["SIDE", "Bounds", "Leans", "Pocket", "at_walls"]
+
+SIDE = 0.4
+"""In metres: a bar so thin may be one of two sides that were seen of a thing."""
+
+# Metres: how far a wall strays, and how wide a slit people do not see.
+_STRAY, _SLIT = 0.08, 0.25
+# The angle by which a room's outline turns where a thing meets the wall.
+_CORNER = math.radians(35.0)
+# Metres of the wall on both sides that have to run on, and how straight.
+_STRETCH, _STRAIGHT = 0.2, math.cos(math.radians(30.0))
+# The share of width times depth that a box fills, after all that it lost.
+_FULL = 0.68
+# A neck is at most this share of how thick what hangs on it is somewhere.
+_NECK = 0.5
+# As a share of how wide it may be at the wall: how far a thing juts out at most.
+_DEEPEST = 1.5
+
+
+class Bounds(NamedTuple):
+    """Bounds on what juts into a room, in metres.
+
+    Attributes
+    ----------
+    widest
+        How wide it is at most where it meets the wall.
+    thinnest
+        What is no thicker is wall.
+    smallest
+        The side of the smallest square that counts.
+    """
+
+    widest: float
+    thinnest: float
+    smallest: float
+
+
+class Leans(enum.IntEnum):
+    """How a pocket meets the wall; of two that overlap, the one counts that comes first here."""
+
+    NOT = 0
+    """By a neck."""
+    AS_A_BOX = 1
+    AS_A_SIDE = 2
+    """By a neck, and so thin that it may be a side of a box."""
+
+
+class Pocket(NamedTuple):
+    """A pocket of a room's outline.
+
+    Attributes
+    ----------
+    outline
+        In metres; its last edge is where it meets the wall.
+    neck, depth
+        How long that edge is, and how far the rest is away from it.
+    leans
+        How it meets the wall.
+    """
+
+    outline: shapely.Polygon
+    neck: float
+    depth: float
+    leans: Leans
+
+    @property
+    def order(self) -> tuple[int, float]:
+        """Which of two that overlap is taken: the smallest by a neck, the largest box."""
+        area = self.outline.area
+        return (self.leans, -area if self.leans is Leans.AS_A_BOX else area)
+
+
+def at_walls(room: shapely.Polygon, bounds: Bounds, cell: float) -> list[Pocket]:
+    """Return what juts out of a room's walls into it, none overlapping another.
+
+    Parameters
+    ----------
+    room
+        Its free space, in metres; holes near its outline count as joined to it.
+    bounds
+        What counts.
+    cell
+        The side of a cell.
+    """
+    stray = max(_STRAY, cell)
+    plain = shapely.simplify(room, stray).buffer(0)
+    opened = plain.buffer(-_SLIT / 2, join_style="mitre").buffer(_SLIT / 2, join_style="mitre")
+    found: list[Pocket] = []
+    for part in shapely.get_parts([opened, plain]).tolist():
+        if part.area > bounds.smallest**2:
+            ring = cast(shapely.Polygon, shapely.Polygon(part.exterior).simplify(stray))
+            found += _pockets(orient(ring), bounds, stray)
+    taken: list[Pocket] = []
+    for pocket in sorted(found, key=lambda each: each.order):
+        if not any(pocket.outline.intersects(other.outline) for other in taken):
+            taken.append(pocket)
+    return taken
+
+
+def _pockets(ring: shapely.Polygon, bounds: Bounds, stray: float) -> Iterator[Pocket]:
+    """Yield the pockets of a ring that are things."""
+    points = shapely.get_coordinates(ring.exterior)[:-1]
+    corners = np.flatnonzero(_turns(points) > _CORNER)
+    spots = shapely.points(points[corners])
+    a, b = shapely.STRtree(spots).query(spots, predicate="dwithin", distance=bounds.widest)
+    a, b = corners[a[a != b]], corners[b[a != b]]
+    areas = _areas(points, a, b)
+    counts = (areas >= max(bounds.smallest, bounds.thinnest) ** 2) & (areas <= ring.area)
+    a, b = a[counts], b[counts]
+    inner = ring.buffer(-stray)
+    shapely.prepare(inner)
+    across = shapely.linestrings(np.stack([points[a], points[b]], axis=1))
+    walled = ~shapely.intersects(inner, across)
+    for first, last in zip(a[walled].tolist(), b[walled].tolist(), strict=True):
+        pocket = _pocket(points, first, last, bounds)
+        if pocket is not None:
+            yield pocket
+
+
+def _pocket(points: FloatArray, a: int, b: int, bounds: Bounds) -> Pocket | None:
+    """Return the pocket between two corners, or None if it is no thing."""
+    chain = _chain(points, a, b)
+    outline, neck = shapely.Polygon(chain), math.dist(chain[0], chain[-1])
+    depth = _depth(chain)
+    leans = (
+        bounds.thinnest < depth <= _DEEPEST * bounds.widest
+        and outline.area >= _FULL * neck * depth
+        and _goes_on(points, a, b)
+    )
+    hangs = depth > 0.5 * neck / _NECK and not outline.buffer(-0.5 * neck / _NECK).is_empty
+    if not (leans or hangs) or not outline.is_valid or not _is_thick(outline, bounds.thinnest):
+        return None
+    if not hangs:
+        return Pocket(outline, neck, depth, Leans.AS_A_BOX)
+    thin = outline.buffer(-SIDE / 2.0).is_empty
+    return Pocket(outline, neck, depth, Leans.AS_A_SIDE if thin else Leans.NOT)
+
+
+def _is_thick(outline: shapely.Polygon, thinnest: float) -> bool:
+    """Whether more than half of it is left when what is thin is taken off."""
+    core = outline.buffer(-thinnest / 2.0)
+    return bool(core.buffer(thinnest / 2.0).area > 0.5 * outline.area)
+
+
+def _goes_on(points: FloatArray, a: int, b: int) -> bool:
+    """Whether the wall before a pocket and the one after it run on along the line between."""
+    along = points[b] - points[a]
+    for corner, step in ((a, -1), (b, 1)):
+        k = corner
+        while math.dist(points[k], points[corner]) < _STRETCH:
+            k = (k + step) % len(points)
+        way = step * (points[k] - points[corner])
+        if way @ along < _STRAIGHT * np.linalg.norm(way) * np.linalg.norm(along):
+            return False
+    return True
+
+
+def _depth(chain: FloatArray) -> float:
+    """Return how far a chain leaves the line through its ends."""
+    along, away = chain[-1] - chain[0], chain - chain[0]
+    return float(np.abs(away[:, 0] * along[1] - away[:, 1] * along[0]).max() / np.hypot(*along))
+
+
+def _turns(points: FloatArray) -> FloatArray:
+    """Return the angle by which a closed line turns left at each point."""
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.asarray(np.arctan2(cross, (before * after).sum(axis=1)))
+
+
+def _areas(points: FloatArray, a: NDArray[np.int64], b: NDArray[np.int64]) -> FloatArray:
+    """Return the area between the way along the ring from each a to its b and the straight one."""
+    following = np.roll(points, -1, axis=0)
+    steps = points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0]
+    until = np.concatenate([[0.0], np.cumsum(steps)])
+    way = np.where(a < b, until[b] - until[a], until[-1] - until[a] + until[b])
+    back = points[b, 0] * points[a, 1] - points[b, 1] * points[a, 0]
+    return np.asarray(-(way + back) / 2.0)
+
+
+def _chain(points: FloatArray, a: int, b: int) -> FloatArray:
+    return points[a : b + 1] if a < b else np.concatenate([points[a:], points[: b + 1]])
