@@ -278,9 +278,9 @@ class Scene:
 
     @cached_property
     def identity(self) -> str:
-        """A hash of the outlines, in hexadecimal: the same for scenes that match alike.
+        """A hash of outlines and certainties, in hexadecimal: the same for scenes that match alike.
 
-        Labels and certainties, which never influence a match, are no part of it.
+        Labels, which never influence a match, are no part of it.
 
         Examples
         --------
@@ -292,6 +292,8 @@ class Scene:
         content = sha256()
         for item in self.objects:
             content.update(b"object")
+            if item.certainty < 1.0:
+                content.update(np.array(item.certainty, dtype="<f8").tobytes())
             for ring in item.rings:
                 content.update(len(ring).to_bytes(8, "little"))
                 content.update(np.ascontiguousarray(ring, dtype="<f8").tobytes())

@@ -11,7 +11,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Iterator
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -20,19 +20,21 @@ from shapely.geometry.polygon import orient
 
 from sketchmatch.model import FloatArray
 
-__all__ = ["SIDE", "Bounds", "Leans", "Pocket", "at_walls"]
+__all__ = ["Bounds", "Leans", "Pocket", "at_walls"]
 
-SIDE = 0.4
-"""In metres: a bar so thin may be one of two sides that were seen of a thing."""
-
-# Metres: how far a wall strays, and how wide a slit people do not see.
-_STRAY, _SLIT = 0.08, 0.25
+# As shares of how thick a wall is: how far it strays, how wide a slit people do not see, and how
+# long a wall runs on both sides of what leans against it.
+_STRAY, _SLIT, _STRETCH = 0.25, 0.7, 0.6
+# In the same unit: a bar so thin may be one of two sides that were seen of a thing.
+_SIDE = 1.15
 # The angle by which a room's outline turns where a thing meets the wall.
 _CORNER = math.radians(35.0)
-# Metres of the wall on both sides that have to run on, and how straight.
-_STRETCH, _STRAIGHT = 0.2, math.cos(math.radians(30.0))
+# How straight it runs.
+_STRAIGHT = math.cos(math.radians(30.0))
 # The share of width times depth that a box fills, after all that it lost.
 _FULL = 0.68
+# What is this much wider than where it meets the wall leans on nothing.
+_BELLY = 0.87
 # A neck is at most this share of how thick what hangs on it is somewhere.
 _NECK = 0.5
 # As a share of how wide it may be at the wall: how far a thing juts out at most.
@@ -50,11 +52,29 @@ class Bounds(NamedTuple):
         What is no thicker is wall.
     smallest
         The side of the smallest square that counts.
+    cell
+        The side of a cell of the map.
     """
 
     widest: float
     thinnest: float
     smallest: float
+    cell: float
+
+    @property
+    def stray(self) -> float:
+        """How far an outline may leave the line that it follows."""
+        return max(_STRAY * self.thinnest, self.cell)
+
+    @property
+    def slit(self) -> float:
+        """How wide a slit people do not see."""
+        return _SLIT * self.thinnest
+
+    @property
+    def side(self) -> float:
+        """How thick what may be one of two sides that were seen of a thing is at most."""
+        return _SIDE * self.thinnest
 
 
 class Leans(enum.IntEnum):
@@ -92,26 +112,25 @@ class Pocket(NamedTuple):
         return (self.leans, -area if self.leans is Leans.AS_A_BOX else area)
 
 
-def at_walls(room: shapely.Polygon, bounds: Bounds, cell: float) -> list[Pocket]:
+def at_walls(room: shapely.Geometry, sides: shapely.Geometry, bounds: Bounds) -> list[Pocket]:
     """Return what juts out of a room's walls into it, none overlapping another.
 
     Parameters
     ----------
     room
-        Its free space, in metres; holes near its outline count as joined to it.
+        Its free space in metres, one polygon or several; holes do not count.
+    sides
+        What stands near the walls and may be a side of what juts out of them.
     bounds
         What counts.
-    cell
-        The side of a cell.
     """
-    stray = max(_STRAY, cell)
-    plain = shapely.simplify(room, stray).buffer(0)
-    opened = plain.buffer(-_SLIT / 2, join_style="mitre").buffer(_SLIT / 2, join_style="mitre")
+    plain = shapely.union_all(_simplified(room, bounds.stray))
+    around = plain.difference(sides).buffer(-bounds.slit / 2.0, join_style="mitre")
+    opened = around.buffer(bounds.slit / 2.0, join_style="mitre")
     found: list[Pocket] = []
-    for part in shapely.get_parts([opened, plain]).tolist():
-        if part.area > bounds.smallest**2:
-            ring = cast(shapely.Polygon, shapely.Polygon(part.exterior).simplify(stray))
-            found += _pockets(orient(ring), bounds, stray)
+    for ring in (*_simplified(opened, bounds.stray), *_simplified(plain, bounds.stray)):
+        if ring.area > bounds.smallest**2:
+            found += _pockets(orient(ring), bounds)
     taken: list[Pocket] = []
     for pocket in sorted(found, key=lambda each: each.order):
         if not any(pocket.outline.intersects(other.outline) for other in taken):
@@ -119,7 +138,20 @@ def at_walls(room: shapely.Polygon, bounds: Bounds, cell: float) -> list[Pocket]
     return taken
 
 
-def _pockets(ring: shapely.Polygon, bounds: Bounds, stray: float) -> Iterator[Pocket]:
+def _simplified(shape: shapely.Geometry, stray: float) -> list[shapely.Polygon]:
+    """Return simpler outlines; they begin at the farthest corner, whichever way they are turned."""
+    found: list[shapely.Polygon] = []
+    for part in shapely.get_parts(shape).tolist():
+        points = shapely.get_coordinates(part.exterior)[:-1]
+        if not len(points):
+            continue
+        away = np.hypot(*(points - shapely.get_coordinates(part.centroid)).T)
+        first = np.roll(points, -int(away.argmax()), axis=0)
+        found += shapely.get_parts(shapely.Polygon(first).simplify(stray).buffer(0)).tolist()
+    return found
+
+
+def _pockets(ring: shapely.Polygon, bounds: Bounds) -> Iterator[Pocket]:
     """Yield the pockets of a ring that are things."""
     points = shapely.get_coordinates(ring.exterior)[:-1]
     corners = np.flatnonzero(_turns(points) > _CORNER)
@@ -129,7 +161,7 @@ def _pockets(ring: shapely.Polygon, bounds: Bounds, stray: float) -> Iterator[Po
     areas = _areas(points, a, b)
     counts = (areas >= max(bounds.smallest, bounds.thinnest) ** 2) & (areas <= ring.area)
     a, b = a[counts], b[counts]
-    inner = ring.buffer(-stray)
+    inner = ring.buffer(-bounds.stray)
     shapely.prepare(inner)
     across = shapely.linestrings(np.stack([points[a], points[b]], axis=1))
     walled = ~shapely.intersects(inner, across)
@@ -146,15 +178,15 @@ def _pocket(points: FloatArray, a: int, b: int, bounds: Bounds) -> Pocket | None
     depth = _depth(chain)
     leans = (
         bounds.thinnest < depth <= _DEEPEST * bounds.widest
-        and outline.area >= _FULL * neck * depth
-        and _goes_on(points, a, b)
+        and _FULL <= outline.area / (neck * depth) <= 1.0 / _BELLY
+        and _goes_on(points, a, b, _STRETCH * bounds.thinnest)
     )
     hangs = depth > 0.5 * neck / _NECK and not outline.buffer(-0.5 * neck / _NECK).is_empty
     if not (leans or hangs) or not outline.is_valid or not _is_thick(outline, bounds.thinnest):
         return None
     if not hangs:
         return Pocket(outline, neck, depth, Leans.AS_A_BOX)
-    thin = outline.buffer(-SIDE / 2.0).is_empty
+    thin = outline.buffer(-bounds.side / 2.0).is_empty
     return Pocket(outline, neck, depth, Leans.AS_A_SIDE if thin else Leans.NOT)
 
 
@@ -164,12 +196,13 @@ def _is_thick(outline: shapely.Polygon, thinnest: float) -> bool:
     return bool(core.buffer(thinnest / 2.0).area > 0.5 * outline.area)
 
 
-def _goes_on(points: FloatArray, a: int, b: int) -> bool:
+def _goes_on(points: FloatArray, a: int, b: int, stretch: float) -> bool:
     """Whether the wall before a pocket and the one after it run on along the line between."""
     along = points[b] - points[a]
     for corner, step in ((a, -1), (b, 1)):
         k = corner
-        while math.dist(points[k], points[corner]) < _STRETCH:
+        k = (k + step) % len(points)
+        while math.dist(points[k], points[corner]) < stretch:
             k = (k + step) % len(points)
         way = step * (points[k] - points[corner])
         if way @ along < _STRAIGHT * np.linalg.norm(way) * np.linalg.norm(along):

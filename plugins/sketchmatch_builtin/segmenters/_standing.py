@@ -12,8 +12,8 @@ import shapely
 from numpy.typing import NDArray
 
 from sketchmatch.model import FloatArray, IntArray
-from sketchmatch_builtin.segmenters._at_walls import SIDE, Bounds, Leans, Pocket, at_walls
-from sketchmatch_builtin.segmenters._cells import Mask, outline, refuse_more
+from sketchmatch_builtin.segmenters._at_walls import Bounds, Leans, Pocket, at_walls
+from sketchmatch_builtin.segmenters._cells import Mask, closed, outline, refuse_more
 from sketchmatch_builtin.segmenters._furniture import FOOT, Bars, Legs, crowds, facing, tables
 from sketchmatch_builtin.segmenters._merging import apart, merged
 
@@ -23,7 +23,7 @@ _Geometries = NDArray[np.object_]
 _Flags = NDArray[np.bool_]
 
 # How sure it is that parts are one thing, by what they form together.
-_TABLE, _FACING, _CROWD = 0.9, 0.8, 0.6
+_TABLE, _FACING, _CROWD = 0.9, 0.6, 0.6
 # The share of a crowd's parts that tables and chairs have where it is these, and no one thing.
 _MOST = 0.6
 # What is in a crowd may be so much larger than a leg, as legs that are near each other are one.
@@ -31,15 +31,15 @@ _CLUMP = 2.0
 # A leg is what the laser met, not what it did not see.
 _MET = 0.4
 # Metres: the side from which on a part may be the bar that a table stands on.
-_BAR = 0.25
+_BAR, _BAR_RATIO = 0.25, 2.5
 # What hangs on a wall by a neck, juts far out of it, or leans against it as its own bumps do.
 _HANGING, _JUTTING, _LEANING = 0.8, 0.7, 0.4
 # The share of an outline that the laser met where there is no doubt.
 _SEEN = 0.5
 # At least so sure is what has some width, and at most so sure what is thin and ragged.
 _COMPACT, _RAGGED = 0.3, 0.4
-# Metres: what is thin; and the share of its hull that something straight fills.
-_THIN, _STRAIGHT = 0.2, 0.6
+# The share of its hull that something straight fills.
+_STRAIGHT = 0.6
 # Legs, before they are merged to tables.
 _MOST_PARTS = 10_000
 
@@ -64,12 +64,15 @@ class Room(NamedTuple):
         1 where the laser met something.
     cell
         The side of a cell, in metres.
+    small
+        Thinner things are thin, in metres.
     """
 
     free: Mask
     inside: Mask
     occupied: Mask
     cell: float
+    small: float
 
 
 class Parts(NamedTuple):
@@ -199,7 +202,8 @@ def _sets(
     clump &= met >= _MET * parts.cells
     leg = clump & (parts.cells <= largest_leg)
     bar = leg & (longer >= _BAR)
-    bar[alone] = True
+    # What is so full is no bar, however it is turned.
+    bar[alone] = parts.cells[alone] * _BAR_RATIO <= np.square(parts.boxes[alone, 2:4]).sum(axis=1)
     free = float(np.count_nonzero(room.free)) * room.cell**2
 
     def legs(which: IntArray) -> Legs:
@@ -228,19 +232,10 @@ def _bars(which: IntArray, parts: Parts, cell: float) -> Bars:
 
 def _bar(k: int, parts: Parts, cell: float) -> list[float]:
     """Return middle, direction, length and width of the smallest rectangle around a part."""
-    rows, columns = np.nonzero(parts.mask(k))
-    points = np.stack([columns, rows], axis=1).astype(np.float32)
-    (x, y), (a, b), degrees = cv2.minAreaRect(points)
+    corners = (outline(parts.mask(k)) + parts.boxes[k, :2]) * cell
+    (x, y), (a, b), degrees = cv2.minAreaRect(corners.astype(np.float32))
     turn = math.radians(degrees if a >= b else degrees + 90.0)
-    left, below = parts.boxes[k, :2].tolist()
-    middle = [(x + left + 0.5) * cell, (y + below + 0.5) * cell]
-    return [
-        *middle,
-        math.cos(turn),
-        math.sin(turn),
-        (max(a, b) + 1.0) * cell,
-        (min(a, b) + 1.0) * cell,
-    ]
+    return [x, y, math.cos(turn), math.sin(turn), max(a, b), min(a, b)]
 
 
 def _is_furniture(
@@ -252,7 +247,7 @@ def _is_furniture(
     larger = (each for each in others if each.area > hull.area)
     return (
         hull.area >= least
-        and not hull.buffer(-_THIN / 2.0 / room.cell).is_empty
+        and not hull.buffer(-room.small / 2.0 / room.cell).is_empty
         and not _meets_walls(hull, room)
         and not any(hull.intersects(each) for each in larger)
     )
@@ -271,19 +266,48 @@ def _meets_walls(hull: shapely.Polygon, room: Room) -> bool:
 def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]:
     """Return the things of a room together with those that stand at its walls."""
     scaled = [shapely.transform(each.outline, lambda p: p * room.cell) for each in things]
-    sides = [each for each in scaled if each.buffer(-SIDE / 2.0).is_empty]
-    free = _walled(room).difference(shapely.union_all(sides))
-    tree = shapely.STRtree([each.outline for each in things])
+    sides = [each for each in scaled if each.buffer(-bounds.side / 2.0).is_empty]
+    outlines = [each.outline for each in things]
+    tree = shapely.STRtree(outlines)
     parts_of_others, found = set(), []
-    for pocket in at_walls(free, bounds, room.cell):
-        polygon = shapely.transform(pocket.outline, lambda p: p / room.cell)
+    for pocket in at_walls(_walled(room), shapely.union_all(sides), bounds):
+        line = shapely.get_coordinates(pocket.outline) / room.cell
+        polygon = _to_the_cell(line, bounds, room)
+        near = tree.query(polygon, predicate="intersects").tolist()
+        part = [k for k in near if _is_most_of(polygon.intersection(outlines[k]), outlines[k])]
+        apart = shapely.union_all([outlines[k] for k in near if k not in part])
+        polygon = max(shapely.get_parts(polygon.difference(apart)), key=shapely.area, default=None)
         # Its last edge is where it meets the wall.
-        share = _seen(shapely.get_coordinates(polygon)[:-1], room)
-        within = tree.query(polygon, predicate="intersects").tolist()
-        if share >= _SEEN and not any(_is_most_of(things[k].outline, polygon) for k in within):
-            parts_of_others.update(within)
-            found.append(Thing(polygon, _of_pocket(pocket)))
+        seen = polygon is not None and _seen(line[:-1], room) >= _SEEN
+        if seen and not any(_is_most_of(outlines[k], polygon) for k in part):
+            parts_of_others.update(part)
+            found.append(Thing(shapely.Polygon(polygon.exterior), _of_pocket(pocket)))
     return [each for k, each in enumerate(things) if k not in parts_of_others] + found
+
+
+def _to_the_cell(line: FloatArray, bounds: Bounds, room: Room) -> shapely.Polygon:
+    """Return the outline of the cells that a simplified pocket stands for.
+
+    These are its own and those around it that it may have left out, but not beyond its last edge.
+    """
+    pocket, stray = shapely.Polygon(line), bounds.stray / room.cell
+    left, below, right, top = np.floor(pocket.buffer(stray).bounds).astype(int).tolist()
+    left, below = max(left, 0), max(below, 0)
+    taken = 1 - (room.free[below : top + 1, left : right + 1])
+    y, x = np.nonzero(taken)
+    spots = shapely.points(x + left + 0.5, y + below + 0.5)
+    # A pocket lies right of its line.
+    (x0, y0), (x1, y1) = line[-2], line[-1]
+    beyond = (x1 - x0) * (y + below + 0.5 - y0) - (y1 - y0) * (x + left + 0.5 - x0) > 0.0
+    shapely.prepare(pocket)
+    kept = shapely.dwithin(pocket, spots, np.where(beyond, 0.0, stray))
+    taken[y[~kept], x[~kept]] = 0
+    filled = closed(taken, round(bounds.slit / room.cell))
+    _, labels, boxes, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
+    if len(boxes) == 1:
+        return pocket
+    largest = labels == 1 + int(boxes[1:, cv2.CC_STAT_AREA].argmax())
+    return shapely.Polygon(outline(largest.astype(np.uint8)) + (left, below))
 
 
 def _is_most_of(part: shapely.Polygon, whole: shapely.Polygon) -> bool:
@@ -296,7 +320,7 @@ def _of_pocket(pocket: Pocket) -> float:
     return _JUTTING if pocket.depth >= pocket.neck else _LEANING
 
 
-def _walled(room: Room) -> shapely.Polygon:
+def _walled(room: Room) -> shapely.Geometry:
     """Return a room's outline, in metres, along the walls' cells: a corner joins two of them."""
     walls = cv2.copyMakeBorder(
         1 - (room.free | room.inside), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(1,)
@@ -310,7 +334,7 @@ def _walled(room: Room) -> shapely.Polygon:
 def _certainty(polygon: shapely.Polygon, room: Room) -> float:
     """Return how sure it is that an outline is a thing, and no shadow of one and no speckle."""
     sure = min(1.0, _seen(shapely.get_coordinates(polygon), room) / _SEEN)
-    if not polygon.buffer(-_THIN / 2.0 / room.cell).is_empty:
+    if not polygon.buffer(-room.small / 2.0 / room.cell).is_empty:
         return max(sure, _COMPACT)
     ragged = polygon.area < _STRAIGHT * polygon.convex_hull.area
     return min(sure, _RAGGED) if ragged else sure
@@ -318,10 +342,11 @@ def _certainty(polygon: shapely.Polygon, room: Room) -> float:
 
 def _seen(line: FloatArray, room: Room) -> float:
     """Return along which share of a line, in cells, the laser met something."""
-    stray = max(1, round(0.1 / room.cell))
-    path = shapely.LineString(line)
-    steps = shapely.line_interpolate_point(path, np.arange(0.25, path.length, 0.5))
-    points = np.floor(shapely.get_coordinates(steps)).astype(int)
+    stray = max(1, min(round(room.small / 2.0 / room.cell), max(room.free.shape)))
+    until = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    steps = np.arange(0.25, until[-1], 0.5)
+    xy = [np.interp(steps, until, each) for each in line.T]
+    points = np.floor(np.stack(xy, axis=1)).astype(int)
     low = np.maximum(points.min(axis=0) - stray, 0)
     high = points.max(axis=0) + stray + 1
     crop = room.occupied[low[1] : high[1], low[0] : high[0]]

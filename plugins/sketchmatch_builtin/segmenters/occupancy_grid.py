@@ -231,7 +231,7 @@ class OccupancyGridSegmenter(Segmenter):
         inside = closed(held, int(min(params.close_gaps / cell + 0.5, max(free.shape))))
         rows, columns = free.shape
         occupied = grid.cells[y : y + rows, x : x + columns] > _OCCUPIED
-        room = Room(free, inside, occupied.view(np.uint8), cell)
+        room = Room(free, inside, occupied.view(np.uint8), cell, params.min_size)
         parts, least = Parts.of(room), (params.min_size / cell) ** 2
         leg, most = (params.leg_size / cell) ** 2, source_limits().max_objects
         if params.merge_distance is None:
@@ -241,7 +241,7 @@ class OccupancyGridSegmenter(Segmenter):
         else:
             things = as_they_are(room, parts, least, most)
         if params.attached > 0.0:
-            bounds = Bounds(params.attached, params.wall_thickness, params.min_size)
+            bounds = Bounds(params.attached, params.wall_thickness, params.min_size, cell)
             things = at_the_walls(room, things, bounds)
         return [
             Thing(self._simplified(shapely.transform(each.outline, lambda p: p + at), grid), sure)

@@ -52,7 +52,8 @@ class SceneObject(google.protobuf.message.Message):
     """Area without the holes, in squared units of the scene."""
     certainty: builtins.float
     """How sure it is that this is one thing, and no part of a wall, shadow or speckle: above 0 and
-    below 1. Not set: there is no doubt. Below 0.5 it is drawn hollow. It never influences a match.
+    below 1. Not set: there is no doubt. What is in doubt, below 0.5, is drawn hollow. The more
+    certain an object of the map is, the likelier is an object map that has it.
     """
     @property
     def rings(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[sketchmatch_proto.v1.source_pb2.Ring]:

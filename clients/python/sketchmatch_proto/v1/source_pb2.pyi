@@ -220,9 +220,7 @@ class LabelledPolygon(google.protobuf.message.Message):
     label: builtins.str
     """A name for people. It never influences a match."""
     certainty: builtins.float
-    """How sure it is that this is one thing, above 0 and up to 1; not set: 1. It never influences a
-    match.
-    """
+    """How sure it is that this is one thing, above 0 and up to 1; not set: 1."""
     @property
     def rings(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Ring]:
         """The outer ring, then its holes, if any. Either orientation is accepted."""
