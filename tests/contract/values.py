@@ -209,7 +209,9 @@ SOURCES = {
                 ),
                 "bar",
             ),
-            LabelledPolygon((np.array([[1.5, -2.5], [4.5, -3.5], [0.5, -6.5]]),)),
+            LabelledPolygon(
+                (np.array([[1.5, -2.5], [4.5, -3.5], [0.5, -6.5]]),), certainty=0.375
+            ),
         )
     ),
     "SegmentRequest.stroke_set": StrokeSet(
@@ -422,7 +424,9 @@ EVENTS = {
 # What answers the other methods.
 
 SEGMENTATION = Segmentation(
-    Scene.from_polygons([BAR, RACK], ["bar", ""]),
+    Scene(
+        (SceneObject.from_polygon(BAR, "bar"), replace(SceneObject.from_polygon(RACK), certainty=0.625))
+    ),
     ("2 specks were left out", "a doorway was closed"),
     ROUTE[:2],
 )

@@ -178,6 +178,7 @@ def _pocket(points: FloatArray, a: int, b: int, bounds: Bounds) -> Pocket | None
     depth = _depth(chain)
     leans = (
         bounds.thinnest < depth <= _DEEPEST * bounds.widest
+        and outline.area <= bounds.widest**2
         and _FULL <= outline.area / (neck * depth) <= 1.0 / _BELLY
         and _goes_on(points, a, b, _STRETCH * bounds.thinnest)
     )

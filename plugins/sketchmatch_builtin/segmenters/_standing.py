@@ -38,6 +38,9 @@ _HANGING, _JUTTING, _LEANING = 0.8, 0.7, 0.4
 _SEEN = 0.5
 # At least so sure is what has some width, and at most so sure what is thin and ragged.
 _COMPACT, _RAGGED = 0.3, 0.4
+# At most so sure is what is thin where what the laser did not see begins near it; how near and how
+# long such an edge is, in the sizes of what is thin.
+_AT_EDGE, _NEAR, _EDGE = 0.4, 2.5, 2.0
 # The share of its hull that something straight fills.
 _STRAIGHT = 0.6
 # Legs, before they are merged to tables.
@@ -336,8 +339,19 @@ def _certainty(polygon: shapely.Polygon, room: Room) -> float:
     sure = min(1.0, _seen(shapely.get_coordinates(polygon), room) / _SEEN)
     if not polygon.buffer(-room.small / 2.0 / room.cell).is_empty:
         return max(sure, _COMPACT)
-    ragged = polygon.area < _STRAIGHT * polygon.convex_hull.area
-    return min(sure, _RAGGED) if ragged else sure
+    if polygon.area < _STRAIGHT * polygon.convex_hull.area:
+        return min(sure, _RAGGED)
+    return min(sure, _AT_EDGE) if _is_at_an_unseen_edge(polygon, room) else sure
+
+
+def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:
+    """Whether what the laser did not see begins near something, and no wall between."""
+    reach = round(_NEAR * room.small / room.cell)
+    left, below, right, top = np.floor(polygon.bounds).astype(int).tolist()
+    window = np.s_[max(below - reach, 0) : top + reach, max(left - reach, 0) : right + reach]
+    unseen = 1 - (room.free[window] | room.inside[window] | room.occupied[window])
+    beside = cv2.dilate(unseen, np.ones((3, 3), np.uint8)) & room.free[window]
+    return bool(np.count_nonzero(beside) * room.cell > _EDGE * room.small)
 
 
 def _seen(line: FloatArray, room: Room) -> float:
