@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import cv2
@@ -38,9 +37,9 @@ _HANGING, _JUTTING, _LEANING = 0.8, 0.7, 0.4
 _SEEN = 0.5
 # At least so sure is what has some width, and at most so sure what is thin and ragged.
 _COMPACT, _RAGGED = 0.3, 0.4
-# At most so sure is what is thin where what the laser did not see begins near it; how near and how
-# long such an edge is, in the sizes of what is thin.
-_AT_EDGE, _NEAR, _EDGE = 0.4, 2.5, 2.0
+# Where what the laser did not see begins near what is thin, that is as doubtful, and a speck, no
+# larger than such a square, even more so. Lengths are in what is thin: how near, how long an edge.
+_EDGE_SPECK, _SPECK, _NEAR, _EDGE = 0.2, 2.0, 2.5, 2.0
 # The share of its hull that something straight fills.
 _STRAIGHT = 0.6
 # Legs, before they are merged to tables.
@@ -172,11 +171,11 @@ def furnished(
     """
     things = as_they_are(room, parts, least, most)
     alone = dict(zip(np.flatnonzero(parts.cells >= max(least, 1.0)).tolist(), things, strict=True))
-    sets = [
-        (members, certainty)
-        for members, certainty in _sets(room, parts, largest_leg, list(alone))
-        if _is_furniture(members, alone, parts, least, room)
-    ]
+
+    def is_thing(members: IntArray) -> bool:
+        return _is_furniture(members, alone, parts, least, room)
+
+    sets = list(_sets(room, parts, largest_leg, list(alone), is_thing))
     if not sets:
         return things
     among = {k: n for n, (members, _) in enumerate(sets) for k in members.tolist()}
@@ -196,7 +195,11 @@ def furnished(
 
 
 def _sets(
-    room: Room, parts: Parts, largest_leg: float, alone: list[int]
+    room: Room,
+    parts: Parts,
+    largest_leg: float,
+    alone: list[int],
+    is_thing: Callable[[IntArray], bool],
 ) -> Iterator[tuple[IntArray, float]]:
     """Yield parts that belong together, none in two sets, and how sure it is that they do."""
     longer = parts.boxes[:, 2:4].max(axis=1) * room.cell
@@ -213,10 +216,10 @@ def _sets(
         return Legs(parts.middles[which] * room.cell, free)
 
     small, many = np.flatnonzero(leg), np.flatnonzero(clump)
-    found = [small[k] for k in tables(legs(small))]
+    found = [small[k] for k in tables(legs(small)) if is_thing(small[k])]
     for members in (many[k] for k in crowds(legs(many))):
         within = [each for each in found if np.isin(each, members).any()]
-        if sum(map(len, within)) < _MOST * len(members):
+        if sum(map(len, within)) < _MOST * len(members) and is_thing(members):
             found = [each for each in found if not np.isin(each, members).any()]
             bar[members] = False
             yield members, _CROWD
@@ -225,7 +228,8 @@ def _sets(
         yield members, _TABLE
     left = np.flatnonzero(bar)
     for pair in facing(_bars(left, parts, room.cell)):
-        yield left[pair], _FACING
+        if is_thing(left[pair]):
+            yield left[pair], _FACING
 
 
 def _bars(which: IntArray, parts: Parts, cell: float) -> Bars:
@@ -234,11 +238,15 @@ def _bars(which: IntArray, parts: Parts, cell: float) -> Bars:
 
 
 def _bar(k: int, parts: Parts, cell: float) -> list[float]:
-    """Return middle, direction, length and width of the smallest rectangle around a part."""
-    corners = (outline(parts.mask(k)) + parts.boxes[k, :2]) * cell
-    (x, y), (a, b), degrees = cv2.minAreaRect(corners.astype(np.float32))
-    turn = math.radians(degrees if a >= b else degrees + 90.0)
-    return [x, y, math.cos(turn), math.sin(turn), max(a, b), min(a, b)]
+    """Return middle, direction, length and width of the rectangle with a part's moments.
+
+    A cell has a moment too, so that it hardly matters how a bar lies on the cells.
+    """
+    rows, columns = np.nonzero(parts.mask(k))
+    spread = np.cov(columns, rows, ddof=0) + np.eye(2) / 12.0
+    moments, along = np.linalg.eigh(spread)
+    width, length = cell * np.sqrt(12.0 * moments)
+    return [*(cell * parts.middles[k]), *along[:, 1], length, width]
 
 
 def _is_furniture(
@@ -337,11 +345,15 @@ def _walled(room: Room) -> shapely.Geometry:
 def _certainty(polygon: shapely.Polygon, room: Room) -> float:
     """Return how sure it is that an outline is a thing, and no shadow of one and no speckle."""
     sure = min(1.0, _seen(shapely.get_coordinates(polygon), room) / _SEEN)
-    if not polygon.buffer(-room.small / 2.0 / room.cell).is_empty:
+    compact = not polygon.buffer(-room.small / 2.0 / room.cell).is_empty
+    speck = polygon.area < (_SPECK * room.small / room.cell) ** 2
+    at_edge = (speck or not compact) and _is_at_an_unseen_edge(polygon, room)
+    if at_edge and speck and not (compact and sure == 1.0):
+        return min(sure, _EDGE_SPECK)
+    if compact:
         return max(sure, _COMPACT)
-    if polygon.area < _STRAIGHT * polygon.convex_hull.area:
-        return min(sure, _RAGGED)
-    return min(sure, _AT_EDGE) if _is_at_an_unseen_edge(polygon, room) else sure
+    ragged = polygon.area < _STRAIGHT * polygon.convex_hull.area
+    return min(sure, _RAGGED) if at_edge or ragged else sure
 
 
 def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:

@@ -155,12 +155,12 @@ class OccupancyGridSegmenter(Segmenter):
             json_schema_extra={"unit": "m"},
         )
         min_certainty: float = Field(
-            0.1,
+            0.25,
             ge=0.01,
             le=1.0,
             description=(
                 "Objects of which it is less certain that they are one thing are left out; the "
-                "default leaves out edges of shadows, 0.5 all that is in doubt."
+                "default leaves out edges of shadows and specks at them, 0.5 all that is in doubt."
             ),
         )
         region_share: float = Field(
