@@ -112,19 +112,20 @@ class Pocket(NamedTuple):
         return (self.leans, -area if self.leans is Leans.AS_A_BOX else area)
 
 
-def at_walls(room: shapely.Geometry, sides: shapely.Geometry, bounds: Bounds) -> list[Pocket]:
+def at_walls(room: shapely.Polygon, sides: shapely.Geometry, bounds: Bounds) -> list[Pocket]:
     """Return what juts out of a room's walls into it, none overlapping another.
 
     Parameters
     ----------
     room
-        Its free space in metres, one polygon or several; holes do not count.
+        Its outline along the middles of the walls' cells, in metres; holes do not count.
     sides
         What stands near the walls and may be a side of what juts out of them.
     bounds
         What counts.
     """
-    plain = shapely.union_all(_simplified(room, bounds.stray))
+    along = shapely.union_all(_simplified(room, bounds.stray))
+    plain = along.buffer(-bounds.cell / 2.0, join_style="mitre")
     around = plain.difference(sides).buffer(-bounds.slit / 2.0, join_style="mitre")
     opened = around.buffer(bounds.slit / 2.0, join_style="mitre")
     found: list[Pocket] = []

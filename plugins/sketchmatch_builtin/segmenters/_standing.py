@@ -258,7 +258,7 @@ def _is_furniture(
     larger = (each for each in others if each.area > hull.area)
     return (
         hull.area >= least
-        and not hull.buffer(-room.small / 2.0 / room.cell).is_empty
+        and not _is_thinner(hull, room.small / room.cell)
         and not _meets_walls(hull, room)
         and not any(hull.intersects(each) for each in larger)
     )
@@ -276,12 +276,12 @@ def _meets_walls(hull: shapely.Polygon, room: Room) -> bool:
 
 def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]:
     """Return the things of a room together with those that stand at its walls."""
-    scaled = [shapely.transform(each.outline, lambda p: p * room.cell) for each in things]
-    sides = [each for each in scaled if each.buffer(-bounds.side / 2.0).is_empty]
+    thin = [each.outline for each in things if _is_thinner(each.outline, bounds.side / room.cell)]
+    sides = shapely.transform(shapely.union_all(thin), lambda p: p * room.cell)
     outlines = [each.outline for each in things]
     tree = shapely.STRtree(outlines)
     parts_of_others, found = set(), []
-    for pocket in at_walls(_walled(room), shapely.union_all(sides), bounds):
+    for pocket in at_walls(_walled(room), sides, bounds):
         line = shapely.get_coordinates(pocket.outline) / room.cell
         polygon = _to_the_cell(line, bounds, room)
         near = tree.query(polygon, predicate="intersects").tolist()
@@ -331,21 +331,24 @@ def _of_pocket(pocket: Pocket) -> float:
     return _JUTTING if pocket.depth >= pocket.neck else _LEANING
 
 
-def _walled(room: Room) -> shapely.Geometry:
-    """Return a room's outline, in metres, along the walls' cells: a corner joins two of them."""
+def _walled(room: Room) -> shapely.Polygon:
+    """Return a room's outline, in metres, along the middles of the walls' cells.
+
+    So that a corner joins two of them, as it does not two free cells.
+    """
     walls = cv2.copyMakeBorder(
         1 - (room.free | room.inside), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(1,)
     )
     contours, tree = cv2.findContours(walls, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     rings = [ring for ring, (*_, parent) in zip(contours, tree[0], strict=True) if parent >= 0]
     ring = max(rings, key=cv2.contourArea)[:, 0, :].astype(np.float64) - 0.5
-    return shapely.Polygon(ring * room.cell).buffer(-room.cell / 2.0, join_style="mitre")
+    return shapely.Polygon(ring * room.cell)
 
 
 def _certainty(polygon: shapely.Polygon, room: Room) -> float:
     """Return how sure it is that an outline is a thing, and no shadow of one and no speckle."""
     sure = min(1.0, _seen(shapely.get_coordinates(polygon), room) / _SEEN)
-    compact = not polygon.buffer(-room.small / 2.0 / room.cell).is_empty
+    compact = not _is_thinner(polygon, room.small / room.cell)
     speck = polygon.area < (_SPECK * room.small / room.cell) ** 2
     at_edge = (speck or not compact) and _is_at_an_unseen_edge(polygon, room)
     if at_edge and speck and not (compact and sure == 1.0):
@@ -354,6 +357,12 @@ def _certainty(polygon: shapely.Polygon, room: Room) -> float:
         return max(sure, _COMPACT)
     ragged = polygon.area < _STRAIGHT * polygon.convex_hull.area
     return min(sure, _RAGGED) if at_edge or ragged else sure
+
+
+def _is_thinner(polygon: shapely.Polygon, width: float) -> bool:
+    """Whether a polygon in cells is nowhere so wide."""
+    # Of stairs along the cells every step would count.
+    return bool(polygon.simplify(0.5).buffer(-width / 2.0).is_empty)
 
 
 def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:

@@ -15,6 +15,7 @@ from pydantic import Field
 from sketchmatch.api import InvalidInputError, Reason, Segmentation, Segmenter
 from sketchmatch.model import IntArray, OccupancyGrid, Scene, SceneObject
 from sketchmatch.model.limits import source_limits
+from sketchmatch.model.scene import DOUBTFUL
 from sketchmatch_builtin.segmenters._at_walls import Bounds
 from sketchmatch_builtin.segmenters._cells import (
     TOLERANCE,
@@ -216,6 +217,7 @@ class OccupancyGridSegmenter(Segmenter):
             [shapely.Polygon(ring) for ring in rings],
             [item for item in source.landmarks if item.kind != ROOM],
             self.params.label_reach,
+            [thing.certainty < DOUBTFUL for thing in things],
         )
         objects = [
             SceneObject.from_rings([ring], name, thing.certainty)
