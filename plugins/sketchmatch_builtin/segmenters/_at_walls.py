@@ -42,7 +42,7 @@ _DEEPEST = 1.5
 
 
 class Bounds(NamedTuple):
-    """Bounds on what juts into a room, in metres.
+    """Bounds on what juts into a room, in cells.
 
     Attributes
     ----------
@@ -52,19 +52,16 @@ class Bounds(NamedTuple):
         What is no thicker is wall.
     smallest
         The side of the smallest square that counts.
-    cell
-        The side of a cell of the map.
     """
 
     widest: float
     thinnest: float
     smallest: float
-    cell: float
 
     @property
     def stray(self) -> float:
         """How far an outline may leave the line that it follows."""
-        return max(_STRAY * self.thinnest, self.cell)
+        return max(_STRAY * self.thinnest, 1.0)
 
     @property
     def slit(self) -> float:
@@ -93,7 +90,7 @@ class Pocket(NamedTuple):
     Attributes
     ----------
     outline
-        In metres; its last edge is where it meets the wall.
+        Its last edge is where it meets the wall.
     neck, depth
         How long that edge is, and how far the rest is away from it.
     leans
@@ -118,14 +115,14 @@ def at_walls(room: shapely.Polygon, sides: shapely.Geometry, bounds: Bounds) -> 
     Parameters
     ----------
     room
-        Its outline along the middles of the walls' cells, in metres; holes do not count.
+        Its outline along the middles of the walls' cells; holes do not count.
     sides
         What stands near the walls and may be a side of what juts out of them.
     bounds
         What counts.
     """
     along = shapely.union_all(_simplified(room, bounds.stray))
-    plain = along.buffer(-bounds.cell / 2.0, join_style="mitre")
+    plain = along.buffer(-0.5, join_style="mitre")
     around = plain.difference(sides).buffer(-bounds.slit / 2.0, join_style="mitre")
     opened = around.buffer(bounds.slit / 2.0, join_style="mitre")
     found: list[Pocket] = []

@@ -67,7 +67,7 @@ class Room(NamedTuple):
     cell
         The side of a cell, in metres.
     small
-        Thinner things are thin, in metres.
+        Thinner things are thin, in cells.
     """
 
     free: Mask
@@ -258,7 +258,7 @@ def _is_furniture(
     larger = (each for each in others if each.area > hull.area)
     return (
         hull.area >= least
-        and not _is_thinner(hull, room.small / room.cell)
+        and not _is_thinner(hull, room.small)
         and not _meets_walls(hull, room)
         and not any(hull.intersects(each) for each in larger)
     )
@@ -276,13 +276,12 @@ def _meets_walls(hull: shapely.Polygon, room: Room) -> bool:
 
 def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]:
     """Return the things of a room together with those that stand at its walls."""
-    thin = [each.outline for each in things if _is_thinner(each.outline, bounds.side / room.cell)]
-    sides = shapely.transform(shapely.union_all(thin), lambda p: p * room.cell)
+    thin = [each.outline for each in things if _is_thinner(each.outline, bounds.side)]
     outlines = [each.outline for each in things]
     tree = shapely.STRtree(outlines)
     parts_of_others, found = set(), []
-    for pocket in at_walls(_walled(room), sides, bounds):
-        line = shapely.get_coordinates(pocket.outline) / room.cell
+    for pocket in at_walls(_walled(room), shapely.union_all(thin), bounds):
+        line = shapely.get_coordinates(pocket.outline)
         polygon = _to_the_cell(line, bounds, room)
         near = tree.query(polygon, predicate="intersects").tolist()
         part = [k for k in near if _is_most_of(polygon.intersection(outlines[k]), outlines[k])]
@@ -301,7 +300,7 @@ def _to_the_cell(line: FloatArray, bounds: Bounds, room: Room) -> shapely.Polygo
 
     These are its own and those around it that it may have left out, but not beyond its last edge.
     """
-    pocket, stray = shapely.Polygon(line), bounds.stray / room.cell
+    pocket, stray = shapely.Polygon(line), bounds.stray
     left, below, right, top = np.floor(pocket.buffer(stray).bounds).astype(int).tolist()
     left, below = max(left, 0), max(below, 0)
     taken = 1 - (room.free[below : top + 1, left : right + 1])
@@ -313,7 +312,7 @@ def _to_the_cell(line: FloatArray, bounds: Bounds, room: Room) -> shapely.Polygo
     shapely.prepare(pocket)
     kept = shapely.dwithin(pocket, spots, np.where(beyond, 0.0, stray))
     taken[y[~kept], x[~kept]] = 0
-    filled = closed(taken, round(bounds.slit / room.cell))
+    filled = closed(taken, round(bounds.slit))
     _, labels, boxes, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
     if len(boxes) == 1:
         return pocket
@@ -332,7 +331,7 @@ def _of_pocket(pocket: Pocket) -> float:
 
 
 def _walled(room: Room) -> shapely.Polygon:
-    """Return a room's outline, in metres, along the middles of the walls' cells.
+    """Return a room's outline along the middles of the walls' cells.
 
     So that a corner joins two of them, as it does not two free cells.
     """
@@ -342,14 +341,14 @@ def _walled(room: Room) -> shapely.Polygon:
     contours, tree = cv2.findContours(walls, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     rings = [ring for ring, (*_, parent) in zip(contours, tree[0], strict=True) if parent >= 0]
     ring = max(rings, key=cv2.contourArea)[:, 0, :].astype(np.float64) - 0.5
-    return shapely.Polygon(ring * room.cell)
+    return shapely.Polygon(ring)
 
 
 def _certainty(polygon: shapely.Polygon, room: Room) -> float:
     """Return how sure it is that an outline is a thing, and no shadow of one and no speckle."""
     sure = min(1.0, _seen(shapely.get_coordinates(polygon), room) / _SEEN)
-    compact = not _is_thinner(polygon, room.small / room.cell)
-    speck = polygon.area < (_SPECK * room.small / room.cell) ** 2
+    compact = not _is_thinner(polygon, room.small)
+    speck = polygon.area < (_SPECK * room.small) ** 2
     at_edge = (speck or not compact) and _is_at_an_unseen_edge(polygon, room)
     if at_edge and speck and not (compact and sure == 1.0):
         return min(sure, _EDGE_SPECK)
@@ -367,17 +366,17 @@ def _is_thinner(polygon: shapely.Polygon, width: float) -> bool:
 
 def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:
     """Whether what the laser did not see begins near something, and no wall between."""
-    reach = round(_NEAR * room.small / room.cell)
+    reach = min(round(_NEAR * room.small), max(room.free.shape))
     left, below, right, top = np.floor(polygon.bounds).astype(int).tolist()
     window = np.s_[max(below - reach, 0) : top + reach, max(left - reach, 0) : right + reach]
     unseen = 1 - (room.free[window] | room.inside[window] | room.occupied[window])
     beside = cv2.dilate(unseen, np.ones((3, 3), np.uint8)) & room.free[window]
-    return bool(np.count_nonzero(beside) * room.cell > _EDGE * room.small)
+    return bool(np.count_nonzero(beside) > _EDGE * room.small)
 
 
 def _seen(line: FloatArray, room: Room) -> float:
     """Return along which share of a line, in cells, the laser met something."""
-    stray = max(1, min(round(room.small / 2.0 / room.cell), max(room.free.shape)))
+    stray = max(1, min(round(room.small / 2.0), max(room.free.shape)))
     until = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
     steps = np.arange(0.25, until[-1], 0.5)
     xy = [np.interp(steps, until, each) for each in line.T]

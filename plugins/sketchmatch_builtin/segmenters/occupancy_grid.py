@@ -233,7 +233,7 @@ class OccupancyGridSegmenter(Segmenter):
         inside = closed(held, int(min(params.close_gaps / cell + 0.5, max(free.shape))))
         rows, columns = free.shape
         occupied = grid.cells[y : y + rows, x : x + columns] > _OCCUPIED
-        room = Room(free, inside, occupied.view(np.uint8), cell, params.min_size)
+        room = Room(free, inside, occupied.view(np.uint8), cell, _cells(params.min_size, cell))
         parts, least = Parts.of(room), (params.min_size / cell) ** 2
         leg, most = (params.leg_size / cell) ** 2, source_limits().max_objects
         if params.merge_distance is None:
@@ -243,7 +243,8 @@ class OccupancyGridSegmenter(Segmenter):
         else:
             things = as_they_are(room, parts, least, most)
         if params.attached > 0.0:
-            bounds = Bounds(params.attached, params.wall_thickness, params.min_size, cell)
+            lengths = (params.attached, params.wall_thickness, params.min_size)
+            bounds = Bounds(*(_cells(length, cell) for length in lengths))
             things = at_the_walls(room, things, bounds)
         return [
             Thing(self._simplified(shapely.transform(each.outline, lambda p: p + at), grid), sure)
@@ -258,6 +259,11 @@ class OccupancyGridSegmenter(Segmenter):
             tolerance = self.params.tolerance / grid.resolution
         coarsest = _COARSEST_TOLERANCE * math.sqrt(polygon.area)
         return cast(shapely.Polygon, polygon.simplify(min(tolerance, coarsest)))
+
+
+def _cells(length: float, cell: float) -> float:
+    """Return a length in cells, without what rounding adds: 0.3 / 0.1 is a little less than 3."""
+    return round(length / cell, 9)
 
 
 def _rooms(free: Mask, share: float) -> Iterator[tuple[Mask, Mask, tuple[int, int]]]:
