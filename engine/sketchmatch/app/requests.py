@@ -139,7 +139,7 @@ def source(
                 return _occupancy_grid(message.occupancy_grid)
             case "map_server_map":
                 packed = message.map_server_map
-                return decode_map_server(packed.yaml, packed.image)
+                return decode_map_server(packed.yaml, packed.image, packed.objects)
             case "image":
                 return decode_image(message.image.data)
             case "file":
@@ -206,6 +206,8 @@ def paths_of(
             path = "image.data"
         elif path == "occupancy_grid.cells" and kind == "map_server_map":
             path = "map_server_map.image"
+        elif path.startswith("occupancy_grid.objects") and kind == "map_server_map":
+            path = f"map_server_map.{path.partition('.')[2]}"
         field = f"{side}.{path}" if path else side
         raise InvalidInputError(error.reason, field, error.problem) from None
 

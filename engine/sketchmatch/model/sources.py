@@ -190,6 +190,9 @@ class OccupancyGrid:
         What the cells were read from, where thresholds decided; else None.
     landmarks
         What the map's file names.
+    objects
+        What people say its objects are, in the map's frame and metres; they stand for the map
+        where nobody chooses a segmenter. None where nobody said so.
     """
 
     cells: NDArray[np.int8]
@@ -198,6 +201,7 @@ class OccupancyGrid:
     notes: tuple[str, ...] = ()
     picture: GridPicture | None = None
     landmarks: tuple[Landmark, ...] = ()
+    objects: PolygonSet | None = None
 
     field = "occupancy_grid"
 

@@ -347,12 +347,13 @@ global___Pose = Pose
 
 @typing.final
 class MapServerMap(google.protobuf.message.Message):
-    """A map as ROS map_server saves it: two files, sent as they are."""
+    """A map as ROS map_server saves it: two files, sent as they are, and what people say of it."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
     YAML_FIELD_NUMBER: builtins.int
     IMAGE_FIELD_NUMBER: builtins.int
+    OBJECTS_FIELD_NUMBER: builtins.int
     yaml: builtins.str
     """Text of the .yaml file. Its keys are read as map_server reads them (`resolution`, `origin`,
     `negate`, `occupied_thresh`, `free_thresh`, `mode`), except `image`, a path that only the
@@ -360,13 +361,19 @@ class MapServerMap(google.protobuf.message.Message):
     """
     image: builtins.bytes
     """Bytes of the picture that `image` in the .yaml names: PGM, PNG, BMP or JPEG."""
+    objects: builtins.str
+    """Text of the file beside the map that says what its objects are (GeoJSON as `sketchmatch segment
+    --out` saves it). They stand for the map where no segmenter is chosen. If none of its features
+    says that it is of a map with this content, it is ignored, with a warning.
+    """
     def __init__(
         self,
         *,
         yaml: builtins.str = ...,
         image: builtins.bytes = ...,
+        objects: builtins.str = ...,
     ) -> None: ...
-    def ClearField(self, field_name: typing.Literal["image", b"image", "yaml", b"yaml"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["image", b"image", "objects", b"objects", "yaml", b"yaml"]) -> None: ...
 
 global___MapServerMap = MapServerMap
 
