@@ -19,6 +19,7 @@ from pathlib import Path, PureWindowsPath
 from typing import Any
 
 __all__ = [
+    "OBJECTS_SUFFIX",
     "PICTURE_SUFFIXES",
     "YAML_SUFFIXES",
     "Document",
@@ -255,4 +256,9 @@ def _shown(name: str) -> str:
 
 
 # It needs what is defined above.
-from sketchmatch_map_files._objects import content_of, find_objects, is_of  # noqa: E402
+from sketchmatch_map_files._objects import (  # noqa: E402
+    OBJECTS_SUFFIX,
+    content_of,
+    find_objects,
+    is_of,
+)

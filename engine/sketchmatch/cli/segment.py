@@ -29,7 +29,12 @@ def segment(
     overlay: options.Overlay = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE", help="Save the objects as polygons, in .geojson."),
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="Save the objects as polygons, in .geojson. Beside a robot's map and named as it "
+            "is with .objects.geojson, they are its objects from then on: edit them at will.",
+        ),
     ] = None,
     verbose: options.Verbose = False,
 ) -> None:
@@ -54,7 +59,7 @@ def segment(
     if overlay is not None:
         pictures.draw_segmentation(found, file, overlay, pen=source.HasField("stroke_set"))
     if out is not None:
-        content = sources.content_of(file)
+        content = sources.content_of(file) if scene_files.is_of_a_map(out) else ""
         scene_files.save_scene(out, pictures.scene_of(found.scene), "--out", content)
     if json:
         output.write_message(found)

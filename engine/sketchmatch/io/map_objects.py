@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
+
+import shapely
 
 from sketchmatch.api.documents import load_json
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.io.geojson import polygons_of
-from sketchmatch.model import OccupancyGrid
+from sketchmatch.model import LabelledPolygon, OccupancyGrid, PolygonSet
 from sketchmatch_map_files import is_of
 
 __all__ = ["with_objects"]
@@ -15,6 +19,10 @@ __all__ = ["with_objects"]
 
 def with_objects(grid: OccupancyGrid, objects: str, content: str) -> OccupancyGrid:
     """Return a grid with the objects that a file says it has, if it is one of this content.
+
+    Coordinates are metres in the map's frame, whatever a tool says that they are. A feature of
+    several polygons, which is what tools make of some that are merged, is one object with the
+    outline around all.
 
     Parameters
     ----------
@@ -37,7 +45,26 @@ def with_objects(grid: OccupancyGrid, objects: str, content: str) -> OccupancyGr
         if not is_of(features, content):
             note = "the file with objects is of another content of the map and was ignored"
             return replace(grid, notes=(*grid.notes, note))
-        # Metres of the map's frame, whatever a tool says that they are.
-        return replace(grid, objects=polygons_of({**features, "crs": None}))
+        return replace(grid, objects=_objects_of({**features, "crs": None}))
     except InvalidInputError as error:
         raise error.within("objects") from None
+
+
+def _objects_of(collection: dict[str, Any]) -> PolygonSet:
+    found = polygons_of(collection)  # which says what is wrong, and where
+    members = collection.get("features")
+    if not isinstance(members, list):
+        return found
+    each = (polygons_of({**collection, "features": [member]}).polygons for member in members)
+    return replace(found, polygons=tuple(_merged(each)))
+
+
+def _merged(features: Iterator[tuple[LabelledPolygon, ...]]) -> Iterator[LabelledPolygon]:
+    """Yield one polygon for each feature that has any."""
+    for polygons in features:
+        if len(polygons) < 2:
+            yield from polygons
+            continue
+        points = shapely.MultiPoint([point for each in polygons for point in each.rings[0]])
+        hull = shapely.get_coordinates(points.convex_hull)
+        yield replace(polygons[0], rings=(hull,))

@@ -8,8 +8,9 @@ from typing import Any
 
 from sketchmatch.io._targets import check_target, writing
 from sketchmatch.model import FloatArray, Scene, SceneObject
+from sketchmatch_map_files import OBJECTS_SUFFIX
 
-__all__ = ["check_scene_path", "encode_geojson", "save_scene"]
+__all__ = ["check_scene_path", "encode_geojson", "is_of_a_map", "save_scene"]
 
 
 def encode_geojson(scene: Scene, content: str = "") -> str:
@@ -47,6 +48,11 @@ def check_scene_path(path: str | Path, field: str = "out") -> None:
         If the name's ending is not .geojson, or its folder does not exist.
     """
     check_target(path, field, (".geojson",), ".geojson")
+
+
+def is_of_a_map(path: str | Path) -> bool:
+    """Whether a file of this name beside a robot's map holds that map's objects."""
+    return Path(path).name.endswith(OBJECTS_SUFFIX)
 
 
 def save_scene(path: str | Path, scene: Scene, field: str = "out", content: str = "") -> None:
