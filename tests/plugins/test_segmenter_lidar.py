@@ -29,11 +29,11 @@ THINGS = {
 }
 LOOKED_AT = ("aws-small-house", "elsabot-downstairs", "tb4-warehouse", "turtlebot3")
 
-# Of the things seen: found whole, of these in doubt; then what was found in pieces, and invented,
-# without and with doubt.
+# Of the things seen: found whole, and of these in doubt; then what was found in pieces, and what was
+# invented, and of this in doubt.
 FOUND = {
     "aws-small-house": (25, 4, 1, 0, 0),
-    "elsabot-downstairs": (8, 1, 0, 4, 2),
+    "elsabot-downstairs": (7, 1, 1, 4, 2),
     "tb4-warehouse": (28, 0, 0, 0, 0),
     "turtlebot3": (9, 0, 0, 0, 0),
     "husky-playpen": (18, 0, 0, 1, 1),
@@ -83,13 +83,18 @@ def counts(name, objects):
     return tuple(told[kind] for kind in kinds)
 
 
-def test_most_of_what_a_person_sees_is_found_whole_and_little_else():
-    for names, share in ((LOOKED_AT, 0.92), (set(FOUND) - set(LOOKED_AT), 0.93)):
-        seen = sum(len(THINGS[name]) for name in names)
-        assert sum(FOUND[name][0] for name in names) >= share * seen
-    for invented, doubt in ((3, 2), (4, 2)):
-        told = sum(sum(each[:4:2]) + each[2] - each[2] + each[3] for each in FOUND.values())
-    assert told
+@pytest.mark.parametrize(
+    ("names", "share"), [(LOOKED_AT, 0.9), (tuple(set(THINGS) - set(LOOKED_AT)), 0.95)]
+)
+def test_most_of_what_a_person_sees_is_found_whole(names, share):
+    seen = sum(len(THINGS[name]) for name in names)
+    assert sum(FOUND[name][0] for name in names) >= share * seen
+
+
+def test_little_is_invented_and_less_without_doubt():
+    whole, doubted, pieces, invented, doubtful = map(sum, zip(*FOUND.values(), strict=True))
+    assert invented <= 0.105 * (whole + pieces + invented)
+    assert invented - doubtful <= 0.06 * (whole - doubted + pieces + invented - doubtful)
 
 
 @pytest.mark.parametrize("name", THINGS)
@@ -143,3 +148,146 @@ def lost(before, after):
             kept.add(k)
             taken.add(j)
     return len(before) - len(kept)
+
+
+# Of what was found without doubt: lost on cells of half the size, and turned by 37°. Where two things
+# are a cell apart, cells that are turned join them; so the bed of the small house joins its wall.
+LOST = {
+    "aws-small-house": (0, 4),
+    "elsabot-downstairs": (0, 2),
+    "tb4-warehouse": (0, 0),
+    "turtlebot3": (0, 0),
+    "husky-playpen": (0, 0),
+    "josefgst-ros-map12": (1, 1),
+    "marrtino-montreal": (0, 1),
+    "nav2-depot": (0, 1),
+    "pmb2-small-office": (0, 0),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LOST)
+def test_neither_turning_a_map_nor_smaller_cells_lose_what_is_found(name):
+    grid = plain(grid_of(name))
+    sure = [item.polygon for item in found(grid) if not item.doubtful]
+    for change, most in zip((doubled, turned), LOST[name], strict=True):
+        moved, back = change(grid)
+        again = [back(item.polygon) for item in found(moved)]
+        assert lost(sure, again) <= most, change.__name__
+
+
+def room(*boxes, shape=(80, 120), cell=0.05):
+    """A walled room of 6 × 4 m with boxes (row, column, rows, columns) in it."""
+    cells = np.zeros(shape, np.int8)
+    cells[:2] = cells[-2:] = cells[:, :2] = cells[:, -2:] = 100
+    for row, column, rows, columns in boxes:
+        cells[row : row + rows, column : column + columns] = 100
+    return OccupancyGrid(cells, cell)
+
+
+BOXES = ((10, 10, 12, 16), (60, 90, 10, 12))
+
+
+def legs(row, column, rows, columns, size=1):
+    """The four legs of a table or chair."""
+    return [(y, x, size, size) for y in (row, row + rows) for x in (column, column + columns)]
+
+
+def more(*boxes, **params):
+    """What is found beside the two boxes, as its area and certainty."""
+    objects = found(room(*BOXES, *boxes), **params)
+    told = [(round(item.area, 3), item.certainty) for item in objects]
+    for box in ((0.48, 1.0), (0.3, 1.0)):
+        told.remove(box)
+    return told
+
+
+def test_four_legs_are_a_table_or_a_chair():
+    assert more(*legs(40, 40, 15, 30)) == [(pytest.approx(16 * 31 * 0.0025), 0.9)]
+    assert more(*legs(40, 40, 8, 8)) == [(pytest.approx(81 * 0.0025, abs=1e-3), 0.9)]
+
+
+def test_legs_at_no_rectangle_or_too_far_apart_are_none():
+    assert more(*legs(40, 40, 15, 30)[:3], (58, 76, 1, 1)) == []
+    assert more(*legs(20, 40, 45, 30)) == []
+    assert more(*legs(40, 40, 3, 8)) == []
+
+
+def test_a_table_and_its_chairs_are_apart():
+    chairs = [*legs(30, 40, 7, 7), *legs(30, 55, 7, 7)]
+    assert sorted(more(*chairs, *legs(44, 40, 14, 24))) == [(0.16, 0.9), (0.16, 0.9), (0.938, 0.9)]
+
+
+def test_two_feet_that_face_each_other_are_a_table():
+    (table,) = more((40, 40, 9, 2), (40, 64, 9, 2))
+    assert table == (pytest.approx(9 * 26 * 0.0025), 0.6)
+    assert more((40, 40, 9, 2), (60, 64, 2, 9)) == [(0.045, 1.0)] * 2
+
+
+def test_a_crowd_of_legs_is_one_thing():
+    rng = np.random.default_rng(6)
+    crowd = [(int(y), int(x), 1, 1) for y, x in rng.integers(0, 26, (25, 2)) + (40, 40)]
+    ((area, certainty),) = more(*crowd)
+    assert certainty == 0.6
+    assert 1.0 < area < 1.7
+
+
+def test_what_the_hull_of_legs_would_cover_of_a_wall_keeps_them_apart():
+    assert more(*legs(40, 40, 15, 30), (2, 54, 60, 2)) == []
+
+
+def test_speckle_makes_no_furniture():
+    rng = np.random.default_rng(0)
+    cells = room(*BOXES, shape=(400, 600)).cells.copy()
+    cells[(rng.random(cells.shape) < 0.002) & (cells == 0)] = 100
+    assert len(found(OccupancyGrid(cells, 0.05), close_gaps=0.0)) == 2
+
+
+@pytest.mark.parametrize(
+    ("box", "certainty"),
+    [((2, 50, 12, 30), 0.4), ((2, 50, 40, 14), 0.7)],
+    ids=["leans against it", "juts out of it"],
+)
+def test_a_box_at_a_wall_is_found_to_the_cell_and_doubted(box, certainty):
+    assert more(box) == [(pytest.approx(box[2] * box[3] * 0.0025), certainty)]
+    assert more(box, attached=0.0) == []
+
+
+@pytest.mark.parametrize(
+    "box",
+    [(2, 50, 6, 30), (2, 50, 40, 6), (2, 50, 12, 70), (2, 98, 20, 20)],
+    ids=["thin", "a partition", "wider than attached", "the corner of a building"],
+)
+def test_bumps_partitions_wings_and_corners_are_walls(box):
+    assert more(box) == []
+
+
+def test_what_touches_a_wall_by_a_corner_hangs_by_a_neck():
+    found_there = more((6, 40, 20, 60), (2, 40, 4, 2))
+    assert found_there == [(pytest.approx(20 * 60 * 0.0025, rel=0.01), 0.8)]
+
+
+def test_a_shadow_is_kept_in_doubt_and_its_edge_left_out():
+    cells = room(*BOXES).cells.copy()
+    cells[30:42, 50:62] = -1
+    cells[60, 30:60] = -1
+    cells[61, 30:60:2] = -1
+    inside = [
+        (round(item.area, 2), item.certainty)
+        for item in found(OccupancyGrid(cells, 0.05))
+        if item.certainty < 1.0
+    ]
+    assert inside == [(0.36, 0.3)]
+    assert len(found(OccupancyGrid(cells, 0.05), min_certainty=0.01)) == 3
+
+
+def test_a_speck_where_the_map_ends_is_left_out():
+    cells = room(*BOXES).cells.copy()
+    cells[40:, 60:] = -1
+    cells[60:70, 90:102] = 100
+    cells[34:36, 78:88] = 100
+    grid = OccupancyGrid(cells, 0.05)
+    with pytest.raises(ValueError, match="only one object"):
+        found(grid)
+    speck = min(found(grid, min_certainty=0.01), key=lambda item: item.area)
+    assert speck.certainty == 0.2

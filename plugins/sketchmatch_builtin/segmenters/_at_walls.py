@@ -20,7 +20,7 @@ from shapely.geometry.polygon import orient
 
 from sketchmatch.model import FloatArray
 
-__all__ = ["Bounds", "Leans", "Pocket", "at_walls"]
+__all__ = ["Bounds", "Leans", "Pocket", "at_walls", "is_thick"]
 
 # As shares of how thick a wall is: how far it strays, how wide a slit people do not see, and how
 # long a wall runs on both sides of what leans against it.
@@ -181,7 +181,7 @@ def _pocket(points: FloatArray, a: int, b: int, bounds: Bounds) -> Pocket | None
         and _goes_on(points, a, b, _STRETCH * bounds.thinnest)
     )
     hangs = depth > 0.5 * neck / _NECK and not outline.buffer(-0.5 * neck / _NECK).is_empty
-    if not (leans or hangs) or not outline.is_valid or not _is_thick(outline, bounds.thinnest):
+    if not (leans or hangs) or not outline.is_valid or not is_thick(outline, bounds.thinnest):
         return None
     if not hangs:
         return Pocket(outline, neck, depth, Leans.AS_A_BOX)
@@ -189,7 +189,7 @@ def _pocket(points: FloatArray, a: int, b: int, bounds: Bounds) -> Pocket | None
     return Pocket(outline, neck, depth, Leans.AS_A_SIDE if thin else Leans.NOT)
 
 
-def _is_thick(outline: shapely.Polygon, thinnest: float) -> bool:
+def is_thick(outline: shapely.Polygon, thinnest: float) -> bool:
     """Whether more than half of it is left when what is thin is taken off."""
     core = outline.buffer(-thinnest / 2.0)
     return bool(core.buffer(thinnest / 2.0).area > 0.5 * outline.area)

@@ -38,7 +38,7 @@ _ALIKE, _PARALLEL = 0.75, math.cos(math.radians(12.0))
 # Metres: longer bars are no feet but two sides of one thing, this near each other.
 _SLIT = 0.3
 # A crowd has at least so many parts, each so many metres from the next, as legs of chairs are.
-_FEWEST, _STEP = 4, 0.6
+_FEWEST, _STEP = 5, 0.6
 
 
 FOOT = 0.8
@@ -155,8 +155,8 @@ def facing(bars: Bars) -> Iterator[IntArray]:
 def crowds(legs: Legs) -> Iterator[IntArray]:
     """Yield parts, each near the next, that are too many for chance.
 
-    Of N parts of density ρ, each has k − 1 others in the circle of area A around such a group with
-    the probability of a Poisson variable of mean ρA; N times that must be small.
+    Of N parts of density ρ, each has k − 1 others in a circle of area A around it with the
+    probability of a Poisson variable of mean ρA; N times that must be small.
     """
     if len(legs.points) < _FEWEST or math.pi * _STEP**2 * legs.density > _FEWEST:
         return
@@ -171,7 +171,9 @@ def crowds(legs: Legs) -> Iterator[IntArray]:
 
 
 def _circle(points: NDArray[np.float64]) -> float:
-    return float(math.pi * shapely.minimum_bounding_radius(shapely.MultiPoint(points)) ** 2)
+    """Return the area of the smallest circle around one of some points that holds the others."""
+    away = np.hypot(*(points[:, None] - points[None]).T)
+    return float(math.pi * away.max(axis=1).min() ** 2)
 
 
 def _at_least(count: int, mean: float) -> float:

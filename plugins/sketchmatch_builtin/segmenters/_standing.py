@@ -11,7 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from sketchmatch.model import FloatArray, IntArray
-from sketchmatch_builtin.segmenters._at_walls import Bounds, Leans, Pocket, at_walls
+from sketchmatch_builtin.segmenters._at_walls import Bounds, Leans, Pocket, at_walls, is_thick
 from sketchmatch_builtin.segmenters._cells import Mask, closed, outline, refuse_more
 from sketchmatch_builtin.segmenters._furniture import FOOT, Bars, Legs, crowds, facing, tables
 from sketchmatch_builtin.segmenters._merging import apart, merged
@@ -288,8 +288,9 @@ def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]
         apart = shapely.union_all([outlines[k] for k in near if k not in part])
         polygon = max(shapely.get_parts(polygon.difference(apart)), key=shapely.area, default=None)
         # Its last edge is where it meets the wall.
-        seen = polygon is not None and _seen(line[:-1], room) >= _SEEN
-        if seen and not any(_is_most_of(outlines[k], polygon) for k in part):
+        kept = polygon is not None and _seen(line[:-1], room) >= _SEEN
+        kept = kept and is_thick(polygon.simplify(0.5), bounds.thinnest)
+        if kept and not any(_is_most_of(outlines[k], polygon) for k in part):
             parts_of_others.update(part)
             found.append(Thing(shapely.Polygon(polygon.exterior), _of_pocket(pocket)))
     return [each for k, each in enumerate(things) if k not in parts_of_others] + found
