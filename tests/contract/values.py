@@ -210,9 +210,7 @@ SOURCES = {
                 ),
                 "bar",
             ),
-            LabelledPolygon(
-                (np.array([[1.5, -2.5], [4.5, -3.5], [0.5, -6.5]]),), certainty=0.375
-            ),
+            LabelledPolygon((np.array([[1.5, -2.5], [4.5, -3.5], [0.5, -6.5]]),), certainty=0.375),
         )
     ),
     "SegmentRequest.stroke_set": StrokeSet(
@@ -434,9 +432,7 @@ EVENTS = {
 # What answers the other methods.
 
 SEGMENTATION = Segmentation(
-    Scene(
-        (SceneObject.from_polygon(BAR, "bar"), SceneObject.from_rings([RACK], certainty=0.625))
-    ),
+    Scene((SceneObject.from_polygon(BAR, "bar"), SceneObject.from_rings([RACK], certainty=0.625))),
     ("2 specks were left out", "a doorway was closed"),
     ROUTE[:2],
 )

@@ -221,7 +221,12 @@ CUPBOARDS = ((1, 5, 6, 12), (33, 30, 6, 9), (1, 40, 6, 8))
 @pytest.mark.parametrize(
     ("grid", "params", "cures", "others"),
     [
-        (room(*CUPBOARDS), {"attached": 0.0}, ["set attached to 2, which finds 3 objects at the"], ["rooms"]),
+        (
+            room(*CUPBOARDS),
+            {"attached": 0.0},
+            ["set attached to 2, which finds 3 objects at the"],
+            ["rooms"],
+        ),
         (flat(), {}, ["choose the segmenter rooms, which finds 2 rooms"], ["attached"]),
         (flat(), {"attached": 0.0}, ["segmenter rooms, which finds 2 rooms"], ["attached"]),
         (room(), {}, ["give a map with objects standing free"], ["attached", "rooms"]),

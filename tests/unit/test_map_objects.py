@@ -82,7 +82,10 @@ def test_objects_are_dropped_named_added_split_and_merged(mended):
         second, third = features[1]["geometry"], features[2]["geometry"]
         merged = [second["coordinates"], third["coordinates"]]
         features[1]["geometry"] = {"type": "MultiPolygon", "coordinates": merged}
-        features[2:] = [feature([0, 3], [1, 3], [1, 5], name="rug"), feature([3, 3], [4, 3], [3, 4])]
+        features[2:] = [
+            feature([0, 3], [1, 3], [1, 5], name="rug"),
+            feature([3, 3], [4, 3], [3, 4]),
+        ]
 
     edit(change)
     scene = read_scene(office)
@@ -117,7 +120,7 @@ def test_a_segmenter_that_is_chosen_goes_over_it(mended):
 
 
 def test_that_of_another_content_is_said_and_ignored(mended):
-    office, beside, edit = mended
+    office, _, edit = mended
     edit(lambda features: features.pop())
     (office.parent / "office.pgm").write_bytes(picture(*BOXES, (30, 50, 4, 4)))
     assert len(read_scene(office)) == 4
@@ -175,7 +178,7 @@ def test_what_cannot_be_read_is_told_with_its_place(mended):
     place = "objects.features[1].geometry.coordinates[0][1]"
     assert caught.value.field == f"{office}: {place}"
     beside.write_text("{", encoding="utf-8")
-    with pytest.raises(InvalidInputError, match="office.yaml: objects is not JSON"):
+    with pytest.raises(InvalidInputError, match=r"office\.yaml: objects is not JSON"):
         read_source(office)
 
 

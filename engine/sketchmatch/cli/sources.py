@@ -45,9 +45,7 @@ def source_of(path: Path, side: str = "") -> Source:
     if (files := read_map_files(path)) is not None:
         say_notes(side, files.notes, verbose=True)
         return Source(
-            map_server_map=MapServerMap(
-                yaml=files.yaml, image=files.picture, objects=files.objects
-            )
+            map_server_map=MapServerMap(yaml=files.yaml, image=files.picture, objects=files.objects)
         )
     file, part = file_and_part(path)
     if not part and file.suffix.lower() in PICTURE_SUFFIXES:

@@ -27,7 +27,8 @@ def encode_geojson(scene: Scene, content: str = "") -> str:
     '{"type": "FeatureCollection", "crs": null, "features": ['
     """
     features = ",\n".join(
-        json.dumps(_feature(item, content), ensure_ascii=False, allow_nan=False) for item in scene.objects
+        json.dumps(_feature(item, content), ensure_ascii=False, allow_nan=False)
+        for item in scene.objects
     )
     return f'{{"type": "FeatureCollection", "crs": null, "features": [\n{features}\n]}}\n'
 

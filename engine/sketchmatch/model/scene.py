@@ -76,8 +76,8 @@ class SceneObject:
         ------
         InvalidInputError
             If a ring has fewer than three distinct points, is not finite or crosses itself, if
-            the polygon has no area, if its holes leave it or overlap, if the label is no name, or if
-            the certainty is no number above 0 and up to 1.
+            the polygon has no area, if its holes leave it or overlap, if the label is no name, or
+            if the certainty is no number above 0 and up to 1.
         """
         arrays = [_clean_ring(ring, f"rings[{k}]") for k, ring in enumerate(rings)]
         if not arrays:

@@ -16,7 +16,7 @@ from sketchmatch_builtin.segmenters._cells import Mask, closed, outline, refuse_
 from sketchmatch_builtin.segmenters._furniture import FOOT, Bars, Legs, crowds, facing, tables
 from sketchmatch_builtin.segmenters._merging import apart, merged
 
-__all__ = ["Parts", "Room", "Thing", "as_they_are", "at_the_walls", "merged_within", "furnished"]
+__all__ = ["Parts", "Room", "Thing", "as_they_are", "at_the_walls", "furnished", "merged_within"]
 
 _Geometries = NDArray[np.object_]
 _Flags = NDArray[np.bool_]
@@ -157,9 +157,7 @@ def merged_within(
     return [Thing(each, _certainty(each, room)) for each in found if each.area >= least]
 
 
-def furnished(
-    room: Room, parts: Parts, least: float, largest_leg: float, most: int
-) -> list[Thing]:
+def furnished(room: Room, parts: Parts, least: float, largest_leg: float, most: int) -> list[Thing]:
     """Return each part of at least so many cells, and the furniture of which a scan shows legs.
 
     Furniture covers no wall and nothing that is larger; what it covers belongs to it.
@@ -318,7 +316,8 @@ def _to_the_cell(line: FloatArray, bounds: Bounds, room: Room) -> shapely.Polygo
     if len(boxes) == 1:
         return pocket
     largest = labels == 1 + int(boxes[1:, cv2.CC_STAT_AREA].argmax())
-    return shapely.Polygon(outline(largest.astype(np.uint8)) + (left, below))
+    corner = np.array([left, below])
+    return shapely.Polygon(outline(largest.astype(np.uint8)) + corner)
 
 
 def _is_most_of(part: shapely.Polygon, whole: shapely.Polygon) -> bool:
