@@ -151,7 +151,7 @@ def lost(before, after):
 
 
 # Of what was found without doubt: lost on cells of half the size, and turned by 37°. Where two
-# things are a cell apart, cells that are turned join them: the bed of the small house joins its wall.
+# things are a cell apart, turned cells join them: the bed of the small house joins its wall.
 LOST = {
     "aws-small-house": (0, 4),
     "elsabot-downstairs": (0, 2),

@@ -194,8 +194,9 @@ def _certainty(feature: dict[str, Any]) -> float:
     """Return the certainty that a scene was saved with; what others call so may be anything."""
     properties = feature.get("properties")
     given = properties.get("certainty") if isinstance(properties, dict) else None
-    plain = isinstance(given, int | float) and not isinstance(given, bool)
-    return float(given) if plain and 0.0 < given <= 1.0 else 1.0
+    if not isinstance(given, int | float) or isinstance(given, bool):
+        return 1.0
+    return float(given) if 0.0 < given <= 1.0 else 1.0
 
 
 def _polygon(value: Any, field: str, label: str) -> LabelledPolygon:

@@ -153,7 +153,7 @@ def _pockets(ring: shapely.Polygon, bounds: Bounds) -> Iterator[Pocket]:
     """Yield the pockets of a ring that are things."""
     points = shapely.get_coordinates(ring.exterior)[:-1]
     corners = np.flatnonzero(_turns(points) > _CORNER)
-    spots = shapely.points(points[corners])
+    spots = np.asarray(shapely.points(points[corners]), dtype=object)
     a, b = shapely.STRtree(spots).query(spots, predicate="dwithin", distance=bounds.widest)
     a, b = corners[a[a != b]], corners[b[a != b]]
     areas = _areas(points, a, b)

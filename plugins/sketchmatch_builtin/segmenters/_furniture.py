@@ -108,12 +108,12 @@ def _largest_rectangle(legs: Legs) -> float:
 
 def _rectangles(points: FloatArray, largest: float) -> Iterator[IntArray]:
     """Yield the corners of rectangles, from the shortest diagonal on."""
-    spots = shapely.points(points)
+    spots = _points(points)
     i, j = shapely.STRtree(spots).query(spots, predicate="dwithin", distance=largest)
     i, j = i[i < j], j[i < j]
     middles = (points[i] + points[j]) / 2.0
     lengths = np.linalg.norm(points[i] - points[j], axis=1)
-    there = shapely.points(middles)
+    there = _points(middles)
     a, b = shapely.STRtree(there).query(there, predicate="dwithin", distance=_SLACK)
     a, b = a[a < b], b[a < b]
     first, second = (points[i[a]] - points[i[b]]), (points[i[a]] - points[j[b]])
@@ -132,7 +132,7 @@ def facing(bars: Bars) -> Iterator[IntArray]:
     """
     long = np.flatnonzero(bars.lengths >= _BAR * bars.widths)
     taken = np.zeros(len(bars.lengths), dtype=bool)
-    spots = shapely.points(bars.middles[long])
+    spots = _points(bars.middles[long])
     if not len(long):
         return
     i, j = shapely.STRtree(spots).query(spots, predicate="dwithin", distance=_LONGEST)
@@ -160,7 +160,7 @@ def crowds(legs: Legs) -> Iterator[IntArray]:
     """
     if len(legs.points) < _FEWEST or math.pi * _STEP**2 * legs.density > _FEWEST:
         return
-    spots = shapely.points(legs.points)
+    spots = _points(legs.points)
     near = shapely.STRtree(spots).query(spots, predicate="dwithin", distance=_STEP)
     group = groups(len(spots), near)
     for k in np.flatnonzero(np.bincount(group) >= _FEWEST).tolist():
@@ -168,6 +168,10 @@ def crowds(legs: Legs) -> Iterator[IntArray]:
         mean = legs.density * _circle(legs.points[members])
         if len(legs.points) * _at_least(len(members) - 1, mean) < _BY_CHANCE:
             yield members
+
+
+def _points(places: FloatArray) -> NDArray[np.object_]:
+    return np.asarray(shapely.points(places), dtype=object)
 
 
 def _circle(points: NDArray[np.float64]) -> float:

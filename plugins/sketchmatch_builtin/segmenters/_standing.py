@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import cv2
 import numpy as np
@@ -251,7 +251,8 @@ def _is_furniture(
     members: IntArray, alone: dict[int, Thing], parts: Parts, least: float, room: Room
 ) -> bool:
     """Whether the hull of parts has some width, no walls in it, and covers nothing larger."""
-    hull = shapely.GeometryCollection(list(parts.outlines(members.tolist()))).convex_hull
+    shapes = list(parts.outlines(members.tolist()))
+    hull = cast(shapely.Polygon, shapely.GeometryCollection(shapes).convex_hull)
     others = (each.outline for k, each in alone.items() if k not in members)
     larger = (each for each in others if each.area > hull.area)
     return (
@@ -284,10 +285,11 @@ def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]
         near = tree.query(polygon, predicate="intersects").tolist()
         part = [k for k in near if _is_most_of(polygon.intersection(outlines[k]), outlines[k])]
         apart = shapely.union_all([outlines[k] for k in near if k not in part])
-        polygon = max(shapely.get_parts(polygon.difference(apart)), key=shapely.area, default=None)
+        left = shapely.get_parts(polygon.difference(apart)).tolist()
+        polygon = max(left, key=shapely.area, default=shapely.Polygon())
         # Its last edge is where it meets the wall.
-        kept = polygon is not None and _seen(line[:-1], room) >= _SEEN
-        kept = kept and is_thick(polygon.simplify(0.5), bounds.thinnest)
+        plain = cast(shapely.Polygon, polygon.simplify(0.5))
+        kept = is_thick(plain, bounds.thinnest) and _seen(line[:-1], room) >= _SEEN
         if kept and not any(_is_most_of(outlines[k], polygon) for k in part):
             parts_of_others.update(part)
             found.append(Thing(shapely.Polygon(polygon.exterior), _of_pocket(pocket)))
@@ -304,12 +306,12 @@ def _to_the_cell(line: FloatArray, bounds: Bounds, room: Room) -> shapely.Polygo
     left, below = max(left, 0), max(below, 0)
     taken = 1 - (room.free[below : top + 1, left : right + 1])
     y, x = np.nonzero(taken)
-    spots = shapely.points(x + left + 0.5, y + below + 0.5)
+    spots = np.asarray(shapely.points(x + left + 0.5, y + below + 0.5), dtype=object)
     # A pocket lies right of its line.
     (x0, y0), (x1, y1) = line[-2], line[-1]
     beyond = (x1 - x0) * (y + below + 0.5 - y0) - (y1 - y0) * (x + left + 0.5 - x0) > 0.0
     shapely.prepare(pocket)
-    kept = shapely.dwithin(pocket, spots, np.where(beyond, 0.0, stray))
+    kept = shapely.distance(pocket, spots) <= np.where(beyond, 0.0, stray)
     taken[y[~kept], x[~kept]] = 0
     filled = closed(taken, round(bounds.slit))
     _, labels, boxes, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
@@ -360,6 +362,9 @@ def _certainty(polygon: shapely.Polygon, room: Room) -> float:
 
 def _is_thinner(polygon: shapely.Polygon, width: float) -> bool:
     """Whether a polygon in cells is nowhere so wide."""
+    # A disc of the area through the perimeter fits into anything, by Bonnesen.
+    if polygon.area >= width / 2.0 * polygon.length:
+        return False
     # Of stairs along the cells every step would count.
     return bool(polygon.simplify(0.5).buffer(-width / 2.0).is_empty)
 
@@ -370,8 +375,8 @@ def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:
     left, below, right, top = np.floor(polygon.bounds).astype(int).tolist()
     window = np.s_[max(below - reach, 0) : top + reach, max(left - reach, 0) : right + reach]
     unseen = 1 - (room.free[window] | room.inside[window] | room.occupied[window])
-    beside = cv2.dilate(unseen, np.ones((3, 3), np.uint8)) & room.free[window]
-    return bool(np.count_nonzero(beside) > _EDGE * room.small)
+    beside = cv2.dilate(unseen, np.ones((3, 3), np.uint8)) > 0
+    return bool(np.count_nonzero(beside & (room.free[window] > 0)) > _EDGE * room.small)
 
 
 def _seen(line: FloatArray, room: Room) -> float:
