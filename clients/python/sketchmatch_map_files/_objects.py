@@ -67,13 +67,11 @@ def find_objects(
         if text is None:
             continue
         try:
-            features = json.loads(text)
+            mine = is_of(json.loads(text), content)
         except (ValueError, RecursionError):
             # Whoever reads it says what is wrong with it.
-            if path == own:
-                return text, ()
-            continue
-        if is_of(features, content):
+            mine = path == own
+        if mine:
             note = f"objects are those of {path.name} beside the map, unless a segmenter is chosen"
             return text, (note,)
         if path == own:

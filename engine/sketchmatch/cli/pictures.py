@@ -64,7 +64,10 @@ def draw_segmentation(response: SegmentResponse, source: Path, target: Path, pen
     """Draw the objects of one scene, by a pen or not, numbered, and the route; save the picture."""
     grid = _grid(source)
     route = _way(response.route)
-    picture = draw_scene(scene_of(response.scene), underlay=grid, pen=pen, route=route)
+    scene = scene_of(response.scene)
+    doubted = sum(item.doubtful for item in scene.objects)
+    caption = f"{doubted} in doubt, drawn hollow" if doubted else ""
+    picture = draw_scene(scene, caption=caption, underlay=grid, pen=pen, route=route)
     save_overlay(target, picture)
 
 
