@@ -5,6 +5,7 @@ their full size; where a thing was found whole, the box is that of what was foun
 segmenter were chosen on ``LOOKED_AT`` alone.
 """
 
+import contextlib
 import json
 import math
 from collections import Counter
@@ -14,7 +15,10 @@ import cv2
 import numpy as np
 import pytest
 import shapely
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
+from sketchmatch.errors import InvalidInputError
 from sketchmatch.io import read_source
 from sketchmatch.model import OccupancyGrid
 from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
@@ -291,3 +295,18 @@ def test_a_speck_where_the_map_ends_is_left_out():
         found(grid)
     speck = min(found(grid, min_certainty=0.01), key=lambda item: item.area)
     assert speck.certainty == 0.2
+
+
+@given(st.integers(0, 2**32 - 1))
+@example(0)
+@settings(max_examples=30)
+def test_whatever_the_walls_are_objects_are_valid(seed):
+    rng = np.random.default_rng(seed)
+    blurred = cv2.GaussianBlur(rng.random((60, 60)), (0, 0), 1.5)
+    high = blurred.mean() + 0.7 * blurred.std()
+    cells = np.select([blurred > high, blurred < high - 0.01], [100, 0], -1).astype(np.int8)
+    with contextlib.suppress(InvalidInputError):
+        objects = found(
+            OccupancyGrid(cells, 0.05), wall_thickness=0.0, min_size=0.0, min_certainty=0.01
+        )
+        assert all(item.polygon.is_valid and 0.0 < item.certainty <= 1.0 for item in objects)

@@ -157,7 +157,12 @@ def _pockets(ring: shapely.Polygon, bounds: Bounds) -> Iterator[Pocket]:
     a, b = shapely.STRtree(spots).query(spots, predicate="dwithin", distance=bounds.widest)
     a, b = corners[a[a != b]], corners[b[a != b]]
     areas = _areas(points, a, b)
-    counts = (areas >= max(bounds.smallest, bounds.thinnest) ** 2) & (areas <= ring.area)
+    necks = np.linalg.norm(points[a] - points[b], axis=1)
+    least = max(1.0, bounds.smallest**2, bounds.thinnest**2)
+    counts = (areas > least) & (areas <= ring.area)
+    # What neither the least of a box nor the least of what hangs by a neck fits into is neither.
+    box = (areas >= _FULL * necks * bounds.thinnest) & (areas <= bounds.widest**2)
+    counts &= box | (areas > math.pi * (0.5 * necks / _NECK) ** 2)
     a, b = a[counts], b[counts]
     inner = ring.buffer(-bounds.stray)
     shapely.prepare(inner)
@@ -180,7 +185,9 @@ def _pocket(points: FloatArray, a: int, b: int, bounds: Bounds) -> Pocket | None
         and _FULL <= outline.area / (neck * depth) <= 1.0 / _BELLY
         and _goes_on(points, a, b, _STRETCH * bounds.thinnest)
     )
-    hangs = depth > 0.5 * neck / _NECK and not outline.buffer(-0.5 * neck / _NECK).is_empty
+    # The disc of the thickness that it has at least.
+    radius = 0.5 * neck / _NECK
+    hangs = outline.area > math.pi * radius**2 and not outline.buffer(-radius).is_empty
     if not (leans or hangs) or not outline.is_valid or not is_thick(outline, bounds.thinnest):
         return None
     if not hangs:
