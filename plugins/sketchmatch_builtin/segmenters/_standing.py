@@ -19,11 +19,11 @@ from sketchmatch_builtin.segmenters._merging import apart, merged
 __all__ = ["Parts", "Room", "Thing", "as_they_are", "at_the_walls", "furnished", "merged_within"]
 
 _Geometries = NDArray[np.object_]
-_Flags = NDArray[np.bool_]
 
 # How sure it is that parts are one thing, by what they form together.
 _TABLE, _FACING, _CROWD = 0.9, 0.6, 0.6
-# The share of a crowd's parts that tables and chairs have where it is these, and no one thing.
+# The share from which on something is most of the whole: of a crowd the legs of tables and chairs,
+# which it is then, and no one thing.
 _MOST = 0.6
 # What is in a crowd may be so much larger than a leg, as legs that are near each other are one.
 _CLUMP = 2.0
@@ -323,7 +323,7 @@ def _to_the_cell(line: FloatArray, bounds: Bounds, room: Room) -> shapely.Polygo
 
 
 def _is_most_of(part: shapely.Polygon, whole: shapely.Polygon) -> bool:
-    return bool(part.area > _STRAIGHT * whole.area)
+    return bool(part.area > _MOST * whole.area)
 
 
 def _of_pocket(pocket: Pocket) -> float:
