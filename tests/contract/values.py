@@ -26,6 +26,7 @@ from sketchmatch.model import (
     OccupancyGrid,
     PolygonSet,
     Scene,
+    SceneObject,
     Stroke,
     StrokeSet,
 )
@@ -209,7 +210,7 @@ SOURCES = {
                 ),
                 "bar",
             ),
-            LabelledPolygon((np.array([[1.5, -2.5], [4.5, -3.5], [0.5, -6.5]]),)),
+            LabelledPolygon((np.array([[1.5, -2.5], [4.5, -3.5], [0.5, -6.5]]),), certainty=0.375),
         )
     ),
     "SegmentRequest.stroke_set": StrokeSet(
@@ -223,6 +224,15 @@ SOURCES = {
         0.25,
         (-1.5, 2.25, 0.75),
         picture=GridPicture(np.array([[1, 255, 1], [255, 1, 127]], dtype=np.uint8), 0.196),
+    ),
+    "SegmentRequest.mended_map": OccupancyGrid(
+        np.array([[0, 100, 0], [100, 0, -1]], dtype=np.int8),
+        0.25,
+        (-1.5, 2.25, 0.75),
+        picture=GridPicture(np.array([[1, 255, 1], [255, 1, 127]], dtype=np.uint8), 0.196),
+        objects=PolygonSet(
+            (LabelledPolygon((np.array([[1.5, 2.5], [4.5, 3.5], [0.5, 6.5]]),), "oven", 0.625),)
+        ),
     ),
     "SegmentRequest.image": PICTURE,
     "SegmentRequest.file": PolygonSet(
@@ -422,7 +432,7 @@ EVENTS = {
 # What answers the other methods.
 
 SEGMENTATION = Segmentation(
-    Scene.from_polygons([BAR, RACK], ["bar", ""]),
+    Scene((SceneObject.from_polygon(BAR, "bar"), SceneObject.from_rings([RACK], certainty=0.625))),
     ("2 specks were left out", "a doorway was closed"),
     ROUTE[:2],
 )

@@ -295,8 +295,10 @@ def test_segment_lists_the_objects_in_lines_and_in_json(command_line, where, tmp
     message = command_line("segment", LIVING_ROOM_MAP, *where, "--json")
     found = Parse(message.stdout, SegmentResponse())
     head, *rows = [line.split("\t") for line in lines.stdout.splitlines()]
-    assert head == ["object", "label", "vertices", "area", "centroid_x", "centroid_y"]
+    columns = ["object", "label", "vertices", "area", "centroid_x", "centroid_y", "certainty"]
+    assert head == columns
     assert [row[0] for row in rows] == [str(k) for k in range(8)]
+    assert {row[6] for row in rows} == {"1"}
     assert [float(row[3]) for row in rows] == pytest.approx(
         [item.area for item in found.scene.objects], rel=1e-5
     )

@@ -204,3 +204,25 @@ def test_what_a_file_leaves_out_is_told(command_line, where, tmp_path):
     done = command_line("segment", file, *where)
     assert done.returncode == 0
     assert "[2] is without a place: left out." in done.stderr
+
+
+def test_a_map_is_mended_in_the_file_that_was_saved_beside_it(command_line, where, tmp_path):
+    for path in LIVING_ROOM_MAP.parent.glob("living_room.*"):
+        shutil.copy(path, tmp_path)
+    room, beside = tmp_path / "living_room.yaml", tmp_path / "living_room.objects.geojson"
+    assert command_line("segment", room, "--out", beside, *where).returncode == 0
+    document = json.loads(beside.read_text(encoding="utf-8"))
+    document["features"][2:4] = []
+    document["features"][0]["properties"]["label"] = "mended"
+    beside.write_text(json.dumps(document), encoding="utf-8")
+    done = command_line("segment", room, *where)
+    rows = [line.split("\t") for line in done.stdout.splitlines()[1:]]
+    assert (len(rows), rows[0][1]) == (6, "mended")
+    assert "objects are those of living_room.objects.geojson beside the map" in done.stderr
+    anew = command_line("segment", room, "--segmenter", "occupancy-grid", *where)
+    assert len(anew.stdout.splitlines()) == 9
+    document["features"][0]["geometry"]["coordinates"] = [[[0, 0], [1, 1], [1, 0], [0, 1]]]
+    beside.write_text(json.dumps(document), encoding="utf-8")
+    wrong = command_line("segment", room, *where)
+    assert wrong.returncode == 2
+    assert "objects.polygons[0] crosses itself" in wrong.stderr

@@ -157,7 +157,7 @@ def test_rooms_take_the_names_of_rooms_in_them():
     assert rooms.warnings == ("No object is left around garden, which the map's file names.",)
 
 
-def test_montreal_names_things_of_which_its_map_shows_none():
+def test_montreal_names_things_of_which_its_map_shows_a_door():
     from sketchmatch.io import read_source
 
     path = ROOT.parent / "shared" / "data" / "ogm" / "marrtino-montreal" / "montreal.yaml"
@@ -165,6 +165,7 @@ def test_montreal_names_things_of_which_its_map_shows_none():
     grid = read_source(path)
     names = ["mary", "box1", "door1", "door2", "door3", "door4"]
     assert [item.name for item in grid.landmarks] == names
-    # The stool (no. 1) stands at (3.97, −1.97), 2.2 m from mary; doors are gaps in the walls.
-    assert labels(found(grid)) == [""] * 5
-    assert labels(found(grid, label_reach=2.2))[1] == "mary"
+    # The stool (no. 2) stands at (3.97, −1.97), 2.2 m from mary; doors are gaps in the walls, but
+    # for one, which stands out of its wall.
+    assert labels(found(grid)) == ["door2", *[""] * 8]
+    assert labels(found(grid, label_reach=2.2))[2] == "mary"

@@ -20,6 +20,7 @@ from sketchmatch_client.errors import InvalidRequestError, refused_as
 from sketchmatch_map_files import (
     PICTURE_SUFFIXES,
     MapFileError,
+    find_objects,
     find_picture,
     find_yaml,
     parse,
@@ -203,7 +204,9 @@ def map_server_map(path: str | os.PathLike[str]) -> source_pb2.Source:
     path
         The .yaml file. The picture that its ``image`` names is read as well; where that is a path
         of another machine, one of that name beside the file is taken, with a warning. Or the
-        picture, which a .yaml beside it names, or the folder that holds one map.
+        picture, which a .yaml beside it names, or the folder that holds one map. A file beside it
+        that says what its objects are, as ``sketchmatch segment --out`` saves it, is read as well,
+        with a warning.
 
     Raises
     ------
@@ -223,10 +226,13 @@ def map_server_map(path: str | os.PathLike[str]) -> source_pb2.Source:
         problem = f"{field} ({file}) names no picture; add a line `image: FILE`"
         raise InvalidRequestError(problem, "INVALID_FILE", field)
     picture, notes = find_picture(file, document)
-    for note in notes:
-        warnings.warn(note, stacklevel=2)
     data = _bytes(picture, "map_server_map.image", f", as {file} names it")
-    return source_pb2.Source(map_server_map=source_pb2.MapServerMap(yaml=text, image=data))
+    objects, more = find_objects(file, document, data)
+    for note in (*notes, *more):
+        warnings.warn(note, stacklevel=2)
+    return source_pb2.Source(
+        map_server_map=source_pb2.MapServerMap(yaml=text, image=data, objects=objects or "")
+    )
 
 
 def image(file: str | os.PathLike[str] | bytes) -> source_pb2.Source:

@@ -1,4 +1,4 @@
-"""The two files of a robot's map: which they are, and what stands in the YAML.
+"""The files of a robot's map: which they are, what stands in the YAML, and whose objects these are.
 
 Client and engine read them here alike, and as ROS does. Its reader, yaml-cpp, keeps every value as
 the text that is written, and who asks for a number gets one; so nothing depends on whether YAML
@@ -19,12 +19,16 @@ from pathlib import Path, PureWindowsPath
 from typing import Any
 
 __all__ = [
+    "OBJECTS_SUFFIX",
     "PICTURE_SUFFIXES",
     "YAML_SUFFIXES",
     "Document",
     "MapFileError",
+    "content_of",
+    "find_objects",
     "find_picture",
     "find_yaml",
+    "is_of",
     "parse",
     "text_of",
 ]
@@ -249,3 +253,12 @@ def _named(files: list[Path]) -> str:
 
 def _shown(name: str) -> str:
     return name if name.isprintable() and len(name) <= 200 else repr(name[:200])
+
+
+# It needs what is defined above.
+from sketchmatch_map_files._objects import (  # noqa: E402
+    OBJECTS_SUFFIX,
+    content_of,
+    find_objects,
+    is_of,
+)

@@ -224,7 +224,7 @@ def source(
                 return _occupancy_grid(message.occupancy_grid)
             case "map_server_map":
                 packed = message.map_server_map
-                return decode_map_server(packed.yaml, packed.image)
+                return decode_map_server(packed.yaml, packed.image, packed.objects)
             case "image":
                 return decode_image(message.image.data)
             case "file":
@@ -291,6 +291,8 @@ def paths_of(
             path = "image.data"
         elif path == "occupancy_grid.cells" and kind == "map_server_map":
             path = "map_server_map.image"
+        elif path.startswith("occupancy_grid.objects") and kind == "map_server_map":
+            path = f"map_server_map.{path.partition('.')[2]}"
         field = f"{side}.{path}" if path else side
         raise InvalidInputError(error.reason, field, error.problem) from None
 
@@ -402,7 +404,9 @@ def _polygon_set(message: source_pb2.PolygonSet) -> PolygonSet:
     return PolygonSet(
         tuple(
             LabelledPolygon(
-                tuple(_points(ring.points, upward) for ring in polygon.rings), polygon.label
+                tuple(_points(ring.points, upward) for ring in polygon.rings),
+                polygon.label,
+                polygon.certainty if polygon.HasField("certainty") else 1.0,
             )
             for polygon in message.polygons
         )

@@ -191,6 +191,7 @@ def scene(value: Scene) -> scene_pb2.Scene:
                 label=item.label,
                 area=item.area,
                 centroid=source_pb2.Point(x=item.centroid[0], y=item.centroid[1]),
+                certainty=item.certainty if item.certainty < 1.0 else None,
             )
             for item in value.objects
         ]

@@ -103,7 +103,11 @@ def name_of(
 def segmentation(record: StoredScene) -> Segmentation:
     """Return a kept scene as it was found."""
     objects = tuple(
-        SceneObject(tuple(frozen_floats(_points(ring.points)) for ring in item.rings), item.label)
+        SceneObject(
+            tuple(frozen_floats(_points(ring.points)) for ring in item.rings),
+            item.label,
+            item.certainty if item.HasField("certainty") else 1.0,
+        )
         for item in record.scene.objects
     )
     route = frozen_floats(_points(record.route)) if record.route else None

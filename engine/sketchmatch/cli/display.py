@@ -192,10 +192,11 @@ def show_scene(response: SegmentResponse, verbose: bool) -> None:
             f"{item.area:.6g}",
             f"{item.centroid.x:.6g}",
             f"{item.centroid.y:.6g}",
+            f"{item.certainty:.2g}" if item.HasField("certainty") else "1",
         )
         for item in response.scene.objects
     ]
-    names = ("label", "vertices", "area", "centroid_x", "centroid_y")
+    names = ("label", "vertices", "area", "centroid_x", "centroid_y", "certainty")
     if not output.for_people():
         output.write_line("object", *names)
         for k, row in enumerate(rows):

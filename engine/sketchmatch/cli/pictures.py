@@ -77,7 +77,10 @@ def draw_segmentation(response: SegmentResponse, source: Path, target: Path, pen
     """Draw the objects of one scene, by a pen or not, numbered, and the route; save the picture."""
     grid = grid_in(source)
     route = _way(response.route)
-    picture = draw_scene(scene_of(response.scene), underlay=grid, pen=pen, route=route)
+    scene = scene_of(response.scene)
+    doubted = sum(item.doubtful for item in scene.objects)
+    caption = f"{doubted} in doubt, drawn hollow" if doubted else ""
+    picture = draw_scene(scene, caption=caption, underlay=grid, pen=pen, route=route)
     save_overlay(target, picture)
 
 
@@ -119,6 +122,7 @@ def scene_of(message: scene_pb2.Scene) -> Scene:
                     for ring in item.rings
                 ),
                 item.label,
+                item.certainty if item.HasField("certainty") else 1.0,
             )
             for item in message.objects
         )

@@ -29,7 +29,12 @@ def segment(
     overlay: options.Overlay = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE", help="Save the objects as polygons, in .geojson."),
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="Save the objects as polygons, in .geojson. Beside a robot's map and named as it "
+            "is with .objects.geojson, they are its objects from then on: edit them at will.",
+        ),
     ] = None,
     verbose: options.Verbose = False,
 ) -> None:
@@ -38,9 +43,8 @@ def segment(
     Parameters are set as in --set segmenter.min_size=0.3. On a terminal the table counts objects
     from 1, as the overlay does; in a pipe the lines count from 0, as the API does.
     """
-    from sketchmatch.cli import display, output, pictures, places
+    from sketchmatch.cli import display, output, pictures, places, sources
     from sketchmatch.cli.answering import answerer
-    from sketchmatch.cli.sources import source_of
     from sketchmatch.io import scene_files
 
     options.refuse_config(config, server)
@@ -50,12 +54,13 @@ def segment(
         scene_files.check_scene_path(out, "--out")
     parameters = options.parse_settings(settings, ("segmenter",)).get("segmenter", {})
     with places.places_in(source=file), answerer(server, config, access) as asked:
-        source = source_of(file)
+        source = sources.source_of(file)
         found = asked.segment(source, segmenter=segmenter, params=parameters, profile=profile)
     if overlay is not None:
         pictures.draw_segmentation(found, file, overlay, pen=source.HasField("stroke_set"))
     if out is not None:
-        scene_files.save_scene(out, pictures.scene_of(found.scene), "--out")
+        content = sources.content_of(file) if scene_files.is_of_a_map(out) else ""
+        scene_files.save_scene(out, pictures.scene_of(found.scene), "--out", content)
     if json:
         output.write_message(found)
     else:

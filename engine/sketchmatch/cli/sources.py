@@ -22,7 +22,7 @@ from sketchmatch_proto.v1.source_pb2 import MapServerMap, Source
 if TYPE_CHECKING:
     from sketchmatch.cli.answering import Answerer
 
-__all__ = ["in_metres", "is_kept", "source_of", "stored_of", "whole_name"]
+__all__ = ["content_of", "in_metres", "is_kept", "source_of", "stored_of", "whole_name"]
 
 _KEPT = "scene:"
 _DIGITS = 64
@@ -91,7 +91,9 @@ def source_of(path: Path, side: str = "") -> Source:
     """
     if (files := read_map_files(path)) is not None:
         say_notes(side, files.notes, verbose=True)
-        return Source(map_server_map=MapServerMap(yaml=files.yaml, image=files.picture))
+        return Source(
+            map_server_map=MapServerMap(yaml=files.yaml, image=files.picture, objects=files.objects)
+        )
     file, part = file_and_part(path)
     if not part and file.suffix.lower() in PICTURE_SUFFIXES:
         if file.suffix.lower() == ".pgm":
@@ -112,12 +114,22 @@ def source_of(path: Path, side: str = "") -> Source:
                 [stroke.label for stroke in strokes],
             )
         case PolygonSet(polygons):
-            return sources.polygons(
+            packed = sources.polygons(
                 [[ring.tolist() for ring in polygon.rings] for polygon in polygons],
                 [polygon.label for polygon in polygons],
             )
+            for message, polygon in zip(packed.polygon_set.polygons, polygons, strict=True):
+                if polygon.certainty < 1.0:
+                    message.certainty = polygon.certainty
+            return packed
         case Image():
             raise AssertionError("pictures pass as they are")
+
+
+def content_of(path: Path) -> str:
+    """Return by what a file with objects knows a robot's map; empty for every other file."""
+    files = read_map_files(path)
+    return "" if files is None else files.content
 
 
 def _timed(points: Any, times: Any) -> list[Any]:

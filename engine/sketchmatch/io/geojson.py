@@ -2,7 +2,8 @@
 
 A ``FeatureCollection``, ``Feature``, ``GeometryCollection``, ``Polygon`` or ``MultiPolygon``, or
 several of them in a list, in a line each, or as a text sequence (RFC 8142); each polygon becomes
-one object. A feature's property ``label``, or else ``name``, or else its ``id``, is its label.
+one object. A feature's property ``label``, or else ``name``, or else its ``id``, is its label, and
+its property ``certainty``, above 0 and up to 1, how sure it is that it is one thing.
 Heights (a third coordinate) are ignored, and rings need not repeat their first point.
 
 A feature whose geometry is null or empty has no place; points and lines are no areas. Both are left
@@ -150,8 +151,9 @@ def _polygons(value: Any, field: str, label: str, remarks: _Remarks) -> Iterator
         case "Feature" if item.get("geometry", 0) is None:
             remarks.append((field, "nowhere"))
         case "Feature":
-            name = _label(item)
-            yield from _polygons(item.get("geometry"), _path(field, "geometry"), name, remarks)
+            name, sure = _label(item), _certainty(item)
+            for each in _polygons(item.get("geometry"), _path(field, "geometry"), name, remarks):
+                yield replace(each, certainty=sure)
         case str() if kind in _GEOMETRIES and item.get("coordinates") == []:
             remarks.append((field, "nowhere"))
         case "Polygon":
@@ -186,6 +188,15 @@ def _label(feature: dict[str, Any]) -> str:
     given = properties if isinstance(properties, dict) else {}
     names = (given.get("label"), given.get("name"), feature.get("id"))
     return next((name for name in map(plain_name, names) if name), "")
+
+
+def _certainty(feature: dict[str, Any]) -> float:
+    """Return the certainty that a scene was saved with; what others call so may be anything."""
+    properties = feature.get("properties")
+    given = properties.get("certainty") if isinstance(properties, dict) else None
+    if not isinstance(given, int | float) or isinstance(given, bool):
+        return 1.0
+    return float(given) if 0.0 < given <= 1.0 else 1.0
 
 
 def _polygon(value: Any, field: str, label: str) -> LabelledPolygon:

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, NamedTuple
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io.ros_bag import is_bag
 from sketchmatch.model import OccupancyGrid
-from sketchmatch_map_files import MapFileError, find_picture, find_yaml, parse, text_of
+from sketchmatch_map_files import (
+    MapFileError,
+    content_of,
+    find_objects,
+    find_picture,
+    find_yaml,
+    parse,
+    text_of,
+)
 
 if TYPE_CHECKING:
     from sketchmatch.io.ros_map import MapServerHeader
@@ -21,7 +29,7 @@ _LONGEST_NAME = 500
 
 
 class MapFiles(NamedTuple):
-    """The two files of a robot's map as they are.
+    """The files of a robot's map as they are.
 
     Attributes
     ----------
@@ -31,11 +39,19 @@ class MapFiles(NamedTuple):
         The bytes of the picture.
     notes
         What there is to say of how they were found, each one sentence.
+    objects
+        The text of the file that says what the objects are; empty if there is none.
     """
 
     yaml: str
     picture: bytes
     notes: tuple[str, ...]
+    objects: str = ""
+
+    @property
+    def content(self) -> str:
+        """By what the file with its objects knows the map."""
+        return content_of(parse(self.yaml), self.picture)
 
     def grid(self) -> OccupancyGrid:
         """Return the occupancy grid in them, with these notes before its own.
@@ -43,9 +59,11 @@ class MapFiles(NamedTuple):
         Raises
         ------
         InvalidInputError
-            With the path ``image``, if the picture cannot be read.
+            With the path ``image`` or ``objects``, if the picture or the objects cannot be read.
         """
-        grid = _header(self.yaml).grid(self.picture)
+        from sketchmatch.io.map_objects import with_objects
+
+        grid = with_objects(_header(self.yaml).grid(self.picture), self.objects, self.content)
         return replace(grid, notes=(*self.notes, *grid.notes))
 
 
@@ -92,7 +110,9 @@ def map_files(path: Path, read: Callable[[Path, str], bytes]) -> MapFiles | None
     shown = (
         name if name.isprintable() and len(name) <= _LONGEST_NAME else quoted(document.images[0])
     )
-    return MapFiles(text, read(picture, f"{path}: image {shown}"), (*notes, *more))
+    data = read(picture, f"{path}: image {shown}")
+    objects, said = find_objects(file, document, data)
+    return MapFiles(text, data, (*notes, *more, *said), objects or "")
 
 
 # NumPy, Pillow and PyYAML wait until there is a map.
@@ -103,7 +123,10 @@ def _bare_map(path: Path, read: Callable[[Path, str], bytes]) -> MapFiles | None
 
     picture = read(path, str(path))
     made = header_for(path.name, picture)
-    return None if made is None else MapFiles(made[0], picture, (made[1],))
+    if made is None:
+        return None
+    objects, said = find_objects(path, parse(made[0]), picture)
+    return MapFiles(made[0], picture, (made[1], *said), objects or "")
 
 
 def _header(text: str) -> MapServerHeader:

@@ -66,9 +66,10 @@ from numpy.typing import NDArray
 
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io.images import load_picture, scaled_to_8_bits
+from sketchmatch.io.map_objects import with_objects
 from sketchmatch.model import GridPicture, Landmark, OccupancyGrid
 from sketchmatch.model.sources import check_placement
-from sketchmatch_map_files import MapFileError, parse
+from sketchmatch_map_files import MapFileError, content_of, parse
 
 __all__ = ["MapServerHeader", "decode_map_server", "header_for", "parse_header"]
 
@@ -182,8 +183,8 @@ class MapServerHeader:
         ).astype(np.int8)
 
 
-def decode_map_server(yaml_text: str, image: bytes) -> OccupancyGrid:
-    """Decode a map from the contents of its two files.
+def decode_map_server(yaml_text: str, image: bytes, objects: str = "") -> OccupancyGrid:
+    """Decode a map from the contents of its files.
 
     Parameters
     ----------
@@ -191,17 +192,20 @@ def decode_map_server(yaml_text: str, image: bytes) -> OccupancyGrid:
         The YAML file. Its ``image`` is not looked at: no path of a caller's is ever opened.
     image
         The picture's file.
+    objects
+        The file that says what its objects are, if there is one.
 
     Raises
     ------
     InvalidInputError
-        With a path within ``yaml`` or the path ``image``, if either cannot be used.
+        With a path within ``yaml`` or ``objects``, or the path ``image``, if one cannot be used.
     """
     try:
         header = parse_header(yaml_text)
     except InvalidInputError as error:
         raise error.within("yaml") from None
-    return header.grid(image)
+    grid = header.grid(image)
+    return with_objects(grid, objects, content_of(parse(yaml_text), image)) if objects else grid
 
 
 def parse_header(yaml_text: str) -> MapServerHeader:

@@ -8,15 +8,17 @@ from typing import Any
 
 from sketchmatch.io._targets import check_target, writing
 from sketchmatch.model import FloatArray, Scene, SceneObject
+from sketchmatch_map_files import OBJECTS_SUFFIX
 
-__all__ = ["check_scene_path", "encode_geojson", "save_scene"]
+__all__ = ["check_scene_path", "encode_geojson", "is_of_a_map", "save_scene"]
 
 
-def encode_geojson(scene: Scene) -> str:
+def encode_geojson(scene: Scene, content: str = "") -> str:
     """Return a scene as a GeoJSON ``FeatureCollection`` that reads back as the very same scene.
 
-    Each object is a ``Polygon`` with its holes and the property ``label``, in the scene's order
-    and coordinates.
+    Each object is a ``Polygon`` with its holes and the property ``label``, and ``certainty`` where
+    that is below 1, in the scene's order and coordinates. With the ``content`` of a robot's map
+    each has it as the property ``map``, so that the file is known as that of the map's objects.
 
     Examples
     --------
@@ -25,7 +27,8 @@ def encode_geojson(scene: Scene) -> str:
     '{"type": "FeatureCollection", "crs": null, "features": ['
     """
     features = ",\n".join(
-        json.dumps(_feature(item), ensure_ascii=False, allow_nan=False) for item in scene.objects
+        json.dumps(_feature(item, content), ensure_ascii=False, allow_nan=False)
+        for item in scene.objects
     )
     return f'{{"type": "FeatureCollection", "crs": null, "features": [\n{features}\n]}}\n'
 
@@ -48,8 +51,13 @@ def check_scene_path(path: str | Path, field: str = "out") -> None:
     check_target(path, field, (".geojson",), ".geojson")
 
 
-def save_scene(path: str | Path, scene: Scene, field: str = "out") -> None:
-    """Save a scene as GeoJSON.
+def is_of_a_map(path: str | Path) -> bool:
+    """Whether a file of this name beside a robot's map holds that map's objects."""
+    return Path(path).name.endswith(OBJECTS_SUFFIX)
+
+
+def save_scene(path: str | Path, scene: Scene, field: str = "out", content: str = "") -> None:
+    """Save a scene as GeoJSON, as :func:`encode_geojson` writes it.
 
     Raises
     ------
@@ -59,13 +67,17 @@ def save_scene(path: str | Path, scene: Scene, field: str = "out") -> None:
     check_scene_path(path, field)
     with writing(path, field):
         # What UTF-8 cannot hold is escaped as JSON escapes it.
-        Path(path).write_bytes(encode_geojson(scene).encode("utf-8", "backslashreplace"))
+        Path(path).write_bytes(encode_geojson(scene, content).encode("utf-8", "backslashreplace"))
 
 
-def _feature(item: SceneObject) -> dict[str, Any]:
+def _feature(item: SceneObject, content: str) -> dict[str, Any]:
     return {
         "type": "Feature",
-        "properties": {"label": item.label},
+        "properties": {
+            "label": item.label,
+            **({"certainty": item.certainty} if item.certainty < 1.0 else {}),
+            **({"map": content} if content else {}),
+        },
         "geometry": {"type": "Polygon", "coordinates": [_closed(ring) for ring in item.rings]},
     }
 

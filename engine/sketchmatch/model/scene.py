@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
@@ -19,7 +20,10 @@ from sketchmatch.model.caching import cached_property
 from sketchmatch.model.labels import cleaned_label, label_from
 from sketchmatch.model.text import listed, name, shortened
 
-__all__ = ["Edges", "Scene", "SceneObject"]
+__all__ = ["DOUBTFUL", "Edges", "Scene", "SceneObject"]
+
+DOUBTFUL = 0.5
+"""Below this certainty it is in doubt that an object is one thing."""
 
 # Below this share of its squared extent an area is rounding, not a shape.
 _FLAT = 1e-9
@@ -41,16 +45,21 @@ class SceneObject:
     label
         A name for people, in one line: :func:`~sketchmatch.model.labels.cleaned_label` makes it
         so. It never influences a match.
+    certainty
+        How sure it is that this is one thing, and no part of a wall, shadow or speckle: above 0
+        and at most 1. What is in doubt, below :data:`DOUBTFUL`, is drawn hollow.
     """
 
     rings: tuple[FloatArray, ...]
     label: str = ""
+    certainty: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", cleaned_label(self.label))
+        object.__setattr__(self, "certainty", _checked_certainty(self.certainty))
 
     @classmethod
-    def from_rings(cls, rings: Iterable[Any], label: Any = "") -> Self:
+    def from_rings(cls, rings: Iterable[Any], label: Any = "", certainty: float = 1.0) -> Self:
         """Check rings and turn them into an object.
 
         Parameters
@@ -60,12 +69,15 @@ class SceneObject:
             closed or not.
         label
             A name for people: text or a number; None and nan are no name.
+        certainty
+            How sure it is that this is one thing.
 
         Raises
         ------
         InvalidInputError
             If a ring has fewer than three distinct points, is not finite or crosses itself, if
-            the polygon has no area, if its holes leave it or overlap, or if the label is no name.
+            the polygon has no area, if its holes leave it or overlap, if the label is no name, or
+            if the certainty is no number above 0 and up to 1.
         """
         arrays = [_clean_ring(ring, f"rings[{k}]") for k, ring in enumerate(rings)]
         if not arrays:
@@ -89,7 +101,7 @@ class SceneObject:
             frozen_floats(ring if (_signed_area(ring) > 0) == (k == 0) else ring[::-1])
             for k, ring in enumerate(arrays)
         )
-        return cls(oriented, label_from(label))
+        return cls(oriented, label_from(label), certainty)
 
     @classmethod
     def from_polygon(cls, polygon: Any, label: Any = "") -> Self:
@@ -125,6 +137,11 @@ class SceneObject:
         return shapely.Polygon(self.rings[0], self.rings[1:])
 
     @property
+    def doubtful(self) -> bool:
+        """Whether it is less than :data:`DOUBTFUL` that this is one thing."""
+        return self.certainty < DOUBTFUL
+
+    @property
     def area(self) -> float:
         """Area without the holes, in squared scene units."""
         return float(sum(_signed_area(ring) for ring in self.rings))
@@ -139,7 +156,8 @@ class SceneObject:
         x, y = self.centroid
         called, corners = shortened(self.label), sum(map(len, self.rings))
         shape = f"{corners} vertices, area {self.area:.3g}, around ({x:.3g}, {y:.3g})"
-        return f"<{type(self).__name__}: {called}{', ' if called else ''}{shape}>"
+        sure = f", certainty {self.certainty:.2g}" if self.certainty < 1.0 else ""
+        return f"<{type(self).__name__}: {called}{', ' if called else ''}{shape}{sure}>"
 
 
 class Edges(NamedTuple):
@@ -260,7 +278,7 @@ class Scene:
 
     @cached_property
     def identity(self) -> str:
-        """A hash of the outlines, in hexadecimal: the same for scenes that match alike.
+        """A hash of outlines and certainties, in hexadecimal: the same for scenes that match alike.
 
         Labels, which never influence a match, are no part of it.
 
@@ -274,6 +292,8 @@ class Scene:
         content = sha256()
         for item in self.objects:
             content.update(b"object")
+            if item.certainty < 1.0:
+                content.update(np.array(item.certainty, dtype="<f8").tobytes())
             for ring in item.rings:
                 content.update(len(ring).to_bytes(8, "little"))
                 content.update(np.ascontiguousarray(ring, dtype="<f8").tobytes())
@@ -290,6 +310,18 @@ class Scene:
         points = np.concatenate([item.rings[0] for item in self.objects])
         (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
         return (float(x0), float(y0), float(x1), float(y1))
+
+
+def _checked_certainty(value: Any) -> float:
+    number = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    # Comparisons with nan are false.
+    if not (number and 0.0 < value <= 1.0):
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "certainty",
+            f"is {quoted(value)}; give a number above 0 and up to 1, or leave it out",
+        )
+    return float(value)
 
 
 def _rings_of(shape: BaseGeometry) -> list[FloatArray]:

@@ -93,10 +93,14 @@ class StrokeSet:
 
 @dataclass(frozen=True, eq=False)
 class LabelledPolygon:
-    """One polygon as it came: outer ring, then holes, each of shape (k, 2), y up."""
+    """One polygon as it came: outer ring, then holes, each of shape (k, 2), y up.
+
+    ``certainty`` is how sure it is that it is one thing, above 0 and up to 1.
+    """
 
     rings: tuple[FloatArray, ...]
     label: str = ""
+    certainty: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", cleaned_label(self.label))
@@ -186,6 +190,9 @@ class OccupancyGrid:
         What the cells were read from, where thresholds decided; else None.
     landmarks
         What the map's file names.
+    objects
+        What people say its objects are, in the map's frame and metres; they stand for the map
+        where nobody chooses a segmenter. None where nobody said so.
     """
 
     cells: NDArray[np.int8]
@@ -194,6 +201,7 @@ class OccupancyGrid:
     notes: tuple[str, ...] = ()
     picture: GridPicture | None = None
     landmarks: tuple[Landmark, ...] = ()
+    objects: PolygonSet | None = None
 
     field = "occupancy_grid"
 

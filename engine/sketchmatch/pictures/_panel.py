@@ -130,7 +130,8 @@ def draw_panel(canvas: Canvas, panel: Panel, box: Box) -> None:
     rings = [frame.rings(item.rings) for item in panel.scene.objects]
     for k in sorted(range(len(rings)), key=lambda k: -panel.scene.objects[k].area):
         colour, pen = panel.colours.get(k), float(k + 1) if panel.pen else None
-        draw_object(canvas, rings[k], colour, pen=pen, over_cells=over_cells)
+        hollow = panel.scene.objects[k].doubtful
+        draw_object(canvas, rings[k], colour, pen=pen, over_cells=over_cells, hollow=hollow)
     if panel.route is not None:
         _draw_route(canvas, frame.rings([panel.route])[0])
     draw_markings(canvas, panel.markings, frame.rings, frame.scale, box)
@@ -164,11 +165,17 @@ def draw_object(
     *,
     pen: float | None = None,
     over_cells: bool = False,
+    hollow: bool = False,
 ) -> None:
     """Draw one object, given in design units: in its colour, or grey and hatched without one.
 
+    What is in doubt is ``hollow``: a dashed outline alone.
     ``pen`` is where in its wobble a pen begins; without it, outlines are drawn as by a machine.
     """
+    if hollow:
+        for ring in rings:
+            canvas.dashed(ring, ALONE if colour is None else _edge(colour), 2.4, 7.0, 4.5)
+        return
     if over_cells:
         canvas.fill(rings, WHITE, 0.8)
     if colour is None:

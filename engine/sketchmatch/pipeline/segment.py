@@ -9,7 +9,7 @@ import numpy as np
 
 from sketchmatch.api import Segmentation, Segmenter
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.model import Scene, Source
+from sketchmatch.model import OccupancyGrid, Scene, Source
 from sketchmatch.model.labels import cleaned_label
 from sketchmatch.model.limits import check_objects, check_source
 from sketchmatch.pipeline.guard import blaming, inspecting
@@ -32,13 +32,17 @@ def segment(source: Source, segmenter: Segmenter, registry: Registry, field: str
         If the segmenter breaks its contract.
     """
     check_source(source, field)
+    read, place = _read_by(segmenter, source, field)
+    check_source(read, place)
     with blaming(segmenter, registry):
         try:
-            with inspecting(segmenter, registry, source):
-                found = segmenter.segment(source)
+            with inspecting(segmenter, registry, read):
+                found = segmenter.segment(read)
         except InvalidInputError as error:
-            raise _with_reasons(error, source).within(field) from None
+            raise _with_reasons(error, read).within(place) from None
         _check_contract(found)
+    if read is not source:
+        found = _with_notes(found, read)
     check_objects(len(found.scene), field)
     return _with_notes(found, source)
 
@@ -60,6 +64,14 @@ def segment_side(
     segmenter = pipeline.segmenter(side)
     assert segmenter is not None
     return segment(given, segmenter, registry, f"{side}.{given.field}")
+
+
+def _read_by(segmenter: Segmenter, source: Source, field: str) -> tuple[Source, str]:
+    """Return what a segmenter reads of a source, and its path: of a mended map, the objects."""
+    if isinstance(source, OccupancyGrid) and not isinstance(source, segmenter.sources):
+        assert source.objects is not None
+        return source.objects, f"{field}.objects"
+    return source, field
 
 
 def _with_notes(found: Segmentation, source: Source) -> Segmentation:

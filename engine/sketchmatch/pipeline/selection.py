@@ -445,7 +445,9 @@ class _Levels:
                 raise error.within(stage) from None
 
     def segmenter(self, stage: str, choice: Choice, source: Source, path: str) -> Segmenter:
-        """Return the segmenter of a stage for a source."""
+        """Return the segmenter of a stage for a source; of a mended map, that of its objects."""
+        if isinstance(source, OccupancyGrid) and source.objects is not None and choice == Choice():
+            source = source.objects
         chosen = self.folded(stage, choice, type(source))
         segmenter = cast(Segmenter, set_up(self.registry, Kind.SEGMENTER, chosen, path))
         if not isinstance(source, segmenter.sources):

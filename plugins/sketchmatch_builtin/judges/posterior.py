@@ -28,7 +28,8 @@ class Posterior(Judge):
     the searcher ``align`` does. A conditional logit [1]_ makes probabilities of what each one is
     worth: how well its places, sizes and shapes agree in one frame, the ways between objects,
     their relations and the forces within them, what a page is stretched by, what is left out on
-    either side, and labels where both sides have some. What that comes to is a network of two
+    either side, and labels where both sides have some; and how certain it is that each mapped
+    object in it is one. What that comes to is a network of two
     small layers over the lines of a map, in any order [2]_, so that a deviation counts the more,
     the better the others fit. That the right map is none of them has a share as well.
 
@@ -85,7 +86,9 @@ class Posterior(Judge):
             quick=problem.elsewhere is not None,
         )
         found = weighed(known, POSTERIOR)
-        order = np.argsort(-found.shares, kind="stable")
+        mapped = problem.template if problem.swapped else problem.argument
+        shares = _as_certain(found.shares, known.maps, mapped)
+        order = np.argsort(-shares, kind="stable")
         maps = [sides.template_partners(each) for each in known.maps[order]]
         told = problem.alternatives + 1
         # Whoever says that a sketched object is a mapped one says that this is the place.
@@ -93,7 +96,7 @@ class Posterior(Judge):
         judged = found.elsewhere if problem.elsewhere is None else problem.elsewhere
         elsewhere = 0.0 if pinned else judged
         here = 1.0 - elsewhere
-        likely = here * (1.0 - found.lost) * found.shares[order]
+        likely = here * (1.0 - found.lost) * shares[order]
         lines = _lines(maps, likely, problem.table)
         best = maps[0]
         lines[np.arange(len(best)), best] += here * found.lost * POSTERIOR.luck
@@ -108,6 +111,16 @@ class Posterior(Judge):
             np.clip(lines, 0.0, 1.0),
             elsewhere,
         )
+
+
+def _as_certain(shares: FloatArray, maps: IntArray, mapped: Scene) -> FloatArray:
+    """Return the maps' shares after what is no thing of the map can be no partner either.
+
+    The share of a map falls with the certainty of each mapped object in it.
+    """
+    certain = np.array([*(item.certainty for item in mapped.objects), 1.0])  # −1 is no partner
+    weighted = shares * certain[maps].prod(axis=1)
+    return np.asarray(weighted * (shares.sum() / weighted.sum()))
 
 
 def _lines(maps: list[IntArray], likely: FloatArray, table: RelationTable) -> FloatArray:

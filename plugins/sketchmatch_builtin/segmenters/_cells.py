@@ -24,7 +24,6 @@ __all__ = [
     "free_cells",
     "holes",
     "in_map",
-    "joined_to_walls",
     "outline",
     "reading_order",
     "refuse_more",
@@ -146,40 +145,6 @@ def components(
     for k in large.tolist():
         x, y, width, height, _ = statistics[k].tolist()
         yield np.asarray(labels[y : y + height, x : x + width] == k, dtype=np.uint8), (x, y)
-
-
-def joined_to_walls(region: Mask, widest: float, thinnest: float) -> Mask:
-    """Return what juts into a region, no wider than ``widest`` and thicker than ``thinnest``.
-
-    What remains of all outside the region when it is opened by a disc of the first diameter is
-    walls, and what lies behind them. What that took away is what juts out of them; opened by a
-    disc of the second diameter, it keeps neither thin partitions nor bumps. The first disc bulges
-    into what is nearly as wide: that loses some of its depth at the wall.
-
-    Parameters
-    ----------
-    region
-        Free cells, 1 in one region and 0 elsewhere.
-    widest, thinnest
-        In cells.
-    """
-    margin = int(widest) + 2
-    outside = np.pad(1 - region, margin, constant_values=1)
-    # What the region encloses stands free of the walls.
-    outside[margin:-margin, margin:-margin] -= holes(region)
-    jutting = outside - _opened(outside, widest / 2.0)
-    return np.asarray(_opened(jutting, thinnest / 2.0)[margin:-margin, margin:-margin])
-
-
-def _opened(mask: Mask, radius: float) -> Mask:
-    """Return a mask opened by a disc; what lies beyond the mask's edge counts as within."""
-    core = (cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) > radius).astype(
-        np.uint8
-    )
-    if not core.any():
-        return np.zeros_like(mask)
-    near = cv2.distanceTransform(1 - core, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= radius
-    return np.asarray(near & (mask > 0), dtype=np.uint8)
 
 
 def outline(mask: Mask) -> FloatArray:

@@ -19,7 +19,10 @@ _LONGEST_NAME = 40
 
 
 def labels_of(
-    polygons: Sequence[shapely.Polygon], landmarks: Iterable[Landmark], reach: float
+    polygons: Sequence[shapely.Polygon],
+    landmarks: Iterable[Landmark],
+    reach: float,
+    doubtful: Sequence[bool] | None = None,
 ) -> tuple[list[str], tuple[str, ...]]:
     """Return a label for each object, empty if it has no name, and a warning about names left.
 
@@ -35,6 +38,8 @@ def labels_of(
         The names and places.
     reach
         In metres.
+    doubtful
+        Which objects get only names whose place lies within them; left out, none.
     """
     named = tuple(landmarks)
     labels, left = [""] * len(polygons), set(range(len(named)))
@@ -44,6 +49,9 @@ def labels_of(
     objects = np.array(polygons, dtype=object)
     k, j = shapely.STRtree(objects).query(points, predicate="dwithin", distance=reach)
     away = shapely.distance(points[k], objects[j])
+    if doubtful is not None:
+        kept = (away == 0.0) | ~np.asarray(doubtful, dtype=bool)[j]
+        k, j, away = k[kept], j[kept], away[kept]
     middle = shapely.distance(points[k], shapely.centroid(objects[j]))
     for pair in np.lexsort((middle, away)).tolist():
         if k[pair] in left and not labels[j[pair]]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from sketchmatch.model import IntArray
 
-__all__ = ["groups", "merged"]
+__all__ = ["apart", "groups", "merged"]
 
 _Geometries = NDArray[np.object_]
 
@@ -36,13 +36,25 @@ def merged(parts: _Geometries, distance: float, largest: float) -> _Geometries:
     """
     near = shapely.STRtree(parts).query(parts, predicate="dwithin", distance=distance)
     small = shapely.area(parts) <= largest
-    group = groups(len(parts), near[:, small[near].all(axis=0)])
+    return apart(parts, groups(len(parts), near[:, small[near].all(axis=0)]))[0]
+
+
+def apart(parts: _Geometries, group: IntArray) -> tuple[_Geometries, IntArray]:
+    """Return the hulls of groups of parts, and each part's group after those that overlap are one.
+
+    Parameters
+    ----------
+    parts
+        Shape (k,), polygons.
+    group
+        Shape (k,), the number of each part's group, counted from 0 in the order of first parts.
+    """
     while True:
         hulls = _hulls(parts, group)
         overlapping = shapely.STRtree(hulls).query(hulls, predicate="intersects")
         joined = groups(len(hulls), overlapping)
         if joined.max(initial=-1) + 1 == len(hulls):
-            return hulls
+            return hulls, group
         group = joined[group]
 
 

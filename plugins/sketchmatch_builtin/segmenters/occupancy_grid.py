@@ -15,36 +15,43 @@ from pydantic import Field
 from sketchmatch.api import InvalidInputError, Reason, Segmentation, Segmenter
 from sketchmatch.model import IntArray, OccupancyGrid, Scene, SceneObject
 from sketchmatch.model.limits import source_limits
+from sketchmatch.model.scene import DOUBTFUL
+from sketchmatch_builtin.segmenters._at_walls import Bounds
 from sketchmatch_builtin.segmenters._cells import (
     TOLERANCE,
     FreeSpaceParams,
     Mask,
     closed,
-    components,
     free_cells,
     holes,
     in_map,
-    joined_to_walls,
-    outline,
     reading_order,
     refuse_more,
 )
 from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of
-from sketchmatch_builtin.segmenters._merging import merged
+from sketchmatch_builtin.segmenters._standing import (
+    Parts,
+    Room,
+    Thing,
+    as_they_are,
+    at_the_walls,
+    furnished,
+    merged_within,
+)
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
 
 __all__ = ["OccupancyGridSegmenter"]
 
 # As a share of an object's size: a tolerance beyond it would change the shape, not the noise.
 _COARSEST_TOLERANCE = 0.12
-# Legs, before they are merged to tables.
-_MOST_PARTS = 10_000
+# In percent: from here on the laser met something.
+_OCCUPIED = 50
 # What the text of ``attached`` recommends, in metres.
 _USUAL_ATTACHED = 2.0
 
 
 class OccupancyGridSegmenter(Segmenter):
-    """Takes as objects the holes in free regions.
+    """Takes as objects what stands in free regions, at their walls, and on legs.
 
     A region is free cells joined by their sides; a hole is what it encloses, joined by sides or
     corners. That fills an object's unseen interior, whatever its grey, and leaves out the walls
@@ -52,8 +59,16 @@ class OccupancyGridSegmenter(Segmenter):
     what was seen of an object's inside; a hole with a room in it is a building and no
     object. Outlines run exactly along the cells' borders and are then simplified [1]_.
 
-    What touches a wall, or was not seen from behind, is no hole. ``attached`` finds such objects
-    by morphological opening [2]_. ``merge_distance`` joins the legs of a table.
+    What touches a wall, or was not seen from behind, is no hole but a pocket of the region's
+    outline: one that hangs on the wall by a neck, or leans against it as a box does. Of a table a
+    scan shows legs: four at the corners of a rectangle, two bars that face each other, or a crowd
+    of small things are one if so many would not stand so by chance [2]_.
+
+    The certainty of an object says how likely it is one thing. What the laser met all around, and
+    no thin and ragged thing, is certain; four legs are .9, feet and crowds .6; what hangs on a wall
+    is .8, what juts far out of it .7, and what leans against it .4, as the wall's own bumps do; an
+    outline that the laser did not meet is .3. Edges of shadows, and specks where what was seen
+    ends, are left out.
 
     Objects come in reading order: by their highest point from the top down, then from the left.
     What the map's file names, other than rooms, gives its name to the object that stands there.
@@ -62,7 +77,8 @@ class OccupancyGridSegmenter(Segmenter):
     ----------
     .. [1] D. H. Douglas, T. K. Peucker, "Algorithms for the reduction of the number of points
        required to represent a digitized line or its caricature", Cartographica 10(2), 1973.
-    .. [2] J. Serra, "Image Analysis and Mathematical Morphology", Academic Press, 1982.
+    .. [2] A. Desolneux, L. Moisan, J.-M. Morel, "Meaningful alignments", International Journal of
+       Computer Vision 40(1), 2000.
 
     Examples
     --------
@@ -107,13 +123,14 @@ class OccupancyGridSegmenter(Segmenter):
             ),
             json_schema_extra={"unit": "m"},
         )
-        merge_distance: float = Field(
-            0.0,
+        merge_distance: float | None = Field(
+            None,
             ge=0.0,
             le=100.0,
             description=(
                 "Small things that are at most this far apart become one with the outline around "
-                "all: 1 makes four legs a table; 0 is off."
+                "all; 0 merges none. When left out, what stands as the legs of tables and chairs "
+                "do, and not by chance, is one."
             ),
             json_schema_extra={"unit": "m"},
         )
@@ -122,23 +139,23 @@ class OccupancyGridSegmenter(Segmenter):
             ge=0.0,
             le=100.0,
             description=(
-                "Small things are those no larger than a square with this side; it matters with "
-                "merge_distance alone."
+                "Small things, of which furniture is merged, are those no larger than a square "
+                "with this side."
             ),
             json_schema_extra={"unit": "m"},
         )
         attached: float = Field(
-            0.0,
+            3.0,
             ge=0.0,
             le=100.0,
             description=(
                 "Objects that touch a wall, or whose back was not seen, count if they are no "
-                "wider than this: 2 keeps cupboards and beds; 0 leaves all out."
+                "wider than this where they meet it; 0 leaves all out."
             ),
             json_schema_extra={"unit": "m"},
         )
         wall_thickness: float = Field(
-            0.3,
+            0.35,
             ge=0.0,
             le=10.0,
             description=(
@@ -146,6 +163,15 @@ class OccupancyGridSegmenter(Segmenter):
                 "the wall and no object; it matters with attached alone."
             ),
             json_schema_extra={"unit": "m"},
+        )
+        min_certainty: float = Field(
+            0.25,
+            ge=0.01,
+            le=1.0,
+            description=(
+                "Objects of which it is less certain that they are one thing are left out; the "
+                "default leaves out edges of shadows and specks at them, 0.5 all that is in doubt."
+            ),
         )
         region_share: float = Field(
             0.1,
@@ -180,58 +206,62 @@ class OccupancyGridSegmenter(Segmenter):
     params: Params
 
     def segment(self, source: OccupancyGrid) -> Segmentation:
-        """Return the holes of the free regions, in metres in the map's frame."""
+        """Return what stands in the free regions, in metres in the map's frame."""
         free, corner = free_cells(source, self.params)
         rooms = list(_rooms(free, self.params.region_share))
-        parts = [
-            (mask, (x + left + corner[0], y + below + corner[1]))
-            for room, held, (left, below) in rooms
-            for mask, (x, y) in self._parts(room, held, source)
-        ]
-        outlines = self._outlines(parts, source)
-        if len(outlines) < 2:
+        things = sorted(
+            (
+                thing
+                for room, held, at in rooms
+                for thing in self._things(
+                    room, held, (at[0] + corner[0], at[1] + corner[1]), source
+                )
+            ),
+            key=lambda thing: reading_order(thing.outline),
+        )
+        refuse_more(len(things), source_limits().max_objects, "raise min_size")
+        if len(things) < 2:
             largest = max(int(np.count_nonzero(room)) for room, _, _ in rooms)
-            raise _too_few(len(outlines), largest, source, self.params)
-        rings = [in_map(shapely.get_coordinates(polygon), source) for polygon in outlines]
+            raise _too_few(len(things), largest, source, self.params)
+        rings = [in_map(shapely.get_coordinates(thing.outline), source) for thing in things]
         labels, unplaced = labels_of(
             [shapely.Polygon(ring) for ring in rings],
             [item for item in source.landmarks if item.kind != ROOM],
             self.params.label_reach,
+            [thing.certainty < DOUBTFUL for thing in things],
         )
-        objects = [SceneObject.from_rings([r], name) for r, name in zip(rings, labels, strict=True)]
+        objects = [
+            SceneObject.from_rings([ring], name, thing.certainty)
+            for ring, name, thing in zip(rings, labels, things, strict=True)
+        ]
         return Segmentation(Scene(tuple(objects)), unplaced)
 
-    def _parts(
-        self, room: Mask, held: Mask, grid: OccupancyGrid
-    ) -> Iterator[tuple[Mask, tuple[int, int]]]:
-        """Yield what stands in a room, cropped, and the (x, y) of its crop."""
-        params, inside = self.params, held
-        if params.attached > 0.0:
-            widest = min(params.attached / grid.resolution, 2.0 * max(room.shape))
-            inside = held | joined_to_walls(room, widest, params.wall_thickness / grid.resolution)
-        inside = closed(
-            inside, int(min(params.close_gaps / grid.resolution + 0.5, max(room.shape)))
-        )
-        if params.merge_distance > 0.0:
-            yield from components(inside, 1, _MOST_PARTS, "take speckle out of the map")
+    def _things(
+        self, free: Mask, held: Mask, at: tuple[int, int], grid: OccupancyGrid
+    ) -> list[Thing]:
+        """Return what stands in a room, in cells from the grid's lower left corner."""
+        params, cell, (x, y) = self.params, grid.resolution, at
+        inside = closed(held, int(min(params.close_gaps / cell + 0.5, max(free.shape))))
+        rows, columns = free.shape
+        occupied = grid.cells[y : y + rows, x : x + columns] > _OCCUPIED
+        room = Room(free, inside, occupied.view(np.uint8), cell, _cells(params.min_size, cell))
+        parts, least = Parts.of(room), (params.min_size / cell) ** 2
+        leg, most = (params.leg_size / cell) ** 2, source_limits().max_objects
+        if params.merge_distance is None:
+            things = furnished(room, parts, least, leg, most)
+        elif params.merge_distance > 0.0:
+            things = merged_within(room, parts, least, params.merge_distance, leg)
         else:
-            least = (params.min_size / grid.resolution) ** 2
-            most = source_limits().max_objects
-            yield from components(inside, least, most, "raise min_size")
-
-    def _outlines(
-        self, parts: list[tuple[Mask, tuple[int, int]]], grid: OccupancyGrid
-    ) -> list[shapely.Polygon]:
-        """Return objects' outlines in cells from the grid's lower left corner, in order."""
-        polygons = np.array([shapely.Polygon(outline(m) + c) for m, c in parts], dtype=object)
-        if self.params.merge_distance > 0.0 and len(polygons):
-            cell = grid.resolution
-            largest = (self.params.leg_size / cell) ** 2
-            polygons = merged(polygons, self.params.merge_distance / cell, largest)
-            least = (self.params.min_size / grid.resolution) ** 2
-            polygons = polygons[shapely.area(polygons) >= least]
-        refuse_more(len(polygons), source_limits().max_objects, "raise min_size")
-        return sorted((self._simplified(p, grid) for p in polygons), key=reading_order)
+            things = as_they_are(room, parts, least, most)
+        if params.attached > 0.0:
+            lengths = (params.attached, params.wall_thickness, params.min_size)
+            bounds = Bounds(*(_cells(length, cell) for length in lengths))
+            things = at_the_walls(room, things, bounds)
+        return [
+            Thing(self._simplified(shapely.transform(each.outline, lambda p: p + at), grid), sure)
+            for each, sure in ((each, each.certainty) for each in things)
+            if sure >= params.min_certainty
+        ]
 
     def _simplified(self, polygon: shapely.Polygon, grid: OccupancyGrid) -> shapely.Polygon:
         if self.params.tolerance is None:
@@ -240,6 +270,11 @@ class OccupancyGridSegmenter(Segmenter):
             tolerance = self.params.tolerance / grid.resolution
         coarsest = _COARSEST_TOLERANCE * math.sqrt(polygon.area)
         return cast(shapely.Polygon, polygon.simplify(min(tolerance, coarsest)))
+
+
+def _cells(length: float, cell: float) -> float:
+    """Return a length in cells, without what rounding adds: 0.3 / 0.1 is a little less than 3."""
+    return round(length / cell, 9)
 
 
 def _rooms(free: Mask, share: float) -> Iterator[tuple[Mask, Mask, tuple[int, int]]]:

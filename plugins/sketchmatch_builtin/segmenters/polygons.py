@@ -52,6 +52,6 @@ class PolygonSegmenter(Segmenter):
 
 def _object(polygon: LabelledPolygon, k: int) -> SceneObject:
     try:
-        return SceneObject.from_rings(polygon.rings, polygon.label)
+        return SceneObject.from_rings(polygon.rings, polygon.label, polygon.certainty)
     except InvalidInputError as error:
         raise error.within(f"polygons[{k}]") from None

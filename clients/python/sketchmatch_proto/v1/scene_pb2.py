@@ -15,7 +15,7 @@ _sym_db = _symbol_database.Default()
 from sketchmatch_proto.v1 import source_pb2 as sketchmatch_dot_v1_dot_source__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1asketchmatch/v1/scene.proto\x12\x0esketchmatch.v1\x1a\x1bsketchmatch/v1/source.proto\"5\n\x05Scene\x12,\n\x07objects\x18\x01 \x03(\x0b\x32\x1b.sketchmatch.v1.SceneObject\"x\n\x0bSceneObject\x12#\n\x05rings\x18\x01 \x03(\x0b\x32\x14.sketchmatch.v1.Ring\x12\r\n\x05label\x18\x02 \x01(\t\x12\x0c\n\x04\x61rea\x18\x03 \x01(\x01\x12\'\n\x08\x63\x65ntroid\x18\x04 \x01(\x0b\x32\x15.sketchmatch.v1.Pointb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1asketchmatch/v1/scene.proto\x12\x0esketchmatch.v1\x1a\x1bsketchmatch/v1/source.proto\"5\n\x05Scene\x12,\n\x07objects\x18\x01 \x03(\x0b\x32\x1b.sketchmatch.v1.SceneObject\"\x9e\x01\n\x0bSceneObject\x12#\n\x05rings\x18\x01 \x03(\x0b\x32\x14.sketchmatch.v1.Ring\x12\r\n\x05label\x18\x02 \x01(\t\x12\x0c\n\x04\x61rea\x18\x03 \x01(\x01\x12\'\n\x08\x63\x65ntroid\x18\x04 \x01(\x0b\x32\x15.sketchmatch.v1.Point\x12\x16\n\tcertainty\x18\x05 \x01(\x01H\x00\x88\x01\x01\x42\x0c\n\n_certaintyb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -24,6 +24,6 @@ if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
   _globals['_SCENE']._serialized_start=75
   _globals['_SCENE']._serialized_end=128
-  _globals['_SCENEOBJECT']._serialized_start=130
-  _globals['_SCENEOBJECT']._serialized_end=250
+  _globals['_SCENEOBJECT']._serialized_start=131
+  _globals['_SCENEOBJECT']._serialized_end=289
 # @@protoc_insertion_point(module_scope)

@@ -45,10 +45,16 @@ class SceneObject(google.protobuf.message.Message):
     LABEL_FIELD_NUMBER: builtins.int
     AREA_FIELD_NUMBER: builtins.int
     CENTROID_FIELD_NUMBER: builtins.int
+    CERTAINTY_FIELD_NUMBER: builtins.int
     label: builtins.str
     """A name for people, as the source gave it; empty if it gave none."""
     area: builtins.float
     """Area without the holes, in squared units of the scene."""
+    certainty: builtins.float
+    """How sure it is that this is one thing, and no part of a wall, shadow or speckle: above 0 and
+    below 1. Not set: there is no doubt. What is in doubt, below 0.5, is drawn hollow. The more
+    certain an object of the map is, the likelier is an object map that has it.
+    """
     @property
     def rings(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[sketchmatch_proto.v1.source_pb2.Ring]:
         """The outer ring counter-clockwise, then the holes clockwise; no last point repeats the first."""
@@ -64,8 +70,10 @@ class SceneObject(google.protobuf.message.Message):
         label: builtins.str = ...,
         area: builtins.float = ...,
         centroid: sketchmatch_proto.v1.source_pb2.Point | None = ...,
+        certainty: builtins.float | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["centroid", b"centroid"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["area", b"area", "centroid", b"centroid", "label", b"label", "rings", b"rings"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_certainty", b"_certainty", "centroid", b"centroid", "certainty", b"certainty"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_certainty", b"_certainty", "area", b"area", "centroid", b"centroid", "certainty", b"certainty", "label", b"label", "rings", b"rings"]) -> None: ...
+    def WhichOneof(self, oneof_group: typing.Literal["_certainty", b"_certainty"]) -> typing.Literal["certainty"] | None: ...
 
 global___SceneObject = SceneObject

@@ -14,15 +14,15 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1bsketchmatch/v1/source.proto\x12\x0esketchmatch.v1\"\xd9\x02\n\x06Source\x12/\n\nstroke_set\x18\x01 \x01(\x0b\x32\x19.sketchmatch.v1.StrokeSetH\x00\x12\x31\n\x0bpolygon_set\x18\x02 \x01(\x0b\x32\x1a.sketchmatch.v1.PolygonSetH\x00\x12\x37\n\x0eoccupancy_grid\x18\x03 \x01(\x0b\x32\x1d.sketchmatch.v1.OccupancyGridH\x00\x12\x36\n\x0emap_server_map\x18\x04 \x01(\x0b\x32\x1c.sketchmatch.v1.MapServerMapH\x00\x12-\n\x05image\x18\x05 \x01(\x0b\x32\x1c.sketchmatch.v1.EncodedImageH\x00\x12+\n\x04\x66ile\x18\x06 \x01(\x0b\x32\x1b.sketchmatch.v1.EncodedFileH\x00\x12\x16\n\x0cstored_scene\x18\x07 \x01(\tH\x00\x42\x06\n\x04kind\"[\n\tStrokeSet\x12\'\n\x07strokes\x18\x01 \x03(\x0b\x32\x16.sketchmatch.v1.Stroke\x12%\n\x06y_axis\x18\x02 \x01(\x0e\x32\x15.sketchmatch.v1.YAxis\"D\n\x06Stroke\x12+\n\x06points\x18\x01 \x03(\x0b\x32\x1b.sketchmatch.v1.StrokePoint\x12\r\n\x05label\x18\x02 \x01(\t\"O\n\x0bStrokePoint\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\x19\n\x0ctime_seconds\x18\x03 \x01(\x01H\x00\x88\x01\x01\x42\x0f\n\r_time_seconds\"f\n\nPolygonSet\x12\x31\n\x08polygons\x18\x01 \x03(\x0b\x32\x1f.sketchmatch.v1.LabelledPolygon\x12%\n\x06y_axis\x18\x02 \x01(\x0e\x32\x15.sketchmatch.v1.YAxis\"E\n\x0fLabelledPolygon\x12#\n\x05rings\x18\x01 \x03(\x0b\x32\x14.sketchmatch.v1.Ring\x12\r\n\x05label\x18\x02 \x01(\t\"-\n\x04Ring\x12%\n\x06points\x18\x01 \x03(\x0b\x32\x15.sketchmatch.v1.Point\"\x1d\n\x05Point\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\"~\n\rOccupancyGrid\x12\x0c\n\x04rows\x18\x01 \x01(\r\x12\x0f\n\x07\x63olumns\x18\x02 \x01(\r\x12\x19\n\x11resolution_meters\x18\x03 \x01(\x01\x12$\n\x06origin\x18\x04 \x01(\x0b\x32\x14.sketchmatch.v1.Pose\x12\r\n\x05\x63\x65lls\x18\x05 \x01(\x0c\"?\n\x04Pose\x12\x10\n\x08x_meters\x18\x01 \x01(\x01\x12\x10\n\x08y_meters\x18\x02 \x01(\x01\x12\x13\n\x0byaw_radians\x18\x03 \x01(\x01\"+\n\x0cMapServerMap\x12\x0c\n\x04yaml\x18\x01 \x01(\t\x12\r\n\x05image\x18\x02 \x01(\x0c\"\x1c\n\x0c\x45ncodedImage\x12\x0c\n\x04\x64\x61ta\x18\x01 \x01(\x0c\"7\n\x0b\x45ncodedFile\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0c\n\x04\x64\x61ta\x18\x02 \x01(\x0c\x12\x0c\n\x04part\x18\x03 \x01(\t*?\n\x05YAxis\x12\x16\n\x12Y_AXIS_UNSPECIFIED\x10\x00\x12\r\n\tY_AXIS_UP\x10\x01\x12\x0f\n\x0bY_AXIS_DOWN\x10\x02\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1bsketchmatch/v1/source.proto\x12\x0esketchmatch.v1\"\xd9\x02\n\x06Source\x12/\n\nstroke_set\x18\x01 \x01(\x0b\x32\x19.sketchmatch.v1.StrokeSetH\x00\x12\x31\n\x0bpolygon_set\x18\x02 \x01(\x0b\x32\x1a.sketchmatch.v1.PolygonSetH\x00\x12\x37\n\x0eoccupancy_grid\x18\x03 \x01(\x0b\x32\x1d.sketchmatch.v1.OccupancyGridH\x00\x12\x36\n\x0emap_server_map\x18\x04 \x01(\x0b\x32\x1c.sketchmatch.v1.MapServerMapH\x00\x12-\n\x05image\x18\x05 \x01(\x0b\x32\x1c.sketchmatch.v1.EncodedImageH\x00\x12+\n\x04\x66ile\x18\x06 \x01(\x0b\x32\x1b.sketchmatch.v1.EncodedFileH\x00\x12\x16\n\x0cstored_scene\x18\x07 \x01(\tH\x00\x42\x06\n\x04kind\"[\n\tStrokeSet\x12\'\n\x07strokes\x18\x01 \x03(\x0b\x32\x16.sketchmatch.v1.Stroke\x12%\n\x06y_axis\x18\x02 \x01(\x0e\x32\x15.sketchmatch.v1.YAxis\"D\n\x06Stroke\x12+\n\x06points\x18\x01 \x03(\x0b\x32\x1b.sketchmatch.v1.StrokePoint\x12\r\n\x05label\x18\x02 \x01(\t\"O\n\x0bStrokePoint\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\x19\n\x0ctime_seconds\x18\x03 \x01(\x01H\x00\x88\x01\x01\x42\x0f\n\r_time_seconds\"f\n\nPolygonSet\x12\x31\n\x08polygons\x18\x01 \x03(\x0b\x32\x1f.sketchmatch.v1.LabelledPolygon\x12%\n\x06y_axis\x18\x02 \x01(\x0e\x32\x15.sketchmatch.v1.YAxis\"k\n\x0fLabelledPolygon\x12#\n\x05rings\x18\x01 \x03(\x0b\x32\x14.sketchmatch.v1.Ring\x12\r\n\x05label\x18\x02 \x01(\t\x12\x16\n\tcertainty\x18\x03 \x01(\x01H\x00\x88\x01\x01\x42\x0c\n\n_certainty\"-\n\x04Ring\x12%\n\x06points\x18\x01 \x03(\x0b\x32\x15.sketchmatch.v1.Point\"\x1d\n\x05Point\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\"~\n\rOccupancyGrid\x12\x0c\n\x04rows\x18\x01 \x01(\r\x12\x0f\n\x07\x63olumns\x18\x02 \x01(\r\x12\x19\n\x11resolution_meters\x18\x03 \x01(\x01\x12$\n\x06origin\x18\x04 \x01(\x0b\x32\x14.sketchmatch.v1.Pose\x12\r\n\x05\x63\x65lls\x18\x05 \x01(\x0c\"?\n\x04Pose\x12\x10\n\x08x_meters\x18\x01 \x01(\x01\x12\x10\n\x08y_meters\x18\x02 \x01(\x01\x12\x13\n\x0byaw_radians\x18\x03 \x01(\x01\"<\n\x0cMapServerMap\x12\x0c\n\x04yaml\x18\x01 \x01(\t\x12\r\n\x05image\x18\x02 \x01(\x0c\x12\x0f\n\x07objects\x18\x03 \x01(\t\"\x1c\n\x0c\x45ncodedImage\x12\x0c\n\x04\x64\x61ta\x18\x01 \x01(\x0c\"7\n\x0b\x45ncodedFile\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0c\n\x04\x64\x61ta\x18\x02 \x01(\x0c\x12\x0c\n\x04part\x18\x03 \x01(\t*?\n\x05YAxis\x12\x16\n\x12Y_AXIS_UNSPECIFIED\x10\x00\x12\r\n\tY_AXIS_UP\x10\x01\x12\x0f\n\x0bY_AXIS_DOWN\x10\x02\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'sketchmatch_proto.v1.source_pb2', _globals)
 if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
-  _globals['_YAXIS']._serialized_start=1217
-  _globals['_YAXIS']._serialized_end=1280
+  _globals['_YAXIS']._serialized_start=1272
+  _globals['_YAXIS']._serialized_end=1335
   _globals['_SOURCE']._serialized_start=48
   _globals['_SOURCE']._serialized_end=393
   _globals['_STROKESET']._serialized_start=395
@@ -34,19 +34,19 @@ if _descriptor._USE_C_DESCRIPTORS == False:
   _globals['_POLYGONSET']._serialized_start=639
   _globals['_POLYGONSET']._serialized_end=741
   _globals['_LABELLEDPOLYGON']._serialized_start=743
-  _globals['_LABELLEDPOLYGON']._serialized_end=812
-  _globals['_RING']._serialized_start=814
-  _globals['_RING']._serialized_end=859
-  _globals['_POINT']._serialized_start=861
-  _globals['_POINT']._serialized_end=890
-  _globals['_OCCUPANCYGRID']._serialized_start=892
-  _globals['_OCCUPANCYGRID']._serialized_end=1018
-  _globals['_POSE']._serialized_start=1020
-  _globals['_POSE']._serialized_end=1083
-  _globals['_MAPSERVERMAP']._serialized_start=1085
-  _globals['_MAPSERVERMAP']._serialized_end=1128
-  _globals['_ENCODEDIMAGE']._serialized_start=1130
-  _globals['_ENCODEDIMAGE']._serialized_end=1158
-  _globals['_ENCODEDFILE']._serialized_start=1160
-  _globals['_ENCODEDFILE']._serialized_end=1215
+  _globals['_LABELLEDPOLYGON']._serialized_end=850
+  _globals['_RING']._serialized_start=852
+  _globals['_RING']._serialized_end=897
+  _globals['_POINT']._serialized_start=899
+  _globals['_POINT']._serialized_end=928
+  _globals['_OCCUPANCYGRID']._serialized_start=930
+  _globals['_OCCUPANCYGRID']._serialized_end=1056
+  _globals['_POSE']._serialized_start=1058
+  _globals['_POSE']._serialized_end=1121
+  _globals['_MAPSERVERMAP']._serialized_start=1123
+  _globals['_MAPSERVERMAP']._serialized_end=1183
+  _globals['_ENCODEDIMAGE']._serialized_start=1185
+  _globals['_ENCODEDIMAGE']._serialized_end=1213
+  _globals['_ENCODEDFILE']._serialized_start=1215
+  _globals['_ENCODEDFILE']._serialized_end=1270
 # @@protoc_insertion_point(module_scope)

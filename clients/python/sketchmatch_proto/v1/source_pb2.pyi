@@ -224,8 +224,11 @@ class LabelledPolygon(google.protobuf.message.Message):
 
     RINGS_FIELD_NUMBER: builtins.int
     LABEL_FIELD_NUMBER: builtins.int
+    CERTAINTY_FIELD_NUMBER: builtins.int
     label: builtins.str
     """A name for people. It never influences a match."""
+    certainty: builtins.float
+    """How sure it is that this is one thing, above 0 and up to 1; not set: 1."""
     @property
     def rings(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Ring]:
         """The outer ring, then its holes, if any. Either orientation is accepted."""
@@ -235,8 +238,11 @@ class LabelledPolygon(google.protobuf.message.Message):
         *,
         rings: collections.abc.Iterable[global___Ring] | None = ...,
         label: builtins.str = ...,
+        certainty: builtins.float | None = ...,
     ) -> None: ...
-    def ClearField(self, field_name: typing.Literal["label", b"label", "rings", b"rings"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_certainty", b"_certainty", "certainty", b"certainty"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_certainty", b"_certainty", "certainty", b"certainty", "label", b"label", "rings", b"rings"]) -> None: ...
+    def WhichOneof(self, oneof_group: typing.Literal["_certainty", b"_certainty"]) -> typing.Literal["certainty"] | None: ...
 
 global___LabelledPolygon = LabelledPolygon
 
@@ -349,12 +355,13 @@ global___Pose = Pose
 
 @typing.final
 class MapServerMap(google.protobuf.message.Message):
-    """A map as ROS map_server saves it: two files, sent as they are."""
+    """A map as ROS map_server saves it: two files, sent as they are, and what people say of it."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
     YAML_FIELD_NUMBER: builtins.int
     IMAGE_FIELD_NUMBER: builtins.int
+    OBJECTS_FIELD_NUMBER: builtins.int
     yaml: builtins.str
     """Text of the .yaml file. Its keys are read as map_server reads them (`resolution`, `origin`,
     `negate`, `occupied_thresh`, `free_thresh`, `mode`), except `image`, a path that only the
@@ -362,13 +369,19 @@ class MapServerMap(google.protobuf.message.Message):
     """
     image: builtins.bytes
     """Bytes of the picture that `image` in the .yaml names: PGM, PNG, BMP or JPEG."""
+    objects: builtins.str
+    """Text of the file beside the map that says what its objects are (GeoJSON as `sketchmatch segment
+    --out` saves it). They stand for the map where no segmenter is chosen. If none of its features
+    says that it is of a map with this content, it is ignored, with a warning.
+    """
     def __init__(
         self,
         *,
         yaml: builtins.str = ...,
         image: builtins.bytes = ...,
+        objects: builtins.str = ...,
     ) -> None: ...
-    def ClearField(self, field_name: typing.Literal["image", b"image", "yaml", b"yaml"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["image", b"image", "objects", b"objects", "yaml", b"yaml"]) -> None: ...
 
 global___MapServerMap = MapServerMap
 

@@ -1,0 +1,243 @@
+"""What stands at a wall: pockets of a room's outline that jut into it.
+
+Between two corners of a room's outline that are near each other lies a pocket: what the outline
+goes around in between. A pocket is a thing if it hangs on the wall by a neck, as a shelf does that
+touches it with one corner, or if it leans against a wall that runs on straight behind it and fills
+its width and depth as a box does; a corner of the building fills one half.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.polygon import orient
+
+from sketchmatch.model import FloatArray
+
+__all__ = ["Bounds", "Leans", "Pocket", "at_walls", "is_thick"]
+
+# As shares of how thick a wall is: how far it strays, how wide a slit people do not see, and how
+# long a wall runs on both sides of what leans against it.
+_STRAY, _SLIT, _STRETCH = 0.25, 0.7, 0.6
+# In the same unit: a bar so thin may be one of two sides that were seen of a thing.
+_SIDE = 1.15
+# The angle by which a room's outline turns where a thing meets the wall.
+_CORNER = math.radians(35.0)
+# How straight it runs.
+_STRAIGHT = math.cos(math.radians(30.0))
+# The share of width times depth that a box fills, after all that it lost.
+_FULL = 0.68
+# What is this much wider than where it meets the wall leans on nothing.
+_BELLY = 0.87
+# A neck is at most this share of how thick what hangs on it is somewhere.
+_NECK = 0.5
+# As a share of how wide it may be at the wall: how far a thing juts out at most.
+_DEEPEST = 1.5
+
+
+class Bounds(NamedTuple):
+    """Bounds on what juts into a room, in cells.
+
+    Attributes
+    ----------
+    widest
+        How wide it is at most where it meets the wall.
+    thinnest
+        What is no thicker is wall.
+    smallest
+        The side of the smallest square that counts.
+    """
+
+    widest: float
+    thinnest: float
+    smallest: float
+
+    @property
+    def stray(self) -> float:
+        """How far an outline may leave the line that it follows."""
+        return max(_STRAY * self.thinnest, 1.0)
+
+    @property
+    def slit(self) -> float:
+        """How wide a slit people do not see."""
+        return _SLIT * self.thinnest
+
+    @property
+    def side(self) -> float:
+        """How thick what may be one of two sides that were seen of a thing is at most."""
+        return _SIDE * self.thinnest
+
+
+class Leans(enum.IntEnum):
+    """How a pocket meets the wall; of two that overlap, the one counts that comes first here."""
+
+    NOT = 0
+    """By a neck."""
+    AS_A_BOX = 1
+    AS_A_SIDE = 2
+    """By a neck, and so thin that it may be a side of a box."""
+
+
+class Pocket(NamedTuple):
+    """A pocket of a room's outline.
+
+    Attributes
+    ----------
+    outline
+        Its last edge is where it meets the wall.
+    neck, depth
+        How long that edge is, and how far the rest is away from it.
+    leans
+        How it meets the wall.
+    """
+
+    outline: shapely.Polygon
+    neck: float
+    depth: float
+    leans: Leans
+
+    @property
+    def order(self) -> tuple[int, float]:
+        """Which of two that overlap is taken: the smallest by a neck, the largest box."""
+        area = self.outline.area
+        return (self.leans, -area if self.leans is Leans.AS_A_BOX else area)
+
+
+def at_walls(room: shapely.Polygon, sides: shapely.Geometry, bounds: Bounds) -> list[Pocket]:
+    """Return what juts out of a room's walls into it, none overlapping another.
+
+    Parameters
+    ----------
+    room
+        Its outline along the middles of the walls' cells; holes do not count.
+    sides
+        What stands near the walls and may be a side of what juts out of them.
+    bounds
+        What counts.
+    """
+    along = shapely.union_all(_simplified(room, bounds.stray))
+    plain = along.buffer(-0.5, join_style="mitre")
+    around = plain.difference(sides).buffer(-bounds.slit / 2.0, join_style="mitre")
+    opened = around.buffer(bounds.slit / 2.0, join_style="mitre")
+    found: list[Pocket] = []
+    for ring in (*_simplified(opened, bounds.stray), *_simplified(plain, bounds.stray)):
+        if ring.area > bounds.smallest**2:
+            found += _pockets(orient(ring), bounds)
+    taken: list[Pocket] = []
+    for pocket in sorted(found, key=lambda each: each.order):
+        if not any(pocket.outline.intersects(other.outline) for other in taken):
+            taken.append(pocket)
+    return taken
+
+
+def _simplified(shape: shapely.Geometry, stray: float) -> list[shapely.Polygon]:
+    """Return simpler outlines; they begin at the farthest corner, whichever way they are turned."""
+    found: list[shapely.Polygon] = []
+    for part in shapely.get_parts(shape).tolist():
+        points = shapely.get_coordinates(part.exterior)[:-1]
+        if not len(points):
+            continue
+        away = np.hypot(*(points - shapely.get_coordinates(part.centroid)).T)
+        first = np.roll(points, -int(away.argmax()), axis=0)
+        found += shapely.get_parts(shapely.Polygon(first).simplify(stray).buffer(0)).tolist()
+    return found
+
+
+def _pockets(ring: shapely.Polygon, bounds: Bounds) -> Iterator[Pocket]:
+    """Yield the pockets of a ring that are things."""
+    points = shapely.get_coordinates(ring.exterior)[:-1]
+    corners = np.flatnonzero(_turns(points) > _CORNER)
+    spots = np.asarray(shapely.points(points[corners]), dtype=object)
+    a, b = shapely.STRtree(spots).query(spots, predicate="dwithin", distance=bounds.widest)
+    a, b = corners[a[a != b]], corners[b[a != b]]
+    areas = _areas(points, a, b)
+    necks = np.linalg.norm(points[a] - points[b], axis=1)
+    least = max(1.0, bounds.smallest**2, bounds.thinnest**2)
+    counts = (areas > least) & (areas <= ring.area)
+    # What neither the least of a box nor the least of what hangs by a neck fits into is neither.
+    box = (areas >= _FULL * necks * bounds.thinnest) & (areas <= bounds.widest**2)
+    counts &= box | (areas > math.pi * (0.5 * necks / _NECK) ** 2)
+    a, b = a[counts], b[counts]
+    inner = ring.buffer(-bounds.stray)
+    shapely.prepare(inner)
+    across = shapely.linestrings(np.stack([points[a], points[b]], axis=1))
+    walled = ~shapely.intersects(inner, across)
+    for first, last in zip(a[walled].tolist(), b[walled].tolist(), strict=True):
+        pocket = _pocket(points, first, last, bounds)
+        if pocket is not None:
+            yield pocket
+
+
+def _pocket(points: FloatArray, a: int, b: int, bounds: Bounds) -> Pocket | None:
+    """Return the pocket between two corners, or None if it is no thing."""
+    chain = _chain(points, a, b)
+    outline, neck = shapely.Polygon(chain), math.dist(chain[0], chain[-1])
+    depth = _depth(chain)
+    leans = (
+        bounds.thinnest < depth <= _DEEPEST * bounds.widest
+        and outline.area <= bounds.widest**2
+        and _FULL <= outline.area / (neck * depth) <= 1.0 / _BELLY
+        and _goes_on(points, a, b, _STRETCH * bounds.thinnest)
+    )
+    # The disc of the thickness that it has at least.
+    radius = 0.5 * neck / _NECK
+    hangs = outline.area > math.pi * radius**2 and not outline.buffer(-radius).is_empty
+    if not (leans or hangs) or not outline.is_valid or not is_thick(outline, bounds.thinnest):
+        return None
+    if not hangs:
+        return Pocket(outline, neck, depth, Leans.AS_A_BOX)
+    thin = outline.buffer(-bounds.side / 2.0).is_empty
+    return Pocket(outline, neck, depth, Leans.AS_A_SIDE if thin else Leans.NOT)
+
+
+def is_thick(outline: shapely.Polygon, thinnest: float) -> bool:
+    """Whether more than half of it is left when what is thin is taken off."""
+    core = outline.buffer(-thinnest / 2.0)
+    return bool(core.buffer(thinnest / 2.0).area > 0.5 * outline.area)
+
+
+def _goes_on(points: FloatArray, a: int, b: int, stretch: float) -> bool:
+    """Whether the wall before a pocket and the one after it run on along the line between."""
+    along = points[b] - points[a]
+    for corner, step in ((a, -1), (b, 1)):
+        k = corner
+        k = (k + step) % len(points)
+        while math.dist(points[k], points[corner]) < stretch:
+            k = (k + step) % len(points)
+        way = step * (points[k] - points[corner])
+        if way @ along < _STRAIGHT * np.linalg.norm(way) * np.linalg.norm(along):
+            return False
+    return True
+
+
+def _depth(chain: FloatArray) -> float:
+    """Return how far a chain leaves the line through its ends."""
+    along, away = chain[-1] - chain[0], chain - chain[0]
+    return float(np.abs(away[:, 0] * along[1] - away[:, 1] * along[0]).max() / np.hypot(*along))
+
+
+def _turns(points: FloatArray) -> FloatArray:
+    """Return the angle by which a closed line turns left at each point."""
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.asarray(np.arctan2(cross, (before * after).sum(axis=1)))
+
+
+def _areas(points: FloatArray, a: NDArray[np.int64], b: NDArray[np.int64]) -> FloatArray:
+    """Return the area between the way along the ring from each a to its b and the straight one."""
+    following = np.roll(points, -1, axis=0)
+    steps = points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0]
+    until = np.concatenate([[0.0], np.cumsum(steps)])
+    way = np.where(a < b, until[b] - until[a], until[-1] - until[a] + until[b])
+    back = points[b, 0] * points[a, 1] - points[b, 1] * points[a, 0]
+    return np.asarray(-(way + back) / 2.0)
+
+
+def _chain(points: FloatArray, a: int, b: int) -> FloatArray:
+    return points[a : b + 1] if a < b else np.concatenate([points[a:], points[: b + 1]])

@@ -1,0 +1,394 @@
+"""What stands in a room of a grid, as outlines, and how sure it is that each is one thing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple, cast
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from sketchmatch.model import FloatArray, IntArray
+from sketchmatch_builtin.segmenters._at_walls import Bounds, Leans, Pocket, at_walls, is_thick
+from sketchmatch_builtin.segmenters._cells import Mask, closed, outline, refuse_more
+from sketchmatch_builtin.segmenters._furniture import FOOT, Bars, Legs, crowds, facing, tables
+from sketchmatch_builtin.segmenters._merging import apart, merged
+
+__all__ = ["Parts", "Room", "Thing", "as_they_are", "at_the_walls", "furnished", "merged_within"]
+
+_Geometries = NDArray[np.object_]
+
+# How sure it is that parts are one thing, by what they form together.
+_TABLE, _FACING, _CROWD = 0.9, 0.6, 0.6
+# The share from which on something is most of the whole: of a crowd the legs of tables and chairs,
+# which it is then, and no one thing.
+_MOST = 0.6
+# What is in a crowd may be so much larger than a leg, as legs that are near each other are one.
+_CLUMP = 2.0
+# A leg is what the laser met, not what it did not see.
+_MET = 0.4
+# Metres: the side from which on a part may be the bar that a table stands on.
+_BAR, _BAR_RATIO = 0.25, 2.5
+# What hangs on a wall by a neck, juts far out of it, or leans against it as its own bumps do.
+_HANGING, _JUTTING, _LEANING = 0.8, 0.7, 0.4
+# The share of an outline that the laser met where there is no doubt.
+_SEEN = 0.5
+# At least so sure is what has some width, and at most so sure what is thin and ragged.
+_COMPACT, _RAGGED = 0.3, 0.4
+# Where what the laser did not see begins near what is thin, that is as doubtful, and a speck, no
+# larger than such a square, even more so. Lengths are in what is thin: how near, how long an edge.
+_EDGE_SPECK, _SPECK, _NEAR, _EDGE = 0.2, 2.0, 2.5, 2.0
+# The share of its hull that something straight fills.
+_STRAIGHT = 0.6
+# Legs, before they are merged to tables.
+_MOST_PARTS = 10_000
+
+
+class Thing(NamedTuple):
+    """An outline in cells, and how sure it is that it is one thing, from 0 to 1."""
+
+    outline: shapely.Polygon
+    certainty: float
+
+
+class Room(NamedTuple):
+    """A free region, cropped.
+
+    Attributes
+    ----------
+    free
+        1 in the region.
+    inside
+        1 in what stands free in it.
+    occupied
+        1 where the laser met something.
+    cell
+        The side of a cell, in metres.
+    small
+        Thinner things are thin, in cells.
+    """
+
+    free: Mask
+    inside: Mask
+    occupied: Mask
+    cell: float
+    small: float
+
+
+class Parts(NamedTuple):
+    """The components, joined by sides or corners, of what stands in a room.
+
+    Attributes
+    ----------
+    labels
+        The number of each cell's part; 0 is none.
+    boxes
+        Shape (n + 1, 5), of each its x, y, columns, rows and cells.
+    middles
+        Shape (n + 1, 2), in cells.
+    """
+
+    labels: NDArray[np.int32]
+    boxes: IntArray
+    middles: FloatArray
+
+    @classmethod
+    def of(cls, room: Room) -> Parts:
+        """Return the parts of what stands in a room."""
+        _, labels, boxes, middles = cv2.connectedComponentsWithStats(room.inside, connectivity=8)
+        return cls(
+            np.asarray(labels, dtype=np.int32),
+            np.asarray(boxes, dtype=np.int64),
+            np.asarray(middles, dtype=np.float64) + 0.5,
+        )
+
+    @property
+    def cells(self) -> IntArray:
+        """How many cells each part has; of what is none of them, no cell counts."""
+        counts = self.boxes[:, cv2.CC_STAT_AREA].copy()
+        counts[0] = 0
+        return counts
+
+    def mask(self, k: int) -> Mask:
+        """Return the cells of a part, cropped to its box."""
+        x, y, columns, rows = self.boxes[k, :4].tolist()
+        crop = self.labels[y : y + rows, x : x + columns] == k
+        return np.asarray(crop, dtype=np.uint8)
+
+    def outlines(self, which: Sequence[int]) -> _Geometries:
+        """Return the outlines of some parts."""
+        found: _Geometries = np.empty(len(which), dtype=object)
+        for n, k in enumerate(which):
+            found[n] = shapely.Polygon(outline(self.mask(k)) + self.boxes[k, :2])
+        return found
+
+
+def as_they_are(room: Room, parts: Parts, least: float, most: int) -> list[Thing]:
+    """Return each part of at least so many cells.
+
+    Raises
+    ------
+    InvalidInputError
+        With the path ``cells`` and the remedy, if there are more than ``most`` of them.
+    """
+    large = np.flatnonzero(parts.cells >= max(least, 1.0)).tolist()
+    refuse_more(len(large), most, "raise min_size")
+    return [Thing(each, _certainty(each, room)) for each in parts.outlines(large)]
+
+
+def merged_within(
+    room: Room, parts: Parts, least: float, distance: float, largest_leg: float
+) -> list[Thing]:
+    """Return the parts after small ones so near each other are one, of at least so many cells.
+
+    Raises
+    ------
+    InvalidInputError
+        With the path ``cells`` and the remedy, if there are too many.
+    """
+    count = len(parts.boxes) - 1
+    refuse_more(count, _MOST_PARTS, "take speckle out of the map")
+    if not count:
+        return []
+    outlines = parts.outlines(range(1, count + 1))
+    found = merged(outlines, distance / room.cell, largest_leg)
+    return [Thing(each, _certainty(each, room)) for each in found if each.area >= least]
+
+
+def furnished(room: Room, parts: Parts, least: float, largest_leg: float, most: int) -> list[Thing]:
+    """Return each part of at least so many cells, and the furniture of which a scan shows legs.
+
+    Furniture covers no wall and nothing that is larger; what it covers belongs to it.
+
+    Raises
+    ------
+    InvalidInputError
+        As :func:`as_they_are` does.
+    """
+    things = as_they_are(room, parts, least, most)
+    alone = dict(zip(np.flatnonzero(parts.cells >= max(least, 1.0)).tolist(), things, strict=True))
+
+    def is_thing(members: IntArray) -> bool:
+        return _is_furniture(members, alone, parts, least, room)
+
+    sets = list(_sets(room, parts, largest_leg, list(alone), is_thing))
+    if not sets:
+        return things
+    among = {k: n for n, (members, _) in enumerate(sets) for k in members.tolist()}
+    which = sorted({*alone, *among})
+    outlines = parts.outlines(which)
+    number: dict[int, int] = {}
+    group = np.array([number.setdefault(among.get(k, -1 - k), len(number)) for k in which])
+    hulls, group = apart(outlines, group)
+    certain = np.zeros(len(hulls))
+    for k, n in zip(which, group.tolist(), strict=True):
+        mine = sets[among[k]][1] if k in among else alone[k].certainty
+        certain[n] = max(certain[n], mine)
+    for k, n in zip(which, group.tolist(), strict=True):
+        if k in among:
+            certain[n] = min(certain[n], sets[among[k]][1])
+    return [Thing(each, float(c)) for each, c in zip(hulls, certain, strict=True)]
+
+
+def _sets(
+    room: Room,
+    parts: Parts,
+    largest_leg: float,
+    alone: list[int],
+    is_thing: Callable[[IntArray], bool],
+) -> Iterator[tuple[IntArray, float]]:
+    """Yield parts that belong together, none in two sets, and how sure it is that they do."""
+    longer = parts.boxes[:, 2:4].max(axis=1) * room.cell
+    met = np.bincount(parts.labels[room.occupied > 0], minlength=len(parts.cells))
+    clump = (parts.cells > 0) & (parts.cells <= _CLUMP * largest_leg) & (longer <= FOOT)
+    clump &= met >= _MET * parts.cells
+    leg = clump & (parts.cells <= largest_leg)
+    bar = leg & (longer >= _BAR)
+    # What is so full is no bar, however it is turned.
+    bar[alone] = parts.cells[alone] * _BAR_RATIO <= np.square(parts.boxes[alone, 2:4]).sum(axis=1)
+    free = float(np.count_nonzero(room.free)) * room.cell**2
+
+    def legs(which: IntArray) -> Legs:
+        return Legs(parts.middles[which] * room.cell, free)
+
+    small, many = np.flatnonzero(leg), np.flatnonzero(clump)
+    found = [small[k] for k in tables(legs(small)) if is_thing(small[k])]
+    for members in (many[k] for k in crowds(legs(many))):
+        within = [each for each in found if np.isin(each, members).any()]
+        if sum(map(len, within)) < _MOST * len(members) and is_thing(members):
+            found = [each for each in found if not np.isin(each, members).any()]
+            bar[members] = False
+            yield members, _CROWD
+    for members in found:
+        bar[members] = False
+        yield members, _TABLE
+    left = np.flatnonzero(bar)
+    for pair in facing(_bars(left, parts, room.cell)):
+        if is_thing(left[pair]):
+            yield left[pair], _FACING
+
+
+def _bars(which: IntArray, parts: Parts, cell: float) -> Bars:
+    sides = np.array([_bar(k, parts, cell) for k in which.tolist()]).reshape(-1, 6)
+    return Bars(sides[:, :2], sides[:, 2:4], sides[:, 4], sides[:, 5])
+
+
+def _bar(k: int, parts: Parts, cell: float) -> list[float]:
+    """Return middle, direction, length and width of the rectangle with a part's moments.
+
+    A cell has a moment too, so that it hardly matters how a bar lies on the cells.
+    """
+    rows, columns = np.nonzero(parts.mask(k))
+    spread = np.cov(columns, rows, ddof=0) + np.eye(2) / 12.0
+    moments, along = np.linalg.eigh(spread)
+    width, length = cell * np.sqrt(12.0 * moments)
+    return [*(cell * parts.middles[k]), *along[:, 1], length, width]
+
+
+def _is_furniture(
+    members: IntArray, alone: dict[int, Thing], parts: Parts, least: float, room: Room
+) -> bool:
+    """Whether the hull of parts has some width, no walls in it, and covers nothing larger."""
+    shapes = list(parts.outlines(members.tolist()))
+    hull = cast(shapely.Polygon, shapely.GeometryCollection(shapes).convex_hull)
+    others = (each.outline for k, each in alone.items() if k not in members)
+    larger = (each for each in others if each.area > hull.area)
+    return (
+        hull.area >= least
+        and not _is_thinner(hull, room.small)
+        and not _meets_walls(hull, room)
+        and not any(hull.intersects(each) for each in larger)
+    )
+
+
+def _meets_walls(hull: shapely.Polygon, room: Room) -> bool:
+    """Whether a hull covers cells that are neither free nor of what stands in the room."""
+    left, below, right, top = np.floor(hull.bounds).astype(int).tolist()
+    window = np.s_[below : top + 1, left : right + 1]
+    drawn = np.zeros(room.free[window].shape, np.uint8)
+    ring = np.round(shapely.get_coordinates(hull) - (left, below) - 0.5).astype(np.int32)
+    cv2.fillPoly(drawn, [ring], (1,))
+    return bool((drawn > room.free[window] | room.inside[window]).any())
+
+
+def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]:
+    """Return the things of a room together with those that stand at its walls."""
+    thin = [each.outline for each in things if _is_thinner(each.outline, bounds.side)]
+    outlines = [each.outline for each in things]
+    tree = shapely.STRtree(outlines)
+    parts_of_others, found = set(), []
+    for pocket in at_walls(_walled(room), shapely.union_all(thin), bounds):
+        line = shapely.get_coordinates(pocket.outline)
+        polygon = _to_the_cell(line, bounds, room)
+        near = tree.query(polygon, predicate="intersects").tolist()
+        part = [k for k in near if _is_most_of(polygon.intersection(outlines[k]), outlines[k])]
+        apart = shapely.union_all([outlines[k] for k in near if k not in part])
+        left = shapely.get_parts(polygon.difference(apart)).tolist()
+        polygon = max(left, key=shapely.area, default=shapely.Polygon())
+        # Its last edge is where it meets the wall.
+        plain = cast(shapely.Polygon, polygon.simplify(0.5))
+        kept = is_thick(plain, bounds.thinnest) and _seen(line[:-1], room) >= _SEEN
+        if kept and not any(_is_most_of(outlines[k], polygon) for k in part):
+            parts_of_others.update(part)
+            found.append(Thing(shapely.Polygon(polygon.exterior), _of_pocket(pocket)))
+    return [each for k, each in enumerate(things) if k not in parts_of_others] + found
+
+
+def _to_the_cell(line: FloatArray, bounds: Bounds, room: Room) -> shapely.Polygon:
+    """Return the outline of the cells that a simplified pocket stands for.
+
+    These are its own and those around it that it may have left out, but not beyond its last edge.
+    """
+    pocket, stray = shapely.Polygon(line), bounds.stray
+    left, below, right, top = np.floor(pocket.buffer(stray).bounds).astype(int).tolist()
+    left, below = max(left, 0), max(below, 0)
+    taken = 1 - (room.free[below : top + 1, left : right + 1])
+    y, x = np.nonzero(taken)
+    spots = np.asarray(shapely.points(x + left + 0.5, y + below + 0.5), dtype=object)
+    # A pocket lies right of its line.
+    (x0, y0), (x1, y1) = line[-2], line[-1]
+    beyond = (x1 - x0) * (y + below + 0.5 - y0) - (y1 - y0) * (x + left + 0.5 - x0) > 0.0
+    shapely.prepare(pocket)
+    kept = shapely.distance(pocket, spots) <= np.where(beyond, 0.0, stray)
+    taken[y[~kept], x[~kept]] = 0
+    filled = closed(taken, round(bounds.slit))
+    _, labels, boxes, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
+    if len(boxes) == 1:
+        return pocket
+    largest = labels == 1 + int(boxes[1:, cv2.CC_STAT_AREA].argmax())
+    corner = np.array([left, below])
+    return shapely.Polygon(outline(largest.astype(np.uint8)) + corner)
+
+
+def _is_most_of(part: shapely.Polygon, whole: shapely.Polygon) -> bool:
+    return bool(part.area > _MOST * whole.area)
+
+
+def _of_pocket(pocket: Pocket) -> float:
+    if pocket.leans is Leans.NOT:
+        return _HANGING
+    return _JUTTING if pocket.depth >= pocket.neck else _LEANING
+
+
+def _walled(room: Room) -> shapely.Polygon:
+    """Return a room's outline along the middles of the walls' cells.
+
+    So that a corner joins two of them, as it does not two free cells.
+    """
+    walls = cv2.copyMakeBorder(
+        1 - (room.free | room.inside), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(1,)
+    )
+    contours, tree = cv2.findContours(walls, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+    rings = [ring for ring, (*_, parent) in zip(contours, tree[0], strict=True) if parent >= 0]
+    ring = max(rings, key=cv2.contourArea)[:, 0, :].astype(np.float64) - 0.5
+    return shapely.Polygon(ring)
+
+
+def _certainty(polygon: shapely.Polygon, room: Room) -> float:
+    """Return how sure it is that an outline is a thing, and no shadow of one and no speckle."""
+    sure = min(1.0, _seen(shapely.get_coordinates(polygon), room) / _SEEN)
+    compact = not _is_thinner(polygon, room.small)
+    speck = polygon.area < (_SPECK * room.small) ** 2
+    at_edge = (speck or not compact) and _is_at_an_unseen_edge(polygon, room)
+    if at_edge and speck and not (compact and sure == 1.0):
+        return min(sure, _EDGE_SPECK)
+    if compact:
+        return max(sure, _COMPACT)
+    ragged = polygon.area < _STRAIGHT * polygon.convex_hull.area
+    return min(sure, _RAGGED) if at_edge or ragged else sure
+
+
+def _is_thinner(polygon: shapely.Polygon, width: float) -> bool:
+    """Whether a polygon in cells is nowhere so wide."""
+    # A disc of the area through the perimeter fits into anything, by Bonnesen.
+    if polygon.area >= width / 2.0 * polygon.length:
+        return False
+    # Of stairs along the cells every step would count.
+    return bool(polygon.simplify(0.5).buffer(-width / 2.0).is_empty)
+
+
+def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:
+    """Whether what the laser did not see begins near something, and no wall between."""
+    reach = min(round(_NEAR * room.small), max(room.free.shape))
+    left, below, right, top = np.floor(polygon.bounds).astype(int).tolist()
+    window = np.s_[max(below - reach, 0) : top + reach, max(left - reach, 0) : right + reach]
+    unseen = 1 - (room.free[window] | room.inside[window] | room.occupied[window])
+    beside = cv2.dilate(unseen, np.ones((3, 3), np.uint8)) > 0
+    return bool(np.count_nonzero(beside & (room.free[window] > 0)) > _EDGE * room.small)
+
+
+def _seen(line: FloatArray, room: Room) -> float:
+    """Return along which share of a line, in cells, the laser met something."""
+    stray = max(1, min(round(room.small / 2.0), max(room.free.shape)))
+    until = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    steps = np.arange(0.25, until[-1], 0.5)
+    xy = [np.interp(steps, until, each) for each in line.T]
+    points = np.floor(np.stack(xy, axis=1)).astype(int)
+    low = np.maximum(points.min(axis=0) - stray, 0)
+    high = points.max(axis=0) + stray + 1
+    crop = room.occupied[low[1] : high[1], low[0] : high[0]]
+    grown = cv2.dilate(crop, np.ones((2 * stray + 1, 2 * stray + 1), np.uint8))
+    x, y = np.clip(points - low, 0, np.array(grown.shape)[::-1] - 1).T
+    return float(grown[y, x].mean())
