@@ -18,7 +18,7 @@ def ros():
     installed = [*messages.install(), *rclpy_stand_in.install()]
     sys.path.insert(0, str(PACKAGE))
     try:
-        names = ("conversions", "matching", "node")
+        names = ("carrying", "conversions", "matching", "node")
         modules = {name: import_module(f"sketchmatch_ros.{name}") for name in names}
         yield SimpleNamespace(**modules)
     finally:

@@ -212,7 +212,8 @@ class Carrier:
     def __init__(self, features):
         self.features, self.asked, self.error = features, [], None
 
-    def __call__(self, client, sketch, map_, partners, drawn):
+    def __call__(self, client, sketch, map_, partners, drawn, radius):
+        assert radius == 0.0
         assert client.server_info().api_version == "sketchmatch.v1"
         self.asked.append((sketch, map_, partners, drawn))
         if self.error is not None:

@@ -50,6 +50,33 @@ def drawn():
     return goal(sketch=sketch, time_budget=given["time_budget"])
 
 
+def test_a_drawn_route_and_a_zone_are_carried_where_they_were_drawn(ros):
+    with processes.server() as running:
+        node = ros.node.SketchmatchNode(ros.carrying.carry)
+        node.parameters |= {"address": running.address, "radius": 0.2}
+        node.go("configure", "inactive")
+        node.go("activate", "active")
+        node.subscriptions["map"].callback(room())
+        goal = drawn()
+        point, stroke = message("geometry_msgs/msg/Point"), message("sketchmatch_msgs/msg/Stroke")
+        way = [point(x=x, y=y) for x, y in [(6.0, 1.0), (6.0, 4.0), (5.0, 8.0)]]
+        goal.sketch.strokes.append(stroke(points=way, label="route"))
+        area = [point(x=x, y=y) for x, y in [(7.0, 8.0), (9.0, 8.0), (9.0, 10.0), (7.0, 10.0)]]
+        goal.sketch.zones = [stroke(points=area)]
+        handle = GoalHandle(node.action_server, goal)
+        result = node.action_server.execute(handle)
+        assert (handle.status, result.error) == ("succeeded", "")
+        # A sketch of one unit a metre, upside down: (x, y) lies at (x, 12 - y).
+        (route,) = node.publishers["/sketchmatch/route"].sent
+        first, last = route.poses[0].pose.position, route.poses[-1].pose.position
+        assert (first.x, first.y, last.x, last.y) == pytest.approx((6, 11, 5, 4), abs=0.2)
+        (mask,) = node.publishers["/sketchmatch/keepout_mask"].sent
+        rows, columns = np.nonzero(np.array(mask.data).reshape(240, 240))
+        edges = [columns.min(), columns.max(), rows.min(), rows.max()]
+        assert np.array(edges) * CELL == pytest.approx((7, 9, 2, 4), abs=0.2)
+        node.go("shutdown", "finalized")
+
+
 def test_the_goal_of_the_readme_has_its_objects_where_they_are(ros):
     with processes.server() as running:
         node = ros.node.SketchmatchNode()

@@ -69,6 +69,7 @@ class Carrier(Protocol):
         map_: Source,
         partners: Mapping[int, int],
         drawn: Features,
+        radius: float,
     ) -> Features:
         """Return each route and each zone as it is on the map, in the order of those drawn.
 
@@ -82,6 +83,8 @@ class Carrier(Protocol):
             Which sketched object is which mapped one, by index.
         drawn
             What is to be carried.
+        radius
+            How far routes are kept away from obstacles, in metres.
 
         Raises
         ------

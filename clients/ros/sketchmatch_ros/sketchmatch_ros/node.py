@@ -22,6 +22,7 @@ from visualization_msgs.msg import MarkerArray
 from sketchmatch_client import CallCancelledError, Client, SketchmatchError
 from sketchmatch_proto.v1.source_pb2 import Source
 from sketchmatch_ros import conversions
+from sketchmatch_ros.carrying import carry
 from sketchmatch_ros.matching import Carrier, Features, Matching, Options
 
 __all__ = ["SketchmatchNode", "main"]
@@ -40,6 +41,7 @@ _PARAMETERS = {
     "profile": "",
     "time_budget": 5.0,
     "timeout": 60.0,
+    "radius": 0.0,
 }
 """Defaults; ``config/sketchmatch.yaml`` says what each is."""
 
@@ -222,7 +224,7 @@ class SketchmatchNode(LifecycleNode):
         self._filter.publish(conversions.filter_info(self._mask.topic_name, header))
 
     def _carried(self, last: _Matched, drawn: Features) -> Features:
-        return self._carry(self._client, last.sketch, last.map_, last.partners, drawn)
+        return self._carry(self._client, last.sketch, last.map_, last.partners, drawn, self._said("radius"))
 
     def _header(self, grid: OccupancyGrid) -> Header:
         return Header(stamp=self.get_clock().now().to_msg(), frame_id=grid.header.frame_id)
@@ -254,7 +256,7 @@ def main() -> None:
     """Run the node until it is interrupted."""
     rclpy.init()
     executor = MultiThreadedExecutor()  # a goal is executed while another is being cancelled
-    node = SketchmatchNode()
+    node = SketchmatchNode(carry)
     executor.add_node(node)
     try:
         executor.spin()

@@ -1,0 +1,36 @@
+"""Carries routes and zones of a sketch by the server's TransferService."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from sketchmatch_client import Client, features
+from sketchmatch_proto.v1.source_pb2 import Point, Source
+from sketchmatch_ros.matching import XY, Features
+
+__all__ = ["carry"]
+
+
+def carry(
+    client: Client,
+    sketch: Source,
+    map_: Source,
+    partners: Mapping[int, int],
+    drawn: Features,
+    radius: float,
+) -> Features:
+    """Return routes and zones on the map, as :class:`~sketchmatch_ros.matching.Carrier` says."""
+    given = [features.route(route) for route in drawn.routes]
+    given += [features.zone(zone) for zone in drawn.zones]
+    answer = client.transfer(sketch, map_, given, object_map=partners, radius=radius)
+    # The route that the segmenter finds comes first and unasked; it is among those given, too.
+    carried = [each.feature for each in answer.features if not each.drawn]
+    count = len(drawn.routes)
+    return Features(
+        [_places(each.route.points) for each in carried[:count]],
+        [_places(each.zone.rings[0].points if each.zone.rings else ()) for each in carried[count:]],
+    )
+
+
+def _places(points: Iterable[Point]) -> list[XY]:
+    return [(point.x, point.y) for point in points]
