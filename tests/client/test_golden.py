@@ -38,7 +38,9 @@ STROKES = sources.strokes(
     ["sofa", "route"],
     y_axis="down",
 )
-POLYGONS = sources.polygons([BAR, [(1.5, 2.5), (4.5, 3.5), (0.5, 6.5)]], ["bar", ""], y_axis="down")
+RINGS = [BAR, [(1.5, 2.5), (4.5, 3.5), (0.5, 6.5)]]
+POLYGONS = sources.polygons(RINGS, ["bar", ""], y_axis="down")
+DOUBTFUL = sources.polygons(RINGS, ["bar", ""], y_axis="down", certainties=[None, 0.375])
 GRID = sources.occupancy_grid([[0, 100, -1], [0, 100, 30]], 0.05, (-1.5, 2.25, 0.75))
 MATCHES = {
     "MatchRequest": (
@@ -135,7 +137,7 @@ class TestRequests:
         call(
             server.address,
             "segment",
-            POLYGONS,
+            DOUBTFUL,
             segmenter="tracing",
             params=params,
             profile="careful",
@@ -150,6 +152,10 @@ class TestRequests:
             "image": sources.image(PICTURE),
             "file": sources.file(SHEET, name="room.sheet", part="cellar"),
         }
+        mended = golden("SegmentRequest.mended_map").source.map_server_map.objects
+        map_files.with_suffix(".objects.geojson").write_text(mended, encoding="utf-8")
+        with pytest.warns(UserWarning):
+            sent["mended_map"] = sources.map_server_map(map_files)
         for source in sent.values():
             call(server.address, "segment", source)
         names = [f"SegmentRequest.{kind}" for kind in sent]

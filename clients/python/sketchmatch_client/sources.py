@@ -89,6 +89,7 @@ def polygons(
     labels: Sequence[Any] | None = None,
     *,
     y_axis: YAxis = "up",
+    certainties: Sequence[float | None] | None = None,
 ) -> source_pb2.Source:
     """Return a sketch or map of polygons.
 
@@ -101,11 +102,13 @@ def polygons(
         A name for each polygon, text or a number; None and nan are no name.
     y_axis
         Which way y grows; see :func:`strokes`.
+    certainties
+        How sure it is, above 0 and up to 1, that each polygon is one thing; None where it is.
 
     Raises
     ------
     InvalidRequestError
-        If the corners are not of this form.
+        If the corners are not of this form, or there are not as many certainties.
 
     Examples
     --------
@@ -119,6 +122,11 @@ def polygons(
     ]
     for polygon, label in zip(drawn, _labels(labels, len(drawn), "polygons"), strict=True):
         polygon.label = label
+    field = "polygon_set.polygons"
+    with refused_as("INVALID_FIELD", field, "have other certainties than a number for each"):
+        for polygon, certainty in zip(drawn, certainties or [None] * len(drawn), strict=True):
+            if certainty is not None:
+                polygon.certainty = certainty
     return source_pb2.Source(
         polygon_set=source_pb2.PolygonSet(polygons=drawn, y_axis=_y_axis(y_axis))
     )
