@@ -18,6 +18,7 @@ __all__ = ["serve"]
 
 _MIB = 1024 * 1024
 _PATIENCE_SECONDS = 30.0
+_WEB_ADDRESS = "127.0.0.1:8080"
 
 
 def serve(
@@ -122,6 +123,19 @@ def serve(
             help="Tell metrics, as Prometheus reads them, and probes over HTTP here.",
         ),
     ] = None,
+    web: Annotated[
+        bool,
+        typer.Option(
+            "--web", help="Show the sketch pad to browsers, at 127.0.0.1:8080 unless told otherwise."
+        ),
+    ] = False,
+    web_address: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Show the sketch pad, and answer Connect, gRPC-Web and JSON, here.",
+        ),
+    ] = None,
     strict_plugins: Annotated[
         bool,
         typer.Option(
@@ -160,12 +174,15 @@ def serve(
         "server.tokens": tokens,
         "server.insecure": insecure or None,
         "server.metrics_address": metrics_address,
+        "server.web_address": web_address,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
         "limits.max_side": max_side,
         "limits.max_vertices": max_vertices,
         "limits.max_objects": max_objects,
     }
+    if web and not load(config, flags).settings.server.web_address:
+        flags["server.web_address"] = _WEB_ADDRESS
     settings = _server_settings(load(config, flags))
     if settings.workers:
         prepare()
@@ -216,6 +233,8 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
         Path(server.tokens) if server.tokens else None,
         server.insecure,
         server.metrics_address,
+        server.web_address,
+        server.web_origins,
     )
 
 

@@ -6,7 +6,7 @@ import asyncio
 import signal
 import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,9 @@ from sketchmatch.app.setup import Setup
 from sketchmatch.config.addresses import is_of_this_machine
 from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
 from sketchmatch.server.callers import CallerInterceptor
+from sketchmatch.server.called import Handlers
 from sketchmatch.server.calls import CallLogInterceptor
+from sketchmatch.server.gateway import Gateway
 from sketchmatch.server.interceptors import ErrorInterceptor, OpeningInterceptor
 from sketchmatch.server.metrics import Metric, Metrics, MetricsInterceptor
 from sketchmatch.server.monitor import Monitor
@@ -89,6 +91,10 @@ class ServerSettings:
         read along.
     metrics_address
         Host and port for metrics and probes over HTTP; None for none.
+    web_address
+        Host and port for browsers; None for none.
+    web_origins
+        Of pages from elsewhere that may call there.
     """
 
     address: str = "127.0.0.1:50051"
@@ -99,6 +105,8 @@ class ServerSettings:
     tokens: Path | None = None
     insecure: bool = False
     metrics_address: str | None = None
+    web_address: str | None = None
+    web_origins: tuple[str, ...] = ()
 
 
 async def serve(
@@ -130,18 +138,21 @@ async def serve(
         If the address cannot be listened on, or must not without naming callers, or a file of
         certificates or tokens is of no use.
     """
-    lacking = _refuse_strangers(settings)
+    lacking = _refuse_strangers(settings, settings.address, "address")
+    if settings.web_address:
+        _refuse_strangers(settings, settings.web_address, "server.web_address")
     files = _Files(settings, say)
     app = Application(load(), settings.workers)
     metrics = Metrics(_METHODS)
+    interceptors = [
+        MetricsInterceptor(metrics),
+        CallLogInterceptor(),
+        *files.interceptors,
+        OpeningInterceptor(),
+        ErrorInterceptor(),
+    ]
     server = grpc.aio.server(
-        interceptors=[
-            MetricsInterceptor(metrics),
-            CallLogInterceptor(),
-            *files.interceptors,
-            OpeningInterceptor(),
-            ErrorInterceptor(),
-        ],
+        interceptors=interceptors,
         options=[
             ("grpc.max_receive_message_length", app.setup.limits.transport_bytes),
             ("grpc.max_send_message_length", -1),
@@ -168,13 +179,17 @@ async def serve(
         ],
     )
     readiness = Readiness(_SERVICES)
-    _add_services(server, app, readiness, metrics)
+    services = _services(app, metrics)
+    _add_services(server, services, readiness)
     _watch(metrics, app, files, readiness)
     port = _listen(server, settings.address, files.credentials)
     told_at = settings.metrics_address
     monitor = Monitor(told_at, metrics, lambda: readiness.serving) if told_at else None
+    gateway = _gateway(settings, app, Handlers(services, interceptors), files)
     await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
+    if gateway:
+        gateway.start()
     unwatch = watch(settings.patience)
     stopping = stop or asyncio.Event()
     warming = _Warming(app, readiness, stopping)
@@ -183,6 +198,10 @@ async def serve(
     say(f"listening on {_found_at(settings.address, port)}")
     if monitor:
         say(f"metrics are at http://{monitor.address}/metrics")
+    if gateway:
+        say(f"the sketch pad is at {gateway.url}")
+        if gateway.lacking:
+            say(gateway.lacking)
     if lacking:
         say(f"insecure: whoever reaches this address {lacking}")
     for problem in app.setup.engine.registry.problems:
@@ -199,7 +218,10 @@ async def serve(
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
         await readiness.drain()
-        ending = asyncio.ensure_future(server.stop(settings.grace))
+        stops = [server.stop(settings.grace)]
+        if gateway:
+            stops.append(gateway.stop(settings.grace))
+        ending = asyncio.gather(*stops)
         await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
         await ending
         await app.close()
@@ -213,7 +235,7 @@ class _Files:
     """What tells friends from strangers, kept in files."""
 
     def __init__(self, settings: ServerSettings, say: Callable[[str], None]) -> None:
-        self._pems = None if settings.tls is None else watched_pems(settings.tls, say)
+        self.pems = None if settings.tls is None else watched_pems(settings.tls, say)
         path = settings.tokens
         self._tokens = (
             None if path is None else Watched("the tokens", [path], lambda: read_tokens(path), say)
@@ -222,7 +244,7 @@ class _Files:
     @property
     def credentials(self) -> grpc.ServerCredentials | None:
         """What encrypts; None for nothing."""
-        return None if self._pems is None else server_credentials(self._pems)
+        return None if self.pems is None else server_credentials(self.pems)
 
     @property
     def interceptors(self) -> list[CallerInterceptor]:
@@ -231,12 +253,12 @@ class _Files:
 
     def expiry(self) -> dict[tuple[str, ...], float]:
         """Return when the certificate expires, as metrics have it."""
-        expires = None if self._pems is None else self._pems.value.expires
+        expires = None if self.pems is None else self.pems.value.expires
         return {} if expires is None else {(): expires.timestamp()}
 
     def look(self) -> None:
         """Read again now what has changed."""
-        for watched in (self._pems, self._tokens):
+        for watched in (self.pems, self._tokens):
             if watched is not None:
                 watched.look()
 
@@ -328,19 +350,48 @@ def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readine
     )
 
 
-def _add_services(
-    server: grpc.aio.Server, app: Application, readiness: Readiness, metrics: Metrics
-) -> None:
+def _services(app: Application, metrics: Metrics) -> tuple[grpc.GenericRpcHandler, ...]:
+    """Return what answers the services of the contract, on whichever port."""
+    catalog = _Collected()
+    catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), catalog)
     matching, scenes = MatchService(app, metrics.matched), SceneService(app)
-    server.add_generic_rpc_handlers((matching.handler(), scenes.handler()))
-    catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), server)
+    return (matching.handler(), scenes.handler(), *catalog.handlers)
+
+
+class _Collected:
+    """What generated code takes for a server, and hands its handlers to."""
+
+    def __init__(self) -> None:
+        self.handlers: list[grpc.GenericRpcHandler] = []
+
+    def add_generic_rpc_handlers(self, handlers: Iterable[grpc.GenericRpcHandler]) -> None:
+        self.handlers += handlers
+
+    def add_registered_method_handlers(self, service: str, handlers: Any) -> None:
+        """Do without: this is a second way to the same."""
+
+
+def _gateway(
+    settings: ServerSettings, app: Application, handlers: Handlers, files: _Files
+) -> Gateway | None:
+    if not settings.web_address:
+        return None
+    pems = files.pems
+    tls = None if settings.tls is None or pems is None else (settings.tls, pems)
+    return Gateway(settings.web_address, settings.web_origins, app, handlers, _SERVICES, tls)
+
+
+def _add_services(
+    server: grpc.aio.Server, services: tuple[grpc.GenericRpcHandler, ...], readiness: Readiness
+) -> None:
+    server.add_generic_rpc_handlers(services)
     health_pb2_grpc.add_HealthServicer_to_server(readiness.servicer, server)
     reflection.enable_server_reflection(
         (*_SERVICES, health.SERVICE_NAME, reflection.SERVICE_NAME), server
     )
 
 
-def _refuse_strangers(settings: ServerSettings) -> str:
+def _refuse_strangers(settings: ServerSettings, address: str, named: str) -> str:
     """Refuse to let strangers in from other machines; return what they can do where that is meant.
 
     Raises
@@ -348,7 +399,7 @@ def _refuse_strangers(settings: ServerSettings) -> str:
     InvalidInputError
         If they could, and nobody said so.
     """
-    if is_of_this_machine(settings.address):
+    if is_of_this_machine(address):
         return ""
     knows_callers = settings.tokens or (settings.tls and settings.tls.client_ca)
     faults = [
@@ -367,8 +418,8 @@ def _refuse_strangers(settings: ServerSettings) -> str:
         ]
         raise InvalidInputError(
             Reason.INVALID_FIELD,
-            "address",
-            f"{settings.address!r} is reached from other machines, and whoever does {lacking}; "
+            named,
+            f"{address!r} is reached from other machines, and whoever does {lacking}; "
             f"give {', and '.join(remedies)}, listen on 127.0.0.1, or say --insecure if that is "
             "meant",
         )
