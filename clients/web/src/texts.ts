@@ -1,0 +1,233 @@
+/** All that the pad says, in each language; another one is another entry of `LANGUAGES`. */
+
+import { computed, signal } from "@preact/signals";
+
+const en = {
+  language: "English",
+  tagline: "Draw a place. See it on the robot's map.",
+  sketch: "Sketch",
+  map: "Robot's map",
+  answer: "Answer",
+  paperHint: "Draw what you see on the map, as you would on a napkin.",
+  paperHint2: "Rough is fine. One outline for each thing.",
+  drawForMe: "Show me",
+  chooseMap: "Choose a map",
+  ownMap: "Open a map of your own",
+  ownMapHint: "A .yaml with its picture, GeoJSON, DXF, a bag, a picture … or drop it here.",
+  places: "Places to try",
+  place: {
+    "living-room": "Living room",
+    kitchen: "Kitchen",
+    office: "Office",
+    workshop: "Workshop",
+    playground: "Playground",
+  },
+  tools: "Tools",
+  pen: "Draw",
+  route: "Route",
+  eraser: "Erase",
+  move: "Move",
+  name: "Name",
+  undo: "Undo",
+  redo: "Redo",
+  clear: "New sheet",
+  fit: "Fit to view",
+  fingerDraws: "Finger draws",
+  fingerDrawsHint: "Off: the pen draws, fingers move the paper.",
+  file: "File",
+  openSketch: "Open a sketch …",
+  openSketchHint: "Strokes, SVG, Excalidraw, a photo",
+  saveStrokes: "Save strokes (JSON)",
+  saveSvg: "Save drawing (SVG)",
+  savePng: "Save picture (PNG)",
+  saveRoute: "Save route (GeoJSON)",
+  copyLink: "Copy a link to this",
+  linkCopied: "The link is copied. Whoever opens it here sees this sketch and its match.",
+  settings: "Language and colours",
+  theme: "Colours",
+  themes: { auto: "As the system", light: "Light", dark: "Dark" },
+  languages: "Language",
+  things: (n: number) => (n === 1 ? "1 thing" : `${n} things`),
+  thing: (n: number) => `thing ${n}`,
+  found: (n: number, of: number) => `${n} of ${of} things found`,
+  foundAll: (n: number) => (n === 1 ? "The one thing is found" : `All ${n} things found`),
+  words: { sure: "sure", likely: "likely", perhaps: "perhaps", guess: "a guess" },
+  whole: {
+    sure: "This is it.",
+    likely: "This is likely it.",
+    perhaps: "This may be it.",
+    guess: "This is a guess.",
+  },
+  notThisPlace: "Probably not this place",
+  notThisPlaceHint: "What you drew fits this map badly. Draw more of it, or choose another map.",
+  ambiguous: (n: number) => `${n} readings fit equally well.`,
+  question: (what: string) => `Which one is ${what}?`,
+  questionHint: "Tap it on the map, or choose here.",
+  noneOfThese: "None of these",
+  is: "is",
+  changeTo: (what: string) => `What ${what} is`,
+  automatic: "decide by yourself",
+  onNoMap: "not on this map",
+  pinned: "you said so",
+  tapToPin: (what: string) => `Tap on the map what ${what} is`,
+  alternatives: "Other readings",
+  reading: (k: number, n: number) => `Reading ${k} of ${n}`,
+  previous: "Previous reading",
+  next: "Next reading",
+  notFound: "Drawn, and not on this map",
+  notDrawn: "On the map, and not drawn",
+  searching: "Searching …",
+  compiling: "Getting ready, once, up to a minute …",
+  cancel: "Cancel",
+  again: "Match again",
+  cancelled: "Cancelled. Draw on, or match again.",
+  oneMore: "Draw one more thing: it takes two to relate.",
+  begin: "Draw, and the answer appears here.",
+  away: "The server does not answer. What you draw is kept in this browser, and it goes on by itself.",
+  busy: "The server is busy; one moment.",
+  token: "This server wants a token.",
+  tokenHint: "Its operator gives you one.",
+  connect: "Connect",
+  curve: "How good the best reading is, and how good any can be, over time",
+  nameIt: "What is it called?",
+  nameHint: "A name helps where the map has names too.",
+  save: "Save",
+  remove: "Take away",
+  close: "Close",
+  leaveOut: "Leave out",
+  pictureLacking: (picture: string) =>
+    picture
+      ? `The map's picture ${picture} is missing; drop it together with the .yaml file.`
+      : "There is no file; drop a map.",
+  preview: "route, preview",
+  skip: "To the answer",
+  objectOnMap: (label: string, partner: string) =>
+    partner ? `${label}, which is ${partner}` : `${label}, not drawn`,
+};
+
+export type Texts = typeof en;
+
+const de: Texts = {
+  language: "Deutsch",
+  tagline: "Zeichne einen Ort. Sieh ihn auf der Karte des Roboters.",
+  sketch: "Skizze",
+  map: "Karte des Roboters",
+  answer: "Antwort",
+  paperHint: "Zeichne, was du auf der Karte siehst, wie auf eine Serviette.",
+  paperHint2: "Ungenau genügt. Ein Umriss für jedes Ding.",
+  drawForMe: "Zeig es mir",
+  chooseMap: "Karte wählen",
+  ownMap: "Eigene Karte öffnen",
+  ownMapHint: "Eine .yaml mit ihrem Bild, GeoJSON, DXF, ein Bag, ein Bild … oder hierher ziehen.",
+  places: "Orte zum Ausprobieren",
+  place: {
+    "living-room": "Wohnzimmer",
+    kitchen: "Küche",
+    office: "Büro",
+    workshop: "Werkstatt",
+    playground: "Spielplatz",
+  },
+  tools: "Werkzeuge",
+  pen: "Zeichnen",
+  route: "Weg",
+  eraser: "Radieren",
+  move: "Verschieben",
+  name: "Benennen",
+  undo: "Zurück",
+  redo: "Wieder vor",
+  clear: "Neues Blatt",
+  fit: "Alles zeigen",
+  fingerDraws: "Finger zeichnet",
+  fingerDrawsHint: "Aus: der Stift zeichnet, Finger bewegen das Papier.",
+  file: "Datei",
+  openSketch: "Skizze öffnen …",
+  openSketchHint: "Striche, SVG, Excalidraw, ein Foto",
+  saveStrokes: "Striche sichern (JSON)",
+  saveSvg: "Zeichnung sichern (SVG)",
+  savePng: "Bild sichern (PNG)",
+  saveRoute: "Weg sichern (GeoJSON)",
+  copyLink: "Link hierzu kopieren",
+  linkCopied: "Der Link ist kopiert. Wer ihn hier öffnet, sieht diese Skizze und ihre Zuordnung.",
+  settings: "Sprache und Farben",
+  theme: "Farben",
+  themes: { auto: "Wie das System", light: "Hell", dark: "Dunkel" },
+  languages: "Sprache",
+  things: (n) => (n === 1 ? "1 Ding" : `${n} Dinge`),
+  thing: (n) => `Ding ${n}`,
+  found: (n, of) => `${n} von ${of} Dingen gefunden`,
+  foundAll: (n) => (n === 1 ? "Das eine Ding ist gefunden" : `Alle ${n} Dinge gefunden`),
+  words: { sure: "sicher", likely: "wahrscheinlich", perhaps: "vielleicht", guess: "geraten" },
+  whole: {
+    sure: "So ist es.",
+    likely: "So ist es wahrscheinlich.",
+    perhaps: "So kann es sein.",
+    guess: "Das ist geraten.",
+  },
+  notThisPlace: "Wahrscheinlich nicht dieser Ort",
+  notThisPlaceHint:
+    "Was du gezeichnet hast, passt schlecht zu dieser Karte. Zeichne mehr, oder wähle eine andere.",
+  ambiguous: (n) => `${n} Lesarten passen gleich gut.`,
+  question: (what) => `Welches davon ist ${what}?`,
+  questionHint: "Tippe es auf der Karte an, oder wähle hier.",
+  noneOfThese: "Keines davon",
+  is: "ist",
+  changeTo: (what) => `Was ${what} ist`,
+  automatic: "entscheide selbst",
+  onNoMap: "nicht auf dieser Karte",
+  pinned: "so gesagt",
+  tapToPin: (what) => `Tippe auf der Karte an, was ${what} ist`,
+  alternatives: "Andere Lesarten",
+  reading: (k, n) => `Lesart ${k} von ${n}`,
+  previous: "Vorige Lesart",
+  next: "Nächste Lesart",
+  notFound: "Gezeichnet, und nicht auf dieser Karte",
+  notDrawn: "Auf der Karte, und nicht gezeichnet",
+  searching: "Sucht …",
+  compiling: "Macht sich bereit, einmal, bis zu einer Minute …",
+  cancel: "Abbrechen",
+  again: "Noch einmal zuordnen",
+  cancelled: "Abgebrochen. Zeichne weiter, oder ordne noch einmal zu.",
+  oneMore: "Zeichne noch ein Ding: für eine Lage braucht es zwei.",
+  begin: "Zeichne, und hier erscheint die Antwort.",
+  away: "Der Server antwortet nicht. Was du zeichnest, bleibt in diesem Browser, und es geht von selbst weiter.",
+  busy: "Der Server ist beschäftigt; einen Augenblick.",
+  token: "Dieser Server verlangt ein Token.",
+  tokenHint: "Wer ihn betreibt, gibt dir eines.",
+  connect: "Verbinden",
+  curve: "Wie gut die beste Lesart ist, und wie gut eine sein kann, im Lauf der Zeit",
+  nameIt: "Wie heißt es?",
+  nameHint: "Ein Name hilft, wo auch die Karte Namen hat.",
+  save: "Sichern",
+  remove: "Wegnehmen",
+  close: "Schließen",
+  leaveOut: "Weglassen",
+  pictureLacking: (picture) =>
+    picture
+      ? `Das Bild der Karte ${picture} fehlt; lege es zusammen mit der .yaml-Datei ab.`
+      : "Da ist keine Datei; lege eine Karte ab.",
+  preview: "Weg, Vorschau",
+  skip: "Zur Antwort",
+  objectOnMap: (label, partner) =>
+    partner ? `${label}, das ist ${partner}` : `${label}, nicht gezeichnet`,
+};
+
+export const LANGUAGES = { en, de } as const;
+export type Language = keyof typeof LANGUAGES;
+
+function isLanguage(name: string | null | undefined): name is Language {
+  return name != null && name in LANGUAGES;
+}
+
+function preferred(): Language {
+  const kept = localStorage.getItem("language");
+  if (isLanguage(kept)) return kept;
+  return navigator.languages.map((name) => name.slice(0, 2)).find(isLanguage) ?? "en";
+}
+
+export const language = signal<Language>(preferred());
+export const texts = computed<Texts>(() => LANGUAGES[language.value]);
+
+export function speak(name: Language): void {
+  localStorage.setItem("language", name);
+  language.value = name;
+}
