@@ -104,7 +104,9 @@ export class SketchmatchClient {
   /** Find the objects of one source. */
   async segment(
     source: Source,
-    options: { segmenter?: { name?: string; parameters?: Record<string, number | string | boolean> } } = {},
+    options: {
+      segmenter?: { name?: string; parameters?: Record<string, number | string | boolean> };
+    } = {},
     signal?: AbortSignal,
   ): Promise<SegmentResponse> {
     const request = create(SegmentRequestSchema, { ...options, source });

@@ -16,10 +16,7 @@ export function similarity(from: readonly Xy[], to: readonly Xy[]): ((point: Xy)
   });
   if (!spread) return null;
   const [a, b] = [along / spread, across / spread];
-  return ([x, y]) => [
-    tx + a * (x - fx) - b * (y - fy),
-    ty + b * (x - fx) + a * (y - fy),
-  ];
+  return ([x, y]) => [tx + a * (x - fx) - b * (y - fy), ty + b * (x - fx) + a * (y - fy)];
 }
 
 function mean(points: readonly Xy[]): Xy {

@@ -112,9 +112,7 @@ export function nameStrokes(ids: ReadonlySet<string>, label: string): void {
 export function pinStrokes(strokes: readonly string[], thing: string | null | undefined): void {
   change((now) => {
     const others = now.pins.filter(
-      (pin) =>
-        !pin.strokes.some((id) => strokes.includes(id)) &&
-        !(thing && pin.thing === thing), // no two sketched things are the same one
+      (pin) => !pin.strokes.some((id) => strokes.includes(id)) && !(thing && pin.thing === thing), // no two sketched things are the same one
     );
     return { ...now, pins: thing === undefined ? others : [...others, { strokes, thing }] };
   });

@@ -71,7 +71,10 @@ export function inkOf(outlines: readonly { points: Xy[]; label: string }[], rout
 }
 
 /** Return the outline of a stroke's ink. */
-export function inkOutline(stroke: Pick<Stroke, "points" | "pressed" | "route">, last: boolean): Xy[] {
+export function inkOutline(
+  stroke: Pick<Stroke, "points" | "pressed" | "route">,
+  last: boolean,
+): Xy[] {
   return getStroke(
     stroke.points.map(([x, y, , pressure]) => [x, y, pressure]),
     {
@@ -184,7 +187,13 @@ export function download(name: string, data: Blob): void {
 }
 
 function broken(why: string): RequestFailed {
-  return new RequestFailed(`The file holds no strokes that can be read: ${why}.`, "invalid", "", "", undefined);
+  return new RequestFailed(
+    `The file holds no strokes that can be read: ${why}.`,
+    "invalid",
+    "",
+    "",
+    undefined,
+  );
 }
 
 function round(value: number, digits = 1): number {

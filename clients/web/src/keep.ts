@@ -38,7 +38,8 @@ export async function keep(kept: Kept): Promise<void> {
 
 /** Return the name under which this tab keeps its sheet; it outlives the page, not the tab. */
 function tab(): string {
-  const name = sessionStorage.getItem("sheet") ?? `sheet-${Date.now().toString(36)}-${Math.random()}`;
+  const name =
+    sessionStorage.getItem("sheet") ?? `sheet-${Date.now().toString(36)}-${Math.random()}`;
   sessionStorage.setItem("sheet", name);
   return name;
 }

@@ -4,7 +4,7 @@ import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 
 import { colourOf } from "./colours";
-import { distance, toScreen, type View, type Xy, zoomed } from "./geometry";
+import { badgePlace, boxOf, distance, toScreen, type View, type Xy, zoomed } from "./geometry";
 import { boxOfMap, type Underlay } from "./maps";
 import { useSize, useView } from "./pane";
 import { Badge } from "./sketch";
@@ -101,7 +101,10 @@ function MapThing({ index, view }: { index: number; view: View }) {
   const pair = answered.value ? pairOf({ side: "map", index }) : undefined;
   const candidate = asking.value === null && question.value?.candidates.includes(index);
   const d = thing.rings.map((ring) => pathThrough(ring, view)).join("");
-  const [x, y] = shown(view, thing.centroid);
+  const outline = (thing.rings[0] ?? []).map((point) => shown(view, point));
+  const [cx, cy] = shown(view, thing.centroid);
+  const [x, y] = badgePlace(outline, [cx, cy]);
+  const below = x === cx && pair ? cy + 27 : x === cx ? cy + 4 : boxOf(outline).y1 + 16;
   const colour = pair ? colourOf(pair.sketch) : null;
   const state = `${isLit("map", index) ? " lit" : ""}${pair ? "" : " alone"}${candidate ? " candidate" : ""}`;
   const tapped = () => {
@@ -121,7 +124,7 @@ function MapThing({ index, view }: { index: number; view: View }) {
       <path d={d} fill={colour ?? "currentColor"} stroke={colour ?? "currentColor"} />
       {pair && <Badge x={x} y={y} number={pair.sketch + 1} colour={colour} />}
       {thing.label && (
-        <text class="label" x={x} y={pair ? y + 27 : y + 4} text-anchor="middle">
+        <text class="label" x={cx} y={below} text-anchor="middle">
           {thing.label}
         </text>
       )}
@@ -139,7 +142,9 @@ function Route({ view }: { view: View }) {
   return (
     <g class="way" data-testid="route">
       <title>{texts.value.preview}</title>
-      <polyline points={points.map((point) => point.map((n) => n.toFixed(1)).join(",")).join(" ")} />
+      <polyline
+        points={points.map((point) => point.map((n) => n.toFixed(1)).join(",")).join(" ")}
+      />
       <path d="M-9,-7L3,0L-9,7" transform={`translate(${end[0]} ${end[1]}) rotate(${turn})`} />
     </g>
   );
@@ -168,7 +173,11 @@ function placing({ origin: [x, y, yaw], resolution }: Underlay, height: number):
 }
 
 function pathThrough(ring: readonly Xy[], view: View): string {
-  const points = ring.map((point) => shown(view, point).map((n) => n.toFixed(1)).join(","));
+  const points = ring.map((point) =>
+    shown(view, point)
+      .map((n) => n.toFixed(1))
+      .join(","),
+  );
   return `M${points.join("L")}Z`;
 }
 
@@ -185,8 +194,14 @@ async function paint(underlay: Underlay, night: boolean): Promise<Painted> {
   const pixels = context.getImageData(0, 0, width, height);
   const { data } = pixels;
   const [wall, floor] = night
-    ? ([[214, 208, 196, 225], [255, 255, 255, 14]] as const)
-    : ([[58, 66, 76, 225], [255, 255, 255, 205]] as const);
+    ? ([
+        [214, 208, 196, 225],
+        [255, 255, 255, 14],
+      ] as const)
+    : ([
+        [58, 66, 76, 225],
+        [255, 255, 255, 205],
+      ] as const);
   for (let k = 0; k < data.length; k += 4) {
     const shade = data[k] ?? 205;
     data.set(shade < 100 ? wall : shade > 230 ? floor : [0, 0, 0, 0], k);

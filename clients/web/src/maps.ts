@@ -39,8 +39,11 @@ export function isPlace(name: string): name is Place {
   return (PLACES as readonly string[]).includes(name);
 }
 
+/** Return what of a map is shown: its things, and something of the walls around them. */
 export function boxOfMap(map: PlaceMap): Box {
-  return boxOf(map.things.flatMap(({ rings }) => rings[0] ?? []));
+  const { x0, y0, x1, y1 } = boxOf(map.things.flatMap(({ rings }) => rings[0] ?? []));
+  const around = 0.09 * Math.max(x1 - x0, y1 - y0);
+  return { x0: x0 - around, y0: y0 - around, x1: x1 + around, y1: y1 + around };
 }
 
 /** Load a place of the gallery. */
@@ -51,7 +54,10 @@ export async function openPlace(client: SketchmatchClient, place: Place): Promis
     fetched(`${folder}/map.png`).then((answer) => answer.blob()),
   ]);
   const source = sources.mapServerMap(yaml, await bytesOf(pixels));
-  return { ...(await found(client, source)), place, title: "", underlay: gridOf(yaml, pixels) };
+  const { things, warnings } = await found(client, source);
+  // What the yaml does not name is a piece of a wall.
+  const named = things.filter(({ label }) => label);
+  return { things: named, warnings, place, title: "", underlay: gridOf(yaml, pixels) };
 }
 
 /** Return how a person drew a place of the gallery. */
@@ -75,8 +81,7 @@ export async function openMap(
     const text = await yaml.text();
     const named = /^\s*image\s*:\s*["']?([^"'\n#]+)/m.exec(text)?.[1]?.trim() ?? "";
     const base = named.split(/[\\/]/).at(-1) ?? "";
-    const picture =
-      files.find(({ name }) => name === base) ?? files.find((file) => file !== yaml);
+    const picture = files.find(({ name }) => name === base) ?? files.find((file) => file !== yaml);
     if (!picture) throw new RequestFailed(lacking(base), "invalid", "", "map", undefined);
     const source = sources.mapServerMap(text, await bytesOf(picture));
     const seen = await shownPixels(picture);
@@ -146,7 +151,8 @@ async function bytesOf(blob: Blob): Promise<Uint8Array> {
 }
 
 function gridOf(yaml: string, pixels: Blob): Underlay {
-  const number = (key: string) => Number(new RegExp(`^\\s*${key}\\s*:\\s*([^\\s#]+)`, "m").exec(yaml)?.[1]);
+  const number = (key: string) =>
+    Number(new RegExp(`^\\s*${key}\\s*:\\s*([^\\s#]+)`, "m").exec(yaml)?.[1]);
   const [x = 0, y = 0, yaw = 0] = (/^\s*origin\s*:\s*\[([^\]]*)\]/m.exec(yaml)?.[1] ?? "")
     .split(",")
     .map(Number);
@@ -168,7 +174,9 @@ async function shownPixels(file: Blob): Promise<Blob | null> {
 /** Robots save maps as binary PGM, which no browser shows. */
 async function pngOfPgm(bytes: Uint8Array): Promise<Blob | null> {
   const head = new TextDecoder("latin1").decode(bytes.subarray(0, 4096));
-  const match = /^P5(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)\s/.exec(head);
+  const match = /^P5(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)\s/.exec(
+    head,
+  );
   const [width, height, most] = (match?.slice(1) ?? []).map(Number);
   if (!match || !width || !height || !most || most > 255) return null;
   const pixels = new ImageData(width, height);

@@ -17,7 +17,11 @@ export interface Progress {
   readonly compiling: boolean;
   readonly seconds: number;
   /** ζ and, where the searcher proves one, its bound, as they developed. */
-  readonly curve: readonly { readonly seconds: number; readonly zeta: number; readonly bound: number | undefined }[];
+  readonly curve: readonly {
+    readonly seconds: number;
+    readonly zeta: number;
+    readonly bound: number | undefined;
+  }[];
 }
 
 /** An answer, and what it is about. */

@@ -15,6 +15,7 @@ import {
 } from "./document";
 import { ink, inkOutline, pathOf } from "./files";
 import {
+  badgePlace,
   boxOf,
   distance,
   distanceToLine,
@@ -132,11 +133,16 @@ function Things({ view }: { view: View }) {
         if (found.strokesOf[k]?.some((id) => moved?.ids.has(id))) return null;
         const pair = pairOf({ side: "sketch", index: k });
         const d = rings.map((ring) => pathThrough(ring, view)).join("");
-        const [x, y] = toScreen(view, [centroid[0], -centroid[1]]);
+        const outline = (rings[0] ?? []).map(([x, y]) => toScreen(view, [x, -y]));
+        const [x, y] = badgePlace(outline, toScreen(view, [centroid[0], -centroid[1]]));
         const state = `${isLit("sketch", k) || asking.value === k ? " lit" : ""}${pair ? "" : " alone"}`;
         return (
           <g key={k} class={`thing${state}`} data-testid={`sketch-thing-${k}`}>
-            <path d={d} fill={pair ? colourOf(k) : "currentColor"} stroke={pair ? colourOf(k) : "currentColor"} />
+            <path
+              d={d}
+              fill={pair ? colourOf(k) : "currentColor"}
+              stroke={pair ? colourOf(k) : "currentColor"}
+            />
             <Badge x={x} y={y} number={k + 1} colour={pair ? colourOf(k) : null} />
           </g>
         );
@@ -149,7 +155,7 @@ export function Badge(props: { x: number; y: number; number: number; colour: str
   const { x, y, number, colour } = props;
   return (
     <g class={`badge${colour ? "" : " hollow"}`} transform={`translate(${x} ${y})`}>
-      <circle r="12" {...(colour ? { fill: colour } : {})} />
+      <circle r="11" {...(colour ? { fill: colour } : {})} />
       <text dy="0.36em" text-anchor="middle">
         {number}
       </text>
@@ -158,7 +164,11 @@ export function Badge(props: { x: number; y: number; number: number; colour: str
 }
 
 function pathThrough(ring: readonly Xy[], view: View): string {
-  const points = ring.map(([x, y]) => toScreen(view, [x, -y]).map((n) => n.toFixed(1)).join(","));
+  const points = ring.map(([x, y]) =>
+    toScreen(view, [x, -y])
+      .map((n) => n.toFixed(1))
+      .join(","),
+  );
   return `M${points.join("L")}Z`;
 }
 
@@ -344,7 +354,8 @@ function handled(
     }
     if (drawingBy === null) {
       const thing = event.pointerType === "touch" ? null : thingAt(paper(event));
-      if (asking.peek() === null) lit.value = thing === null ? null : { side: "sketch", index: thing };
+      if (asking.peek() === null)
+        lit.value = thing === null ? null : { side: "sketch", index: thing };
       return;
     }
     if (drawingBy !== event.pointerId) return;
@@ -402,7 +413,11 @@ function handled(
         if (lengthOf(points) * view.peek().scale >= TAP) {
           const began = points[0]?.[2] ?? 0;
           const timed = points.map(([x, y, t, p]) => [x, y, t - began, p] as const);
-          const stroke: Stroke = { ...ink(timed, pressed(points)), id: newId(), route: chosen === "route" };
+          const stroke: Stroke = {
+            ...ink(timed, pressed(points)),
+            id: newId(),
+            route: chosen === "route",
+          };
           addStroke(stroke);
         } else if (tapped) select(point);
         break;
@@ -432,7 +447,8 @@ function handled(
     if (asking.peek() === null) lit.value = null;
   };
   const key = (event: KeyboardEvent): void => {
-    if (event.code !== "Space" || (event.target as Element).closest("button,input,select,dialog")) return;
+    if (event.code !== "Space" || (event.target as Element).closest("button,input,select,dialog"))
+      return;
     spaced.value = event.type === "keydown";
   };
   element.addEventListener("pointerdown", down);
@@ -448,4 +464,3 @@ function handled(
     window.removeEventListener("keyup", key);
   };
 }
-
