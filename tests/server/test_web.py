@@ -116,7 +116,7 @@ def test_a_stream_has_every_event_and_ends_without_error(server):
     told = [match_service_pb2.MatchResponse.FromString(event) for _, event in events]
     kinds = [event.WhichOneof("event") for event in told]
     assert status == 200
-    assert (kinds[0], kinds[1], kinds[-1]) == ("accepted", "scenes", "result")
+    assert (kinds[0], kinds.count("scenes"), kinds[-1]) == ("accepted", 1, "result")
     assert len(told[-1].result.object_matches) == 4
     assert (flags, json.loads(end)) == (2, {})
 

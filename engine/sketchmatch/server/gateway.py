@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Gateway"]
 
 _SETTING = "server.web_address"
+_BACKLOG = 1024
 _Asgi = Callable[[Any, Any, Any], Awaitable[None]]
 
 
@@ -182,6 +183,7 @@ def _listening(address: str) -> tuple[socket.socket, str]:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host.strip("[]"), int(port)))
+        listener.listen(_BACKLOG)
     except (OSError, OverflowError) as error:
         listener.close()
         why = (getattr(error, "strerror", None) or str(error)).lower()
