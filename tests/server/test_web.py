@@ -50,7 +50,9 @@ def gateway(settings=None, warm=False, **limits):
 
 
 def address_of(host: Host) -> str:
-    (url,) = [found[1] for line in host.said if (found := re.match(r"the sketch pad is at (\S+)", line))]
+    (url,) = [
+        found[1] for line in host.said if (found := re.match(r"the sketch pad is at (\S+)", line))
+    ]
     return urlsplit(url).netloc
 
 
@@ -123,7 +125,9 @@ def test_a_stream_has_every_event_and_ends_without_error(server):
 
 def test_a_stream_of_json_has_the_same(server):
     request = {"sketch": {"strokeSet": {}}, "map": {}}
-    _, _, answer = ask(server, MATCH, framed(json.dumps(request).encode()), "application/connect+json")
+    _, _, answer = ask(
+        server, MATCH, framed(json.dumps(request).encode()), "application/connect+json"
+    )
     ((flags, end),) = frames(answer)
     error = json.loads(end)["error"]
     assert (flags, error["code"]) == (2, "invalid_argument")
@@ -302,7 +306,9 @@ def test_an_address_in_use_is_refused_in_words():
 
 def test_other_machines_reach_it_only_where_that_is_meant():
     host = Host(setup(), ServerSettings("127.0.0.1:0", web_address="0.0.0.0:0"))
-    with pytest.raises(InvalidInputError, match=r"server\.web_address .*reached from other machines"):
+    with pytest.raises(
+        InvalidInputError, match=r"server\.web_address .*reached from other machines"
+    ):
         host.wait_until_listening()
 
 
@@ -345,7 +351,9 @@ def page(pages, path, method="GET", **headers):
     async def send(message):
         sent.append(message)
 
-    asked = [(key.replace("_", "-").lower().encode(), value.encode()) for key, value in headers.items()]
+    asked = [
+        (key.replace("_", "-").lower().encode(), value.encode()) for key, value in headers.items()
+    ]
     scope = {"type": "http", "path": path, "method": method, "headers": asked}
     asyncio.run(pages(scope, None, send))
     start, body = sent

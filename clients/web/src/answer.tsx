@@ -42,7 +42,7 @@ export function AnswerPanel() {
         <h2 id="answer-title">{t.answer}</h2>
         {readings.value > 1 && <Pager />}
       </div>
-      <div class="scroll" tabIndex={0} role="region" aria-label={t.answer}>
+      <div class="scroll" tabIndex={0}>
         <Headline />
         {asking.value !== null && <Asking index={asking.value} />}
         {found && asking.value === null && <Question />}

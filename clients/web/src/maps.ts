@@ -86,7 +86,7 @@ export async function openMap(
     const source = sources.mapServerMap(text, await bytesOf(picture));
     const seen = await shownPixels(picture);
     return {
-      ...(await found(client, source)),
+      ...(await found(client, source, yaml.name)),
       place: "",
       title: yaml.name,
       underlay: seen && gridOf(text, seen),
@@ -96,7 +96,7 @@ export async function openMap(
   const source = sources.file(first.name, await bytesOf(first));
   const seen = await shownPixels(first);
   return {
-    ...(await found(client, source)),
+    ...(await found(client, source, first.name)),
     place: "",
     title: first.name,
     underlay: seen && { pixels: seen, resolution: 1, origin: [0, 0, 0], grid: false },
@@ -108,7 +108,8 @@ export async function openOutlines(
   client: SketchmatchClient,
   file: File,
 ): Promise<{ outlines: { points: Xy[]; label: string }[]; route: Xy[] }> {
-  const { scene, route } = await client.segment(sources.file(file.name, await bytesOf(file)));
+  const source = sources.file(file.name, await bytesOf(file));
+  const { scene, route } = await naming(file.name, () => client.segment(source));
   return {
     outlines: thingsOf(scene).map(({ rings, label }) => {
       const ring = (rings[0] ?? []).map(([x, y]) => [x, -y] as const);
@@ -130,9 +131,22 @@ export function thingsOf(scene: Scene | undefined): Thing[] {
 async function found(
   client: SketchmatchClient,
   source: Source,
+  name = "",
 ): Promise<{ things: Thing[]; warnings: readonly string[] }> {
-  const { scene, warnings } = await client.segment(source);
+  const { scene, warnings } = await naming(name, () => client.segment(source));
   return { things: thingsOf(scene), warnings };
+}
+
+/** Have errors name the file that a person knows, not the field that it travels in. */
+async function naming<T>(name: string, work: () => Promise<T>): Promise<T> {
+  try {
+    return await work();
+  } catch (thrown) {
+    const { message, failure, reason, field, retrySeconds } = RequestFailed.from(thrown);
+    const told =
+      name && field && message.startsWith(field) ? name + message.slice(field.length) : message;
+    throw new RequestFailed(told, failure, reason, field, retrySeconds);
+  }
 }
 
 async function fetched(path: string): Promise<Response> {

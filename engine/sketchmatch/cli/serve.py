@@ -126,7 +126,8 @@ def serve(
     web: Annotated[
         bool,
         typer.Option(
-            "--web", help="Show the sketch pad to browsers, at 127.0.0.1:8080 unless told otherwise."
+            "--web",
+            help="Show the sketch pad to browsers, at 127.0.0.1:8080 unless told otherwise.",
         ),
     ] = False,
     web_address: Annotated[
