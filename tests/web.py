@@ -14,10 +14,15 @@ from tests.tools import ROOT, require
 
 CLIENTS = ROOT / "clients"
 PAD = ROOT / "engine" / "sketchmatch" / "server" / "pad"
-_FLAGS = (
-    "--no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync"
-).split()
+_FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
 
 
 @cache

@@ -96,10 +96,12 @@ export function SketchPane() {
       ref={element}
       class={`paper tool-${spaced.value ? "hand" : tool.value}`}
       data-testid="paper"
-      role="img"
-      aria-label={`${t.sketch}: ${t.things(answered.value?.sketched.length ?? 0)}`}
     >
-      <canvas ref={still} />
+      <canvas
+        ref={still}
+        role="img"
+        aria-label={`${t.sketch}: ${t.things(answered.value?.sketched.length ?? 0)}`}
+      />
       <Things view={view.value} />
       <canvas ref={wet} />
       {empty && <Hint />}

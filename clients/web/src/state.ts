@@ -106,7 +106,7 @@ export const pairs = computed<readonly Pair[]>(() => {
     sketch: line.sketchObject,
     map: line.mapObject,
     probability: line.probability,
-    pinned: pinOf(found, line.sketchObject) !== undefined,
+    pinned: pinOf(found, line.sketchObject) === found.map.things[line.mapObject]?.id,
   }));
 });
 

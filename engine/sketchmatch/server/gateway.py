@@ -81,7 +81,7 @@ class Gateway:
         pages = bundled_pages()
         self._socket, self.address = _listening(address)
         self.url = f"{'https' if tls else 'http'}://{self.address}/"
-        self.lacking = "" if pages else "the sketch pad is not built; make web does"
+        self.lacking = () if pages else ("the sketch pad is not built; make web does",)
         front = _Front(connect, pages, origins, local=is_of_this_machine(address))
         self._server = _server(uvicorn, front, tls)
         self._end: asyncio.Task[None] | None = None

@@ -20,8 +20,8 @@ from sketchmatch.app.application import Application
 from sketchmatch.app.setup import Setup
 from sketchmatch.config.addresses import is_of_this_machine
 from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
-from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.called import Handlers
+from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.calls import CallLogInterceptor
 from sketchmatch.server.gateway import Gateway
 from sketchmatch.server.interceptors import ErrorInterceptor, OpeningInterceptor
@@ -138,9 +138,7 @@ async def serve(
         If the address cannot be listened on, or must not without naming callers, or a file of
         certificates or tokens is of no use.
     """
-    lacking = _refuse_strangers(settings, settings.address, "address")
-    if settings.web_address:
-        _refuse_strangers(settings, settings.web_address, "server.web_address")
+    lacking = _refuse_strangers(settings)
     files = _Files(settings, say)
     app = Application(load(), settings.workers)
     metrics = Metrics(_METHODS)
@@ -183,29 +181,20 @@ async def serve(
     _add_services(server, services, readiness)
     _watch(metrics, app, files, readiness)
     port = _listen(server, settings.address, files.credentials)
-    told_at = settings.metrics_address
-    monitor = Monitor(told_at, metrics, lambda: readiness.serving) if told_at else None
-    gateway = _gateway(settings, app, Handlers(services, interceptors), files)
+    beside = _Beside(settings, app, files, Handlers(services, interceptors), metrics, readiness)
     await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
-    if gateway:
-        gateway.start()
+    beside.start()
     unwatch = watch(settings.patience)
     stopping = stop or asyncio.Event()
     warming = _Warming(app, readiness, stopping)
     reloading = _Reloading(load, app, files, readiness, say, warming)
     _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
     say(f"listening on {_found_at(settings.address, port)}")
-    if monitor:
-        say(f"metrics are at http://{monitor.address}/metrics")
-    if gateway:
-        say(f"the sketch pad is at {gateway.url}")
-        if gateway.lacking:
-            say(gateway.lacking)
     if lacking:
-        say(f"insecure: whoever reaches this address {lacking}")
-    for problem in app.setup.engine.registry.problems:
-        say(problem)
+        beside.sentences.append(f"insecure: whoever reaches this address {lacking}")
+    for sentence in (*beside.sentences, *app.setup.engine.registry.problems):
+        say(sentence)
     try:
         await _first(asyncio.ensure_future(warming.begin(say)), stopping)
         if not stopping.is_set():
@@ -218,15 +207,11 @@ async def serve(
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
         await readiness.drain()
-        stops = [server.stop(settings.grace)]
-        if gateway:
-            stops.append(gateway.stop(settings.grace))
-        ending = asyncio.gather(*stops)
+        ending = asyncio.gather(server.stop(settings.grace), beside.stop(settings.grace))
         await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
         await ending
         await app.close()
-        if monitor:
-            await asyncio.to_thread(monitor.close)
+        await beside.close()
         unwatch()
     say("stopped")
 
@@ -261,6 +246,53 @@ class _Files:
         for watched in (self.pems, self._tokens):
             if watched is not None:
                 watched.look()
+
+
+class _Beside:
+    """What answers over HTTP beside the gRPC server: monitors, and browsers.
+
+    Attributes
+    ----------
+    sentences
+        What to say of it to the person who started the server.
+    """
+
+    def __init__(
+        self,
+        settings: ServerSettings,
+        app: Application,
+        files: _Files,
+        handlers: Handlers,
+        metrics: Metrics,
+        readiness: Readiness,
+    ) -> None:
+        self.sentences: list[str] = []
+        self._monitor: Monitor | None = None
+        self._gateway: Gateway | None = None
+        if settings.metrics_address:
+            self._monitor = Monitor(settings.metrics_address, metrics, lambda: readiness.serving)
+            self.sentences.append(f"metrics are at http://{self._monitor.address}/metrics")
+        if settings.web_address:
+            tls = (settings.tls, files.pems) if settings.tls and files.pems else None
+            self._gateway = Gateway(
+                settings.web_address, settings.web_origins, app, handlers, _SERVICES, tls
+            )
+            self.sentences += [f"the sketch pad is at {self._gateway.url}", *self._gateway.lacking]
+
+    def start(self) -> None:
+        """Answer from now on."""
+        if self._gateway:
+            self._gateway.start()
+
+    async def stop(self, grace: float) -> None:
+        """Answer browsers nothing new, and leave so many seconds to what is under way."""
+        if self._gateway:
+            await self._gateway.stop(grace)
+
+    async def close(self) -> None:
+        """Tell monitors nothing more."""
+        if self._monitor:
+            await asyncio.to_thread(self._monitor.close)
 
 
 class _Warming:
@@ -371,16 +403,6 @@ class _Collected:
         """Do without: this is a second way to the same."""
 
 
-def _gateway(
-    settings: ServerSettings, app: Application, handlers: Handlers, files: _Files
-) -> Gateway | None:
-    if not settings.web_address:
-        return None
-    pems = files.pems
-    tls = None if settings.tls is None or pems is None else (settings.tls, pems)
-    return Gateway(settings.web_address, settings.web_origins, app, handlers, _SERVICES, tls)
-
-
 def _add_services(
     server: grpc.aio.Server, services: tuple[grpc.GenericRpcHandler, ...], readiness: Readiness
 ) -> None:
@@ -391,7 +413,7 @@ def _add_services(
     )
 
 
-def _refuse_strangers(settings: ServerSettings, address: str, named: str) -> str:
+def _refuse_strangers(settings: ServerSettings) -> str:
     """Refuse to let strangers in from other machines; return what they can do where that is meant.
 
     Raises
@@ -399,7 +421,13 @@ def _refuse_strangers(settings: ServerSettings, address: str, named: str) -> str
     InvalidInputError
         If they could, and nobody said so.
     """
-    if is_of_this_machine(address):
+    reached = {"address": settings.address, "server.web_address": settings.web_address}
+    open_to_all = [
+        (named, address)
+        for named, address in reached.items()
+        if address and not is_of_this_machine(address)
+    ]
+    if not open_to_all:
         return ""
     knows_callers = settings.tokens or (settings.tls and settings.tls.client_ca)
     faults = [
@@ -416,6 +444,7 @@ def _refuse_strangers(settings: ServerSettings, address: str, named: str) -> str
             *([] if settings.tls else ["--tls-certificate and --tls-key"]),
             *([] if knows_callers else ["--tokens or --tls-client-ca"]),
         ]
+        named, address = open_to_all[0]
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             named,
