@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import zlib
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Mapping
 from contextlib import aclosing
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -33,7 +33,7 @@ __all__ = ["connect_application"]
 _JSON = "json"
 _Context = RequestContext[Any, Any]
 _Application = Callable[[Any, Any, Any], Awaitable[None]]
-_CODES = {
+_CODES: dict[grpc.StatusCode, Code] = {
     code: Code(code.value[1].replace(" ", "_").replace("cancelled", "canceled"))
     for code in grpc.StatusCode
     if code is not grpc.StatusCode.OK
@@ -102,7 +102,7 @@ def connect_application(
         Returns how large a request may be now, inflated.
     """
     pool = descriptor_pool.Default()
-    endpoints: dict[str, Endpoint[Any, Any]] = {}
+    endpoints: dict[str, Any] = {}
     for service in services:
         for method in pool.FindServiceByName(service).methods:
             path = f"/{service}/{method.name}"
@@ -111,7 +111,7 @@ def connect_application(
                 endpoints[path] = answers.endpoint(method.name, service)
     compressions: list[Compression] = [_Uninflated()]
 
-    def found(_: None) -> Mapping[str, Endpoint[Any, Any]]:
+    def found(_: None) -> Mapping[str, Any]:
         return endpoints
 
     return _Connect(
@@ -154,7 +154,7 @@ class _Answers:
         # Nobody waits for an answer to a request that was stopped.
         return _Encoded(b"", kind=self._told)
 
-    async def _stream(self, request: _Encoded, context: _Context) -> Any:
+    async def _stream(self, request: _Encoded, context: _Context) -> AsyncGenerator[_Encoded, None]:
         call = Call(self._path, _peer(context), _metadata(context), _seconds(context))
         try:
             data = await self._opened(request)
