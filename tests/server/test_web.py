@@ -220,6 +220,18 @@ def test_calls_show_a_token_where_the_server_wants_one(tmp_path):
     assert page[0] in (200, 404)  # the pad itself is nothing secret
 
 
+def test_a_stranger_is_refused_before_the_request_is_received(tmp_path, caplog):
+    tokens = tmp_path / "tokens"
+    tokens.write_text(f"{new_token('pad')[1].line}\n")
+    with gateway({"tokens": tokens}) as host, caplog.at_level("INFO"):
+        name, _, port = address_of(host).rpartition(":")
+        with socket.create_connection((name, int(port)), 30) as link:
+            head = f"POST {SEGMENT} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 50000000\r\n"
+            link.sendall(f"{head}Content-Type: application/proto\r\n\r\n".encode())
+            assert link.recv(4096).startswith(b"HTTP/1.1 401 ")
+    assert any("Segment code=UNAUTHENTICATED" in line for line in caplog.messages)
+
+
 def test_a_busy_server_says_when_to_come_back_and_a_caller_who_leaves_gives_its_place_back():
     with gateway(max_concurrent_matches=1, max_waiting=0) as host:
         body = framed(small_match(**ENDLESS).SerializeToString())

@@ -85,12 +85,12 @@ export function fromScreen(view: View, [x, y]: Xy): Xy {
   return [(x - view.x) / view.scale, (y - view.y) / view.scale];
 }
 
-const SMALL = 46;
+const SMALL = 30;
 
 /** Return where the number of a thing stands on the screen: beside what it would hide. */
 export function badgePlace(ring: readonly Xy[], centre: Xy): Xy {
   const { x0, y0, x1, y1 } = boxOf(ring);
-  return Math.min(x1 - x0, y1 - y0) < SMALL ? [x1 + 9, y0 - 7] : centre;
+  return Math.min(x1 - x0, y1 - y0) < SMALL ? [x1 + 3, y0 - 3] : centre;
 }
 
 /** Return the view with one point of the screen kept, and all else grown by a factor. */

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncGenerator, Sequence
-from contextlib import suppress
+from contextlib import aclosing, suppress
 from dataclasses import dataclass
 from functools import partial
 from types import SimpleNamespace
@@ -13,6 +13,7 @@ from typing import Any
 
 import grpc
 
+from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.wrapping import kind_of
 
 __all__ = ["Call", "CallRefused", "Handlers"]
@@ -70,6 +71,21 @@ class Handlers:
                 answering.cancel()
                 with suppress(asyncio.CancelledError, CallRefused):
                     await answering
+
+    async def refuse_stranger(self, call: Call) -> None:
+        """Refuse a call of nobody who is known, before its request is received.
+
+        Raises
+        ------
+        CallRefused
+            If it is one.
+        """
+        asking = [each for each in self.interceptors if isinstance(each, CallerInterceptor)]
+        if not all(each.knows(call.details) for each in asking):
+            # Refused as all are, so that it is counted and told of.
+            async with aclosing(self.responses(call, b"")) as responses:
+                async for _ in responses:
+                    break
 
     async def _answer(self, call: Call, request: bytes) -> None:
         find = self._find

@@ -15,6 +15,7 @@ from connectrpc.codec import Codec
 from connectrpc.compression import Compression
 from connectrpc.compression.gzip import GzipCompression
 from connectrpc.errors import ConnectError, ErrorDetail
+from connectrpc.interceptor import MetadataInterceptor
 from connectrpc.method import IdempotencyLevel, MethodInfo, StreamType
 from connectrpc.request import RequestContext
 from connectrpc.server import ConnectASGIApplication, Endpoint
@@ -79,6 +80,21 @@ class _Uninflated(GzipCompression):
         return bytes(data)
 
 
+class _AskingFirst(MetadataInterceptor[None]):
+    """Refuses strangers before their requests are received."""
+
+    def __init__(self, handlers: Handlers) -> None:
+        self._handlers = handlers
+
+    async def on_start(self, ctx: _Context) -> None:
+        method = ctx.method
+        call = _call(f"/{method.service_name}/{method.name}", ctx)
+        try:
+            await self._handlers.refuse_stranger(call)
+        except CallRefused as refused:
+            _raise(refused.code, refused.message, refused.trailer)
+
+
 class _Connect(ConnectASGIApplication[None]):
     @property
     def path(self) -> str:
@@ -117,6 +133,7 @@ def connect_application(
     return _Connect(
         service=None,
         endpoints=found,
+        interceptors=[_AskingFirst(handlers)],
         read_max_bytes=transport_bytes,
         compressions=compressions,
         codecs=[_Unopened("proto"), _Unopened(_JSON)],
@@ -155,7 +172,7 @@ class _Answers:
         return _Encoded(b"", kind=self._told)
 
     async def _stream(self, request: _Encoded, context: _Context) -> AsyncGenerator[_Encoded, None]:
-        call = Call(self._path, _peer(context), _metadata(context), _seconds(context))
+        call = _call(self._path, context)
         try:
             data = await self._opened(request)
             async with aclosing(self._handlers.responses(call, data)) as responses:
@@ -194,6 +211,10 @@ def _raise(code: grpc.StatusCode, message: str, trailer: Iterable[tuple[str, byt
         for detail in status_pb2.Status.FromString(packed).details
     ]
     raise ConnectError(_CODES[code], message, details)
+
+
+def _call(path: str, context: _Context) -> Call:
+    return Call(path, _peer(context), _metadata(context), _seconds(context))
 
 
 def _peer(context: _Context) -> str:

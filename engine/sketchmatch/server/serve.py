@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import grpc
 from grpc_health.v1 import health, health_pb2_grpc
@@ -385,7 +385,9 @@ def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readine
 def _services(app: Application, metrics: Metrics) -> tuple[grpc.GenericRpcHandler, ...]:
     """Return what answers the services of the contract, on whichever port."""
     catalog = _Collected()
-    catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), catalog)
+    catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(
+        CatalogService(app), cast(grpc.aio.Server, catalog)
+    )
     matching, scenes = MatchService(app, metrics.matched), SceneService(app)
     return (matching.handler(), scenes.handler(), *catalog.handlers)
 
