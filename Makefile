@@ -77,7 +77,7 @@ clients/node_modules/.package-lock.json: clients/package-lock.json
 	npm --prefix clients ci
 	@touch $@
 
-lint-web: clients/node_modules/.package-lock.json
+lint-web: $(WEB)
 	npm --prefix clients run lint
 
 bench-web: $(VENV)/dev $(WEB)
