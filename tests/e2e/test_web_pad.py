@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import pytest
 
+from sketchmatch.examples import LIVING_ROOM_MAP
 from tests import processes
 from tests.pace import wait_until
 from tests.tools import require
@@ -307,6 +308,22 @@ def test_a_broken_sketch_is_refused_in_words_and_the_drawing_stays(pad, visit, t
         notice.get_by_role("button").click()
         notice.wait_for(state="detached")
     assert strokes(page) == 1
+
+
+def test_a_map_of_ones_own_is_shown_and_its_things_are_found_otherwise_by_a_slider(pad, visit):
+    page = visit(pad)
+    page.get_by_test_id("map-file").set_input_files(
+        [LIVING_ROOM_MAP, LIVING_ROOM_MAP.with_suffix(".pgm")]
+    )
+    page.locator(".map-pane .title", has_text=LIVING_ROOM_MAP.name).wait_for()
+    page.locator("image.grid").wait_for(state="attached")  # no browser shows a PGM by itself
+    before = page.locator(".floor .thing").count()
+    page.get_by_test_id("open-tuning").click()
+    slider = page.locator("#tuning input[name=min_size]")
+    slider.wait_for()
+    slider.fill("1.2")
+    things = page.locator(".floor .thing")
+    wait_until(lambda: 2 <= things.count() < before, "the slider changes nothing")
 
 
 def test_another_place_is_said_to_be_probably_another(pad, visit):

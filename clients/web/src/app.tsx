@@ -10,6 +10,7 @@ import { Icon, type IconName } from "./icons";
 import { MapPane } from "./map";
 import { isPlace, PLACES } from "./maps";
 import { SketchPane } from "./sketch";
+import { Tuning } from "./tuning";
 import {
   asking,
   bringMap,
@@ -80,6 +81,11 @@ export function App() {
           <div class="panel-head">
             <h2 id="map-title">{t.map}</h2>
             <span class="muted title">{titleOfMap()}</span>
+            {place.value?.found && (
+              <Menu id="tuning" icon="settings" label={t.tuning}>
+                <Tuning />
+              </Menu>
+            )}
           </div>
           <MapPane />
         </section>

@@ -29,6 +29,15 @@ export interface PlaceMap {
   readonly things: readonly Thing[];
   readonly underlay: Underlay | null;
   readonly warnings: readonly string[];
+  /** What its things were found in, and how; null where that is not kept. */
+  readonly found: Found | null;
+}
+
+/** How the things of a map were found, so that they can be looked for otherwise. */
+export interface Found {
+  readonly source: Source;
+  readonly segmenter: string;
+  readonly parameters: Readonly<Record<string, unknown>>;
 }
 
 /** The bundled places, as folders and as keys of their titles. */
@@ -54,10 +63,10 @@ export async function openPlace(client: SketchmatchClient, place: Place): Promis
     fetched(`${folder}/map.png`).then((answer) => answer.blob()),
   ]);
   const source = sources.mapServerMap(yaml, await bytesOf(pixels));
-  const { things, warnings } = await found(client, source);
+  const all = await found(client, source);
   // What the yaml does not name is a piece of a wall.
-  const named = things.filter(({ label }) => label);
-  return { things: named, warnings, place, title: "", underlay: gridOf(yaml, pixels) };
+  const things = all.things.filter(({ label }) => label);
+  return { ...all, things, found: null, place, title: "", underlay: gridOf(yaml, pixels) };
 }
 
 /** Return how a person drew a place of the gallery. */
@@ -132,9 +141,27 @@ async function found(
   client: SketchmatchClient,
   source: Source,
   name = "",
-): Promise<{ things: Thing[]; warnings: readonly string[] }> {
-  const { scene, warnings } = await naming(name, () => client.segment(source));
-  return { things: thingsOf(scene), warnings };
+  chosen: { name?: string; parameters?: Tuned } = {},
+): Promise<Pick<PlaceMap, "things" | "warnings" | "found">> {
+  const { scene, warnings, segmenter } = await naming(name, () =>
+    client.segment(source, { segmenter: chosen }),
+  );
+  const how = { segmenter: segmenter?.name ?? "", parameters: segmenter?.parameters ?? {} };
+  return { things: thingsOf(scene), warnings, found: { source, ...how } };
+}
+
+/** What of a segmenter's parameters a person sets. */
+export type Tuned = Record<string, number | boolean | string>;
+
+/** Look for the things of a map again, with other parameters. */
+export async function foundOtherwise(
+  client: SketchmatchClient,
+  map: PlaceMap,
+  parameters: Tuned,
+): Promise<PlaceMap> {
+  if (!map.found) return map;
+  const { source, segmenter } = map.found;
+  return { ...map, ...(await found(client, source, map.title, { name: segmenter, parameters })) };
 }
 
 /** Have errors name the file that a person knows, not the field that it travels in. */

@@ -10,6 +10,7 @@ import { ink, inkOf, packed, parseStrokes, unpacked } from "./files";
 import { isInside, type Xy } from "./geometry";
 import { keep, restored } from "./keep";
 import {
+  foundOtherwise,
   isPlace,
   openMap,
   openOutlines,
@@ -17,6 +18,7 @@ import {
   type Place,
   type PlaceMap,
   sampleSketch,
+  type Tuned,
 } from "./maps";
 import { type Answered, type Progress, Session } from "./session";
 import { texts } from "./texts";
@@ -268,6 +270,18 @@ export async function bringSketch(file: File): Promise<void> {
   });
 }
 
+/** Look for the things of the map again, with other parameters. */
+export async function findOtherwise(parameters: Tuned): Promise<void> {
+  const map = place.peek();
+  if (!map) return;
+  await telling(async () => {
+    const other = await foundOtherwise(client, map, parameters);
+    if (place.peek() !== map) return; // another one was chosen meanwhile
+    show(other);
+    change((now) => (now.pins.length ? { ...now, pins: [] } : now));
+  });
+}
+
 /** Take a thing off the map, as if the robot had not seen it. */
 export function leaveOut(index: number): void {
   const map = place.value;
@@ -310,7 +324,7 @@ export async function start(): Promise<void> {
   await mapped(map);
   effect(() => {
     const [now, here] = [drawing.value, place.value];
-    if (here) void keep({ drawing: now, map: here.place || here });
+    if (here) void keep({ drawing: now, map: here.place || { ...here, found: null } });
   });
 }
 
