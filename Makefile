@@ -18,7 +18,7 @@ says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 
 .PHONY: demo test test-slow test-all test-units test-interpreted mutation lint proto bench \
   bench-histograms bench-match bench-searchers bench-server bench-startup experiments fuzz look \
-  reference api serve clean web lint-web bench-web
+  reference api serve clean web pad lint-web bench-web
 
 demo: $(VENV)/runtime
 	@$(BIN)/sketchmatch demo
@@ -76,6 +76,9 @@ clients/node_modules/.package-lock.json: clients/package-lock.json
 	@command -v npm >/dev/null || { echo "the sketch pad is built by Node.js 20 or newer, which is missing"; exit 1; }
 	npm --prefix clients ci
 	@touch $@
+
+pad: $(VENV)/web $(WEB)
+	@$(BIN)/sketchmatch serve --web $(ARGS)
 
 lint-web: $(WEB)
 	npm --prefix clients run lint
@@ -147,6 +150,10 @@ $(VENV)/runtime: pyproject.toml clients/python/pyproject.toml constraints.txt
 
 $(VENV)/dev: $(VENV)/runtime
 	@$(BIN)/python $(PIP) --editable '.[dev]'
+	@touch $@
+
+$(VENV)/web: $(VENV)/runtime
+	@$(BIN)/python $(PIP) --editable '.[web]'
 	@touch $@
 
 # Without a wheel for this Python the benchmark leaves the peers out and says so.
