@@ -52,6 +52,7 @@ export function MapPane() {
       });
     return () => {
       wanted = false;
+      if (painted.peek()) URL.revokeObjectURL(painted.peek()?.url ?? "");
     };
   }, [map?.underlay, dark.value]);
   useEffect(() => {
