@@ -19,7 +19,7 @@ says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 .PHONY: demo test test-slow test-all test-units test-interpreted mutation lint proto bench \
   bench-histograms bench-match bench-searchers bench-server bench-sketches bench-startup experiments \
   fuzz look \
-  reference api serve clean
+  reference api serve clean web pad lint-web bench-web
 
 demo: $(VENV)/runtime
 	@$(BIN)/sketchmatch demo
@@ -57,10 +57,35 @@ lint: $(VENV)/dev .venv-proto/tools
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache > $(VENV)/lint-imports.log || { cat $(VENV)/lint-imports.log; exit 1; }
 	@if [ -x $(PROTO_BIN)/buf ]; then $(PROTO_BIN)/buf lint proto; fi
+	@if [ "$$CI" = true ] || command -v npm >/dev/null; then $(MAKE) --no-print-directory lint-web; fi
 
 proto: .venv-proto/tools
 	$(PROTO_BIN)/buf lint proto
 	$(PROTO_BIN)/python proto/generate.py
+
+# The sketch pad and the TypeScript client. Nothing else needs Node.js: without it the server has no
+# pad to show, and the tests of it are skipped.
+WEB := engine/sketchmatch/server/pad/index.html
+web: $(WEB)
+
+$(WEB): clients/node_modules/.package-lock.json $(shell find clients/typescript clients/web proto \
+  -name node_modules -prune -o -path '*/src/gen' -prune -o -path '*/dist' -prune -o -type f -print)
+	@command -v npm >/dev/null || { echo "the sketch pad is built by Node.js 20 or newer, which is missing"; exit 1; }
+	npm --prefix clients run build
+
+clients/node_modules/.package-lock.json: clients/package-lock.json
+	@command -v npm >/dev/null || { echo "the sketch pad is built by Node.js 20 or newer, which is missing"; exit 1; }
+	npm --prefix clients ci
+	@touch $@
+
+pad: $(VENV)/web $(WEB)
+	@$(BIN)/sketchmatch serve --web $(ARGS)
+
+lint-web: $(WEB)
+	npm --prefix clients run lint
+
+bench-web: $(VENV)/dev $(WEB)
+	@$(BIN)/python -m tests.benchmarks.web $(ARGS)
 
 # One picture of every map, floor and drawing as it is segmented by default: look at it.
 look: $(VENV)/dev
@@ -106,7 +131,8 @@ serve: $(VENV)/runtime
 	@$(BIN)/sketchmatch serve $(ARGS)
 
 clean:
-	rm -rf .venv .venv-newest .venv-proto
+	rm -rf .venv .venv-newest .venv-proto clients/node_modules engine/sketchmatch/server/pad \
+	  clients/typescript/dist clients/typescript/src/gen
 
 # Naming another Python than that of the environment makes the environment anew.
 version = $(shell $(1) -c 'import sys; print(sys.version)' 2>/dev/null)
@@ -128,6 +154,10 @@ $(VENV)/runtime: pyproject.toml clients/python/pyproject.toml constraints.txt
 
 $(VENV)/dev: $(VENV)/runtime
 	@$(BIN)/python $(PIP) --editable '.[dev]'
+	@touch $@
+
+$(VENV)/web: $(VENV)/runtime
+	@$(BIN)/python $(PIP) --editable '.[web]'
 	@touch $@
 
 # Without a wheel for this Python the benchmark leaves the peers out and says so.

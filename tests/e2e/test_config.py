@@ -100,7 +100,7 @@ def test_check_says_every_fault_in_a_line(command_line, mine):
         f"sketchmatch: {mine}: server.colour is no setting; server has: address, grace_seconds, "
         "max_request_mib, max_matches, workers, max_waiting, max_wait_seconds, "
         "max_time_budget_seconds, default_time_budget_seconds, tls_certificate, tls_key, "
-        "tls_client_ca, tokens, store, keep, metrics_address, insecure",
+        "tls_client_ca, tokens, store, keep, metrics_address, web_address, web_origins, insecure",
     ]
 
 

@@ -1,9 +1,11 @@
 """What operators deploy says the same as the program, and is what its readers take."""
 
+import http.client
 import importlib.util
 import re
 import shutil
 import socket
+import ssl
 import subprocess
 import sys
 import tomllib
@@ -261,6 +263,29 @@ def test_behind_envoy_calls_go_to_both_servers_and_to_the_one_that_is_left(tmp_p
         one.process.terminate()
         assert one.end() == 0
         wait_until(lambda: fits(client), "calls do not go to the server that is left")
+
+
+@pytest.mark.slow
+def test_behind_envoy_browsers_are_answered_in_grpc_web(tmp_path):
+    envoy()
+    with (
+        server("--workers", "0") as one,
+        proxied(tmp_path, [one.address, one.address]) as (address, authority),
+        Client(address, root_certificates=authority) as client,
+    ):
+        wait_until(lambda: fits(client), "the server is never healthy")
+        link = http.client.HTTPSConnection(
+            address, timeout=60, context=ssl.create_default_context(cafile=str(authority))
+        )
+        path = "/sketchmatch.v1.CatalogService/GetServerInfo"
+        head = {"Content-Type": "application/grpc-web+proto", "X-Grpc-Web": "1"}
+        link.request("POST", path, bytes(5), head)
+        answer = link.getresponse()
+        body = answer.read()
+        link.close()
+    assert (answer.status, answer.headers["Content-Type"]) == (200, "application/grpc-web+proto")
+    assert b"sketchmatch.v1" in body
+    assert b"grpc-status:0" in body.replace(b" ", b"")
 
 
 def fits(client):

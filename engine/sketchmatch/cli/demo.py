@@ -49,6 +49,7 @@ def demo(
     pictures.draw_match(answer, LIVING_ROOM_MAP, overlay, metres)
     display.show_match(answer, metres, verbose=False)
     say(f"the picture is in {overlay}")
+    say("draw a place yourself: sketchmatch serve --web (in a checkout, make pad)")
 
 
 @contextmanager

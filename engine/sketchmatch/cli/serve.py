@@ -18,6 +18,7 @@ __all__ = ["serve"]
 
 _MIB = 1024 * 1024
 _PATIENCE_SECONDS = 30.0
+_WEB_ADDRESS = "127.0.0.1:8080"
 
 
 def serve(
@@ -133,6 +134,20 @@ def serve(
             help="Tell metrics, as Prometheus reads them, and probes over HTTP here.",
         ),
     ] = None,
+    web: Annotated[
+        bool,
+        typer.Option(
+            "--web",
+            help="Show the sketch pad to browsers, at 127.0.0.1:8080 unless told otherwise.",
+        ),
+    ] = False,
+    web_address: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Show the sketch pad, and answer Connect, gRPC-Web and JSON, here.",
+        ),
+    ] = None,
     strict_plugins: Annotated[
         bool,
         typer.Option(
@@ -173,12 +188,15 @@ def serve(
         "server.store": store,
         "server.keep": False if no_store else None,
         "server.metrics_address": metrics_address,
+        "server.web_address": web_address,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
         "limits.max_side": max_side,
         "limits.max_vertices": max_vertices,
         "limits.max_objects": max_objects,
     }
+    if web and not load(config, flags).settings.server.web_address:
+        flags["server.web_address"] = _WEB_ADDRESS
     settings = _server_settings(load(config, flags))
     if settings.workers:
         prepare()
@@ -230,6 +248,8 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
         server.insecure,
         server.metrics_address,
         _store(server.store, server.keep),
+        server.web_address,
+        server.web_origins,
     )
 
 

@@ -205,6 +205,17 @@ class _Server(_Section):
         "HTTP; none, when left out.",
         examples=["127.0.0.1:9464"],
     )
+    web_address: Annotated[str | None, AfterValidator(_watched)] = Field(
+        None,
+        description="Host and port for browsers: the sketch pad, and the services over Connect, "
+        "gRPC-Web and JSON; none, when left out.",
+        examples=["127.0.0.1:8080"],
+    )
+    web_origins: _Names = Field(
+        (),
+        description="Origins of pages from elsewhere that may call at the address for browsers.",
+        examples=[["https://pad.example.org"]],
+    )
     insecure: bool = Field(
         False,
         description="Listen where other machines reach the server though strangers may call then, "

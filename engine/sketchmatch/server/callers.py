@@ -51,6 +51,13 @@ class CallerInterceptor(grpc.aio.ServerInterceptor):
                 return _refusing(error)
         return await continuation(handler_call_details)
 
+    def knows(self, details: grpc.HandlerCallDetails) -> bool:
+        """Whether a call shows a token that is known."""
+        try:
+            return bool(self._caller(details))
+        except NotAuthenticatedError:
+            return False
+
     def _caller(self, details: grpc.HandlerCallDetails) -> str:
         shown = [
             value if isinstance(value, str) else value.decode("latin-1")

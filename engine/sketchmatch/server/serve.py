@@ -6,10 +6,10 @@ import asyncio
 import signal
 import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import grpc
 from grpc_health.v1 import health, health_pb2_grpc
@@ -21,8 +21,10 @@ from sketchmatch.app.setup import Setup
 from sketchmatch.app.store import Store
 from sketchmatch.config.addresses import is_of_this_machine
 from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError, StoreError
+from sketchmatch.server.called import Handlers
 from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.calls import CallLogInterceptor
+from sketchmatch.server.gateway import Gateway
 from sketchmatch.server.interceptors import ErrorInterceptor, OpeningInterceptor
 from sketchmatch.server.metrics import Metric, Metrics, MetricsInterceptor
 from sketchmatch.server.monitor import Monitor
@@ -103,6 +105,10 @@ class ServerSettings:
         Host and port for metrics and probes over HTTP; None for none.
     store
         The folder for what is kept beyond the life of the server; None for keeping nothing.
+    web_address
+        Host and port for browsers; None for none.
+    web_origins
+        Of pages from elsewhere that may call there.
     """
 
     address: str = "127.0.0.1:50051"
@@ -114,6 +120,8 @@ class ServerSettings:
     insecure: bool = False
     metrics_address: str | None = None
     store: Path | None = None
+    web_address: str | None = None
+    web_origins: tuple[str, ...] = ()
 
 
 async def serve(
@@ -150,14 +158,15 @@ async def serve(
     store = _opened(settings.store, say)
     app = Application(load(), settings.workers, store)
     metrics = Metrics(_METHODS)
+    interceptors = [
+        MetricsInterceptor(metrics),
+        CallLogInterceptor(),
+        *files.interceptors,
+        OpeningInterceptor(),
+        ErrorInterceptor(),
+    ]
     server = grpc.aio.server(
-        interceptors=[
-            MetricsInterceptor(metrics),
-            CallLogInterceptor(),
-            *files.interceptors,
-            OpeningInterceptor(),
-            ErrorInterceptor(),
-        ],
+        interceptors=interceptors,
         options=[
             ("grpc.max_receive_message_length", app.setup.limits.transport_bytes),
             ("grpc.max_send_message_length", -1),
@@ -184,25 +193,24 @@ async def serve(
         ],
     )
     readiness = Readiness(_SERVICES)
-    _add_services(server, app, readiness, metrics)
+    services = _services(app, metrics)
+    _add_services(server, services, readiness)
     _watch(metrics, app, files, readiness)
     port = _listen(server, settings.address, files.credentials)
-    told_at = settings.metrics_address
-    monitor = Monitor(told_at, metrics, lambda: readiness.serving) if told_at else None
+    beside = _Beside(settings, app, files, Handlers(services, interceptors), metrics, readiness)
     await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
+    beside.start()
     unwatch = watch(settings.patience)
     stopping = stop or asyncio.Event()
     warming = _Warming(app, readiness, stopping)
     reloading = _Reloading(load, app, files, readiness, say, warming)
     _on_signals({"SIGTERM": stopping.set, "SIGINT": stopping.set, "SIGHUP": reloading.start})
     say(f"listening on {_found_at(settings.address, port)}")
-    if monitor:
-        say(f"metrics are at http://{monitor.address}/metrics")
     if lacking:
-        say(f"insecure: whoever reaches this address {lacking}")
-    for problem in app.setup.engine.registry.problems:
-        say(problem)
+        beside.sentences.append(f"insecure: whoever reaches this address {lacking}")
+    for sentence in (*beside.sentences, *app.setup.engine.registry.problems):
+        say(sentence)
     try:
         await _first(asyncio.ensure_future(warming.begin(say)), stopping)
         if not stopping.is_set():
@@ -215,14 +223,13 @@ async def serve(
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
         await readiness.drain()
-        ending = asyncio.ensure_future(server.stop(settings.grace))
+        ending = asyncio.gather(server.stop(settings.grace), beside.stop(settings.grace))
         await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
         await ending
         await app.close()
+        await beside.close()
         if store:
             store.close()
-        if monitor:
-            await asyncio.to_thread(monitor.close)
         unwatch()
     say("stopped")
 
@@ -242,7 +249,7 @@ class _Files:
     """What tells friends from strangers, kept in files."""
 
     def __init__(self, settings: ServerSettings, say: Callable[[str], None]) -> None:
-        self._pems = None if settings.tls is None else watched_pems(settings.tls, say)
+        self.pems = None if settings.tls is None else watched_pems(settings.tls, say)
         path = settings.tokens
         self._tokens = (
             None if path is None else Watched("the tokens", [path], lambda: read_tokens(path), say)
@@ -251,7 +258,7 @@ class _Files:
     @property
     def credentials(self) -> grpc.ServerCredentials | None:
         """What encrypts; None for nothing."""
-        return None if self._pems is None else server_credentials(self._pems)
+        return None if self.pems is None else server_credentials(self.pems)
 
     @property
     def interceptors(self) -> list[CallerInterceptor]:
@@ -260,14 +267,61 @@ class _Files:
 
     def expiry(self) -> dict[tuple[str, ...], float]:
         """Return when the certificate expires, as metrics have it."""
-        expires = None if self._pems is None else self._pems.value.expires
+        expires = None if self.pems is None else self.pems.value.expires
         return {} if expires is None else {(): expires.timestamp()}
 
     def look(self) -> None:
         """Read again now what has changed."""
-        for watched in (self._pems, self._tokens):
+        for watched in (self.pems, self._tokens):
             if watched is not None:
                 watched.look()
+
+
+class _Beside:
+    """What answers over HTTP beside the gRPC server: monitors, and browsers.
+
+    Attributes
+    ----------
+    sentences
+        What to say of it to the person who started the server.
+    """
+
+    def __init__(
+        self,
+        settings: ServerSettings,
+        app: Application,
+        files: _Files,
+        handlers: Handlers,
+        metrics: Metrics,
+        readiness: Readiness,
+    ) -> None:
+        self.sentences: list[str] = []
+        self._monitor: Monitor | None = None
+        self._gateway: Gateway | None = None
+        if settings.metrics_address:
+            self._monitor = Monitor(settings.metrics_address, metrics, lambda: readiness.serving)
+            self.sentences.append(f"metrics are at http://{self._monitor.address}/metrics")
+        if settings.web_address:
+            tls = (settings.tls, files.pems) if settings.tls and files.pems else None
+            self._gateway = Gateway(
+                settings.web_address, settings.web_origins, app, handlers, _SERVICES, tls
+            )
+            self.sentences += [f"the sketch pad is at {self._gateway.url}", *self._gateway.lacking]
+
+    def start(self) -> None:
+        """Answer from now on."""
+        if self._gateway:
+            self._gateway.start()
+
+    async def stop(self, grace: float) -> None:
+        """Answer browsers nothing new, and leave so many seconds to what is under way."""
+        if self._gateway:
+            await self._gateway.stop(grace)
+
+    async def close(self) -> None:
+        """Tell monitors nothing more."""
+        if self._monitor:
+            await asyncio.to_thread(self._monitor.close)
 
 
 class _Warming:
@@ -357,14 +411,34 @@ def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readine
     )
 
 
-def _add_services(
-    server: grpc.aio.Server, app: Application, readiness: Readiness, metrics: Metrics
-) -> None:
-    matching, scenes = MatchService(app, metrics.matched), SceneService(app)
+def _services(app: Application, metrics: Metrics) -> tuple[grpc.GenericRpcHandler, ...]:
+    """Return what answers the services of the contract, on whichever port."""
+    catalog = _Collected()
+    catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(
+        CatalogService(app), cast(grpc.aio.Server, catalog)
+    )
+    served = MatchService(app, metrics.matched), SceneService(app)
     others = TransferService(app), SketchService(app)
-    handlers = (each.handler() for each in (matching, scenes, *others))
-    server.add_generic_rpc_handlers(tuple(handlers))
-    catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), server)
+    return (*(each.handler() for each in (*served, *others)), *catalog.handlers)
+
+
+class _Collected:
+    """What generated code takes for a server, and hands its handlers to."""
+
+    def __init__(self) -> None:
+        self.handlers: list[grpc.GenericRpcHandler] = []
+
+    def add_generic_rpc_handlers(self, handlers: Iterable[grpc.GenericRpcHandler]) -> None:
+        self.handlers += handlers
+
+    def add_registered_method_handlers(self, service: str, handlers: Any) -> None:
+        """Do without: this is a second way to the same."""
+
+
+def _add_services(
+    server: grpc.aio.Server, services: tuple[grpc.GenericRpcHandler, ...], readiness: Readiness
+) -> None:
+    server.add_generic_rpc_handlers(services)
     health_pb2_grpc.add_HealthServicer_to_server(readiness.servicer, server)
     reflection.enable_server_reflection(
         (*_SERVICES, health.SERVICE_NAME, reflection.SERVICE_NAME), server
@@ -379,7 +453,13 @@ def _refuse_strangers(settings: ServerSettings) -> str:
     InvalidInputError
         If they could, and nobody said so.
     """
-    if is_of_this_machine(settings.address):
+    reached = {"address": settings.address, "server.web_address": settings.web_address}
+    open_to_all = [
+        (named, address)
+        for named, address in reached.items()
+        if address and not is_of_this_machine(address)
+    ]
+    if not open_to_all:
         return ""
     knows_callers = settings.tokens or (settings.tls and settings.tls.client_ca)
     faults = [
@@ -396,10 +476,11 @@ def _refuse_strangers(settings: ServerSettings) -> str:
             *([] if settings.tls else ["--tls-certificate and --tls-key"]),
             *([] if knows_callers else ["--tokens or --tls-client-ca"]),
         ]
+        named, address = open_to_all[0]
         raise InvalidInputError(
             Reason.INVALID_FIELD,
-            "address",
-            f"{settings.address!r} is reached from other machines, and whoever does {lacking}; "
+            named,
+            f"{address!r} is reached from other machines, and whoever does {lacking}; "
             f"give {', and '.join(remedies)}, listen on 127.0.0.1, or say --insecure if that is "
             "meant",
         )

@@ -224,7 +224,9 @@ class SketchmatchNode(LifecycleNode):
         self._filter.publish(conversions.filter_info(self._mask.topic_name, header))
 
     def _carried(self, last: _Matched, drawn: Features) -> Features:
-        return self._carry(self._client, last.sketch, last.map_, last.partners, drawn, self._said("radius"))
+        return self._carry(
+            self._client, last.sketch, last.map_, last.partners, drawn, self._said("radius")
+        )
 
     def _header(self, grid: OccupancyGrid) -> Header:
         return Header(stamp=self.get_clock().now().to_msg(), frame_id=grid.header.frame_id)

@@ -1,0 +1,145 @@
+import { create, type MessageInitShape } from "@bufbuild/protobuf";
+import { type Client, createClient, type Interceptor, type Transport } from "@connectrpc/connect";
+import { createConnectTransport } from "@connectrpc/connect-web";
+
+import { RequestFailed } from "./errors.js";
+import {
+  CatalogService,
+  type GetServerInfoResponse,
+  type ListAlgorithmsResponse,
+} from "./gen/sketchmatch/v1/catalog_service_pb.js";
+import type {
+  MatchAccepted,
+  MatchProgress,
+  MatchResult,
+  MatchScenes,
+} from "./gen/sketchmatch/v1/match_pb.js";
+import { MatchRequestSchema, MatchService } from "./gen/sketchmatch/v1/match_service_pb.js";
+import {
+  SceneService,
+  SegmentRequestSchema,
+  type SegmentResponse,
+} from "./gen/sketchmatch/v1/scene_service_pb.js";
+import type { Source } from "./gen/sketchmatch/v1/source_pb.js";
+
+/** How to get in at a server. */
+export interface Access {
+  /** Returns the token to show; an empty one is not shown. It is asked for at each call. */
+  readonly token?: () => string;
+}
+
+/** What else a request says; `MatchRequest` in the contract explains each. */
+export type MatchOptions = Omit<
+  Extract<MessageInitShape<typeof MatchRequestSchema>, { $typeName?: never }>,
+  "sketch" | "map"
+>;
+
+/** Called while a match runs, each as often as there is something new. */
+export interface MatchWatchers {
+  readonly accepted?: (accepted: MatchAccepted) => void;
+  readonly scenes?: (scenes: MatchScenes) => void;
+  readonly progress?: (progress: MatchProgress) => void;
+}
+
+/** What came of a match. Indices of the result point into the scenes. */
+export interface Answer {
+  readonly scenes: MatchScenes;
+  readonly result: MatchResult;
+}
+
+/** Asks a server at its address for browsers, as in `http://127.0.0.1:8080`. */
+export class SketchmatchClient {
+  readonly #matches: Client<typeof MatchService>;
+  readonly #scenes: Client<typeof SceneService>;
+  readonly #catalog: Client<typeof CatalogService>;
+  /** Calls any service of the contract, those too that have no method here. */
+  readonly transport: Transport;
+
+  constructor(address: string, access: Access = {}) {
+    this.transport = createConnectTransport({
+      baseUrl: address,
+      useBinaryFormat: true,
+      interceptors: [showing(access.token ?? (() => ""))],
+    });
+    this.#matches = createClient(MatchService, this.transport);
+    this.#scenes = createClient(SceneService, this.transport);
+    this.#catalog = createClient(CatalogService, this.transport);
+  }
+
+  /**
+   * Find out which sketched object is which mapped object.
+   *
+   * @throws RequestFailed, with `failure` `"cancelled"` if `signal` aborts it.
+   */
+  async match(
+    sketch: Source,
+    map: Source,
+    options: MatchOptions = {},
+    watchers: MatchWatchers = {},
+    signal?: AbortSignal,
+  ): Promise<Answer> {
+    let scenes: MatchScenes | undefined;
+    const request = create(MatchRequestSchema, { ...options, sketch, map });
+    return failing(async () => {
+      for await (const { event } of this.#matches.match(request, stopping(signal))) {
+        switch (event.case) {
+          case "accepted":
+            watchers.accepted?.(event.value);
+            break;
+          case "scenes":
+            scenes = event.value;
+            watchers.scenes?.(scenes);
+            break;
+          case "progress":
+            watchers.progress?.(event.value);
+            break;
+          case "result":
+            if (scenes) return { scenes, result: event.value };
+        }
+      }
+      throw new RequestFailed("the server broke off", "away", "", "", undefined);
+    });
+  }
+
+  /** Find the objects of one source. */
+  async segment(
+    source: Source,
+    options: {
+      segmenter?: { name?: string; parameters?: Record<string, number | string | boolean> };
+    } = {},
+    signal?: AbortSignal,
+  ): Promise<SegmentResponse> {
+    const request = create(SegmentRequestSchema, { ...options, source });
+    return failing(() => this.#scenes.segment(request, stopping(signal)));
+  }
+
+  /** Return what there is to choose from. */
+  async algorithms(signal?: AbortSignal): Promise<ListAlgorithmsResponse> {
+    return failing(() => this.#catalog.listAlgorithms({}, stopping(signal)));
+  }
+
+  /** Return the server's versions and limits. */
+  async info(signal?: AbortSignal): Promise<GetServerInfoResponse> {
+    return failing(() => this.#catalog.getServerInfo({}, stopping(signal)));
+  }
+}
+
+function showing(token: () => string): Interceptor {
+  return (next) => (request) => {
+    const shown = token();
+    if (shown) request.header.set("Authorization", `Bearer ${shown}`);
+    return next(request);
+  };
+}
+
+function stopping(signal: AbortSignal | undefined): { signal?: AbortSignal } {
+  return signal ? { signal } : {};
+}
+
+async function failing<T>(call: () => Promise<T>): Promise<T> {
+  try {
+    return await call();
+  } catch (thrown) {
+    throw RequestFailed.from(thrown);
+  }
+}

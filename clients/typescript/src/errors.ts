@@ -1,0 +1,77 @@
+import { Code, ConnectError } from "@connectrpc/connect";
+
+import {
+  BadRequestSchema,
+  ErrorInfoSchema,
+  RetryInfoSchema,
+} from "./gen/google/rpc/error_details_pb.js";
+
+/**
+ * What a program does about a failed call:
+ *
+ * - `invalid`: the request cannot be answered; correct it, `field` says where.
+ * - `busy`: send the same again after `retrySeconds`.
+ * - `away`: nobody answers there, or not now; try again later.
+ * - `unauthenticated`: the server wants a token, or another one.
+ * - `late`: the time was too short.
+ * - `cancelled`: the caller wanted no answer any more.
+ * - `failed`: the server or an algorithm is at fault.
+ */
+export type Failure =
+  | "invalid"
+  | "busy"
+  | "away"
+  | "unauthenticated"
+  | "late"
+  | "cancelled"
+  | "failed";
+
+const FAILURES: Partial<Record<Code, Failure>> = {
+  [Code.InvalidArgument]: "invalid",
+  [Code.ResourceExhausted]: "busy",
+  [Code.Unavailable]: "away",
+  [Code.Unauthenticated]: "unauthenticated",
+  [Code.DeadlineExceeded]: "late",
+  [Code.Canceled]: "cancelled",
+};
+
+/** A call that brought no answer. Its `message` is a sentence for people. */
+export class RequestFailed extends Error {
+  override readonly name = "RequestFailed";
+
+  constructor(
+    message: string,
+    /** What to do about it. */
+    readonly failure: Failure,
+    /** For programs, as in `INVALID_STROKE`; empty where the server gave none. */
+    readonly reason: string,
+    /** Path of the field at fault, as in `sketch.stroke_set.strokes[3]`; empty where there is none. */
+    readonly field: string,
+    /** After how many seconds the same request may succeed; undefined where nobody knows. */
+    readonly retrySeconds: number | undefined,
+  ) {
+    super(message);
+  }
+
+  /** Return what went wrong with a call, whatever was thrown. */
+  static from(thrown: unknown): RequestFailed {
+    if (thrown instanceof RequestFailed) return thrown;
+    const error = ConnectError.from(thrown);
+    const [info] = error.findDetails(ErrorInfoSchema);
+    const [request] = error.findDetails(BadRequestSchema);
+    const [retry] = error.findDetails(RetryInfoSchema);
+    const delay = retry?.retryDelay;
+    return new RequestFailed(
+      error.rawMessage,
+      isUnreachable(error) ? "away" : (FAILURES[error.code] ?? "failed"),
+      info?.reason ?? "",
+      request?.fieldViolations[0]?.field ?? "",
+      delay && Number(delay.seconds) + delay.nanos / 1e9,
+    );
+  }
+}
+
+/** Whether nobody answered: fetch throws a TypeError then, in browsers and in Node.js. */
+function isUnreachable(error: ConnectError): boolean {
+  return error.code === Code.Unknown && error.cause instanceof TypeError;
+}

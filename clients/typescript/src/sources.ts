@@ -1,0 +1,75 @@
+/** What a person or a robot hands in, as `Source` messages. */
+
+import { create } from "@bufbuild/protobuf";
+
+import { type Scene } from "./gen/sketchmatch/v1/scene_pb.js";
+import { type Source, SourceSchema, YAxis } from "./gen/sketchmatch/v1/source_pb.js";
+
+/** Which way y grows: `"down"` on screens. Read with the wrong one, a sketch is its mirror image. */
+export type Axis = "up" | "down";
+
+/** A stroke from pen down to pen up: `[x, y]` or `[x, y, seconds]`, and perhaps a name. */
+export interface PenStroke {
+  readonly points: readonly (readonly number[])[];
+  readonly label?: string | undefined;
+}
+
+/** A polygon: the outer ring, then holes, and perhaps a name. */
+export interface NamedPolygon {
+  readonly rings: readonly (readonly (readonly [number, number])[])[];
+  readonly label?: string | undefined;
+}
+
+/** Return strokes of a pen. Screens' y grows down, as it does here unless told otherwise. */
+export function strokes(drawn: readonly PenStroke[], y: Axis = "down"): Source {
+  const value = {
+    yAxis: axis(y),
+    strokes: drawn.map(({ points, label }) => ({
+      label: label ?? "",
+      points: points.map(([x, y, seconds]) => ({
+        x: x ?? NaN,
+        y: y ?? NaN,
+        ...(seconds === undefined ? {} : { timeSeconds: seconds }),
+      })),
+    })),
+  };
+  return create(SourceSchema, { kind: { case: "strokeSet", value } });
+}
+
+/** Return polygons that are objects already; a robot's y grows up. */
+export function polygons(drawn: readonly NamedPolygon[], y: Axis = "up"): Source {
+  const value = {
+    yAxis: axis(y),
+    polygons: drawn.map(({ rings, label }) => ({
+      label: label ?? "",
+      rings: rings.map((ring) => ({ points: ring.map(([x, y]) => ({ x, y })) })),
+    })),
+  };
+  return create(SourceSchema, { kind: { case: "polygonSet", value } });
+}
+
+/** Return the objects of a scene as they are. */
+export function scene(found: Scene): Source {
+  const polygons = found.objects.map(({ rings, label }) => ({ rings, label }));
+  const value = { polygons, yAxis: YAxis.UP };
+  return create(SourceSchema, { kind: { case: "polygonSet", value } });
+}
+
+/** Return a map as ROS map_server saves it: the text of the yaml, the bytes of its picture. */
+export function mapServerMap(yaml: string, image: Uint8Array): Source {
+  return create(SourceSchema, { kind: { case: "mapServerMap", value: { yaml, image } } });
+}
+
+/** Return a picture: PNG, JPEG, BMP or PGM. */
+export function image(data: Uint8Array): Source {
+  return create(SourceSchema, { kind: { case: "image", value: { data } } });
+}
+
+/** Return a file of another tool; its ending says which. */
+export function file(name: string, data: Uint8Array, part = ""): Source {
+  return create(SourceSchema, { kind: { case: "file", value: { name, data, part } } });
+}
+
+function axis(y: Axis): YAxis {
+  return y === "up" ? YAxis.UP : YAxis.DOWN;
+}

@@ -1,0 +1,497 @@
+/** The page. */
+
+import { useEffect, useRef } from "preact/hooks";
+
+import { AnswerPanel, currentName } from "./answer";
+import { canRedo, canUndo, drawing, nameStrokes, redo, undo } from "./document";
+import { download, drawingSvg, inkOutline, pathOf, strokesJson } from "./files";
+import { boxOf } from "./geometry";
+import { Icon, type IconName } from "./icons";
+import { MapPane } from "./map";
+import { isPlace, PLACES } from "./maps";
+import { SketchPane } from "./sketch";
+import { Tuning } from "./tuning";
+import {
+  asking,
+  bringMap,
+  bringSketch,
+  carried,
+  choose,
+  choosePlace,
+  fingerDraws,
+  link,
+  naming,
+  newSheet,
+  notice,
+  place,
+  refit,
+  showToken,
+  theme,
+  type Theme,
+  type Tool,
+  tool,
+  trouble,
+} from "./state";
+import { type Language, language, LANGUAGES, speak, texts } from "./texts";
+
+const TOOLS: readonly (readonly [Tool, string])[] = [
+  ["pen", "P"],
+  ["route", "R"],
+  ["eraser", "E"],
+  ["move", "V"],
+  ["name", "N"],
+];
+
+export function App() {
+  const t = texts.value;
+  useEffect(() => {
+    document.documentElement.lang = language.value;
+  }, [language.value]);
+  useEffect(() => {
+    window.addEventListener("keydown", pressed);
+    return () => window.removeEventListener("keydown", pressed);
+  }, []);
+  return (
+    <>
+      <a class="skip" href="#answer">
+        {t.skip}
+      </a>
+      <header class="top">
+        <h1>
+          <img src="icon.svg" alt="" width="26" height="26" />
+          sketchmatch
+        </h1>
+        <p class="tagline">{t.tagline}</p>
+        <div class="menus">
+          <PlaceMenu />
+          <FileMenu />
+          <SettingsMenu />
+        </div>
+      </header>
+      <main class="board">
+        <section class="pane sketch-pane" aria-labelledby="sketch-title">
+          <div class="panel-head">
+            <h2 id="sketch-title">{t.sketch}</h2>
+            <History />
+          </div>
+          <SketchPane />
+          <Toolbar />
+        </section>
+        <section class="pane map-pane" aria-labelledby="map-title">
+          <div class="panel-head">
+            <h2 id="map-title">{t.map}</h2>
+            <span class="muted title">{titleOfMap()}</span>
+            {place.value?.found && (
+              <Menu id="tuning" icon="settings" label={t.tuning}>
+                <Tuning />
+              </Menu>
+            )}
+          </div>
+          <MapPane />
+        </section>
+        <AnswerPanel />
+      </main>
+      <Notice />
+      <NameDialog />
+      <TokenDialog />
+    </>
+  );
+}
+
+function titleOfMap(): string {
+  const map = place.value;
+  if (!map) return "";
+  return isPlace(map.place) ? texts.value.place[map.place] : map.title;
+}
+
+function pressed(event: KeyboardEvent): void {
+  if ((event.target as Element).closest("input,select,textarea,dialog")) return;
+  const key = event.key.toLowerCase();
+  if (event.ctrlKey || event.metaKey) {
+    if (key === "z") (event.shiftKey ? redo : undo)();
+    else if (key === "y") redo();
+    else return;
+    event.preventDefault();
+    return;
+  }
+  if (key === "escape") asking.value = null;
+  const chosen = TOOLS.find(([, letter]) => letter.toLowerCase() === key);
+  if (chosen && !event.altKey) tool.value = chosen[0];
+}
+
+function Toolbar() {
+  const t = texts.value;
+  return (
+    <div class="toolbar" role="toolbar" aria-label={t.tools}>
+      {TOOLS.map(([name, letter]) => (
+        <button
+          type="button"
+          key={name}
+          class="tool"
+          aria-pressed={tool.value === name}
+          title={`${t[name]} (${letter})`}
+          aria-label={t[name]}
+          data-testid={`tool-${name}`}
+          onClick={() => (tool.value = name)}
+        >
+          <Icon name={name} />
+          <span class="tool-name">{t[name]}</span>
+        </button>
+      ))}
+      <span class="gap" />
+      <button
+        type="button"
+        class="tool touch-only"
+        aria-pressed={fingerDraws.value}
+        title={t.fingerDrawsHint}
+        aria-label={t.fingerDraws}
+        data-testid="finger-draws"
+        onClick={() => (fingerDraws.value = !fingerDraws.value)}
+      >
+        <Icon name="finger" />
+      </button>
+    </div>
+  );
+}
+
+function History() {
+  const t = texts.value;
+  const action = (icon: IconName, name: string, act: () => void, can = true) => (
+    <button
+      type="button"
+      class="tool small"
+      title={name}
+      aria-label={name}
+      disabled={!can}
+      onClick={act}
+      data-testid={icon}
+    >
+      <Icon name={icon} />
+    </button>
+  );
+  return (
+    <div class="history">
+      {action("undo", t.undo, undo, canUndo.value)}
+      {action("redo", t.redo, redo, canRedo.value)}
+      {action("clear", t.clear, newSheet, drawing.value.strokes.length > 0)}
+      {action("fit", t.fit, () => refit.value++)}
+    </div>
+  );
+}
+
+function Menu(props: {
+  id: string;
+  icon: IconName;
+  label: string;
+  children: preact.ComponentChildren;
+}) {
+  return (
+    <div class="menu">
+      <button
+        type="button"
+        class="quiet"
+        popovertarget={props.id}
+        data-testid={`open-${props.id}`}
+        aria-label={props.label}
+      >
+        <Icon name={props.icon} />
+        <span class="menu-name">{props.label}</span>
+      </button>
+      <div id={props.id} popover="auto" class="sheet">
+        {props.children}
+      </div>
+    </div>
+  );
+}
+
+function shut(id: string): void {
+  document.getElementById(id)?.hidePopover();
+}
+
+function PlaceMenu() {
+  const t = texts.value;
+  return (
+    <Menu id="places" icon="map" label={t.chooseMap}>
+      <h2>{t.places}</h2>
+      <ul class="gallery">
+        {PLACES.map((name) => (
+          <li key={name}>
+            <button
+              type="button"
+              data-testid={`place-${name}`}
+              aria-pressed={place.value?.place === name}
+              onClick={() => {
+                shut("places");
+                void choosePlace(name);
+              }}
+            >
+              <img src={`places/${name}/map.png`} alt="" loading="lazy" />
+              <span>{t.place[name]}</span>
+            </button>
+          </li>
+        ))}
+      </ul>
+      <FileButton
+        label={t.ownMap}
+        hint={t.ownMapHint}
+        testId="map-file"
+        multiple
+        chosen={(files) => {
+          shut("places");
+          void bringMap(files);
+        }}
+      />
+    </Menu>
+  );
+}
+
+function FileButton(props: {
+  label: string;
+  hint: string;
+  testId: string;
+  multiple?: boolean;
+  chosen: (files: File[]) => void;
+}) {
+  const input = useRef<HTMLInputElement>(null);
+  return (
+    <>
+      <button type="button" class="item" onClick={() => input.current?.click()}>
+        <span>{props.label}</span>
+        <span class="muted">{props.hint}</span>
+      </button>
+      <input
+        ref={input}
+        type="file"
+        hidden
+        multiple={props.multiple ?? false}
+        data-testid={props.testId}
+        onChange={({ currentTarget }) => {
+          const files = [...(currentTarget.files ?? [])];
+          currentTarget.value = "";
+          if (files.length) props.chosen(files);
+        }}
+      />
+    </>
+  );
+}
+
+function FileMenu() {
+  const t = texts.value;
+  const drawn = drawing.value.strokes.length > 0;
+  const item = (name: string, act: () => void, can: boolean, testId: string) => (
+    <button
+      type="button"
+      class="item"
+      disabled={!can}
+      data-testid={testId}
+      onClick={() => {
+        shut("file");
+        act();
+      }}
+    >
+      {name}
+    </button>
+  );
+  const save = (name: string, kind: string, text: string) =>
+    download(name, new Blob([text], { type: kind }));
+  return (
+    <Menu id="file" icon="file" label={t.file}>
+      <FileButton
+        label={t.openSketch}
+        hint={t.openSketchHint}
+        testId="sketch-file"
+        chosen={([file]) => {
+          shut("file");
+          if (file) void bringSketch(file);
+        }}
+      />
+      <hr />
+      {item(
+        t.saveStrokes,
+        () => save("sketch.json", "application/json", strokesJson(drawing.peek())),
+        drawn,
+        "save-strokes",
+      )}
+      {item(
+        t.saveSvg,
+        () => save("sketch.svg", "image/svg+xml", drawingSvg(drawing.peek())),
+        drawn,
+        "save-svg",
+      )}
+      {item(t.savePng, () => void savePng(), drawn, "save-png")}
+      {item(
+        t.saveRoute,
+        () => save("route.geojson", "application/geo+json", routeGeoJson()),
+        carried.value !== null,
+        "save-route",
+      )}
+      <hr />
+      {item(t.copyLink, () => void copyLink(), drawn && Boolean(place.value?.place), "copy-link")}
+    </Menu>
+  );
+}
+
+function routeGeoJson(): string {
+  const coordinates = (carried.peek() ?? []).map(([x, y]) => [
+    Number(x.toFixed(3)),
+    Number(y.toFixed(3)),
+  ]);
+  const feature = {
+    type: "Feature",
+    properties: { name: "route" },
+    geometry: { type: "LineString", coordinates },
+  };
+  return `${JSON.stringify({ type: "FeatureCollection", features: [feature] })}\n`;
+}
+
+async function savePng(): Promise<void> {
+  const { strokes } = drawing.peek();
+  const { x0, y0, x1, y1 } = boxOf(strokes.flatMap(({ points }) => points));
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [2 * (x1 - x0 + 60), 2 * (y1 - y0 + 60)];
+  const context = canvas.getContext("2d");
+  if (!context) return;
+  context.fillStyle = "#fffdf8";
+  context.fillRect(0, 0, canvas.width, canvas.height);
+  context.setTransform(2, 0, 0, 2, 2 * (30 - x0), 2 * (30 - y0));
+  context.fillStyle = "#22303c";
+  for (const stroke of strokes) context.fill(new Path2D(pathOf(inkOutline(stroke, true))));
+  const blob = await new Promise<Blob | null>((done) => canvas.toBlob(done));
+  if (blob) download("sketch.png", blob);
+}
+
+async function copyLink(): Promise<void> {
+  const address = await link();
+  try {
+    await navigator.clipboard.writeText(address);
+    notice.value = texts.peek().linkCopied;
+  } catch {
+    notice.value = address; // a page that is not trusted may not copy
+  }
+}
+
+function SettingsMenu() {
+  const t = texts.value;
+  return (
+    <Menu id="settings" icon="settings" label={t.settings}>
+      <fieldset>
+        <legend>{t.languages}</legend>
+        {(Object.keys(LANGUAGES) as Language[]).map((name) => (
+          <label key={name} lang={name}>
+            <input
+              type="radio"
+              name="language"
+              checked={language.value === name}
+              onChange={() => speak(name)}
+            />
+            {LANGUAGES[name].language}
+          </label>
+        ))}
+      </fieldset>
+      <fieldset>
+        <legend>{t.theme}</legend>
+        {(Object.keys(t.themes) as Theme[]).map((name) => (
+          <label key={name}>
+            <input
+              type="radio"
+              name="theme"
+              checked={theme.value === name}
+              onChange={() => choose(name)}
+            />
+            {t.themes[name]}
+          </label>
+        ))}
+      </fieldset>
+    </Menu>
+  );
+}
+
+function Notice() {
+  if (!notice.value) return null;
+  return (
+    <div class="notice" role="alert" data-testid="notice">
+      <p>{notice.value}</p>
+      <button
+        type="button"
+        class="tool small"
+        aria-label={texts.value.close}
+        onClick={() => (notice.value = "")}
+      >
+        <Icon name="close" />
+      </button>
+    </div>
+  );
+}
+
+function NameDialog() {
+  const t = texts.value;
+  const dialog = useRef<HTMLDialogElement>(null);
+  const ids = naming.value;
+  useEffect(() => {
+    if (ids) dialog.current?.showModal();
+    else dialog.current?.close();
+  }, [ids]);
+  const names = new Set((place.value?.things ?? []).map(({ label }) => label).filter(Boolean));
+  return (
+    <dialog ref={dialog} onClose={() => (naming.value = null)} aria-labelledby="name-title">
+      {ids && (
+        <form
+          method="dialog"
+          onSubmit={({ currentTarget }) => {
+            const name = new FormData(currentTarget).get("name");
+            nameStrokes(new Set(ids), typeof name === "string" ? name.trim() : "");
+          }}
+        >
+          <h2 id="name-title">{t.nameIt}</h2>
+          <input
+            name="name"
+            list="names"
+            aria-labelledby="name-title"
+            defaultValue={currentName()}
+            autocomplete="off"
+            maxLength={80}
+          />
+          <datalist id="names">
+            {[...names].map((name) => (
+              <option key={name} value={name} />
+            ))}
+          </datalist>
+          <p class="muted">{t.nameHint}</p>
+          <button type="submit" class="primary">
+            {t.save}
+          </button>
+        </form>
+      )}
+    </dialog>
+  );
+}
+
+function TokenDialog() {
+  const t = texts.value;
+  const dialog = useRef<HTMLDialogElement>(null);
+  const wanted = trouble.value?.failure === "unauthenticated";
+  useEffect(() => {
+    if (wanted) dialog.current?.showModal();
+    else dialog.current?.close();
+  }, [wanted]);
+  return (
+    <dialog ref={dialog} aria-labelledby="token-title">
+      {wanted && (
+        <form
+          method="dialog"
+          onSubmit={({ currentTarget }) => {
+            const token = new FormData(currentTarget).get("token");
+            if (typeof token === "string") showToken(token);
+          }}
+        >
+          <h2 id="token-title">{t.token}</h2>
+          <input name="token" type="password" aria-labelledby="token-title" autocomplete="off" />
+          <p class="muted">{t.tokenHint}</p>
+          <button type="submit" class="primary">
+            {t.connect}
+          </button>
+        </form>
+      )}
+    </dialog>
+  );
+}

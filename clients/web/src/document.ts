@@ -1,0 +1,119 @@
+/** What a person drew and said, with every step of it kept for undoing. */
+
+import { computed, signal } from "@preact/signals";
+
+/** x and y in units of the paper, y down; seconds; pressure from 0 to 1. */
+export type InkPoint = readonly [number, number, number, number];
+
+export interface Stroke {
+  readonly id: string;
+  readonly points: readonly InkPoint[];
+  readonly label: string;
+  /** The way that the robot shall take, which is no thing. */
+  readonly route: boolean;
+  /** Whether a pen drew it, whose pressure was felt. */
+  readonly pressed: boolean;
+}
+
+/** The person said: what these strokes show is that thing of the map; null: it is on no map. */
+export interface Pin {
+  readonly strokes: readonly string[];
+  readonly thing: string | null;
+}
+
+export interface Drawing {
+  readonly strokes: readonly Stroke[];
+  readonly pins: readonly Pin[];
+}
+
+export const EMPTY: Drawing = { strokes: [], pins: [] };
+
+const current = signal<Drawing>(EMPTY);
+const past = signal<readonly Drawing[]>([]);
+const future = signal<readonly Drawing[]>([]);
+
+/** What there is now. */
+export const drawing = computed(() => current.value);
+export const canUndo = computed(() => past.value.length > 0);
+export const canRedo = computed(() => future.value.length > 0);
+
+/** Change the drawing by a step that can be undone. */
+export function change(next: (now: Drawing) => Drawing): void {
+  const now = current.peek();
+  const changed = next(now);
+  if (changed === now) return;
+  past.value = [...past.peek(), now];
+  future.value = [];
+  current.value = changed;
+}
+
+/** Show another drawing, with no way back to the one before. */
+export function replace(other: Drawing): void {
+  past.value = [];
+  future.value = [];
+  current.value = other;
+}
+
+export function undo(): void {
+  const before = past.peek().at(-1);
+  if (!before) return;
+  future.value = [current.peek(), ...future.peek()];
+  past.value = past.peek().slice(0, -1);
+  current.value = before;
+}
+
+export function redo(): void {
+  const [after, ...later] = future.peek();
+  if (!after) return;
+  past.value = [...past.peek(), current.peek()];
+  future.value = later;
+  current.value = after;
+}
+
+export function newId(): string {
+  return Math.random().toString(36).slice(2, 10);
+}
+
+/** Add a stroke; there is one route at most. */
+export function addStroke(stroke: Stroke): void {
+  change((now) => ({
+    ...now,
+    strokes: [...now.strokes.filter((other) => !(stroke.route && other.route)), stroke],
+  }));
+}
+
+export function eraseStrokes(ids: ReadonlySet<string>): void {
+  change((now) => ({
+    strokes: now.strokes.filter(({ id }) => !ids.has(id)),
+    pins: now.pins.filter(({ strokes }) => !strokes.every((id) => ids.has(id))),
+  }));
+}
+
+export function moveStrokes(ids: ReadonlySet<string>, dx: number, dy: number): void {
+  const moved = (stroke: Stroke): Stroke => ({
+    ...stroke,
+    points: stroke.points.map(([x, y, t, p]) => [x + dx, y + dy, t, p] as const),
+  });
+  change((now) => ({
+    ...now,
+    strokes: now.strokes.map((stroke) => (ids.has(stroke.id) ? moved(stroke) : stroke)),
+  }));
+}
+
+/** Name what some strokes show; one name for all of them. */
+export function nameStrokes(ids: ReadonlySet<string>, label: string): void {
+  change((now) => ({
+    ...now,
+    strokes: now.strokes.map((stroke) => (ids.has(stroke.id) ? { ...stroke, label } : stroke)),
+  }));
+}
+
+/** Say what some strokes show; undefined takes back what was said of them. */
+export function pinStrokes(strokes: readonly string[], thing: string | null | undefined): void {
+  change((now) => {
+    const others = now.pins.filter(
+      (pin) => !pin.strokes.some((id) => strokes.includes(id)) && !(thing && pin.thing === thing), // no two sketched things are the same one
+    );
+    return { ...now, pins: thing === undefined ? others : [...others, { strokes, thing }] };
+  });
+}

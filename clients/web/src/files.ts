@@ -1,0 +1,205 @@
+/** Drawings as files and links. */
+
+import { RequestFailed } from "@sketchmatch/client";
+import { getStroke } from "perfect-freehand";
+
+import { type Drawing, type InkPoint, newId, type Pin, type Stroke } from "./document";
+import { boxOf, type Xy } from "./geometry";
+
+const ROUTE_NAMES = new Set(["route", "path"]);
+
+/** Return strokes as our JSON has them. */
+export function strokesJson({ strokes }: Drawing): string {
+  const saved = strokes.map(({ points, label, route }) => ({
+    ...(route ? { label: "route" } : label ? { label } : {}),
+    points: points.map(([x, y, t]) => [round(x), round(y), round(t, 3)]),
+  }));
+  return `${JSON.stringify({ y_axis: "down", strokes: saved })}\n`;
+}
+
+/**
+ * Read strokes as our JSON has them; null if it is other JSON.
+ *
+ * @throws RequestFailed if the strokes are of no use.
+ */
+export function parseStrokes(text: string): Stroke[] | null {
+  let document: unknown;
+  try {
+    document = JSON.parse(text);
+  } catch (error) {
+    throw broken((error as Error).message);
+  }
+  if (typeof document !== "object" || document === null || !("strokes" in document)) return null;
+  const down = "y_axis" in document && document.y_axis === "down" ? 1 : -1;
+  if (!Array.isArray(document.strokes)) throw broken("strokes is no list");
+  return document.strokes.map((stroke: unknown, k): Stroke => {
+    const { points, label } = (stroke ?? {}) as { points?: unknown; label?: unknown };
+    if (!Array.isArray(points)) throw broken(`strokes[${k}].points is no list`);
+    const name = typeof label === "string" ? label : "";
+    return {
+      ...ink(
+        points.map((point: unknown, i): InkPoint => {
+          const [x, y, t = 0] = Array.isArray(point) ? (point as unknown[]) : [];
+          if (!Number.isFinite(x) || !Number.isFinite(y)) {
+            throw broken(`strokes[${k}].points[${i}] is no [x, y]`);
+          }
+          return [x as number, down * (y as number), typeof t === "number" ? t : 0, 0.5];
+        }),
+      ),
+      label: ROUTE_NAMES.has(name.toLowerCase()) ? "" : name,
+      route: ROUTE_NAMES.has(name.toLowerCase()),
+    };
+  });
+}
+
+/** Return a stroke of these points. */
+export function ink(points: readonly InkPoint[], pressed = false): Stroke {
+  return { id: newId(), points, label: "", route: false, pressed };
+}
+
+/** Return what outlines look like when somebody draws them, about as large as a sheet. */
+export function inkOf(outlines: readonly { points: Xy[]; label: string }[], route: Xy[]): Stroke[] {
+  const all = [...outlines.flatMap(({ points }) => points), ...route];
+  const { x0, y0, x1, y1 } = boxOf(all);
+  const factor = 700 / Math.max(x1 - x0, y1 - y0, 1e-9);
+  const placed = (points: Xy[]) =>
+    ink(points.map(([x, y]) => [factor * (x - x0), factor * (y - y0), 0, 0.5] as const));
+  return [
+    ...outlines.map(({ points, label }) => ({ ...placed(points), label })),
+    ...(route.length ? [{ ...placed(route), route: true }] : []),
+  ];
+}
+
+/** Return the outline of a stroke's ink. */
+export function inkOutline(
+  stroke: Pick<Stroke, "points" | "pressed" | "route">,
+  last: boolean,
+): Xy[] {
+  return getStroke(
+    stroke.points.map(([x, y, , pressure]) => [x, y, pressure]),
+    {
+      size: stroke.route ? 3.5 : 5,
+      thinning: stroke.route ? 0 : 0.45,
+      smoothing: 0.5,
+      streamline: 0.3,
+      simulatePressure: !stroke.pressed,
+      last,
+    },
+  ).map(([x = 0, y = 0]) => [x, y] as const);
+}
+
+/** Return a closed path through the middles of an outline, as SVG and canvas read it. */
+export function pathOf(outline: readonly Xy[]): string {
+  const [first] = outline;
+  if (!first || outline.length < 3) return "";
+  const parts = outline.map(([x, y], k) => {
+    const [nx, ny] = outline[(k + 1) % outline.length] ?? [x, y];
+    return `${round(x)},${round(y)} ${round((x + nx) / 2)},${round((y + ny) / 2)}`;
+  });
+  return `M${round(first[0])},${round(first[1])}Q${parts.join(" ")}Z`;
+}
+
+/** Return the drawing as SVG that our server reads, each stroke a line with its name. */
+export function drawingSvg({ strokes }: Drawing): string {
+  const { x0, y0, x1, y1 } = boxOf(strokes.flatMap(({ points }) => points));
+  const box = [x0 - 20, y0 - 20, x1 - x0 + 40, y1 - y0 + 40].map((n) => round(n)).join(" ");
+  const lines = strokes.map(({ points, label, route }) => {
+    const name = route ? "route" : label;
+    const title = name ? `<title>${escaped(name)}</title>` : "";
+    const line = points.map(([x, y]) => `${round(x)},${round(y)}`).join(" ");
+    return `  <polyline points="${line}">${title}</polyline>`;
+  });
+  return [
+    `<svg xmlns="http://www.w3.org/2000/svg" viewBox="${box}">`,
+    `<g fill="none" stroke="#22303c" stroke-width="4" stroke-linecap="round" stroke-linejoin="round">`,
+    ...lines,
+    "</g>",
+    "</svg>\n",
+  ].join("\n");
+}
+
+/** What a link says. */
+export interface Shared {
+  readonly place: string;
+  readonly drawing: Drawing;
+}
+
+interface Packed {
+  p: string;
+  s: { d: number[]; l?: string; r?: 1; i: string }[];
+  n: Pin[];
+}
+
+/** Return a drawing packed for a link: differences of whole points, deflated. */
+export async function packed({ place, drawing }: Shared): Promise<string> {
+  const s = drawing.strokes.map(({ points, label, route, id }) => {
+    let [px, py] = [0, 0];
+    const d = points.flatMap(([x, y]) => {
+      const [dx, dy] = [Math.round(x) - px, Math.round(y) - py];
+      [px, py] = [px + dx, py + dy];
+      return [dx, dy];
+    });
+    return { d, i: id, ...(label ? { l: label } : {}), ...(route ? { r: 1 as const } : {}) };
+  });
+  const text = JSON.stringify({ p: place, s, n: [...drawing.pins] } satisfies Packed);
+  const data = await through(new Blob([text]), new CompressionStream("deflate-raw"));
+  return btoa(String.fromCharCode(...data))
+    .replace(/\+/g, "-")
+    .replace(/\//g, "_")
+    .replace(/=+$/, "");
+}
+
+/** Return what a link says; null if it says nothing that is understood. */
+export async function unpacked(text: string): Promise<Shared | null> {
+  try {
+    const data = Uint8Array.from(atob(text.replace(/-/g, "+").replace(/_/g, "/")), (c) =>
+      c.charCodeAt(0),
+    );
+    const plain = await through(new Blob([data]), new DecompressionStream("deflate-raw"));
+    const { p, s, n } = JSON.parse(new TextDecoder().decode(plain)) as Packed;
+    const strokes = s.map(({ d, l, r, i }): Stroke => {
+      let [x, y] = [0, 0];
+      const points: InkPoint[] = [];
+      for (let k = 0; k + 1 < d.length; k += 2) {
+        [x, y] = [x + Number(d[k]), y + Number(d[k + 1])];
+        points.push([x, y, k / 120, 0.5]);
+      }
+      return { ...ink(points), id: i, label: l ?? "", route: r === 1 };
+    });
+    return { place: p, drawing: { strokes, pins: n } };
+  } catch {
+    return null;
+  }
+}
+
+async function through(blob: Blob, stream: CompressionStream): Promise<Uint8Array> {
+  const answer = new Response(blob.stream().pipeThrough(stream));
+  return new Uint8Array(await answer.arrayBuffer());
+}
+
+/** Have the browser save a file. */
+export function download(name: string, data: Blob): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(data);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+function broken(why: string): RequestFailed {
+  return new RequestFailed(
+    `The file holds no strokes that can be read: ${why}.`,
+    "invalid",
+    "",
+    "",
+    undefined,
+  );
+}
+
+function round(value: number, digits = 1): number {
+  return Number(value.toFixed(digits));
+}
+
+function escaped(text: string): string {
+  return text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/"/g, "&quot;");
+}

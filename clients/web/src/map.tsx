@@ -1,0 +1,248 @@
+/** The robot's side: its map, the things on it, and the route as it would drive. */
+
+import { signal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+
+import { colourOf } from "./colours";
+import { badgePlace, boxOf, distance, toScreen, type View, type Xy, zoomed } from "./geometry";
+import { boxOfMap, type Underlay } from "./maps";
+import { useSize, useView } from "./pane";
+import { Badge } from "./sketch";
+import {
+  answered,
+  asking,
+  bringMap,
+  carried,
+  dark,
+  isLit,
+  lit,
+  mapName,
+  pairOf,
+  pin,
+  place,
+  question,
+  sketchName,
+} from "./state";
+import { texts } from "./texts";
+
+const over = signal(false);
+
+/** A picture as it is shown, painted anew for light and dark. */
+interface Painted {
+  readonly url: string;
+  readonly width: number;
+  readonly height: number;
+}
+
+const painted = signal<Painted | null>(null);
+
+export function MapPane() {
+  const { element, size } = useSize<HTMLDivElement>();
+  const map = place.value;
+  const view = useView(size, () => flippedBox(), 44);
+  const t = texts.value;
+
+  useEffect(() => {
+    let wanted = true;
+    const underlay = map?.underlay;
+    if (!underlay) painted.value = null;
+    else
+      void paint(underlay, dark.value).then((picture) => {
+        if (wanted) painted.value = picture;
+      });
+    return () => {
+      wanted = false;
+      if (painted.peek()) URL.revokeObjectURL(painted.peek()?.url ?? "");
+    };
+  }, [map?.underlay, dark.value]);
+  useEffect(() => {
+    if (element.current) moved(element.current, view);
+  }, []);
+
+  const drop = (event: DragEvent) => {
+    event.preventDefault();
+    over.value = false;
+    const files = [...(event.dataTransfer?.files ?? [])];
+    if (files.length) void bringMap(files);
+  };
+  return (
+    <div
+      ref={element}
+      class={`floor${over.value ? " over" : ""}${asking.value !== null ? " asking" : ""}`}
+      data-testid="map"
+      onDragOver={(event) => {
+        event.preventDefault();
+        over.value = true;
+      }}
+      onDragLeave={() => (over.value = false)}
+      onDrop={drop}
+    >
+      <svg class="overlay" role="img" aria-label={`${t.map}: ${t.things(map?.things.length ?? 0)}`}>
+        {map?.underlay && painted.value && (
+          <image
+            href={painted.value.url}
+            width={painted.value.width}
+            height={painted.value.height}
+            transform={`${matrix(view.value)} ${placing(map.underlay, painted.value.height)}`}
+            class={map.underlay.grid ? "grid" : "photo"}
+          />
+        )}
+        {map?.things.map((thing, k) => (
+          <MapThing key={thing.id} index={k} view={view.value} />
+        ))}
+        <Route view={view.value} />
+      </svg>
+    </div>
+  );
+}
+
+function MapThing({ index, view }: { index: number; view: View }) {
+  const thing = place.value?.things[index];
+  if (!thing) return null;
+  const pair = answered.value ? pairOf({ side: "map", index }) : undefined;
+  const candidate = asking.value === null && question.value?.candidates.includes(index);
+  const d = thing.rings.map((ring) => pathThrough(ring, view)).join("");
+  const outline = (thing.rings[0] ?? []).map((point) => shown(view, point));
+  const [cx, cy] = shown(view, thing.centroid);
+  const [x, y] = badgePlace(outline, [cx, cy]);
+  const below = x === cx && pair ? cy + 27 : x === cx ? cy + 4 : boxOf(outline).y1 + 16;
+  const colour = pair ? colourOf(pair.sketch) : null;
+  const state = `${isLit("map", index) ? " lit" : ""}${pair ? "" : " alone"}${candidate ? " candidate" : ""}`;
+  const tapped = () => {
+    const asked = asking.value ?? (candidate ? (question.value?.sketch ?? null) : null);
+    if (asked !== null) pin(asked, index);
+    else lit.value = { side: "map", index };
+  };
+  return (
+    <g
+      class={`thing${state}`}
+      data-testid={`map-thing-${index}`}
+      onPointerEnter={() => (lit.value = { side: "map", index })}
+      onPointerLeave={() => (lit.value = null)}
+      onClick={tapped}
+    >
+      <title>{texts.value.objectOnMap(mapName(index), pair ? sketchName(pair.sketch) : "")}</title>
+      <path d={d} fill={colour ?? "currentColor"} stroke={colour ?? "currentColor"} />
+      {pair && <Badge x={x} y={y} number={pair.sketch + 1} colour={colour} />}
+      {thing.label && (
+        <text class="label" x={cx} y={below} text-anchor="middle">
+          {thing.label}
+        </text>
+      )}
+    </g>
+  );
+}
+
+function Route({ view }: { view: View }) {
+  const route = carried.value;
+  if (!route || route.length < 2) return null;
+  const points = route.map((point) => shown(view, point));
+  const [end, before] = [points.at(-1), points.at(-6) ?? points[0]];
+  if (!end || !before) return null;
+  const turn = (Math.atan2(end[1] - before[1], end[0] - before[0]) * 180) / Math.PI;
+  return (
+    <g class="way" data-testid="route">
+      <title>{texts.value.preview}</title>
+      <polyline
+        points={points.map((point) => point.map((n) => n.toFixed(1)).join(",")).join(" ")}
+      />
+      <path d="M-9,-7L3,0L-9,7" transform={`translate(${end[0]} ${end[1]}) rotate(${turn})`} />
+    </g>
+  );
+}
+
+/** The map's y grows up, the screen's down: views are of the map turned over. */
+function flippedBox() {
+  const map = place.peek();
+  if (!map?.things.length) return null;
+  const { x0, y0, x1, y1 } = boxOfMap(map);
+  return { x0, y0: -y1, x1, y1: -y0 };
+}
+
+function shown(view: View, [x, y]: Xy): Xy {
+  return toScreen(view, [x, -y]);
+}
+
+function matrix({ scale, x, y }: View): string {
+  return `matrix(${scale} 0 0 ${-scale} ${x} ${y})`;
+}
+
+/** Return what takes pixels of a picture to units of the map. */
+function placing({ origin: [x, y, yaw], resolution }: Underlay, height: number): string {
+  const turn = (yaw * 180) / Math.PI;
+  return `translate(${x} ${y}) rotate(${turn}) scale(${resolution} ${-resolution}) translate(0 ${-height})`;
+}
+
+function pathThrough(ring: readonly Xy[], view: View): string {
+  const points = ring.map((point) =>
+    shown(view, point)
+      .map((n) => n.toFixed(1))
+      .join(","),
+  );
+  return `M${points.join("L")}Z`;
+}
+
+/** Return an occupancy grid in the page's colours, unknown left blank; other pictures as they are. */
+async function paint(underlay: Underlay, night: boolean): Promise<Painted> {
+  const bitmap = await createImageBitmap(underlay.pixels);
+  const { width, height } = bitmap;
+  if (!underlay.grid) return { url: URL.createObjectURL(underlay.pixels), width, height };
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [width, height];
+  const context = canvas.getContext("2d", { willReadFrequently: true });
+  if (!context) return { url: "", width, height };
+  context.drawImage(bitmap, 0, 0);
+  const pixels = context.getImageData(0, 0, width, height);
+  const { data } = pixels;
+  const [wall, floor] = night
+    ? ([
+        [214, 208, 196, 225],
+        [255, 255, 255, 14],
+      ] as const)
+    : ([
+        [58, 66, 76, 225],
+        [255, 255, 255, 205],
+      ] as const);
+  for (let k = 0; k < data.length; k += 4) {
+    const shade = data[k] ?? 205;
+    data.set(shade < 100 ? wall : shade > 230 ? floor : [0, 0, 0, 0], k);
+  }
+  context.putImageData(pixels, 0, 0);
+  const blob = await new Promise<Blob | null>((done) => canvas.toBlob(done));
+  return { url: blob ? URL.createObjectURL(blob) : "", width, height };
+}
+
+/** Let fingers, the wheel and the mouse move the map. */
+function moved(element: HTMLElement, view: { value: View; peek(): View }): void {
+  const pointers = new Map<number, Xy>();
+  const at = (event: MouseEvent): Xy => {
+    const { left, top } = element.getBoundingClientRect();
+    return [event.clientX - left, event.clientY - top];
+  };
+  element.addEventListener("pointerdown", (event) => pointers.set(event.pointerId, at(event)));
+  element.addEventListener("pointermove", (event) => {
+    const before = pointers.get(event.pointerId);
+    if (!before) return;
+    const now = at(event);
+    pointers.set(event.pointerId, now);
+    const other = [...pointers].find(([id]) => id !== event.pointerId)?.[1];
+    const seen = view.peek();
+    if (other) {
+      view.value = zoomed(seen, other, distance(now, other) / Math.max(distance(before, other), 1));
+    } else view.value = { ...seen, x: seen.x + now[0] - before[0], y: seen.y + now[1] - before[1] };
+  });
+  for (const name of ["pointerup", "pointercancel", "pointerleave"] as const) {
+    element.addEventListener(name, (event) => pointers.delete(event.pointerId));
+  }
+  element.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      const seen = view.peek();
+      if (event.ctrlKey || event.metaKey) {
+        view.value = zoomed(seen, at(event), Math.exp(-event.deltaY * 0.01));
+      } else view.value = { ...seen, x: seen.x - event.deltaX, y: seen.y - event.deltaY };
+    },
+    { passive: false },
+  );
+}

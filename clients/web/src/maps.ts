@@ -1,0 +1,231 @@
+/** The robot's side: maps, and the things that were found on them. */
+
+import { RequestFailed, sources, type SketchmatchClient } from "@sketchmatch/client";
+import type { Scene } from "@sketchmatch/client/v1/scene";
+import type { Source } from "@sketchmatch/client/v1/source";
+
+import { boxOf, type Box, type Xy } from "./geometry";
+
+export interface Thing {
+  readonly id: string;
+  readonly rings: readonly (readonly Xy[])[];
+  readonly label: string;
+  readonly centroid: Xy;
+}
+
+/** A picture under the things, and where it lies: pixels to units of the map, y up. */
+export interface Underlay {
+  readonly pixels: Blob;
+  readonly resolution: number;
+  readonly origin: readonly [number, number, number];
+  /** Whether it is an occupancy grid, whose greys have a meaning. */
+  readonly grid: boolean;
+}
+
+export interface PlaceMap {
+  /** Of the gallery, or empty for one that was brought. */
+  readonly place: string;
+  readonly title: string;
+  readonly things: readonly Thing[];
+  readonly underlay: Underlay | null;
+  readonly warnings: readonly string[];
+  /** What its things were found in, and how; null where that is not kept. */
+  readonly found: Found | null;
+}
+
+/** How the things of a map were found, so that they can be looked for otherwise. */
+export interface Found {
+  readonly source: Source;
+  readonly segmenter: string;
+  readonly parameters: Readonly<Record<string, unknown>>;
+}
+
+/** The bundled places, as folders and as keys of their titles. */
+export const PLACES = ["living-room", "kitchen", "office", "workshop", "playground"] as const;
+export type Place = (typeof PLACES)[number];
+
+export function isPlace(name: string): name is Place {
+  return (PLACES as readonly string[]).includes(name);
+}
+
+/** Return what of a map is shown: its things, and something of the walls around them. */
+export function boxOfMap(map: PlaceMap): Box {
+  const { x0, y0, x1, y1 } = boxOf(map.things.flatMap(({ rings }) => rings[0] ?? []));
+  const around = 0.09 * Math.max(x1 - x0, y1 - y0);
+  return { x0: x0 - around, y0: y0 - around, x1: x1 + around, y1: y1 + around };
+}
+
+/** Load a place of the gallery. */
+export async function openPlace(client: SketchmatchClient, place: Place): Promise<PlaceMap> {
+  const folder = `places/${place}`;
+  const [yaml, pixels] = await Promise.all([
+    fetched(`${folder}/map.yaml`).then((answer) => answer.text()),
+    fetched(`${folder}/map.png`).then((answer) => answer.blob()),
+  ]);
+  const source = sources.mapServerMap(yaml, await bytesOf(pixels));
+  const all = await found(client, source);
+  // What the yaml does not name is a piece of a wall.
+  const things = all.things.filter(({ label }) => label);
+  return { ...all, things, found: null, place, title: "", underlay: gridOf(yaml, pixels) };
+}
+
+/** Return how a person drew a place of the gallery. */
+export async function sampleSketch(place: Place): Promise<string> {
+  return (await fetched(`places/${place}/sketch.json`)).text();
+}
+
+/**
+ * Load a map from files: a yaml with its picture, or any one file that the server reads.
+ *
+ * @throws RequestFailed, with a sentence for people.
+ */
+export async function openMap(
+  client: SketchmatchClient,
+  files: readonly File[],
+  lacking: (picture: string) => string,
+): Promise<PlaceMap> {
+  const yaml = files.find(({ name }) => /\.ya?ml$/i.test(name));
+  const [first] = files;
+  if (yaml) {
+    const text = await yaml.text();
+    const named = /^\s*image\s*:\s*["']?([^"'\n#]+)/m.exec(text)?.[1]?.trim() ?? "";
+    const base = named.split(/[\\/]/).at(-1) ?? "";
+    const picture = files.find(({ name }) => name === base) ?? files.find((file) => file !== yaml);
+    if (!picture) throw new RequestFailed(lacking(base), "invalid", "", "map", undefined);
+    const source = sources.mapServerMap(text, await bytesOf(picture));
+    const seen = await shownPixels(picture);
+    return {
+      ...(await found(client, source, yaml.name)),
+      place: "",
+      title: yaml.name,
+      underlay: seen && gridOf(text, seen),
+    };
+  }
+  if (!first) throw new RequestFailed(lacking(""), "invalid", "", "map", undefined);
+  const source = sources.file(first.name, await bytesOf(first));
+  const seen = await shownPixels(first);
+  return {
+    ...(await found(client, source, first.name)),
+    place: "",
+    title: first.name,
+    underlay: seen && { pixels: seen, resolution: 1, origin: [0, 0, 0], grid: false },
+  };
+}
+
+/** Return the outlines that the server sees in a file, y down, as a sketch has them. */
+export async function openOutlines(
+  client: SketchmatchClient,
+  file: File,
+): Promise<{ outlines: { points: Xy[]; label: string }[]; route: Xy[] }> {
+  const source = sources.file(file.name, await bytesOf(file));
+  const { scene, route } = await naming(file.name, () => client.segment(source));
+  return {
+    outlines: thingsOf(scene).map(({ rings, label }) => {
+      const ring = (rings[0] ?? []).map(([x, y]) => [x, -y] as const);
+      return { points: [...ring, ...ring.slice(0, 1)], label };
+    }),
+    route: route.map(({ x, y }) => [x, -y] as const),
+  };
+}
+
+export function thingsOf(scene: Scene | undefined): Thing[] {
+  return (scene?.objects ?? []).map(({ rings, label, centroid }, index) => ({
+    id: `${index}`,
+    label,
+    rings: rings.map(({ points }) => points.map(({ x, y }) => [x, y] as const)),
+    centroid: [centroid?.x ?? 0, centroid?.y ?? 0],
+  }));
+}
+
+async function found(
+  client: SketchmatchClient,
+  source: Source,
+  name = "",
+  chosen: { name?: string; parameters?: Tuned } = {},
+): Promise<Pick<PlaceMap, "things" | "warnings" | "found">> {
+  const { scene, warnings, segmenter } = await naming(name, () =>
+    client.segment(source, { segmenter: chosen }),
+  );
+  const how = { segmenter: segmenter?.name ?? "", parameters: segmenter?.parameters ?? {} };
+  return { things: thingsOf(scene), warnings, found: { source, ...how } };
+}
+
+/** What of a segmenter's parameters a person sets. */
+export type Tuned = Record<string, number | boolean | string>;
+
+/** Look for the things of a map again, with other parameters. */
+export async function foundOtherwise(
+  client: SketchmatchClient,
+  map: PlaceMap,
+  parameters: Tuned,
+): Promise<PlaceMap> {
+  if (!map.found) return map;
+  const { source, segmenter } = map.found;
+  return { ...map, ...(await found(client, source, map.title, { name: segmenter, parameters })) };
+}
+
+/** Have errors name the file that a person knows, not the field that it travels in. */
+async function naming<T>(name: string, work: () => Promise<T>): Promise<T> {
+  try {
+    return await work();
+  } catch (thrown) {
+    const { message, failure, reason, field, retrySeconds } = RequestFailed.from(thrown);
+    const told =
+      name && field && message.startsWith(field) ? name + message.slice(field.length) : message;
+    throw new RequestFailed(told, failure, reason, field, retrySeconds);
+  }
+}
+
+async function fetched(path: string): Promise<Response> {
+  let answer: Response;
+  try {
+    answer = await fetch(path);
+  } catch (thrown) {
+    throw new RequestFailed(String(thrown), "away", "", "", undefined);
+  }
+  if (!answer.ok) throw new RequestFailed(answer.statusText, "away", "", "", undefined);
+  return answer;
+}
+
+async function bytesOf(blob: Blob): Promise<Uint8Array> {
+  return new Uint8Array(await blob.arrayBuffer());
+}
+
+function gridOf(yaml: string, pixels: Blob): Underlay {
+  const number = (key: string) =>
+    Number(new RegExp(`^\\s*${key}\\s*:\\s*([^\\s#]+)`, "m").exec(yaml)?.[1]);
+  const [x = 0, y = 0, yaw = 0] = (/^\s*origin\s*:\s*\[([^\]]*)\]/m.exec(yaml)?.[1] ?? "")
+    .split(",")
+    .map(Number);
+  return { pixels, resolution: number("resolution") || 1, origin: [x, y, yaw || 0], grid: true };
+}
+
+/** Return a picture that browsers show; null where the file holds none that they know. */
+async function shownPixels(file: Blob): Promise<Blob | null> {
+  const bytes = await bytesOf(file);
+  if (bytes[0] === 0x50 && bytes[1] === 0x35) return pngOfPgm(bytes);
+  try {
+    (await createImageBitmap(file)).close();
+    return file;
+  } catch {
+    return null;
+  }
+}
+
+/** Robots save maps as binary PGM, which no browser shows. */
+async function pngOfPgm(bytes: Uint8Array): Promise<Blob | null> {
+  const head = new TextDecoder("latin1").decode(bytes.subarray(0, 4096));
+  const match = /^P5(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)\s/.exec(
+    head,
+  );
+  const [width, height, most] = (match?.slice(1) ?? []).map(Number);
+  if (!match || !width || !height || !most || most > 255) return null;
+  const pixels = new ImageData(width, height);
+  for (let k = 0; k < width * height; k++) {
+    const shade = Math.round(((bytes[match[0].length + k] ?? 0) * 255) / most);
+    pixels.data.set([shade, shade, shade, 255], 4 * k);
+  }
+  const canvas = new OffscreenCanvas(width, height);
+  canvas.getContext("2d")?.putImageData(pixels, 0, 0);
+  return canvas.convertToBlob();
+}

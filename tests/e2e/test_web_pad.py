@@ -1,0 +1,512 @@
+"""The sketch pad in a real browser, against a real server."""
+
+import json
+import re
+from itertools import pairwise
+
+import pytest
+
+from sketchmatch.examples import LIVING_ROOM_MAP
+from tests import processes
+from tests.pace import wait_until
+from tests.tools import require
+from tests.web import CLIENTS, KITCHEN, Hand, answer, chromium, draw_kitchen, serving_pad
+
+pytestmark = pytest.mark.timeout(300)
+
+# Playwright waits by itself for what it is asked for, so long at most.
+_PATIENCE_MS = 60_000
+
+
+@pytest.fixture(scope="module")
+def pad():
+    with serving_pad() as (_, url):
+        yield url
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture
+def visit(browser):
+    """Return what opens a page; what goes wrong in a page fails the test."""
+    contexts, faults = [], []
+
+    def opened(url, place="kitchen", context=None, **options):
+        if context is None:
+            context = browser.new_context(
+                **{"viewport": {"width": 1280, "height": 860}, "locale": "en-GB", **options}
+            )
+            context.set_default_timeout(_PATIENCE_MS)
+            contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.on("console", lambda said: faults.append(said.text) if is_fault(said) else None)
+        page.goto(url)
+        page.get_by_test_id("map-thing-0").wait_for()
+        if place:
+            page.get_by_test_id("open-places").click()
+            page.get_by_test_id(f"place-{place}").click()
+            page.get_by_test_id(f"place-{place}").wait_for(state="hidden")
+            page.locator(".map-pane .title", has_text=place.capitalize()).wait_for()
+        return page
+
+    yield opened
+    for context in contexts:
+        context.close()
+    assert not faults
+
+
+def is_fault(said):
+    # A server that is away is what some tests are about, and browsers tell of it.
+    return said.type == "error" and "net::ERR" not in said.text and "status of" not in said.text
+
+
+def wait_for_answer(page, things):
+    headline = page.get_by_test_id("headline")
+    headline.get_by_text(re.compile(rf"(All|of) {things} things found")).wait_for()
+
+
+def names():
+    return dict(enumerate(KITCHEN, start=1))
+
+
+def test_six_things_drawn_by_pointer_are_the_right_things_of_the_map(pad, visit):
+    page = visit(pad)
+    draw_kitchen(Hand(page))
+    wait_for_answer(page, 6)
+    assert answer(page) == names()
+    # The same number and colour on both sides.
+    for number, name in names().items():
+        badge = page.get_by_test_id(f"sketch-thing-{number - 1}").locator("circle")
+        colour = badge.get_attribute("fill")
+        thing = page.locator(".floor .thing", has_text=name)
+        assert thing.locator("circle").get_attribute("fill") == colour
+        assert thing.locator(".badge text").text_content() == str(number)
+
+
+def test_what_is_pointed_at_or_focused_lights_up_on_both_sides(pad, visit):
+    page = visit(pad)
+    draw_kitchen(Hand(page))
+    wait_for_answer(page, 6)
+    for act in ("hover", "focus"):
+        page.get_by_test_id("pair-3").__getattribute__(act)()
+        lit = page.locator(".thing.lit")
+        lit.nth(1).wait_for(state="attached")
+        assert [item.locator(".badge text").text_content() for item in lit.all()] == ["4", "4"]
+
+
+def test_a_tap_on_the_map_says_what_a_thing_is_and_can_be_taken_back(pad, visit):
+    page = visit(pad)
+    hand = Hand(page)
+    draw_kitchen(hand)
+    wait_for_answer(page, 6)
+    hand.tap(*KITCHEN["bin"][:2])
+    page.get_by_test_id("asking").wait_for()
+    page.locator(".floor .thing", has_text="bench").click()
+    page.locator("[data-testid=pairs] .line", has_text="you said so").wait_for()
+    assert answer(page)[6] == "bench"
+    page.get_by_test_id("undo").click()
+    wait_until(lambda: answer(page) == names(), "what was taken back still holds")
+
+
+def test_a_thing_can_be_said_to_be_on_no_map_by_keyboard_alone(pad, visit):
+    page = visit(pad)
+    draw_kitchen(Hand(page))
+    wait_for_answer(page, 6)
+    page.get_by_test_id("pair-1").focus()
+    page.keyboard.press("Enter")
+    chooser = page.get_by_test_id("asking").locator("select")
+    chooser.focus()
+    chooser.select_option("none")
+    page.get_by_test_id("not-found").get_by_text("thing 2").wait_for()
+    assert 2 not in answer(page)
+
+
+def test_two_equal_readings_are_one_question_that_a_tap_answers(pad, visit, tmp_path):
+    square = [[[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]]
+    names = ["north", "south", "east", "west"]
+    places = [(0, 4), (0, -4), (9, 0), (-9, 0)]
+    document = {
+        "type": "FeatureCollection",
+        "features": [
+            {
+                "type": "Feature",
+                "properties": {"name": name},
+                "geometry": {
+                    "type": "Polygon",
+                    "coordinates": [[[x + px, y + py] for px, py in ring] for ring in square],
+                },
+            }
+            for name, (x, y) in zip(names, places, strict=True)
+        ],
+    }
+    file = tmp_path / "crossing.geojson"
+    file.write_text(json.dumps(document))
+    page = visit(pad)
+    page.get_by_test_id("map-file").set_input_files(file)
+    page.locator(".map-pane .title", has_text="crossing").wait_for()
+    hand = Hand(page)
+    # Half a turn leaves a cross of equal squares as it is.
+    for x, y in ((0, -70), (0, 70), (160, 0), (-160, 0)):
+        hand.box(x, y, 40, 40)
+    question = page.get_by_test_id("question")
+    question.wait_for()
+    candidates = page.locator(".floor .thing.candidate")
+    assert candidates.count() >= 2
+    label = candidates.first.locator(".label").text_content()
+    candidates.first.click()
+    page.locator("[data-testid=pairs] .line", has_text="you said so").wait_for()
+    question.wait_for(state="detached")
+    assert label in answer(page).values()
+
+
+def test_a_route_is_drawn_on_the_map_and_saved_in_metres(pad, visit):
+    page = visit(pad)
+    hand = Hand(page)
+    draw_kitchen(hand)
+    wait_for_answer(page, 6)
+    page.get_by_test_id("tool-route").click()
+    hand.draw([(-100, -20), (-90, 90), (60, 90)], closed=False)
+    page.get_by_test_id("route").wait_for(state="attached")
+    wait_for_answer(page, 6)
+    page.get_by_test_id("open-file").click()
+    with page.expect_download() as saved:
+        page.get_by_test_id("save-route").click()
+    document = json.loads(saved.value.path().read_text())
+    line = document["features"][0]["geometry"]["coordinates"]
+    # It goes down past the left of the island at (3.3, 2.75) and then to its right.
+    (x0, y0), (x1, y1) = line[0], line[-1]
+    assert 1.0 < x0 < 2.7
+    assert x1 > x0 + 1.0
+    assert y1 < y0 - 0.5
+
+
+def test_undo_and_redo_go_all_the_way_and_nothing_is_lost_between_fast_strokes(pad, visit):
+    page = visit(pad)
+    hand = Hand(page)
+    for k in range(20):
+        hand.draw([(-200 + 20 * k, -60), (-200 + 20 * k, 60)], closed=False)
+    assert strokes(page) == 20
+    for left in range(19, -1, -1):
+        page.keyboard.press("Control+z")
+        assert strokes(page) == left
+    for _ in range(20):
+        page.keyboard.press("Control+Shift+Z")
+    assert strokes(page) == 20
+
+
+def strokes(page):
+    """Return how many strokes there are, by what would be saved."""
+    undo = page.get_by_test_id("undo")
+    page.get_by_test_id("open-file").click()
+    if page.get_by_test_id("save-strokes").is_disabled():
+        page.keyboard.press("Escape")
+        return 0
+    with page.expect_download() as saved:
+        page.get_by_test_id("save-strokes").click()
+    undo.wait_for()
+    return len(json.loads(saved.value.path().read_text())["strokes"])
+
+
+def test_a_thing_is_erased_moved_and_named(pad, visit):
+    page = visit(pad)
+    hand = Hand(page)
+    draw_kitchen(hand)
+    wait_for_answer(page, 6)
+    page.get_by_test_id("tool-name").click()
+    hand.tap(*KITCHEN["stove"][:2])
+    page.get_by_role("dialog").locator("input").fill("my oven")
+    page.keyboard.press("Enter")
+    page.get_by_test_id("pair-1").get_by_text("my oven").wait_for()
+    page.get_by_test_id("tool-eraser").click()
+    x, y, width, _ = KITCHEN["bin"]
+    hand.tap(x - width / 2, y)
+    wait_for_answer(page, 5)
+    page.get_by_test_id("tool-move").click()
+    x, y, *_ = KITCHEN["fridge"]
+    before = page.get_by_test_id("sketch-thing-0").locator("path").get_attribute("d")
+    hand.draw([(x, y), (x + 30, y + 10)], closed=False)
+    wait_until(
+        lambda: page.get_by_test_id("sketch-thing-0").locator("path").get_attribute("d") != before,
+        "what was moved is where it was",
+    )
+    page.keyboard.press("Control+z")
+    page.keyboard.press("Control+z")
+    wait_for_answer(page, 6)
+
+
+def test_strokes_and_svg_are_saved_and_opened_again(pad, visit, tmp_path):
+    page = visit(pad)
+    draw_kitchen(Hand(page))
+    wait_for_answer(page, 6)
+    for item, name in (("save-strokes", "sketch.json"), ("save-svg", "sketch.svg")):
+        page.get_by_test_id("open-file").click()
+        with page.expect_download() as saved:
+            page.get_by_test_id(item).click()
+        saved.value.save_as(tmp_path / name)
+    for name in ("sketch.json", "sketch.svg"):
+        page.get_by_test_id("clear").click()
+        page.get_by_test_id("pairs").wait_for(state="detached")
+        page.get_by_test_id("sketch-file").set_input_files(tmp_path / name)
+        wait_for_answer(page, 6)
+        assert answer(page) == names()
+
+
+def test_a_link_opens_the_sketch_and_its_match_in_another_browser(pad, visit):
+    page = visit(pad, permissions=["clipboard-read", "clipboard-write"])
+    draw_kitchen(Hand(page))
+    wait_for_answer(page, 6)
+    page.get_by_test_id("open-file").click()
+    page.get_by_test_id("copy-link").click()
+    page.get_by_test_id("notice").wait_for()
+    link = page.evaluate("navigator.clipboard.readText()")
+    assert link.startswith(f"{pad}#")
+    other = visit(link, place=None)
+    wait_for_answer(other, 6)
+    assert answer(other) == names()
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "sentence"),
+    [
+        ("plan.dxf", b"no drawing", "plan.dxf"),
+        ("map.yaml", b"image: office.pgm\n", "The map's picture office.pgm is missing"),
+        ("photo.png", b"\x89PNG broken", "picture"),
+    ],
+)
+def test_a_broken_map_is_refused_in_words_and_the_map_stays(
+    pad, visit, tmp_path, name, data, sentence
+):
+    page = visit(pad)
+    file = tmp_path / name
+    file.write_bytes(data)
+    page.get_by_test_id("map-file").set_input_files(file)
+    notice = page.get_by_test_id("notice")
+    notice.wait_for()
+    assert sentence in notice.inner_text()
+    assert page.locator(".floor .thing").count() == 6
+
+
+def test_a_broken_sketch_is_refused_in_words_and_the_drawing_stays(pad, visit, tmp_path):
+    page = visit(pad)
+    Hand(page).box(0, 0, 80, 60)
+    for name, text in (
+        ("a.json", "{"),
+        ("b.json", '{"strokes": [{"points": [[1, "x"]]}]}'),
+        ("c.svg", "<svg"),
+    ):
+        file = tmp_path / name
+        file.write_text(text)
+        page.get_by_test_id("sketch-file").set_input_files(file)
+        notice = page.get_by_test_id("notice")
+        notice.wait_for()
+        assert len(notice.inner_text()) > 20
+        notice.get_by_role("button").click()
+        notice.wait_for(state="detached")
+    assert strokes(page) == 1
+
+
+def test_a_map_of_ones_own_is_shown_and_its_things_are_found_otherwise_by_a_slider(pad, visit):
+    page = visit(pad)
+    page.get_by_test_id("map-file").set_input_files(
+        [LIVING_ROOM_MAP, LIVING_ROOM_MAP.with_suffix(".pgm")]
+    )
+    page.locator(".map-pane .title", has_text=LIVING_ROOM_MAP.name).wait_for()
+    page.locator("image.grid").wait_for(state="attached")  # no browser shows a PGM by itself
+    before = page.locator(".floor .thing").count()
+    page.get_by_test_id("open-tuning").click()
+    slider = page.locator("#tuning input[name=min_size]")
+    slider.wait_for()
+    slider.fill("1.2")
+    things = page.locator(".floor .thing")
+    wait_until(lambda: 2 <= things.count() < before, "the slider changes nothing")
+
+
+def test_another_place_is_said_to_be_probably_another(pad, visit):
+    page = visit(pad, place="playground")
+    draw_kitchen(Hand(page))
+    page.get_by_test_id("elsewhere").wait_for()
+    assert "Probably not this place" in page.get_by_test_id("headline").inner_text()
+
+
+@pytest.mark.slow  # a server of its own
+def test_a_long_search_shows_how_it_goes_and_is_cancelled(visit, tmp_path):
+    config = tmp_path / "endless.toml"
+    config.write_text(
+        '[pipeline.searcher]\nname = "easm"\n'
+        "parameters = { patience = 10_000_000, generations = 10_000_000 }\n"
+    )
+    with serving_pad("--config", str(config)) as (_, url):
+        page = visit(url)
+        draw_kitchen(Hand(page))
+        cancel = page.get_by_test_id("cancel")
+        cancel.wait_for()
+        page.locator(".curve").wait_for()
+        cancel.click()
+        page.get_by_test_id("again").wait_for()
+        assert page.get_by_test_id("cancel").count() == 0
+        page.get_by_test_id("again").click()
+        cancel.wait_for()
+
+
+@pytest.mark.slow  # a server of its own
+def test_what_is_drawn_while_the_server_is_away_is_kept_and_matched_when_it_is_back(visit):
+    with serving_pad() as (server, url):
+        page = visit(url)
+        hand = Hand(page)
+        first, *rest = KITCHEN.values()
+        hand.box(*first)
+        server.process.kill()
+        server.process.wait()
+        for place in rest:
+            hand.box(*place)
+        page.get_by_text("The server does not answer.").wait_for()
+    address = re.search(r"//(\S+)/", url)[1]
+    with processes.server("--web-address", address, "--workers", "0"):
+        wait_for_answer(page, 6)
+        assert answer(page) == names()
+        page.reload()
+        wait_for_answer(page, 6)
+        assert answer(page) == names()
+
+
+def test_each_tab_has_its_own_sheet_and_a_new_one_begins_with_the_latest(pad, visit):
+    page = visit(pad)
+    draw_kitchen(Hand(page))
+    wait_for_answer(page, 6)
+    other = visit(pad, place=None, context=page.context)
+    wait_for_answer(other, 6)
+    other.get_by_test_id("clear").click()
+    other.get_by_test_id("pairs").wait_for(state="detached")
+    page.reload()
+    wait_for_answer(page, 6)
+
+
+def touch(session, kind, points):
+    session.send(
+        "Input.dispatchTouchEvent",
+        {
+            "type": kind,
+            "touchPoints": [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)],
+        },
+    )
+
+
+def test_on_a_tablet_a_finger_draws_and_two_fingers_move_the_paper(pad, visit):
+    page = visit(pad, viewport={"width": 1024, "height": 768}, has_touch=True)
+    mx, my = Hand(page).middle
+    session = page.context.new_cdp_session(page)
+    for x, y, width, height in list(KITCHEN.values())[:3]:
+        w, h = width / 2, height / 2
+        corners = [(-w, -h), (w, -h), (w, h), (-w, h), (-w, -h)]
+        touch(session, "touchStart", [(mx + x - w, my + y - h)])
+        for (ax, ay), (bx, by) in pairwise(corners):
+            for k in range(1, 7):
+                at = mx + x + ax + (bx - ax) * k / 6, my + y + ay + (by - ay) * k / 6
+                touch(session, "touchMove", [at])
+        touch(session, "touchEnd", [])
+    wait_for_answer(page, 3)
+    before = page.get_by_test_id("sketch-thing-0").locator("path").bounding_box()
+    touch(session, "touchStart", [(mx - 40, my)])
+    touch(session, "touchStart", [(mx - 40, my), (mx + 40, my)])
+    for k in range(1, 11):
+        touch(session, "touchMove", [(mx - 40 - 4 * k, my), (mx + 40 + 4 * k, my)])
+    touch(session, "touchEnd", [])
+    after = page.get_by_test_id("sketch-thing-0").locator("path").bounding_box()
+    assert after["width"] > 1.5 * before["width"]
+    assert strokes(page) == 3
+
+
+def test_once_a_pen_has_drawn_a_palm_does_nothing_and_fingers_move_the_paper(pad, visit):
+    page = visit(pad, viewport={"width": 1024, "height": 768}, has_touch=True)
+    pen = """([kind, id, type, x, y]) => {
+      const paper = document.querySelector('[data-testid=paper]');
+      const { left, top } = paper.getBoundingClientRect();
+      paper.dispatchEvent(new PointerEvent(kind, {
+        pointerId: id, pointerType: type, clientX: left + x, clientY: top + y,
+        bubbles: true, cancelable: true, pressure: kind === 'pointerup' ? 0 : 0.7 }));
+    }"""
+
+    def send(*event):
+        page.evaluate(pen, list(event))
+
+    send("pointerdown", 7, "pen", 60, 60)
+    send("pointermove", 7, "pen", 160, 60)
+    send("pointerdown", 9, "touch", 200, 260)  # the palm
+    send("pointermove", 9, "touch", 210, 270)
+    send("pointermove", 7, "pen", 160, 160)
+    send("pointerup", 9, "touch", 210, 270)
+    send("pointermove", 7, "pen", 60, 160)
+    send("pointerup", 7, "pen", 60, 60)
+    assert strokes(page) == 1
+    send("pointerdown", 9, "touch", 200, 160)
+    send("pointermove", 9, "touch", 260, 200)
+    send("pointerup", 9, "touch", 260, 200)
+    assert strokes(page) == 1
+    switch = page.get_by_test_id("finger-draws")
+    assert switch.get_attribute("aria-pressed") == "false"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
+def test_axe_finds_nothing_that_keeps_anybody_out(pad, visit, scheme, size):
+    axe = CLIENTS / "node_modules" / "axe-core" / "axe.min.js"
+    require(axe.exists(), "axe-core (npm ci in clients)")
+    width, height = size
+    page = visit(pad, viewport={"width": width, "height": height}, color_scheme=scheme)
+    look = "async () => (await axe.run()).violations.map(v => [v.id, v.nodes.map(n => n.html)])"
+    page.evaluate(axe.read_text(encoding="utf-8"))
+    assert page.evaluate(look) == []
+    page.get_by_test_id("show-me").click()
+    wait_for_answer(page, 6)
+    page.get_by_test_id("pair-0").click()
+    assert page.evaluate(look) == []
+    for menu in ("places", "file", "settings"):
+        page.get_by_test_id(f"open-{menu}").click()
+        assert page.evaluate(look) == [], menu
+        page.keyboard.press("Escape")
+
+
+def test_it_speaks_german_to_who_asks_for_it(pad, visit):
+    page = visit(pad, place=None, locale="de-DE")
+    assert page.locator("html").get_attribute("lang") == "de"
+    assert page.get_by_role("heading", name="Karte des Roboters").is_visible()
+    page.get_by_test_id("open-settings").click()
+    page.get_by_label("English").check()
+    assert page.get_by_role("heading", name="Robot's map").is_visible()
+
+
+@pytest.mark.slow  # a server of its own
+def test_a_server_that_wants_a_token_is_given_it(tmp_path, browser):
+    tokens = tmp_path / "tokens"
+    token = processes.sketchmatch("tokens", "add", "pad", "--file", tokens).stdout.strip()
+    with serving_pad("--tokens", str(tokens)) as (_, url):
+        context = browser.new_context(locale="en-GB")
+        page = context.new_page()
+        page.goto(url)
+        dialog = page.get_by_role("dialog")
+        dialog.locator("input").fill(token)
+        dialog.get_by_role("button").click()
+        page.get_by_test_id("map-thing-0").wait_for()
+        context.close()
+
+
+def test_it_loads_quickly_and_asks_nobody_else(pad, browser):
+    context = browser.new_context()
+    page = context.new_page()
+    asked, weight = [], []
+
+    def received(answer):
+        asked.append(answer.url)
+        weight.append(int(answer.headers.get("content-length", 0)))
+
+    page.on("response", received)
+    page.goto(pad)
+    page.get_by_test_id("map-thing-0").wait_for()
+    context.close()
+    assert all(url.startswith((pad, "blob:")) for url in asked)
+    assert 20_000 < sum(weight) < 200_000

@@ -1,0 +1,27 @@
+"""``sketchmatch serve --web`` from the command line."""
+
+import socket
+from contextlib import suppress
+
+from tests.processes import sketchmatch
+
+
+def test_web_alone_means_port_8080_of_this_machine_and_says_when_that_is_taken():
+    with socket.socket() as taken:
+        with suppress(OSError):  # somebody else has it, which does as well
+            taken.bind(("127.0.0.1", 8080))
+            taken.listen()
+        done = sketchmatch("serve", "--address", "127.0.0.1:0", "--workers", "0", "--web")
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 2
+    assert "server.web_address '127.0.0.1:8080' cannot be listened on" in line
+    assert "choose a free port" in line
+    assert done.stdout == ""
+
+
+def test_an_address_that_is_none_is_refused_by_its_name():
+    done = sketchmatch("serve", "--web-address", "8080")
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 2
+    assert "--web-address is '8080'" in line
+    assert "should have a port" in line
