@@ -154,7 +154,7 @@ class TestRequests:
         }
         mended = golden("SegmentRequest.mended_map").source.map_server_map.objects
         map_files.with_suffix(".objects.geojson").write_text(mended, encoding="utf-8")
-        with pytest.warns(UserWarning):
+        with pytest.warns(UserWarning, match="objects"):
             sent["mended_map"] = sources.map_server_map(map_files)
         for source in sent.values():
             call(server.address, "segment", source)
