@@ -96,19 +96,28 @@ bool contains(const std::string& text, const char* part) {
   return text.find(part) != std::string::npos;
 }
 
+/// Why gRPC says that a certificate cannot be trusted; none if it does not say that.
+std::optional<std::string> distrust(const std::string& message) {
+  static const std::regex other_name("Hostname Verification Check|Peer name .* is not in peer");
+  // As BoringSSL says it, and as OpenSSL does.
+  static const std::regex refused(
+      "(?:CERTIFICATE_VERIFY_FAILED|certificate verify failed):? ?([^:]*)");
+  std::smatch found;
+  if (std::regex_search(message, other_name)) {
+    return "it is for another name";
+  }
+  if (!std::regex_search(message, found, refused)) {
+    return std::nullopt;
+  }
+  const std::string why = stripped(found[1].str());
+  return why.empty() ? "nobody whom the client trusts vouches for it" : why;
+}
+
 /// Returns what gRPC says of a link that did not come about; it has no status for that.
 Failure unavailable(const std::string& message, const std::string& address) {
-  static const std::regex untrusted(
-      "CERTIFICATE_VERIFY_FAILED:? ?([^:]*)|Hostname Verification Check|"
-      "Peer name .* is not in peer");
-  std::smatch found;
-  if (std::regex_search(message, found, untrusted)) {
-    std::string why = stripped(found[1].str());
-    if (why.empty()) {
-      why = "it is for another name";
-    }
+  if (const auto why = distrust(message)) {
     return {Failure::Kind::not_authenticated,
-            "the certificate of the server at " + address + " cannot be trusted (" + why +
+            "the certificate of the server at " + address + " cannot be trusted (" + *why +
                 "); give the root_certificates of its authority and a name that it is for, or "
                 "have it renewed",
             {},
@@ -116,7 +125,7 @@ Failure unavailable(const std::string& message, const std::string& address) {
             {}};
   }
   std::string remedy = "start it, or check the address";
-  if (contains(message, "WRONG_VERSION_NUMBER")) {
+  if (contains(message, "WRONG_VERSION_NUMBER") || contains(message, "wrong version number")) {
     remedy = "it does not encrypt: ask it without certificates and tls";
   } else if (contains(message, "Socket closed")) {
     remedy =

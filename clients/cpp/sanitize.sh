@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# Builds the tests with sanitizers and runs them: sanitize.sh address,undefined, or thread.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+sanitizers=${1:-address,undefined}
+build=build/cpp-${sanitizers//,/-}
+cmake -S clients/cpp -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS=-O1 \
+  -DSKETCHMATCH_BUILD_EXAMPLES=OFF -DSKETCHMATCH_BUILD_TESTS=ON -DSKETCHMATCH_STRICT=ON \
+  -DSKETCHMATCH_SANITIZE="$sanitizers" >/dev/null
+nice cmake --build "$build" --parallel 2 --target sketchmatch_tests memory
+# The system's gRPC is not built for it, so that its locks are unknown.
+export TSAN_OPTIONS="suppressions=$PWD/clients/cpp/tests/tsan.supp ${TSAN_OPTIONS:-}"
+export UBSAN_OPTIONS="print_stacktrace=1 ${UBSAN_OPTIONS:-}"
+ctest --test-dir "$build" --output-on-failure
+"$build/tests/memory" 300
