@@ -184,7 +184,7 @@ AsyncMatch::AsyncMatch(std::shared_ptr<detail::PendingMatch> pending)
 AsyncMatch::AsyncMatch(AsyncMatch&& other) noexcept = default;
 
 AsyncMatch& AsyncMatch::operator=(AsyncMatch&& other) noexcept {
-  std::swap(pending_, other.pending_);  // what was here ends with the other
+  const AsyncMatch ended(std::exchange(pending_, std::move(other.pending_)));
   return *this;
 }
 

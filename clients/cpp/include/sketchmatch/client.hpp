@@ -37,7 +37,9 @@ class MatchCall {
   /// @cond internal
   explicit MatchCall(std::unique_ptr<detail::MatchStream> stream);
   /// @endcond
+  /// Takes the call of another.
   MatchCall(MatchCall&& other) noexcept;
+  /// Takes the call of another; what was here ends.
   MatchCall& operator=(MatchCall&& other) noexcept;
   MatchCall(const MatchCall&) = delete;
   MatchCall& operator=(const MatchCall&) = delete;
@@ -76,7 +78,9 @@ class AsyncMatch {
   /// @cond internal
   explicit AsyncMatch(std::shared_ptr<detail::PendingMatch> pending);
   /// @endcond
+  /// Takes the match of another.
   AsyncMatch(AsyncMatch&& other) noexcept;
+  /// Takes the match of another; what was here ends.
   AsyncMatch& operator=(AsyncMatch&& other) noexcept;
   AsyncMatch(const AsyncMatch&) = delete;
   AsyncMatch& operator=(const AsyncMatch&) = delete;
@@ -108,7 +112,9 @@ class Client {
   /// @throws InvalidRequestError If the address is none, a file cannot be read, parts contradict
   ///   each other, or others could read the token.
   explicit Client(const std::string& address, const ClientOptions& options = {});
+  /// Takes the connection of another.
   Client(Client&& other) noexcept;
+  /// Takes the connection of another; what was here ends.
   Client& operator=(Client&& other) noexcept;
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
