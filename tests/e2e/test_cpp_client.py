@@ -67,7 +67,7 @@ def built():
         require(Path("/usr/include", header).exists(), f"the C++ header {header}")
     options = ("-DSKETCHMATCH_BUILD_TESTS=ON", "-DSKETCHMATCH_STRICT=ON")
     run("cmake", "-S", FOLDER, "-B", BUILD, "-G", "Ninja", *options)
-    run("nice", "cmake", "--build", BUILD, "--parallel", "2")
+    run("cmake", "--build", BUILD, "--parallel", "2")
     return BUILD
 
 
@@ -193,7 +193,7 @@ class TestReadme:
         (commands,) = [block for block in blocks("sh") if "apt-get" in block]
         named = commands.replace("\\\n", " ").split()[4:]
         assert sorted(named) == sorted(PACKAGES)
-        ci = (ROOT / ".ci" / "run").read_text(encoding="utf-8").split()
+        ci = re.findall(r"[\w.+-]+", (ROOT / ".ci" / "run").read_text(encoding="utf-8"))
         assert {name for name in PACKAGES if name not in ci} == set()
 
     def test_every_way_into_a_server_is_listed(self):

@@ -11,8 +11,8 @@ namespace sketchmatch::detail {
 
 namespace {
 
-constexpr Seconds kShortest{0.1};
-constexpr Seconds kLongest{5.0};
+constexpr Seconds kShortestPause{0.1};
+constexpr Seconds kLongestPause{5.0};
 // gRPC fails at once where the deadline is further away than its clock can tell.
 constexpr Seconds kForEver{1e8};
 
@@ -32,7 +32,7 @@ std::optional<Seconds> limit_of(Seconds timeout) {
 }
 
 Attempts::Attempts(int retries, std::optional<Seconds> limit)
-    : retries_(retries), backoff_(kShortest) {
+    : retries_(retries), backoff_(kShortestPause) {
   if (limit) {
     deadline_ = std::chrono::steady_clock::now() +
                 std::chrono::duration_cast<std::chrono::steady_clock::duration>(*limit);
@@ -59,7 +59,7 @@ std::optional<Seconds> Attempts::pause_after(const Failure& failure) {
     return std::nullopt;
   }
   --retries_;
-  backoff_ = std::min(2.0 * backoff_, kLongest);
+  backoff_ = std::min(2.0 * backoff_, kLongestPause);
   return pause;
 }
 
