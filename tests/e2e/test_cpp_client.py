@@ -200,7 +200,7 @@ class TestReadme:
         table = README.partition("| member of `ClientOptions` |")[2].partition("\n\n")[0]
         header = (FOLDER / "include/sketchmatch/options.hpp").read_text(encoding="utf-8")
         ways = header.partition("int retries")[2].partition("std::shared_ptr<grpc")[0]
-        members = re.findall(r"(\w+);$", ways, re.M)
+        members = re.findall(r"> (\w+);$", ways, re.M)
         assert len(members) == 7
         for name in members:
             assert f"`{name}`" in table
