@@ -160,6 +160,7 @@ TEST_F(Calls, TheClientsTimeoutHoldsUnlessTheCallHasItsOwn) {
   options.timeout = milliseconds(150);
   const Client hasty(server.address(), options);
   EXPECT_THROW(static_cast<void>(hasty.match(room(), room())), DeadlineExceededError);
+  ASSERT_TRUE(server.wait_until_cancelled());
   server.endless = false;
   server.events = small_match();
   CallOptions call;
