@@ -1,6 +1,7 @@
 #include "access.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <system_error>
 #include <utility>
@@ -96,12 +97,10 @@ std::string pem_of(const std::optional<Said>& found, const char* mark, const cha
 }
 
 void refuse_all(const ClientOptions& options, const char* problem, bool with_tls) {
-  const std::pair<const char*, bool> given[] = {
-      // NOLINT: a short list
-      {"tls", with_tls && options.tls.has_value()},
-      {"root_certificates", options.root_certificates.has_value()},
-      {"certificate", options.certificate.has_value()},
-      {"key", options.key.has_value()}};
+  const std::array given{std::pair("tls", with_tls && options.tls.has_value()),
+                         std::pair("root_certificates", options.root_certificates.has_value()),
+                         std::pair("certificate", options.certificate.has_value()),
+                         std::pair("key", options.key.has_value())};
   for (const auto& [name, is_given] : given) {
     if (is_given) {
       refuse(name, problem);

@@ -205,9 +205,9 @@ struct Client::Impl {
   std::unique_ptr<v1::SceneService::Stub> scenes;
   std::unique_ptr<v1::CatalogService::Stub> catalog;
 
-  std::unique_ptr<detail::MatchStream> stream(const Source& sketch, const Source& map,
-                                              const MatchOptions& options,
-                                              const CallOptions& call) const {
+  [[nodiscard]] std::unique_ptr<detail::MatchStream> stream(const Source& sketch, const Source& map,
+                                                            const MatchOptions& options,
+                                                            const CallOptions& call) const {
     return std::make_unique<detail::MatchStream>(connection,
                                                  detail::match_request(sketch, map, options), call);
   }

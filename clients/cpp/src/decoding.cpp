@@ -26,6 +26,7 @@ namespace detail {
 namespace {
 
 /// Returns a value where a message has it.
+// NOLINTNEXTLINE(cppcoreguidelines-macro-usage): a function cannot name a field
 #define SKETCHMATCH_KNOWN(message, field) \
   ((message).has_##field() ? std::optional((message).field()) : std::nullopt)
 
