@@ -4,5 +4,5 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 find clients/cpp -name '*.?pp' -print0 | xargs -0 clang-format --dry-run --Werror
-if (($# == 0)); then set -- clients/cpp/src/*.cpp clients/cpp/examples/*.cpp; fi
+if (($# == 0)); then set -- clients/cpp/src/*.cpp; fi
 clang-tidy --quiet -p build/cpp --extra-arg=-std=c++17 "$@"
