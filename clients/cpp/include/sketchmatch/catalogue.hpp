@@ -1,0 +1,100 @@
+/// @file
+/// What a server offers, and what it is.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <sketchmatch/match.hpp>
+#include <string>
+#include <vector>
+
+namespace sketchmatch {
+
+/// What an algorithm does in a match.
+enum class AlgorithmKind { unspecified, segmenter, histogram, similarity, searcher, judge };
+
+/// The forms of a source.
+enum class SourceKind {
+  unspecified,
+  stroke_set,
+  polygon_set,
+  occupancy_grid,
+  map_server_map,
+  image,
+  file
+};
+
+/// One algorithm that a request can name.
+struct Algorithm {
+  AlgorithmKind kind = AlgorithmKind::unspecified;  ///< What it does.
+  std::string name;                                 ///< What it is selected by.
+  std::string summary;                              ///< One line for lists.
+  std::string description;                          ///< Its documentation.
+  std::string distribution;                         ///< Python distribution that it comes from.
+  std::string distribution_version;                 ///< Version of that distribution.
+  Parameters parameters_schema;                     ///< Its parameters as a JSON Schema.
+  bool is_default = false;                          ///< Whether it is taken where none is named.
+  std::vector<SourceKind> source_kinds;             ///< For a segmenter, what it reads.
+  std::string source;                               ///< The publications it is from.
+};
+
+/// Whether a plugin can be used.
+enum class PluginState { unspecified, active, disabled, failed };
+
+/// A distribution that offers algorithms.
+struct Plugin {
+  std::string distribution;                      ///< Its name.
+  std::string version;                           ///< Its version.
+  PluginState state = PluginState::unspecified;  ///< Whether it can be used.
+  std::string reason;                            ///< Why not.
+};
+
+/// A pipeline that a request can name.
+struct Profile {
+  std::string name;                ///< What it is selected by.
+  std::string summary;             ///< One line for lists.
+  Pipeline pipeline;               ///< What it chooses.
+  bool is_default = false;         ///< Whether it is taken where none is named.
+  std::optional<Weights> weights;  ///< What the parts of ζ count for.
+  bool allow_unmatched = false;    ///< Whether objects may stay without partner on both sides.
+};
+
+/// Reads one kind of file.
+struct FileReader {
+  std::string name;                                  ///< What errors call it.
+  std::string summary;                               ///< One line for lists.
+  std::vector<std::string> suffixes;                 ///< What names of its files end in.
+  std::vector<std::string> json_keys;                ///< Keys by which it knows a JSON document.
+  SourceKind source_kind = SourceKind::unspecified;  ///< The form of source in such a file.
+  std::string distribution;                          ///< Python distribution that it comes from.
+  std::string distribution_version;                  ///< Version of that distribution.
+};
+
+/// What a server offers.
+struct Catalogue {
+  std::vector<Algorithm> algorithms;  ///< By kind and name.
+  std::vector<Plugin> plugins;        ///< All plugins found, whether they can be used or not.
+  std::vector<Profile> profiles;      ///< The pipelines that requests can name.
+  std::vector<FileReader> readers;    ///< What reads the files of other tools.
+};
+
+/// Limits on requests; one that is absent is not limited.
+struct ServerLimits {
+  std::optional<std::uint64_t> max_request_bytes;       ///< Largest request.
+  std::optional<std::uint32_t> max_objects;             ///< Most objects in a scene.
+  std::optional<std::uint32_t> max_concurrent_matches;  ///< Most matches at the same time.
+  std::optional<Seconds> max_time_budget;               ///< Longest time budget.
+  std::optional<std::uint32_t> max_waiting;             ///< Most requests that wait.
+  std::optional<Seconds> max_wait;                      ///< Longest wait.
+};
+
+/// What a server is.
+struct ServerInfo {
+  std::string version;                   ///< Version of the engine.
+  std::string api_version;               ///< The newest API that it serves.
+  std::uint32_t plugin_api_version = 0;  ///< Version of the plugin API.
+  ServerLimits limits;                   ///< What requests must keep to.
+  Seconds uptime{0.0};                   ///< Time since it started.
+};
+
+}  // namespace sketchmatch

@@ -1,0 +1,100 @@
+/// @file
+/// What can go wrong in a call, each with one sentence for people and a reason for programs.
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+namespace sketchmatch {
+
+/// A time in seconds; durations of `std::chrono` convert to it by themselves.
+using Seconds = std::chrono::duration<double>;
+
+/// Base of every error of this package. `what()` is one sentence for people.
+class SketchmatchError : public std::runtime_error {
+ public:
+  /// @param message One sentence for people.
+  /// @param reason A name of `sketchmatch.v1.ErrorReason` without its prefix; empty if none was
+  ///   given.
+  explicit SketchmatchError(const std::string& message, std::string reason = {});
+
+  /// A name of `sketchmatch.v1.ErrorReason` without its prefix, e.g. `"INVALID_STROKE"`.
+  [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
+
+  /// What to do, as the sentence says it behind its semicolon; empty where it does not.
+  [[nodiscard]] std::string remedy() const;
+
+ private:
+  std::string reason_;
+};
+
+/// The request cannot be used as it is; correct it, the same one fails again.
+class InvalidRequestError : public SketchmatchError {
+ public:
+  /// @param message One sentence with the remedy.
+  /// @param reason What kind of fault it is.
+  /// @param field Path of the field at fault; empty for the whole.
+  explicit InvalidRequestError(const std::string& message, std::string reason = {},
+                               std::string field = {});
+
+  /// Path of the field at fault, e.g. `"sketch.stroke_set.strokes[3]"`; empty for the whole.
+  [[nodiscard]] const std::string& field() const noexcept { return field_; }
+
+ private:
+  std::string field_;
+};
+
+/// The same request may succeed later.
+class RetryableError : public SketchmatchError {
+ public:
+  /// @param message One sentence.
+  /// @param reason Why it does not now.
+  /// @param retry_after After which time to send the request again, if the server said it.
+  explicit RetryableError(const std::string& message, std::string reason = {},
+                          std::optional<Seconds> retry_after = std::nullopt);
+
+  /// After which time to send the same request again; none where the server did not say.
+  [[nodiscard]] std::optional<Seconds> retry_after() const noexcept { return retry_after_; }
+
+ private:
+  std::optional<Seconds> retry_after_;
+};
+
+/// No server answers, it is starting or stopping, or it lost the process that answered.
+class ServerUnavailableError : public RetryableError {
+  using RetryableError::RetryableError;
+};
+
+/// The server has no room for the request now; send it again after `retry_after()`.
+class ServerBusyError : public RetryableError {
+  using RetryableError::RetryableError;
+};
+
+/// The time ended before there was an answer; allow more of it.
+class DeadlineExceededError : public SketchmatchError {
+  using SketchmatchError::SketchmatchError;
+};
+
+/// Server or client does not trust the other: give another token, or other certificates.
+class NotAuthenticatedError : public SketchmatchError {
+  using SketchmatchError::SketchmatchError;
+};
+
+/// The server does not know the method; it is older than this client, or another server.
+class NotSupportedError : public SketchmatchError {
+  using SketchmatchError::SketchmatchError;
+};
+
+/// The call was cancelled.
+class CallCancelledError : public SketchmatchError {
+  using SketchmatchError::SketchmatchError;
+};
+
+/// The server could not do what it should; the message says which part of it failed.
+class ServerFailedError : public SketchmatchError {
+  using SketchmatchError::SketchmatchError;
+};
+
+}  // namespace sketchmatch

@@ -1,0 +1,105 @@
+/// @file
+/// Calls: what they have in common, and a match as a stream of events.
+#pragma once
+
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+#include <sketchmatch/v1/match_service.grpc.pb.h>
+
+#include <memory>
+#include <optional>
+#include <sketchmatch/match.hpp>
+#include <sketchmatch/options.hpp>
+#include <string>
+
+#include "attempts.hpp"
+#include "cancellation_state.hpp"
+#include "statuses.hpp"
+
+namespace sketchmatch::detail {
+
+/// A connection, and how calls are made over it.
+struct Connection {
+  std::string address;
+  std::string authorization;
+  std::optional<Seconds> timeout;
+  int retries = 0;
+  std::shared_ptr<grpc::Channel> channel;
+
+  /// Adds what says who calls.
+  void authorize(grpc::ClientContext& context) const;
+
+  /// Returns how long a call may take.
+  [[nodiscard]] std::optional<Seconds> limit(const CallOptions& call) const;
+};
+
+/// Makes a call, again where that helps, and returns its answer.
+/// @param ask Called with a context and an answer to fill; returns the status.
+template <typename Answer, typename Ask>
+Answer asked(const Connection& connection, const CallOptions& call, const Ask& ask) {
+  Attempts attempts(connection.retries, connection.limit(call));
+  while (true) {
+    Failure failure;
+    {
+      grpc::ClientContext context;
+      attempts.limit(context);
+      connection.authorize(context);
+      const OnCancel stop(call.cancellation.state(), [&context] { context.TryCancel(); });
+      Answer answer;
+      const grpc::Status status = ask(&context, &answer);
+      if (status.ok()) {
+        return answer;
+      }
+      failure = failure_of(status, connection.address);
+    }
+    const auto pause = attempts.pause_after(failure);
+    if (!pause) {
+      failure.raise();
+    }
+    call.cancellation.state()->wait_for(*pause);
+  }
+}
+
+/// A match that a server is doing.
+class MatchStream {
+ public:
+  MatchStream(std::shared_ptr<const Connection> connection, v1::MatchRequest request,
+              const CallOptions& call);
+  MatchStream(const MatchStream&) = delete;
+  MatchStream& operator=(const MatchStream&) = delete;
+  MatchStream(MatchStream&&) = delete;
+  MatchStream& operator=(MatchStream&&) = delete;
+  ~MatchStream();
+
+  /// Returns the next event; none at the end.
+  std::optional<MatchEvent> next();
+
+  /// Waits for the end.
+  Match result(const ProgressCallback& on_progress);
+
+  /// Stops the match; any thread may.
+  void cancel() { own_->cancel(); }
+
+ private:
+  /// One attempt: it is stopped where it is left.
+  struct Attempt;
+
+  std::optional<v1::MatchResponse> read();
+  void keep(const MatchEvent& event);
+
+  std::shared_ptr<const Connection> connection_;
+  std::unique_ptr<v1::MatchService::Stub> stub_;
+  v1::MatchRequest request_;
+  std::optional<Seconds> limit_;
+  std::shared_ptr<CancellationState> own_;
+  OnCancel callers_;
+  std::optional<Attempts> attempts_;
+  std::unique_ptr<Attempt> attempt_;
+  bool told_ = false;
+  bool ended_ = false;
+  std::optional<Failure> failure_;
+  Match match_;
+  bool has_result_ = false;
+};
+
+}  // namespace sketchmatch::detail

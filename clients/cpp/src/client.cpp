@@ -1,0 +1,331 @@
+#include <grpcpp/create_channel.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/support/byte_buffer.h>
+#include <sketchmatch/v1/catalog_service.grpc.pb.h>
+#include <sketchmatch/v1/scene_service.grpc.pb.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <limits>
+#include <sketchmatch/client.hpp>
+#include <thread>
+#include <utility>
+
+#include "access.hpp"
+#include "address.hpp"
+#include "call.hpp"
+#include "decoding.hpp"
+#include "requests.hpp"
+#include "text.hpp"
+
+namespace sketchmatch {
+
+namespace {
+
+// The standard health service, by hand: its request is one text, its response one enum (both field
+// 1). A program may hold its messages once, and may have them from elsewhere.
+constexpr const char* kCheckHealth = "/grpc.health.v1.Health/Check";
+constexpr const char* kServing = "\x08\x01";
+constexpr std::size_t kLongestName = 127;
+constexpr Seconds kHealthPoll{0.05};
+
+[[noreturn]] void refuse_part(const std::string& name) {
+  detail::refuse("name", "is " + detail::in_quotes(name) +
+                             ", which the server does not have; name a service, as in "
+                             "sketchmatch.v1.MatchService, or an algorithm, as in searcher/easm");
+}
+
+grpc::ByteBuffer health_request(const std::string& name) {
+  if (name.size() > kLongestName || !detail::is_utf8(name)) {
+    refuse_part(name);
+  }
+  std::string message;
+  if (!name.empty()) {
+    message = std::string("\x0a") + static_cast<char>(name.size()) + name;
+  }
+  const grpc::Slice slice(message);
+  return {&slice, 1};
+}
+
+std::string bytes_of(const grpc::ByteBuffer& buffer) {
+  grpc::Slice slice;
+  if (!buffer.DumpToSingleSlice(&slice).ok()) {
+    return {};
+  }
+  // gRPC has bytes where we have characters.
+  return {reinterpret_cast<const char*>(slice.begin()), slice.size()};  // NOLINT
+}
+
+/// Makes a call with bytes for messages.
+grpc::Status ask(const std::shared_ptr<grpc::Channel>& channel, const char* method,
+                 grpc::ClientContext* context, const grpc::ByteBuffer& request,
+                 grpc::ByteBuffer* answer) {
+  grpc::CompletionQueue queue;
+  grpc::GenericStub stub(channel);
+  grpc::Status status;
+  const auto reader = stub.PrepareUnaryCall(context, method, request, &queue);
+  reader->StartCall();
+  reader->Finish(answer, &status, nullptr);
+  void* tag = nullptr;
+  bool ok = false;
+  queue.Next(&tag, &ok);
+  queue.Shutdown();
+  while (queue.Next(&tag, &ok)) {
+  }
+  return status;
+}
+
+grpc::ChannelArguments channel_arguments(const std::string& address, const detail::Access& access) {
+  grpc::ChannelArguments arguments;
+  // What is too large is the server's to say: only it knows its memory.
+  arguments.SetMaxSendMessageSize(-1);
+  arguments.SetMaxReceiveMessageSize(-1);
+  // Buffer as little as there may be: what waits here for a slow reader is progress that the server
+  // can no longer replace by the latest. A whole message passes at once all the same.
+  arguments.SetInt("grpc.http2.lookahead_bytes", 1);
+  arguments.SetInt("grpc.http2.bdp_probe", 0);
+  // A robot's link may vanish without a word: find out within 40 s, and reconnect soon.
+  arguments.SetInt("grpc.keepalive_time_ms", 30'000);
+  arguments.SetInt("grpc.keepalive_timeout_ms", 10'000);
+  arguments.SetInt("grpc.http2.ping_timeout_ms", 10'000);
+  arguments.SetInt("grpc.initial_reconnect_backoff_ms", 100);
+  arguments.SetInt("grpc.max_reconnect_backoff_ms", 5'000);
+  if (detail::is_here(address)) {
+    // No proxy, whatever http_proxy says, leads to where the client itself is.
+    arguments.SetInt("grpc.enable_http_proxy", 0);
+  }
+  if (access.server_name) {
+    arguments.SetSslTargetNameOverride(*access.server_name);
+  }
+  return arguments;
+}
+
+}  // namespace
+
+namespace detail {
+
+/// A match in a thread of its own.
+class PendingMatch {
+ public:
+  PendingMatch(std::unique_ptr<MatchStream> stream, MatchCallbacks callbacks)
+      : stream_(std::move(stream)), callbacks_(std::move(callbacks)) {}
+
+  static std::shared_ptr<PendingMatch> started(std::unique_ptr<MatchStream> stream,
+                                               MatchCallbacks callbacks) {
+    auto pending = std::make_shared<PendingMatch>(std::move(stream), std::move(callbacks));
+    pending->thread_ = std::thread([pending] { pending->run(); });
+    return pending;
+  }
+
+  [[nodiscard]] const std::shared_future<Match>& future() const { return future_; }
+
+  void cancel() { stream_->cancel(); }
+
+  /// Stops the match, and waits until its thread has ended, unless that is this very thread.
+  void end() {
+    cancel();
+    if (thread_.get_id() == std::this_thread::get_id()) {
+      thread_.detach();
+    } else {
+      thread_.join();
+    }
+  }
+
+ private:
+  void run() {
+    try {
+      promise_.set_value(told());
+    } catch (...) {  // of a callback, too
+      promise_.set_exception(std::current_exception());
+    }
+  }
+
+  Match told() {
+    try {
+      Match match = stream_->result(callbacks_.on_progress);
+      if (callbacks_.on_match) {
+        callbacks_.on_match(match);
+      }
+      return match;
+    } catch (const SketchmatchError& error) {
+      if (callbacks_.on_error) {
+        callbacks_.on_error(error);
+      }
+      throw;
+    }
+  }
+
+  std::unique_ptr<MatchStream> stream_;
+  MatchCallbacks callbacks_;
+  std::promise<Match> promise_;
+  std::shared_future<Match> future_{promise_.get_future()};
+  std::thread thread_;
+};
+
+}  // namespace detail
+
+MatchCall::MatchCall(std::unique_ptr<detail::MatchStream> stream) : stream_(std::move(stream)) {}
+MatchCall::MatchCall(MatchCall&& other) noexcept = default;
+MatchCall& MatchCall::operator=(MatchCall&& other) noexcept = default;
+MatchCall::~MatchCall() = default;
+
+std::optional<MatchEvent> MatchCall::next() { return stream_->next(); }
+
+Match MatchCall::result(const ProgressCallback& on_progress) {
+  return stream_->result(on_progress);
+}
+
+void MatchCall::cancel() { stream_->cancel(); }
+
+AsyncMatch::AsyncMatch(std::shared_ptr<detail::PendingMatch> pending)
+    : pending_(std::move(pending)) {}
+
+AsyncMatch::AsyncMatch(AsyncMatch&& other) noexcept = default;
+
+AsyncMatch& AsyncMatch::operator=(AsyncMatch&& other) noexcept {
+  const AsyncMatch ended(std::exchange(pending_, std::move(other.pending_)));
+  return *this;
+}
+
+AsyncMatch::~AsyncMatch() {
+  if (pending_) {
+    pending_->end();
+  }
+}
+
+std::shared_future<Match> AsyncMatch::future() const { return pending_->future(); }
+
+Match AsyncMatch::get() const { return pending_->future().get(); }
+
+void AsyncMatch::cancel() { pending_->cancel(); }
+
+struct Client::Impl {
+  std::shared_ptr<const detail::Connection> connection;
+  std::unique_ptr<v1::SceneService::Stub> scenes;
+  std::unique_ptr<v1::CatalogService::Stub> catalog;
+
+  [[nodiscard]] std::unique_ptr<detail::MatchStream> stream(const Source& sketch, const Source& map,
+                                                            const MatchOptions& options,
+                                                            const CallOptions& call) const {
+    return std::make_unique<detail::MatchStream>(connection,
+                                                 detail::match_request(sketch, map, options), call);
+  }
+};
+
+Client::Client(const std::string& address, const ClientOptions& options) {
+  const auto access = detail::access_to(address, options);
+  if (options.retries < 0) {
+    detail::refuse("retries", "is " + std::to_string(options.retries) +
+                                  "; give how often a request may be sent again, at least 0");
+  }
+  const auto timeout = options.timeout ? detail::limit_of(*options.timeout) : std::nullopt;
+  auto channel = grpc::CreateCustomChannel(
+      address, access.credentials ? access.credentials : grpc::InsecureChannelCredentials(),
+      channel_arguments(address, access));
+  impl_ = std::make_shared<const Impl>(
+      Impl{std::make_shared<const detail::Connection>(detail::Connection{
+               address, access.authorization, timeout, options.retries, channel}),
+           v1::SceneService::NewStub(channel), v1::CatalogService::NewStub(channel)});
+}
+
+Client::Client(Client&& other) noexcept = default;
+Client& Client::operator=(Client&& other) noexcept = default;
+Client::~Client() = default;
+
+Match Client::match(const Source& sketch, const Source& map, const MatchOptions& options,
+                    const ProgressCallback& on_progress, const CallOptions& call) const {
+  return impl_->stream(sketch, map, options, call)->result(on_progress);
+}
+
+MatchCall Client::events(const Source& sketch, const Source& map, const MatchOptions& options,
+                         const CallOptions& call) const {
+  return MatchCall(impl_->stream(sketch, map, options, call));
+}
+
+AsyncMatch Client::match_async(const Source& sketch, const Source& map, const MatchOptions& options,
+                               MatchCallbacks callbacks, const CallOptions& call) const {
+  return AsyncMatch(detail::PendingMatch::started(impl_->stream(sketch, map, options, call),
+                                                  std::move(callbacks)));
+}
+
+Segmentation Client::segment(const Source& source, const SegmentOptions& options,
+                             const CallOptions& call) const {
+  const auto request = detail::segment_request(source, options);
+  return detail::decoded(detail::asked<v1::SegmentResponse>(
+      *impl_->connection, call, [&](grpc::ClientContext* context, v1::SegmentResponse* answer) {
+        return impl_->scenes->Segment(context, request, answer);
+      }));
+}
+
+Catalogue Client::algorithms(const CallOptions& call) const {
+  return detail::decoded(detail::asked<v1::ListAlgorithmsResponse>(
+      *impl_->connection, call,
+      [&](grpc::ClientContext* context, v1::ListAlgorithmsResponse* answer) {
+        return impl_->catalog->ListAlgorithms(context, {}, answer);
+      }));
+}
+
+ServerInfo Client::server_info(const CallOptions& call) const {
+  return detail::decoded(detail::asked<v1::GetServerInfoResponse>(
+      *impl_->connection, call,
+      [&](grpc::ClientContext* context, v1::GetServerInfoResponse* answer) {
+        return impl_->catalog->GetServerInfo(context, {}, answer);
+      }));
+}
+
+bool Client::is_serving(const std::string& name, const CallOptions& call) const {
+  const auto request = health_request(name);
+  grpc::ClientContext context;
+  detail::Attempts(0, impl_->connection->limit(call)).limit(context);
+  authorize(context);
+  const detail::OnCancel stop(call.cancellation.state(), [&context] { context.TryCancel(); });
+  grpc::ByteBuffer answer;
+  const auto status = ask(channel(), kCheckHealth, &context, request, &answer);
+  if (status.error_code() == grpc::StatusCode::NOT_FOUND) {
+    refuse_part(name);
+  }
+  check(status);
+  return bytes_of(answer) == kServing;
+}
+
+void Client::wait_until_serving(Seconds timeout, const Cancellation& cancellation) const {
+  using Clock = std::chrono::steady_clock;
+  const auto limit = detail::limit_of(timeout);
+  const auto began = Clock::now();
+  while (true) {
+    CallOptions call;
+    call.cancellation = cancellation;
+    call.timeout = limit ? std::max(Seconds(0.0), *limit - Seconds(Clock::now() - began))
+                         : Seconds(std::numeric_limits<double>::infinity());
+    try {
+      if (is_serving({}, call)) {
+        return;
+      }
+    } catch (const ServerUnavailableError&) {  // yet
+    } catch (const DeadlineExceededError&) {   // as below
+    }
+    if (limit && Seconds(Clock::now() - began) >= *limit) {
+      throw ServerUnavailableError("the sketchmatch server at " + impl_->connection->address +
+                                   " did not serve within " + detail::shown(timeout.count()) +
+                                   " s; start it, check the address, or wait longer");
+    }
+    cancellation.state()->wait_for(kHealthPoll);
+  }
+}
+
+const std::shared_ptr<grpc::Channel>& Client::channel() const noexcept {
+  return impl_->connection->channel;
+}
+
+void Client::authorize(grpc::ClientContext& context) const {
+  impl_->connection->authorize(context);
+}
+
+void Client::check(const grpc::Status& status) const {
+  if (!status.ok()) {
+    detail::failure_of(status, impl_->connection->address).raise();
+  }
+}
+
+}  // namespace sketchmatch

@@ -1,0 +1,337 @@
+#include "decoding.hpp"
+
+#include <string>
+#include <vector>
+
+namespace sketchmatch {
+
+namespace {
+
+ObjectMap map_of(const std::vector<ObjectMatch>& lines) {
+  ObjectMap map;
+  for (const auto& line : lines) {
+    map.emplace(line.sketch_object, line.map_object);
+  }
+  return map;
+}
+
+}  // namespace
+
+ObjectMap Progress::object_map() const { return map_of(object_matches); }
+
+ObjectMap Match::object_map() const { return map_of(result.object_matches); }
+
+namespace detail {
+
+namespace {
+
+/// Returns a value where a message has it.
+// NOLINTNEXTLINE(cppcoreguidelines-macro-usage): a function cannot name a field
+#define SKETCHMATCH_KNOWN(message, field) \
+  ((message).has_##field() ? std::optional((message).field()) : std::nullopt)
+
+Seconds decoded(const google::protobuf::Duration& message) {
+  return std::chrono::seconds(message.seconds()) +
+         Seconds(std::chrono::nanoseconds(message.nanos()));
+}
+
+Parameters decoded(const google::protobuf::Struct& message);
+
+Value decoded(const google::protobuf::Value& message) {
+  switch (message.kind_case()) {
+    case google::protobuf::Value::kBoolValue:
+      return message.bool_value();
+    case google::protobuf::Value::kNumberValue:
+      return message.number_value();
+    case google::protobuf::Value::kStringValue:
+      return message.string_value();
+    case google::protobuf::Value::kListValue: {
+      Value::List list;
+      for (const auto& each : message.list_value().values()) {
+        list.push_back(decoded(each));
+      }
+      return list;
+    }
+    case google::protobuf::Value::kStructValue:
+      return decoded(message.struct_value());
+    default:
+      return nullptr;
+  }
+}
+
+Parameters decoded(const google::protobuf::Struct& message) {
+  Parameters values;
+  for (const auto& [name, value] : message.fields()) {
+    values.emplace(name, decoded(value));
+  }
+  return values;
+}
+
+AlgorithmSelection decoded(const v1::AlgorithmSelection& message) {
+  return {message.name(), decoded(message.parameters())};
+}
+
+Pipeline decoded(const v1::Pipeline& message) {
+  return {decoded(message.sketch_segmenter()),
+          decoded(message.map_segmenter()),
+          decoded(message.histogram()),
+          decoded(message.similarity()),
+          decoded(message.searcher()),
+          decoded(message.judge()),
+          message.profile()};
+}
+
+Weights decoded(const v1::ConfidenceWeights& message) {
+  const auto one_if_absent = [](const std::optional<double>& weight) {
+    return weight.value_or(1.0);
+  };
+  return {one_if_absent(SKETCHMATCH_KNOWN(message, similarity)),
+          one_if_absent(SKETCHMATCH_KNOWN(message, rotation)),
+          one_if_absent(SKETCHMATCH_KNOWN(message, dilation)),
+          SKETCHMATCH_KNOWN(message, shape),
+          SKETCHMATCH_KNOWN(message, size),
+          SKETCHMATCH_KNOWN(message, distance)};
+}
+
+Point decoded(const v1::Point& message) { return {message.x(), message.y()}; }
+
+// What repeated fields hold, before they ask for it.
+SceneObject decoded(const v1::SceneObject& message);
+ObjectMatch decoded(const v1::ObjectMatch& message);
+FmapEntry decoded(const v1::FmapEntry& message);
+AlternativeMap decoded(const v1::AlternativeMap& message);
+Algorithm decoded(const v1::Algorithm& message);
+Plugin decoded(const v1::Plugin& message);
+Profile decoded(const v1::Profile& message);
+FileReader decoded(const v1::FileReader& message);
+
+/// Returns the values of a repeated field.
+template <typename Field>
+auto all(const Field& messages) {
+  std::vector<decltype(decoded(messages.Get(0)))> values;
+  values.reserve(static_cast<std::size_t>(messages.size()));
+  for (const auto& each : messages) {
+    values.push_back(decoded(each));
+  }
+  return values;
+}
+
+template <typename Field>
+std::vector<std::string> texts(const Field& field) {
+  return {field.begin(), field.end()};
+}
+
+template <typename Field>
+std::vector<std::uint32_t> numbers(const Field& field) {
+  return {field.begin(), field.end()};
+}
+
+SceneObject decoded(const v1::SceneObject& message) {
+  SceneObject object{{}, message.label(), message.area(), decoded(message.centroid())};
+  for (const auto& ring : message.rings()) {
+    object.rings.push_back(all(ring.points()));
+  }
+  return object;
+}
+
+Scene decoded(const v1::Scene& message) { return {all(message.objects())}; }
+
+MatchAccepted decoded(const v1::MatchAccepted& message) {
+  return {message.match_id(),
+          message.seed(),
+          decoded(message.pipeline()),
+          decoded(message.weights()),
+          message.has_time_budget() ? std::optional(decoded(message.time_budget())) : std::nullopt,
+          SKETCHMATCH_KNOWN(message, unmatched_price)};
+}
+
+MatchScenes decoded(const v1::MatchScenes& message) {
+  return {decoded(message.sketch()), decoded(message.map()), texts(message.sketch_warnings()),
+          texts(message.map_warnings()), all(message.sketch_route())};
+}
+
+ObjectRelation decoded(const v1::ObjectRelation& message) {
+  return {message.reference_object(), message.phrase(), message.degree()};
+}
+
+ObjectMatch decoded(const v1::ObjectMatch& message) {
+  return {message.sketch_object(),
+          message.map_object(),
+          message.sketch_label(),
+          message.map_label(),
+          message.confidence(),
+          SKETCHMATCH_KNOWN(message, margin),
+          message.has_relation() ? std::optional(decoded(message.relation())) : std::nullopt,
+          SKETCHMATCH_KNOWN(message, probability)};
+}
+
+Progress decoded(const v1::MatchProgress& message) {
+  return {static_cast<Phase>(message.phase()),
+          SKETCHMATCH_KNOWN(message, fraction),
+          message.iteration(),
+          message.evaluations(),
+          SKETCHMATCH_KNOWN(message, confidence),
+          SKETCHMATCH_KNOWN(message, upper_bound),
+          all(message.object_matches()),
+          decoded(message.elapsed())};
+}
+
+FmapConfidence decoded(const v1::FmapConfidence& message) {
+  return {message.total(),
+          message.similarity(),
+          message.rotation(),
+          message.dilation(),
+          SKETCHMATCH_KNOWN(message, shape),
+          SKETCHMATCH_KNOWN(message, size)};
+}
+
+FmapEntry decoded(const v1::FmapEntry& message) {
+  return {{message.sketch_pair().first(), message.sketch_pair().second()},
+          {message.map_pair().first(), message.map_pair().second()},
+          message.similarity(),
+          message.rotation_radians(),
+          message.dilation()};
+}
+
+AlternativeMap decoded(const v1::AlternativeMap& message) {
+  return {all(message.object_matches()), decoded(message.fmap_confidence()),
+          message.omap_confidence(), SKETCHMATCH_KNOWN(message, probability)};
+}
+
+Ambiguity decoded(const v1::Ambiguity& message) {
+  return {message.maps(), numbers(message.alternatives()),
+          numbers(message.deciding_sketch_objects())};
+}
+
+MatchStatistics decoded(const v1::MatchStatistics& message) {
+  return {message.iterations(),
+          message.evaluations(),
+          decoded(message.segment_elapsed()),
+          decoded(message.describe_elapsed()),
+          decoded(message.relate_elapsed()),
+          decoded(message.search_elapsed()),
+          decoded(message.total_elapsed())};
+}
+
+MatchResult decoded(const v1::MatchResult& message) {
+  MatchResult result;
+  result.match_id = message.match_id();
+  result.seed = message.seed();
+  result.outcome = static_cast<Outcome>(message.outcome());
+  result.object_matches = all(message.object_matches());
+  result.unmatched_sketch_objects = numbers(message.unmatched_sketch_objects());
+  result.unmatched_sketch_probabilities = {message.unmatched_sketch_probabilities().begin(),
+                                           message.unmatched_sketch_probabilities().end()};
+  result.unmatched_map_objects = numbers(message.unmatched_map_objects());
+  result.omap_confidence = message.omap_confidence();
+  result.fmap_confidence = decoded(message.fmap_confidence());
+  result.upper_bound = SKETCHMATCH_KNOWN(message, upper_bound);
+  result.fmap_entries = all(message.fmap_entries());
+  result.rotation_radians = message.rotation_radians();
+  result.scale = message.scale();
+  result.statistics = decoded(message.statistics());
+  result.alternatives = all(message.alternatives());
+  result.search_note = message.search_note();
+  result.probability = SKETCHMATCH_KNOWN(message, probability);
+  result.place_probability = SKETCHMATCH_KNOWN(message, place_probability);
+  if (message.has_ambiguity()) {
+    result.ambiguity = decoded(message.ambiguity());
+  }
+  return result;
+}
+
+template <typename Field>
+std::vector<SourceKind> kinds(const Field& field) {
+  std::vector<SourceKind> found;
+  for (const int kind : field) {
+    found.push_back(static_cast<SourceKind>(kind));
+  }
+  return found;
+}
+
+Algorithm decoded(const v1::Algorithm& message) {
+  return {static_cast<AlgorithmKind>(message.kind()),
+          message.name(),
+          message.summary(),
+          message.description(),
+          message.distribution(),
+          message.distribution_version(),
+          decoded(message.parameters_schema()),
+          message.is_default(),
+          kinds(message.source_kinds()),
+          message.source()};
+}
+
+Plugin decoded(const v1::Plugin& message) {
+  return {message.distribution(), message.version(), static_cast<PluginState>(message.state()),
+          message.reason()};
+}
+
+Profile decoded(const v1::Profile& message) {
+  return {message.name(),
+          message.summary(),
+          decoded(message.pipeline()),
+          message.is_default(),
+          message.has_weights() ? std::optional(decoded(message.weights())) : std::nullopt,
+          message.allow_unmatched()};
+}
+
+FileReader decoded(const v1::FileReader& message) {
+  return {message.name(),
+          message.summary(),
+          texts(message.suffixes()),
+          texts(message.json_keys()),
+          static_cast<SourceKind>(message.source_kind()),
+          message.distribution(),
+          message.distribution_version()};
+}
+
+ServerLimits decoded(const v1::ServerLimits& message) {
+  ServerLimits limits;
+  limits.max_request_bytes = SKETCHMATCH_KNOWN(message, max_request_bytes);
+  limits.max_objects = SKETCHMATCH_KNOWN(message, max_objects);
+  limits.max_concurrent_matches = SKETCHMATCH_KNOWN(message, max_concurrent_matches);
+  if (message.has_max_time_budget()) {
+    limits.max_time_budget = decoded(message.max_time_budget());
+  }
+  limits.max_waiting = SKETCHMATCH_KNOWN(message, max_waiting);
+  if (message.has_max_wait()) {
+    limits.max_wait = decoded(message.max_wait());
+  }
+  return limits;
+}
+
+}  // namespace
+
+std::optional<MatchEvent> decoded(const v1::MatchResponse& message) {
+  switch (message.event_case()) {
+    case v1::MatchResponse::kAccepted:
+      return decoded(message.accepted());
+    case v1::MatchResponse::kScenes:
+      return decoded(message.scenes());
+    case v1::MatchResponse::kProgress:
+      return decoded(message.progress());
+    case v1::MatchResponse::kResult:
+      return decoded(message.result());
+    default:
+      return std::nullopt;
+  }
+}
+
+Segmentation decoded(const v1::SegmentResponse& message) {
+  return {decoded(message.scene()), texts(message.warnings()), decoded(message.segmenter()),
+          all(message.route())};
+}
+
+Catalogue decoded(const v1::ListAlgorithmsResponse& message) {
+  return {all(message.algorithms()), all(message.plugins()), all(message.profiles()),
+          all(message.readers())};
+}
+
+ServerInfo decoded(const v1::GetServerInfoResponse& message) {
+  return {message.version(), message.api_version(), message.plugin_api_version(),
+          decoded(message.limits()), decoded(message.uptime())};
+}
+
+}  // namespace detail
+}  // namespace sketchmatch

@@ -1,0 +1,22 @@
+/// @file
+/// From messages to values.
+#pragma once
+
+#include <sketchmatch/v1/catalog_service.pb.h>
+#include <sketchmatch/v1/match_service.pb.h>
+#include <sketchmatch/v1/scene_service.pb.h>
+
+#include <optional>
+#include <sketchmatch/catalogue.hpp>
+#include <sketchmatch/match.hpp>
+#include <sketchmatch/scene.hpp>
+
+namespace sketchmatch::detail {
+
+/// Returns an event; none for one of a kind that this version does not know.
+std::optional<MatchEvent> decoded(const v1::MatchResponse& message);
+Segmentation decoded(const v1::SegmentResponse& message);
+Catalogue decoded(const v1::ListAlgorithmsResponse& message);
+ServerInfo decoded(const v1::GetServerInfoResponse& message);
+
+}  // namespace sketchmatch::detail

@@ -1,0 +1,40 @@
+/// @file
+/// What ended a call, from the status that gRPC has of it.
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <optional>
+#include <sketchmatch/errors.hpp>
+#include <string>
+
+namespace sketchmatch::detail {
+
+/// An error before it is thrown.
+struct Failure {
+  /// One for each class of errors.
+  enum class Kind {
+    invalid_request,
+    unavailable,
+    busy,
+    deadline_exceeded,
+    not_authenticated,
+    not_supported,
+    cancelled,
+    failed
+  };
+
+  Kind kind = Kind::failed;
+  std::string message;
+  std::string reason;
+  std::string field;
+  std::optional<Seconds> retry_after;
+
+  /// Throws it.
+  [[noreturn]] void raise() const;
+};
+
+/// Returns what a status that is not OK says of a call to a server at an address.
+Failure failure_of(const grpc::Status& status, const std::string& address);
+
+}  // namespace sketchmatch::detail

@@ -1,0 +1,184 @@
+// A real server, whose address the environment tells: SKETCHMATCH_TEST_ADDRESS, and so on.
+#include <gtest/gtest.h>
+#include <sys/types.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <future>
+#include <sketchmatch/sketchmatch.hpp>
+#include <string>
+#include <vector>
+
+namespace sketchmatch::test {
+
+namespace {
+
+std::string variable(const std::string& name) {
+  const char* text = std::getenv(("SKETCHMATCH_TEST_" + name).c_str());  // NOLINT
+  return text == nullptr ? "" : text;
+}
+
+std::string example(const std::string& name) { return variable("EXAMPLES") + "/" + name; }
+
+Source sketch() { return sources::file(example("living_room_sketch.svg")); }
+
+Source map() { return sources::map_server_map(example("living_room.yaml")); }
+
+/// A grid of equal squares, for which no searcher finds the best map soon.
+Source squares(int side) {
+  std::vector<Ring> rings;
+  for (int x = 0; x < side; ++x) {
+    for (int y = 0; y < side; ++y) {
+      const double left = 10.0 * x + 0.01 * y * x;
+      const double low = 10.0 * y;
+      rings.push_back({{left, low}, {left + 4, low}, {left + 4, low + 4}, {left, low + 4}});
+    }
+  }
+  return sources::polygons(rings);
+}
+
+MatchOptions long_search() {
+  MatchOptions options;
+  options.searcher = "easm";
+  options.params["searcher"]["generations"] = 1'000'000;
+  return options;
+}
+
+class Real : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (variable("ADDRESS").empty()) {
+      GTEST_SKIP() << "SKETCHMATCH_TEST_ADDRESS names no server";
+    }
+  }
+
+  [[nodiscard]] static Client client() { return Client(variable("ADDRESS")); }
+};
+
+}  // namespace
+
+TEST_F(Real, ALivingRoomIsMatchedWithProgress) {
+  int progressed = 0;
+  MatchOptions options;
+  options.time_budget = std::chrono::seconds(60);
+  const auto match =
+      client().match(sketch(), map(), options, [&](const Progress& /*progress*/) { ++progressed; });
+  EXPECT_EQ(match.object_map(),
+            (ObjectMap{{0, 6}, {1, 4}, {2, 7}, {3, 5}, {4, 1}, {5, 0}, {6, 2}, {7, 3}}));
+  EXPECT_GT(progressed, 0);
+  EXPECT_EQ(match.accepted.time_budget, Seconds(60.0));
+  EXPECT_EQ(match.scenes.sketch.objects.size(), 8U);
+  EXPECT_GT(match.result.probability.value_or(0.0), 0.9);
+  EXPECT_EQ(match.result.statistics.total_elapsed > Seconds(0.0), true);
+}
+
+TEST_F(Real, ASketchIsSegmented) {
+  const auto found = client().segment(sketch());
+  EXPECT_EQ(found.scene.objects.size(), 8U);
+  EXPECT_EQ(found.scene.objects.at(2).label, "plant");
+}
+
+TEST_F(Real, TheCatalogueAndTheInfoAreRead) {
+  const auto catalogue = client().algorithms();
+  EXPECT_GT(catalogue.algorithms.size(), 10U);
+  const auto schema = catalogue.algorithms.front().parameters_schema;
+  EXPECT_EQ(schema.at("type"), Value("object"));
+  EXPECT_EQ(client().server_info().api_version, "sketchmatch.v1");
+}
+
+TEST_F(Real, HealthIsToldOfTheWholeAndItsParts) {
+  client().wait_until_serving(std::chrono::seconds(60));
+  EXPECT_TRUE(client().is_serving("sketchmatch.v1.MatchService"));
+  EXPECT_THROW(static_cast<void>(client().is_serving("searcher/none")), InvalidRequestError);
+}
+
+TEST_F(Real, AWrongRequestNamesTheField) {
+  MatchOptions options;
+  options.params["searcher"]["wings"] = 2;
+  try {
+    static_cast<void>(client().match(sketch(), map(), options));
+    FAIL();
+  } catch (const InvalidRequestError& error) {
+    EXPECT_EQ(error.reason(), "INVALID_PARAMETER");
+    EXPECT_NE(error.field(), "");
+    EXPECT_NE(error.remedy(), "");
+  }
+}
+
+TEST_F(Real, ASearchCanBeCancelled) {
+  const auto known = client();
+  std::promise<void> begun;
+  bool told = false;
+  MatchCallbacks callbacks;
+  callbacks.on_progress = [&](const Progress& progress) {
+    if (progress.phase == Phase::search && !told) {
+      told = true;
+      begun.set_value();
+    }
+  };
+  auto pending = known.match_async(squares(5), squares(6), long_search(), callbacks);
+  ASSERT_EQ(begun.get_future().wait_for(std::chrono::minutes(2)), std::future_status::ready);
+  pending.cancel();
+  EXPECT_THROW(static_cast<void>(pending.get()), CallCancelledError);
+}
+
+TEST_F(Real, AServerThatIsKilledAmidAStreamIsUnavailable) {
+  const auto pid = static_cast<pid_t>(std::stol(variable("DOOMED_PID")));
+  ClientOptions options;
+  options.retries = 1;
+  const Client known(variable("DOOMED_ADDRESS"), options);
+  bool killed = false;
+  EXPECT_THROW(static_cast<void>(known.match(squares(5), squares(6), long_search(),
+                                             [&](const Progress& /*progress*/) {
+                                               if (!killed) {
+                                                 killed = kill(pid, SIGKILL) == 0;
+                                               }
+                                             })),
+               ServerUnavailableError);
+  EXPECT_TRUE(killed);
+  EXPECT_THROW(static_cast<void>(known.server_info()), ServerUnavailableError);
+}
+
+TEST_F(Real, ATokenOverTlsLetsIn) {
+  ClientOptions options;
+  options.retries = 0;
+  options.root_certificates = variable("CA");
+  options.token_file = variable("TOKEN_FILE");
+  const auto address = variable("TLS_ADDRESS");
+  EXPECT_EQ(Client(address, options).match(sketch(), map()).object_map().size(), 8U);
+  options.token_file.reset();
+  EXPECT_THROW(static_cast<void>(Client(address, options).server_info()), NotAuthenticatedError);
+  options.token = "robot-7.wrong";
+  EXPECT_THROW(static_cast<void>(Client(address, options).server_info()), NotAuthenticatedError);
+}
+
+TEST_F(Real, AServerThatNobodyVouchesForIsNotTrusted) {
+  ClientOptions options;
+  options.retries = 0;
+  options.tls = true;
+  try {
+    static_cast<void>(Client(variable("TLS_ADDRESS"), options).server_info());
+    FAIL();
+  } catch (const NotAuthenticatedError& error) {
+    EXPECT_NE(std::string(error.what()).find("cannot be trusted"), std::string::npos);
+  }
+  options.tls.reset();
+  options.root_certificates = variable("CA");
+  options.server_name = "another.example";
+  EXPECT_THROW(static_cast<void>(Client(variable("TLS_ADDRESS"), options).server_info()),
+               NotAuthenticatedError);
+}
+
+TEST_F(Real, ACertificateOfTheClientLetsIn) {
+  ClientOptions options;
+  options.retries = 0;
+  options.root_certificates = variable("CA");
+  const auto address = variable("MUTUAL_ADDRESS");
+  EXPECT_THROW(static_cast<void>(Client(address, options).server_info()), SketchmatchError);
+  options.certificate = variable("CERTIFICATE");
+  options.key = variable("KEY");
+  EXPECT_EQ(Client(address, options).server_info().api_version, "sketchmatch.v1");
+}
+
+}  // namespace sketchmatch::test

@@ -1,0 +1,298 @@
+"""The C++ client: built, installed, used by strangers, and asked of real servers.
+
+All of it takes minutes, most of which the compiler needs, and only what changed is built anew.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
+from tests.certificates import Authority
+from tests.pace import slowness
+from tests.processes import Server, server, sketchmatch
+from tests.tools import ROOT, require
+
+# The compiler alone needs minutes.
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
+
+FOLDER = ROOT / "clients" / "cpp"
+BUILD = ROOT / "build" / "cpp"
+README = (FOLDER / "README.md").read_text(encoding="utf-8")
+OBJECT_MAP = {0: 6, 1: 4, 2: 7, 3: 5, 4: 1, 5: 0, 6: 2, 7: 3}
+PACKAGES = (
+    *("cmake", "g++", "libgrpc++-dev", "libprotobuf-dev", "libyaml-cpp-dev", "pkg-config"),
+    "protobuf-compiler-grpc",
+)
+
+
+def blocks(language):
+    """Return the blocks of the README in a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.M | re.S)
+
+
+def run(*command, cwd=ROOT, timeout=1800, **environment):
+    """Run a command to its end, which is to be a good one, and return what it said."""
+    done = subprocess.run(
+        list(map(str, command)),
+        cwd=cwd,
+        env={**os.environ, **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        encoding="utf-8",
+        timeout=timeout,
+        check=False,
+    )
+    assert done.returncode == 0, f"{' '.join(map(str, command))}\n{done.stdout[-8000:]}"
+    return done.stdout
+
+
+def shell(commands, cwd, **environment):
+    return run("bash", "-euo", "pipefail", "-c", commands, cwd=cwd, **environment)
+
+
+@pytest.fixture(scope="session")
+def built():
+    """Build library, examples and tests, with every warning an error."""
+    for program in ("cmake", "ninja", "c++", "protoc", "grpc_cpp_plugin", "pkg-config"):
+        require(shutil.which(program), f"the program {program}")
+    for header in ("grpcpp/grpcpp.h", "yaml-cpp/yaml.h", "gtest/gtest.h"):
+        require(Path("/usr/include", header).exists(), f"the C++ header {header}")
+    options = ("-DSKETCHMATCH_BUILD_TESTS=ON", "-DSKETCHMATCH_STRICT=ON")
+    run("cmake", "-S", FOLDER, "-B", BUILD, "-G", "Ninja", *options)
+    run("cmake", "--build", BUILD, "--parallel", "2")
+    return BUILD
+
+
+@pytest.fixture(scope="module")
+def home(built, tmp_path_factory):
+    """Install as the README says, into a home folder."""
+    assert built.is_relative_to(ROOT)  # where the README's commands find it
+    (commands,) = [block for block in blocks("sh") if "--install" in block]
+    folder = tmp_path_factory.mktemp("home")
+    shell(commands, ROOT, HOME=str(folder))
+    return folder
+
+
+@pytest.fixture
+def here(tmp_path):
+    """Return a folder with the files that the README names."""
+    shutil.copy(LIVING_ROOM_SKETCH, tmp_path / "sketch.svg")
+    shutil.copy(LIVING_ROOM_MAP, tmp_path / "room.yaml")
+    shutil.copy(LIVING_ROOM_MAP.with_suffix(".pgm"), tmp_path)
+    (tmp_path / "ca.pem").write_text("-----BEGIN CERTIFICATE-----\n", encoding="utf-8")
+    (tmp_path / "robot-7.token").write_text("robot-7.secret\n", encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def servers(tmp_path_factory):
+    """Run servers of each kind, and return what the tests in C++ are told of them."""
+    folder = tmp_path_factory.mktemp("servers")
+    authority = Authority(folder, "authority")
+    own, robot = authority.issue("localhost"), authority.issue("robot-7")
+    token = sketchmatch("tokens", "add", "robot-7", "--file", folder / "tokens").stdout
+    (folder / "token").write_text(token, encoding="utf-8")
+    tls = ("--tls-certificate", str(own.certificate), "--tls-key", str(own.key), "--workers", "0")
+    client_ca = ("--tls-client-ca", str(authority.certificate))
+    with ExitStack() as stack:
+        plain = stack.enter_context(server())
+        by_token = stack.enter_context(server(*tls, "--tokens", str(folder / "tokens")))
+        mutual = stack.enter_context(server(*tls, *client_ca))
+        doomed = Server()
+        stack.callback(doomed.end)
+        stack.callback(doomed.process.kill)
+        doomed.wait_for("serving$")
+        yield {
+            "ADDRESS": plain.address,
+            "TLS_ADDRESS": by_token.address.replace("127.0.0.1", "localhost"),
+            "MUTUAL_ADDRESS": mutual.address.replace("127.0.0.1", "localhost"),
+            "DOOMED_ADDRESS": doomed.address,
+            "DOOMED_PID": str(doomed.process.pid),
+            "CA": str(authority.certificate),
+            "CERTIFICATE": str(robot.certificate),
+            "KEY": str(robot.key),
+            "TOKEN_FILE": str(folder / "token"),
+            "EXAMPLES": str(LIVING_ROOM_MAP.parent),
+        }
+
+
+def test_every_test_in_cpp_passes_and_none_is_skipped(built, servers):
+    told = {f"SKETCHMATCH_TEST_{name}": value for name, value in servers.items()}
+    said = run("ctest", "--test-dir", built, "--output-on-failure", **told)
+    assert "100% tests passed" in said
+    assert "Skipped" not in said
+
+
+def test_the_examples_run(built, servers):
+    address = servers["ADDRESS"]
+    files = (LIVING_ROOM_SKETCH, LIVING_ROOM_MAP)
+    examples = built / "examples"
+    assert "\n6 sofa          2 " in run(examples / "first_answer", address, *files)
+    said = run(examples / "beside", address, *files)
+    assert {f"{drawn} is {mapped}" for drawn, mapped in OBJECT_MAP.items()} < set(said.splitlines())
+    said = run(examples / "ask_or_act", address).splitlines()
+    assert {"sofa is at 2.5, 6", "table is at 7, 5.25"} < set(said)
+    assert 'api_version: "sketchmatch.v1"' in run(examples / "raw", address)
+
+
+def test_an_example_without_its_files_says_what_is_missing(built):
+    done = subprocess.run(
+        [built / "examples" / "first_answer", "localhost:1", "none.svg", "none.yaml"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("first_answer: file (none.svg) cannot be read: ")
+
+
+class TestReadme:
+    def test_five_lines_give_a_first_answer_through_cmake(self, home, servers, here):
+        program, *_ = blocks("cpp")
+        lines = program.partition("main() {\n")[2].rstrip("}\n").splitlines()
+        assert len(lines) == 5
+        (here / "hello.cpp").write_text(
+            program.replace("localhost:50051", servers["ADDRESS"]), encoding="utf-8"
+        )
+        (project,) = blocks("cmake")
+        (here / "CMakeLists.txt").write_text(project, encoding="utf-8")
+        (commands,) = [block for block in blocks("sh") if "-S . " in block]
+        shell(commands, here, HOME=str(home))
+        assert "8 of 8 sketched objects matched" in run(here / "build" / "hello", cwd=here)
+
+    @pytest.mark.parametrize("number", range(len(blocks("cpp"))))
+    def test_every_program_runs_through_pkg_config(self, home, servers, here, number):
+        program = blocks("cpp")[number]
+        (here / "hello.cpp").write_text(
+            program.replace("localhost:50051", servers["ADDRESS"]), encoding="utf-8"
+        )
+        (commands,) = [block for block in blocks("sh") if "pkg-config --cflags" in block]
+        shell(commands, here, HOME=str(home))
+        said = run(here / "hello", cwd=here)
+        assert SAID[number] in said
+
+    @pytest.mark.usefixtures("built")
+    def test_protoc_makes_code_of_the_contract(self, here):
+        (commands,) = [block for block in blocks("sh") if "protoc --proto_path" in block]
+        (here / "proto").symlink_to(ROOT / "proto")
+        shell(commands, here)
+        made = {str(file.relative_to(here)) for file in here.glob("generated/**/*.h")}
+        assert "generated/sketchmatch/v1/match_service.grpc.pb.h" in made
+        assert "generated/google/rpc/error_details.pb.h" in made
+
+    def test_what_it_installs_is_what_ci_installs(self):
+        (commands,) = [block for block in blocks("sh") if "apt-get" in block]
+        named = commands.replace("\\\n", " ").split()[4:]
+        assert sorted(named) == sorted(PACKAGES)
+        ci = re.findall(r"[\w.+-]+", (ROOT / ".ci" / "run").read_text(encoding="utf-8"))
+        assert {name for name in PACKAGES if name not in ci} == set()
+
+    def test_every_way_into_a_server_is_listed(self):
+        table = README.partition("| member of `ClientOptions` |")[2].partition("\n\n")[0]
+        header = (FOLDER / "include/sketchmatch/options.hpp").read_text(encoding="utf-8")
+        ways = header.partition("int retries")[2].partition("std::shared_ptr<grpc")[0]
+        members = re.findall(r"> (\w+);$", ways, re.M)
+        assert len(members) == 7
+        for name in members:
+            assert f"`{name}`" in table
+            assert f"`SKETCHMATCH_{name.upper()}`" in table
+
+    def test_every_error_is_listed(self):
+        header = (FOLDER / "include/sketchmatch/errors.hpp").read_text(encoding="utf-8")
+        errors = set(re.findall(r"^class (\w+)", header, re.M))
+        listed = set(re.findall(r"^\| `(\w+Error)`", README, re.M))
+        assert listed == errors - {"SketchmatchError", "RetryableError"}
+
+
+SAID = (
+    "8 of 8 sketched objects matched",
+    "desk is object",
+    "8 of 8 sketched objects matched",
+    "TOO_FEW_OBJECTS in ",
+    "",
+    "sketchmatch.v1\n",
+)
+"""What each program of the README prints."""
+
+
+class TestInstallation:
+    def test_headers_stand_alone_and_need_none_that_is_generated(self, home, tmp_path):
+        include = home / ".local" / "include"
+        for header in sorted((FOLDER / "include" / "sketchmatch").glob("*.hpp")):
+            if header.name == "raw.hpp":
+                continue
+            unit = tmp_path / f"{header.stem}.cpp"
+            unit.write_text(f"#include <sketchmatch/{header.name}>\n", encoding="utf-8")
+            said = run("c++", "-std=c++17", "-Wall", "-Wextra", "-M", f"-I{include}", unit)
+            assert "sketchmatch/" in said
+            assert ".pb.h" not in said
+            assert "grpcpp" not in said
+
+    def test_the_contract_is_beside_the_library(self, home):
+        proto = home / ".local" / "share" / "sketchmatch" / "proto"
+        ours = sorted(file.name for file in (ROOT / "proto/sketchmatch/v1").glob("*.proto"))
+        assert sorted(file.name for file in proto.glob("sketchmatch/v1/*.proto")) == ours
+        assert (proto / "google" / "rpc" / "error_details.proto").exists()
+
+    def test_ament_finds_the_package(self, home):
+        share = home / ".local" / "share"
+        assert (share / "ament_index/resource_index/packages/sketchmatch").exists()
+        assert "<name>sketchmatch</name>" in (share / "sketchmatch/package.xml").read_text()
+
+
+def test_a_match_of_eight_objects_costs_less_than_a_millisecond_more_than_the_stub(built):
+    figures = json.loads(run(built / "tests" / "overhead"))
+    assert figures["objects"] == 8
+    assert figures["client"] - figures["raw"] < 1000 * slowness(), figures
+
+
+def test_ten_thousand_calls_leave_nothing_behind(built):
+    figures = json.loads(run(built / "tests" / "memory", 10_000))
+    assert figures["calls"] == 10_000
+    # A leak of one small object a call would be 300 KiB or more; buffers of threads come and go.
+    assert figures["grown"] < 4 * 2**20, figures
+
+
+@pytest.mark.usefixtures("built")
+@pytest.mark.parametrize("sanitizers", ["address,undefined", "thread"])
+def test_sanitizers_find_nothing(sanitizers):
+    said = run(FOLDER / "sanitize.sh", sanitizers)
+    assert "100% tests passed" in said
+    assert "ERROR: " not in said
+    assert "WARNING: ThreadSanitizer" not in said
+
+
+@pytest.mark.usefixtures("built")
+def test_clang_format_and_clang_tidy_find_nothing():
+    for program in ("clang-format", "clang-tidy"):
+        require(shutil.which(program), f"the program {program}")
+    run(FOLDER / "tidy.sh")
+
+
+def test_doxygen_finds_everything_documented():
+    require(shutil.which("doxygen"), "the program doxygen")
+    run("doxygen", FOLDER / "Doxyfile")
+    assert (ROOT / "build" / "cpp-docs" / "html" / "index.html").exists()
+
+
+def test_every_recipe_is_of_the_same_version():
+    texts = {
+        name: (FOLDER / name).read_text(encoding="utf-8")
+        for name in (
+            *("CMakeLists.txt", "conanfile.py", "Doxyfile", "include/sketchmatch/version.hpp"),
+            *("package.xml", "vcpkg/sketchmatch/vcpkg.json"),
+        )
+    }
+    (version,) = re.findall(r'^version = "(.+)"', (ROOT / "pyproject.toml").read_text(), re.M)
+    assert {name for name, text in texts.items() if version not in text} == set()
+    recipe = json.loads(texts["vcpkg/sketchmatch/vcpkg.json"])
+    assert recipe["version"] == version
