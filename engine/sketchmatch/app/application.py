@@ -7,24 +7,33 @@ import logging
 import math
 import time
 import uuid
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import AsyncIterator, Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, contextmanager, suppress
-from typing import Protocol
+from contextlib import asynccontextmanager, closing, contextmanager, suppress
+from dataclasses import replace
+from typing import Protocol, TypeVar
 
 from google.protobuf.message import Message
 
 from sketchmatch.app import responses
+from sketchmatch.app.archive import Archive
 from sketchmatch.app.frames import Flag
 from sketchmatch.app.jobs import Job, answers
-from sketchmatch.app.orders import Order
+from sketchmatch.app.matches import Matches
+from sketchmatch.app.orders import Order, Wish
 from sketchmatch.app.packed import check_size
 from sketchmatch.app.setup import Setup
-from sketchmatch.app.tasks import Task
+from sketchmatch.app.tasks import Record, State, Task
 from sketchmatch.app.waiting import Caller, FairQueue
 from sketchmatch.app.worker import flags
 from sketchmatch.app.workers import Workers
-from sketchmatch.errors import ServerStoppingError, TooBusyError, WorkerLostError
+from sketchmatch.errors import (
+    MatchCancelledError,
+    MatchInterruptedError,
+    ServerStoppingError,
+    TooBusyError,
+    WorkerLostError,
+)
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.warmup import (
     COMPILING,
@@ -38,14 +47,18 @@ from sketchmatch_proto.v1.catalog_service_pb2 import (
     GetServerInfoResponse,
     ListAlgorithmsResponse,
 )
+from sketchmatch_proto.v1.match_service_pb2 import MatchRequest, MatchResponse
 
 __all__ = ["Application", "Place"]
 
 _log = logging.getLogger(__name__)
 _LOOK = 0.05
+_MOMENT = 0.005
 _LONGEST_RETRY = 60
 _FIRST_GUESS = 1.0
+_STOPS = "the server is about to stop"
 _Ended = Callable[[Task, BaseException | None], None]
+_Match = TypeVar("_Match", bound=Task | Record)
 
 
 class Place(Protocol):
@@ -124,11 +137,24 @@ class Application:
     workers
         How many worker processes wait at least; without any, requests are answered in threads of
         this process, but for strangers' plugins.
+    archive
+        Where matches are kept; None for nowhere.
+    matched
+        Called when a match has ended that has a result, with its events but progress.
     """
 
-    def __init__(self, setup: Setup, workers: int = 0) -> None:
+    def __init__(
+        self,
+        setup: Setup,
+        workers: int = 0,
+        archive: Archive | None = None,
+        matched: Callable[[list[MatchResponse]], None] = lambda _: None,
+    ) -> None:
         self._setup = setup
         self._kept = workers
+        self.matches = Matches(archive)
+        """All matches that are known."""
+        self._matched = matched
         self._began = time.monotonic()
         self._workers = Workers(workers, self._ended, self._dispatch)
         self._here = Here(self._ended)
@@ -136,6 +162,7 @@ class Application:
         self._waiting = FairQueue[Task]()
         self._typical = _FIRST_GUESS
         self._stopping = False
+        self._inflating = asyncio.Lock()
         self._looking: asyncio.Task[None] | None = None
         self._catalogue: tuple[Setup, ListAlgorithmsResponse] | None = None
 
@@ -166,7 +193,12 @@ class Application:
         return answers(Job(uuid.uuid4().hex, request), self._setup)
 
     @contextmanager
-    def running(self, kind: str, data: bytes, caller: Caller = Caller()) -> Iterator[Task]:  # noqa: B008
+    def running(
+        self,
+        kind: str,
+        data: bytes,
+        caller: Caller = Caller(),  # noqa: B008
+    ) -> Iterator[Task]:
         """Admit a request and do it, in its turn, until the end of the block.
 
         Parameters
@@ -175,13 +207,6 @@ class Application:
             Name of the message, and the message.
         caller
             Who asks.
-
-        Parameters
-        ----------
-        request
-            A message of the contract that wants work.
-        caller
-            The name of who asks; empty where nobody has names.
 
         Raises
         ------
@@ -192,19 +217,61 @@ class Application:
         ServerStoppingError
             If nothing is begun any more.
         """
-        setup = self._setup
-        if self._stopping:
-            raise ServerStoppingError("the server is about to stop")
-        check_size(len(data), setup.limits.max_request_bytes)
-        task = Task(Order(uuid.uuid4().hex, kind, data), setup, caller)
-        self._admit(task)
-        try:
+        with self.reading(self._begun(Order(uuid.uuid4().hex, kind, data), caller)) as task:
             yield task
+
+    @asynccontextmanager
+    async def matching(
+        self,
+        data: bytes,
+        caller: Caller = Caller(),  # noqa: B008
+    ) -> AsyncIterator[Task | Record]:
+        """Read the match that a request asks for, which begins if there is no such match yet.
+
+        It stops at the end of the block if nobody else reads it, unless it is to keep running.
+
+        Parameters
+        ----------
+        data
+            The request, encoded.
+        caller
+            Who asks.
+
+        Raises
+        ------
+        SketchmatchError
+            As :meth:`running` does.
+        InvalidInputError
+            If the caller gave the request's name to another.
+        """
+        check_size(len(data), self._setup.limits.max_request_bytes)
+        order = Order(uuid.uuid4().hex, MatchRequest.DESCRIPTOR.name, data)
+        wish = await self._wish(order)
+        match = await self.matches.same(caller.name, wish)
+        if match is None:
+            match = self._begun(order, caller, wish)
+        elif isinstance(match, Record) and match.state is State.INTERRUPTED:
+            match = self._begun(replace(order, id=match.id), caller, wish, match)
+        with self.reading(match):
+            yield match
+
+    @contextmanager
+    def reading(self, match: _Match) -> Iterator[_Match]:
+        """Read a match until the end of the block, and stop it then as :meth:`matching` does."""
+        if isinstance(match, Record):
+            yield match
+            return
+        match.readers += 1
+        try:
+            yield match
         finally:
-            if self._waiting.remove(task, caller):
-                task.log.end()
-            elif task in self._running:
-                self._place(task).stop(task)
+            match.readers -= 1
+            if not (match.readers or match.wish.keep_running):
+                self._stop(match, MatchInterruptedError("nobody read the match any more"))
+
+    def cancel(self, task: Task) -> None:
+        """Stop a match, whoever reads it."""
+        self._stop(task, MatchCancelledError("the match was cancelled"))
 
     def algorithms(self) -> ListAlgorithmsResponse:
         """Return what there is to choose from, put together once for each setup."""
@@ -292,7 +359,7 @@ class Application:
         self._stopping = True
         for task in tuple(self._waiting):
             self._waiting.remove(task, task.caller)
-            task.log.end(ServerStoppingError("the server is about to stop"))
+            self._finish(task, ServerStoppingError(_STOPS))
         deadline = time.monotonic() + seconds
         while self._running and time.monotonic() < deadline:
             await asyncio.sleep(_LOOK)
@@ -303,11 +370,57 @@ class Application:
         """End all tasks that are under way, and wait for their threads and processes."""
         self._stopping = True
         for task in tuple(self._running):
-            self._place(task).stop(task)
+            self._stop(task, ServerStoppingError(_STOPS))
         await self._here.close()
         await self._workers.close()
+        while self._running:  # ends that threads told of
+            await asyncio.sleep(_MOMENT)
+        await self.matches.close()
         if self._looking is not None:
             self._looking.cancel()
+
+    async def _wish(self, order: Order) -> Wish:
+        limit = self._setup.limits.max_request_bytes
+        if not order.is_large:
+            return order.wish(limit)
+        async with self._inflating:  # one at a time: a few bytes may become very many
+            return await asyncio.to_thread(order.wish, limit)
+
+    def _begun(
+        self,
+        order: Order,
+        caller: Caller,
+        wish: Wish = Wish(),  # noqa: B008
+        former: Record | None = None,
+    ) -> Task:
+        """Return a request that is admitted."""
+        setup = self._setup
+        if self._stopping:
+            raise ServerStoppingError(_STOPS)
+        check_size(len(order.data), setup.limits.max_request_bytes)
+        task = Task(order, setup, caller, wish, former)
+        self._admit(task)
+        if order.is_match:
+            self.matches.begin(task)
+        return task
+
+    def _stop(self, task: Task, why: BaseException) -> None:
+        """See that a task comes to an end, unless it has."""
+        if self._waiting.remove(task, task.caller):
+            self._finish(task, why)
+        elif task in self._running:
+            task.stop(why)
+            self.matches.changed(task)
+            self._place(task).stop(task)
+
+    def _finish(self, task: Task, error: BaseException | None = None) -> None:
+        """Tell of the end of a task."""
+        task.end(error)
+        if not task.order.is_match:
+            return
+        self.matches.end(task)
+        if task.state is State.SUCCEEDED:
+            self._matched(task.events())
 
     def _admit(self, task: Task) -> None:
         """Let a task begin or wait; if there is no room, it or the greediest one goes away."""
@@ -323,7 +436,7 @@ class Application:
         error = TooBusyError(f"{there_are}{waiting}, which is its limit", self._retry_seconds())
         if crowded[0] is task:
             raise error
-        crowded[0].log.end(error)
+        self._finish(crowded[0], error)
 
     def _dispatch(self) -> None:
         """Begin what waits, as far as there are places."""
@@ -332,6 +445,7 @@ class Application:
             if task is None:
                 return
             self._running.add(task)
+            task.begin()
             self._place(task).begin(task)
 
     def _has_room(self) -> bool:
@@ -359,7 +473,7 @@ class Application:
         self._running.discard(task)
         taken = time.monotonic() - task.asked
         self._typical += 0.1 * (min(taken, _LONGEST_RETRY) - self._typical)
-        task.log.end(error)
+        self._finish(task, error)
         self._dispatch()
 
     def _retry_seconds(self) -> int:
@@ -373,11 +487,15 @@ class Application:
         while True:
             await asyncio.sleep(_LOOK)
             self._workers.look()
+            for task in self._running:
+                if task.order.is_match and task.log.kept > task.noted:
+                    task.noted = task.log.kept
+                    self.matches.changed(task)
             now, longest = time.monotonic(), self._setup.limits.max_wait
             for task in [task for task in self._waiting if now - task.asked > longest]:
                 self._waiting.remove(task, task.caller)
                 problem = f"the request waited {longest:g} s for its turn, which is the limit"
-                task.log.end(TooBusyError(problem, self._retry_seconds()))
+                self._finish(task, TooBusyError(problem, self._retry_seconds()))
 
 
 def _job(task: Task) -> Job:

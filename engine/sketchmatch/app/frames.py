@@ -10,8 +10,11 @@ from enum import IntEnum
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
+    MatchCancelledError,
+    MatchInterruptedError,
     PluginError,
     Reason,
+    RetryableError,
     ServerStoppingError,
     SketchmatchError,
 )
@@ -80,6 +83,15 @@ def frame(kind: int, content: bytes = b"") -> bytes:
     return _HEAD.pack(len(content), kind) + content
 
 
+_KINDS: dict[str, type[SketchmatchError]] = {
+    "unavailable": AnswerUnavailableError,
+    "stopping": ServerStoppingError,
+    "interrupted": MatchInterruptedError,
+    "cancelled": MatchCancelledError,
+    "plugin": PluginError,
+}
+
+
 def failure(error: Exception, log: str) -> bytes:
     """Return what is told of an error: nothing that needs a plugin's own classes to be read."""
     told: dict[str, object] = {"log": log}
@@ -91,6 +103,10 @@ def failure(error: Exception, log: str) -> bytes:
             told |= {"kind": "unavailable", "problem": f"{error}"}
         case ServerStoppingError():
             told |= {"kind": "stopping", "problem": f"{error.problem}"}
+        case RetryableError():
+            told |= {"kind": "interrupted", "problem": f"{error.problem}"}
+        case MatchCancelledError():
+            told |= {"kind": "cancelled", "problem": f"{error}"}
         case SketchmatchError():
             told |= {"kind": "plugin", "problem": f"{error}"}
     return json.dumps(told).encode()
@@ -102,10 +118,6 @@ def failure_of(content: bytes) -> tuple[SketchmatchError | None, str]:
     match told:
         case {"kind": "input", "reason": reason, "field": field, "problem": problem}:
             return InvalidInputError(Reason(reason), field, problem), told["log"]
-        case {"kind": "unavailable", "problem": problem}:
-            return AnswerUnavailableError(problem), told["log"]
-        case {"kind": "stopping", "problem": problem}:
-            return ServerStoppingError(problem), told["log"]
-        case {"kind": "plugin", "problem": problem}:
-            return PluginError(problem), told["log"]
+        case {"kind": kind, "problem": problem}:
+            return _KINDS[kind](problem), told["log"]
     return None, told["log"]

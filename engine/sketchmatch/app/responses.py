@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from google.protobuf.duration_pb2 import Duration
+from google.protobuf.timestamp_pb2 import Timestamp
 
 import sketchmatch
 from sketchmatch.api import API_VERSION, Algorithm, Segmentation, Segmenter
 from sketchmatch.app.setup import Setup
+from sketchmatch.errors import SketchmatchError
 from sketchmatch.model import (
     Confidence,
     ConfidenceWeights,
@@ -49,15 +51,20 @@ from sketchmatch_proto.v1 import (
     source_pb2,
 )
 
+if TYPE_CHECKING:
+    from sketchmatch.app.tasks import Record
+
 __all__ = [
     "ResponseWriter",
     "catalogue",
+    "details",
     "fmap_entry",
     "result",
     "scene",
     "segmented",
     "selection",
     "server_info",
+    "summary",
 ]
 
 _SOURCE_KINDS = {
@@ -285,6 +292,45 @@ def _relation(relation: ObjectRelation | None) -> match_pb2.ObjectRelation | Non
         phrase=relation.phrase,
         degree=relation.degree,
     )
+
+
+def summary(record: Record) -> match_service_pb2.MatchSummary:
+    """Return what is known of a match."""
+    error = record.error
+    return match_service_pb2.MatchSummary(
+        match_id=record.id,
+        request_id=record.wish.request_id,
+        state=match_service_pb2.MatchState.ValueType(record.state),
+        created_at=_timestamp(record.created),
+        ended_at=None if record.ended is None else _timestamp(record.ended),
+        outcome=match_pb2.Outcome.ValueType(record.outcome),
+        last_event=record.events[-1][0] if record.events else 0,
+        error_message="" if error is None else _UNFORESEEN if _is_ours(error) else str(error),
+        error_reason=getattr(error, "reason", ""),
+    )
+
+
+def details(record: Record) -> match_service_pb2.GetMatchResponse:
+    """Return what is known of a match, with its events."""
+    response = match_service_pb2.GetMatchResponse(match=summary(record))
+    for number, encoded in record.events:
+        event = response.events.add()
+        event.ParseFromString(encoded)
+        event.number = number
+    return response
+
+
+_UNFORESEEN = "the server failed in a way nobody foresaw"
+
+
+def _is_ours(error: BaseException) -> bool:
+    return not isinstance(error, SketchmatchError)
+
+
+def _timestamp(seconds: float) -> Timestamp:
+    stamp = Timestamp()
+    stamp.FromNanoseconds(round(seconds * 1e9))
+    return stamp
 
 
 def _ambiguity(value: Ambiguity | None) -> match_pb2.Ambiguity | None:

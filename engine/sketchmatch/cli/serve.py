@@ -126,6 +126,14 @@ def serve(
     no_store: Annotated[
         bool, typer.Option("--no-store", help="Keep nothing beyond the life of the server.")
     ] = False,
+    keep_matches_days: Annotated[
+        float | None,
+        typer.Option(metavar="DAYS", help="Keep a match so long after its end; 30 by default."),
+    ] = None,
+    keep_matches_mib: Annotated[
+        int | None,
+        typer.Option(help="Most that kept matches may take, in MiB; 1024 by default."),
+    ] = None,
     metrics_address: Annotated[
         str | None,
         typer.Option(
@@ -172,6 +180,8 @@ def serve(
         "server.insecure": insecure or None,
         "server.store": store,
         "server.keep": False if no_store else None,
+        "server.keep_matches_days": keep_matches_days,
+        "server.keep_matches_mib": keep_matches_mib,
         "server.metrics_address": metrics_address,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
@@ -189,8 +199,8 @@ def serve(
         configuration = load(config, flags)
         if _server_settings(configuration) != settings:
             say(
-                "addresses, server.grace_seconds, server.workers and the names of files stay until "
-                "the server is started anew"
+                "addresses, server.grace_seconds, server.workers, what is kept and the names of "
+                "files stay until the server is started anew"
             )
         return _setup(configuration)
 
@@ -230,6 +240,9 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
         server.insecure,
         server.metrics_address,
         _store(server.store, server.keep),
+        bool(server.store),
+        server.keep_matches_days,
+        server.keep_matches_mib * _MIB,
     )
 
 

@@ -199,6 +199,15 @@ class _Server(_Section):
         examples=["/var/lib/sketchmatch"],
     )
     keep: bool = Field(True, description="Keep things on disk, beyond the life of the server.")
+    keep_matches_days: float = Field(
+        30.0, gt=0, le=36_500, description="How long a match is kept after its end."
+    )
+    keep_matches_mib: int = Field(
+        1024,
+        ge=1,
+        le=1_000_000,
+        description="Most that kept matches may take, in MiB; the oldest go first.",
+    )
     metrics_address: Annotated[str | None, AfterValidator(_watched)] = Field(
         None,
         description="Host and port for Prometheus' /metrics and the probes /livez and /readyz over "

@@ -17,9 +17,11 @@ from grpc_reflection.v1alpha import reflection
 
 import sketchmatch
 from sketchmatch.app.application import Application
+from sketchmatch.app.archive import Archive
 from sketchmatch.app.setup import Setup
+from sketchmatch.app.store import Store
 from sketchmatch.config.addresses import is_of_this_machine
-from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError
+from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError, StoreError
 from sketchmatch.server.callers import CallerInterceptor
 from sketchmatch.server.calls import CallLogInterceptor
 from sketchmatch.server.interceptors import ErrorInterceptor, OpeningInterceptor
@@ -46,6 +48,7 @@ _MOST_AT_ONCE = 1000
 _PING_MS = 10_000
 _IDLE_MS = 600_000
 _QUIET = 1.0
+_DAY = 86_400.0
 _LOOK = 0.05
 _COMING_TO_AN_END = 2.0
 """Seconds of the grace that are left to matches for coming to an end with what they have."""
@@ -91,6 +94,10 @@ class ServerSettings:
         Host and port for metrics and probes over HTTP; None for none.
     store
         The folder for what is kept beyond the life of the server; None for keeping nothing.
+    store_named
+        Whether somebody named that folder, so that the server is not to start without it.
+    matches_days, matches_bytes
+        For how long matches are kept there, and how large their file may grow.
     """
 
     address: str = "127.0.0.1:50051"
@@ -102,6 +109,9 @@ class ServerSettings:
     insecure: bool = False
     metrics_address: str | None = None
     store: Path | None = None
+    store_named: bool = True
+    matches_days: float = 30.0
+    matches_bytes: int = 1 << 30
 
 
 async def serve(
@@ -135,8 +145,10 @@ async def serve(
     """
     lacking = _refuse_strangers(settings)
     files = _Files(settings, say)
-    app = Application(load(), settings.workers)
-    metrics = Metrics(_METHODS)
+    metrics, setup = Metrics(_METHODS), load()
+    store = _opened(settings, say)
+    archive = None if store is None else _archive(store, settings, metrics)
+    app = Application(setup, settings.workers, archive, metrics.matched)
     server = grpc.aio.server(
         interceptors=[
             MetricsInterceptor(metrics),
@@ -171,7 +183,7 @@ async def serve(
         ],
     )
     readiness = Readiness(_SERVICES)
-    _add_services(server, app, readiness, metrics)
+    _add_services(server, app, readiness)
     _watch(metrics, app, files, readiness)
     port = _listen(server, settings.address, files.credentials)
     told_at = settings.metrics_address
@@ -206,6 +218,8 @@ async def serve(
         await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
         await ending
         await app.close()
+        if store is not None:
+            store.close()
         if monitor:
             await asyncio.to_thread(monitor.close)
         unwatch()
@@ -331,10 +345,36 @@ def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readine
     )
 
 
-def _add_services(
-    server: grpc.aio.Server, app: Application, readiness: Readiness, metrics: Metrics
-) -> None:
-    matching, scenes = MatchService(app, metrics.matched), SceneService(app)
+def _opened(settings: ServerSettings, say: Callable[[str], None]) -> Store | None:
+    """Return the folder in which things are kept; None for none, which is said if it is no choice.
+
+    Raises
+    ------
+    InvalidInputError
+        If somebody named one that is of no use.
+    """
+    if settings.store is None:
+        return None
+    try:
+        return Store(settings.store)
+    except StoreError as error:
+        if settings.store_named:
+            raise InvalidInputError(Reason.INVALID_FIELD, "server.store", str(error)) from None
+        say(f"nothing is kept beyond the life of this server: {error}")
+        return None
+
+
+def _archive(store: Store, settings: ServerSettings, metrics: Metrics) -> Archive:
+    return Archive(
+        store,
+        settings.matches_days * _DAY,
+        settings.matches_bytes,
+        lambda count: metrics.unkept.add(count=count),
+    )
+
+
+def _add_services(server: grpc.aio.Server, app: Application, readiness: Readiness) -> None:
+    matching, scenes = MatchService(app), SceneService(app)
     server.add_generic_rpc_handlers((matching.handler(), scenes.handler()))
     catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(CatalogService(app), server)
     health_pb2_grpc.add_HealthServicer_to_server(readiness.servicer, server)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import aclosing
 from typing import Any, TypeVar
 
 import grpc
+from google.protobuf.message import Message
 
+from sketchmatch.app import responses
 from sketchmatch.app.application import Application
-from sketchmatch.app.tasks import Log
+from sketchmatch.app.orders import varint
+from sketchmatch.app.tasks import Log, Record, Task, is_progress
 from sketchmatch.app.waiting import Caller
 from sketchmatch.server.callers import caller_of
 from sketchmatch.server.calls import note
@@ -23,7 +26,6 @@ from sketchmatch_proto.v1 import (
     match_service_pb2,
     scene_service_pb2,
 )
-from sketchmatch_proto.v1.match_pb2 import MatchAccepted, MatchResult
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
 __all__ = ["CatalogService", "MatchService", "SceneService", "followed"]
@@ -31,9 +33,13 @@ __all__ = ["CatalogService", "MatchService", "SceneService", "followed"]
 _MATCH = match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name
 _SCENE = scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name
 
-_LENGTH_DELIMITED = 2
-_PROGRESS = bytes(
-    [MatchResponse.DESCRIPTOR.fields_by_name["progress"].number << 3 | _LENGTH_DELIMITED]
+_VARINT, _LENGTH_DELIMITED = 0, 2
+_NUMBER = bytes([MatchResponse.DESCRIPTOR.fields_by_name["number"].number << 3 | _VARINT])
+_EVENT = bytes(
+    [
+        match_service_pb2.WatchMatchResponse.DESCRIPTOR.fields_by_name["event"].number << 3
+        | _LENGTH_DELIMITED
+    ]
 )
 _Context = grpc.aio.ServicerContext[Any, Any]
 _Item = TypeVar("_Item")
@@ -42,36 +48,65 @@ _Item = TypeVar("_Item")
 class MatchService:
     """Matches, streaming the search while it runs; requests and responses pass as they come."""
 
-    def __init__(
-        self,
-        app: Application,
-        matched: Callable[[MatchAccepted, MatchResult], None] = lambda *_: None,
-    ) -> None:
+    def __init__(self, app: Application) -> None:
         self._app = app
-        self._matched = matched
 
     async def Match(self, request: bytes, context: _Context) -> None:  # noqa: N802
-        """Run a match and pass its events on."""
-        with self._app.running("MatchRequest", request, _caller(context)) as task:
-            note(match=task.id)
-            pacing, accepted = Pacing(), MatchAccepted()
-            async with aclosing(followed(task.log)) as responses:
-                async for response in responses:
-                    if _is_progress(response):
-                        if pacing.is_due():
-                            await context.write(response)
-                        continue
-                    await context.write(response)
-                    event = MatchResponse.FromString(response)
-                    _note_event(event)
-                    if event.HasField("accepted"):
-                        accepted = event.accepted
-                    elif event.HasField("result"):
-                        self._matched(accepted, event.result)
+        """Run a match, or attach to the one that is the same, and pass its events on."""
+        async with self._app.matching(request, _caller(context)) as match:
+            await _tell(match, 0, context.write)
+
+    async def GetMatch(  # noqa: N802
+        self, request: match_service_pb2.GetMatchRequest, context: _Context
+    ) -> match_service_pb2.GetMatchResponse:
+        """Tell how a match is."""
+        match = await self._app.matches.get(_caller(context).name, request.match_id)
+        return responses.details(match.record())
+
+    async def WatchMatch(  # noqa: N802
+        self, request: match_service_pb2.WatchMatchRequest, context: _Context
+    ) -> None:
+        """Pass on what a match told after an event, and tells."""
+        match = await self._app.matches.get(_caller(context).name, request.match_id)
+        with self._app.reading(match):
+            await _tell(
+                match,
+                request.after,
+                lambda event: context.write(_EVENT + varint(len(event)) + event),
+            )
+
+    async def CancelMatch(  # noqa: N802
+        self, request: match_service_pb2.CancelMatchRequest, context: _Context
+    ) -> match_service_pb2.CancelMatchResponse:
+        """Stop a match."""
+        match = await self._app.matches.get(_caller(context).name, request.match_id)
+        if isinstance(match, Task):
+            self._app.cancel(match)
+        return match_service_pb2.CancelMatchResponse(match=responses.summary(match.record()))
+
+    async def ListMatches(  # noqa: N802
+        self, request: match_service_pb2.ListMatchesRequest, context: _Context
+    ) -> match_service_pb2.ListMatchesResponse:
+        """List the caller's matches."""
+        found, token = await self._app.matches.page(
+            _caller(context).name, request.page_size, request.page_token
+        )
+        return match_service_pb2.ListMatchesResponse(
+            matches=map(responses.summary, found), next_page_token=token
+        )
 
     def handler(self) -> grpc.GenericRpcHandler:
         """Return what answers the calls of the service."""
-        return _handler(_MATCH, Match=grpc.unary_stream_rpc_method_handler(self.Match))
+        return _handler(
+            _MATCH,
+            Match=grpc.unary_stream_rpc_method_handler(self.Match),
+            WatchMatch=grpc.unary_stream_rpc_method_handler(
+                self.WatchMatch, match_service_pb2.WatchMatchRequest.FromString
+            ),
+            GetMatch=_unary(self.GetMatch, match_service_pb2.GetMatchRequest),
+            CancelMatch=_unary(self.CancelMatch, match_service_pb2.CancelMatchRequest),
+            ListMatches=_unary(self.ListMatches, match_service_pb2.ListMatchesRequest),
+        )
 
 
 class SceneService:
@@ -84,9 +119,9 @@ class SceneService:
         """Segment, and return what was found."""
         with self._app.running("SegmentRequest", request, _caller(context)) as task:
             async with aclosing(followed(task.log)) as told:
-                responses = [response async for response in told]
+                found = [response async for _, response in told]
         # Nobody waits for an answer to a request that was stopped.
-        return responses[0] if responses else b""
+        return found[0] if found else b""
 
     def handler(self) -> grpc.GenericRpcHandler:
         """Return what answers the calls of the service."""
@@ -122,9 +157,25 @@ def _caller(context: _Context) -> Caller:
     return Caller(name or peer.rpartition(":")[0] or peer, peer)
 
 
-def _is_progress(response: bytes) -> bool:
-    """Whether an encoded event is progress; it has no other field."""
-    return response[:1] == _PROGRESS
+async def _tell(
+    match: Task | Record, after: int, write: Callable[[bytes], Awaitable[None]]
+) -> None:
+    """Pass on what a match told after an event, and tells, until its end."""
+    note(match=match.id)
+    pacing = Pacing()
+    async with aclosing(followed(match.log, after)) as told:
+        async for number, response in told:
+            if is_progress(response):
+                if pacing.is_due():
+                    await write(_numbered(number, response))
+                continue
+            await write(_numbered(number, response))
+            _note_event(match.event(number, response))
+
+
+def _numbered(number: int, response: bytes) -> bytes:
+    """Return an encoded event with its number."""
+    return response + _NUMBER + varint(number)
 
 
 def _note_event(event: MatchResponse) -> None:
@@ -144,9 +195,15 @@ def _handler(service: str, **methods: Any) -> grpc.GenericRpcHandler:
     return grpc.method_handlers_generic_handler(service, methods)
 
 
-async def followed(log: Log[_Item]) -> AsyncGenerator[_Item, None]:
-    """Yield what a log holds and gets, until it ends; raise the error that it ends with."""
-    loop, changed, seen = asyncio.get_running_loop(), asyncio.Event(), 0
+def _unary(method: Callable[[Any, _Context], Awaitable[Any]], kind: type[Message]) -> Any:
+    return grpc.unary_unary_rpc_method_handler(
+        method, kind.FromString, lambda response: response.SerializeToString()
+    )
+
+
+async def followed(log: Log[_Item], seen: int = 0) -> AsyncGenerator[tuple[int, _Item], None]:
+    """Yield what a log holds and gets after a number, until it ends; raise what it ends with."""
+    loop, changed = asyncio.get_running_loop(), asyncio.Event()
 
     here = threading.get_ident()
 
@@ -161,8 +218,8 @@ async def followed(log: Log[_Item]) -> AsyncGenerator[_Item, None]:
             changed.clear()
             ended, found = log.ended, log.next(seen)
             if found is not None:
-                seen, item = found
-                yield item
+                seen, _ = found
+                yield found
             elif ended:
                 break
             else:
