@@ -1,3 +1,6 @@
+import os
+import tempfile
+
 from hypothesis import HealthCheck, settings
 from hypothesis.database import DirectoryBasedExampleDatabase
 
@@ -18,3 +21,7 @@ settings.register_profile(
 settings.load_profile("same")
 
 let_children_be_interrupted()
+
+# No server of a test's keeps anything in the folder of the person who runs the tests.
+_state = tempfile.TemporaryDirectory(prefix="sketchmatch-state-")
+os.environ["XDG_STATE_HOME"] = _state.name

@@ -73,7 +73,7 @@ def test_a_reader_is_told_the_error_that_a_log_ends_with_after_all_else():
     async def follow():
         async with aclosing(followed(log)) as told_so_far:
             async for _, item in told_so_far:
-                items.append(item)  # noqa: PERF401 (kept when it raises)
+                items.append(item)
 
     with pytest.raises(ZeroDivisionError, match="lost"):
         asyncio.run(follow())

@@ -67,7 +67,7 @@ def test_every_request_and_response_has_a_file():
         for method in service.methods
     ]
     sent = {kind.name for method in methods for kind in (method.input_type, method.output_type)}
-    assert len(methods) == 4
+    assert len(methods) == 8
     assert sent <= {name.split(".")[0] for name in NAMES}
 
 

@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 from sketchmatch.app.frames import failure, failure_of
 from sketchmatch.app.orders import Wish
 from sketchmatch.app.store import Store
-from sketchmatch.app.tasks import Record, State
+from sketchmatch.app.tasks import Record, State, is_progress
 from sketchmatch.errors import MatchInterruptedError, StoreError
 
 __all__ = ["INTERRUPTED", "Archive", "Kept"]
@@ -219,8 +219,8 @@ class Archive:
         for record in records:
             if record.state.ended:
                 self._written.pop(record.id, None)
-            elif record.events:
-                self._written[record.id] = record.events[-1][0]
+            elif kept := [number for number, event in record.events if not is_progress(event)]:
+                self._written[record.id] = kept[-1]
 
     def _insert(self, connection: sqlite3.Connection, records: Iterable[Record]) -> None:
         for record in records:
@@ -232,7 +232,11 @@ class Archive:
                 )
             connection.executemany(
                 "INSERT OR IGNORE INTO events VALUES (?, ?, ?)",
-                [(record.id, number, event) for number, event in record.events if number > seen],
+                [
+                    (record.id, number, event)
+                    for number, event in record.events
+                    if number > seen and (record.state.ended or not is_progress(event))
+                ],
             )
 
     def _tidy(self) -> None:
