@@ -97,7 +97,6 @@ class Archive:
         self._failed = failed
         self._lock = threading.Lock()
         self._changed: dict[str, Kept] = {}
-        self._written: dict[str, int] = {}
         self._wanted = threading.Event()
         self._idle = threading.Condition(self._lock)
         self._writing = False
@@ -200,15 +199,14 @@ class Archive:
         records = [match.record() for match in batch.values()]
         try:
             try:
-                self._work(lambda connection: self._insert(connection, records))
+                self._work(lambda connection: _insert(connection, records))
             except StoreError as error:
                 if not _is_full(error):
                     raise
                 self._work(_delete_oldest)
-                self._work(lambda connection: self._insert(connection, records))
+                self._work(lambda connection: _insert(connection, records))
             self._tidy()
         except StoreError as error:
-            self._written.clear()
             if records:
                 self._failed(len(records))
             self._say(f"{error}; until then matches go on and are not kept")
@@ -216,28 +214,6 @@ class Archive:
         if self._fault:
             self._fault = ""
             _log.info("matches are kept again")
-        for record in records:
-            if record.state.ended:
-                self._written.pop(record.id, None)
-            elif kept := [number for number, event in record.events if not is_progress(event)]:
-                self._written[record.id] = kept[-1]
-
-    def _insert(self, connection: sqlite3.Connection, records: Iterable[Record]) -> None:
-        for record in records:
-            connection.execute(_WRITE, _row(record))
-            seen = self._written.get(record.id, 0)
-            if record.run:
-                connection.execute(
-                    "DELETE FROM events WHERE match = ? AND number <= ?", (record.id, record.first)
-                )
-            connection.executemany(
-                "INSERT OR IGNORE INTO events VALUES (?, ?, ?)",
-                [
-                    (record.id, number, event)
-                    for number, event in record.events
-                    if number > seen and (record.state.ended or not is_progress(event))
-                ],
-            )
 
     def _tidy(self) -> None:
         """Delete what is too old, and the oldest where there is too much."""
@@ -278,6 +254,23 @@ class Archive:
         if fault != self._fault or now - self._said > _SAY_AGAIN_SECONDS:
             _log.error("%s", fault)
             self._fault, self._said = fault, now
+
+
+def _insert(connection: sqlite3.Connection, records: Iterable[Record]) -> None:
+    for record in records:
+        connection.execute(_WRITE, _row(record))
+        if record.run:
+            connection.execute(
+                "DELETE FROM events WHERE match = ? AND number <= ?", (record.id, record.first)
+            )
+        connection.executemany(
+            "INSERT OR IGNORE INTO events VALUES (?, ?, ?)",
+            [
+                (record.id, number, event)
+                for number, event in record.events
+                if record.state.ended or not is_progress(event)
+            ],
+        )
 
 
 def _used_bytes(connection: sqlite3.Connection) -> int:
