@@ -22,6 +22,7 @@ from sketchmatch.app.jobs import Job, answers
 from sketchmatch.app.matches import Matches
 from sketchmatch.app.orders import Order, Wish
 from sketchmatch.app.packed import check_size
+from sketchmatch.app.quotas import Rates
 from sketchmatch.app.setup import Setup
 from sketchmatch.app.tasks import Record, State, Task
 from sketchmatch.app.waiting import Caller, FairQueue
@@ -159,7 +160,8 @@ class Application:
         self._workers = Workers(workers, self._ended, self._dispatch)
         self._here = Here(self._ended)
         self._running: set[Task] = set()
-        self._waiting = FairQueue[Task]()
+        self._waiting = FairQueue[Task](lambda task: task.wish.priority)
+        self._rates = Rates()
         self._typical = _FIRST_GUESS
         self._stopping = False
         self._inflating = asyncio.Lock()
@@ -399,6 +401,7 @@ class Application:
             raise ServerStoppingError(_STOPS)
         check_size(len(order.data), setup.limits.max_request_bytes)
         task = Task(order, setup, caller, wish, former)
+        self._rates.take(caller.name, setup.limits.max_per_minute)
         self._admit(task)
         if order.is_match:
             self.matches.begin(task)
@@ -455,7 +458,12 @@ class Application:
         return all_places and (not self._kept or short < self._kept)
 
     def _fits(self, task: Task) -> bool:
-        """Whether a task may have a place: strangers never have all of them."""
+        """Whether a task may have a place: neither strangers nor a caller ever have all."""
+        most = self._setup.limits.max_per_caller
+        if most is not None:
+            name = task.caller.name
+            if sum(1 for other in self._running if other.caller.name == name) >= most:
+                return False
         if not task.strangers:
             return True
         theirs = sum(1 for other in self._running if other.strangers)

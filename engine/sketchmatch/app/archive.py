@@ -59,6 +59,7 @@ _UNENDED = f"state NOT IN ({_ENDS})"
 _BATCH_SECONDS = 0.05
 _TIDY_SECONDS = 60.0
 _FULL = 0.9
+_MOST_NAMES = 500_000
 _FEWEST_DELETED = 100
 _DELETED_SHARE = 20
 _SAY_AGAIN_SECONDS = 60.0
@@ -103,7 +104,8 @@ class Archive:
         self._closing = False
         self._tidied = -_TIDY_SECONDS
         self._fault, self._said = "", 0.0
-        self._claimed = False
+        self._claiming, self._claimed = threading.Lock(), False
+        self._names: set[int] | None = None
         self._writer = threading.Thread(
             target=self._write_on, name="sketchmatch-archive", daemon=True
         )
@@ -115,6 +117,11 @@ class Archive:
         with self._lock:
             self._changed[name] = match
         self._wanted.set()
+
+    def may_know(self, caller: str, request_id: str) -> bool:
+        """Whether it may be worth asking for a match by its caller's name for it."""
+        names = self._names
+        return names is None or hash((caller, request_id)) in names
 
     def flush(self, seconds: float = 5.0) -> None:
         """Wait until all that was to be kept is written, or has failed."""
@@ -211,9 +218,18 @@ class Archive:
                 self._failed(len(records))
             self._say(f"{error}; until then matches go on and are not kept")
             return
+        self._know(records)
         if self._fault:
             self._fault = ""
             _log.info("matches are kept again")
+
+    def _know(self, records: Iterable[Record]) -> None:
+        """Know the names of what was written."""
+        if self._names is not None:
+            named = (record for record in records if record.wish.request_id)
+            self._names |= {hash((each.caller, each.wish.request_id)) for each in named}
+            if len(self._names) > _MOST_NAMES:
+                self._names = None
 
     def _tidy(self) -> None:
         """Delete what is too old, and the oldest where there is too much."""
@@ -235,18 +251,11 @@ class Archive:
 
     def _work(self, job: Callable[[sqlite3.Connection], _Result]) -> _Result:
         """Do something with the file, once nothing in it pretends to be running."""
-
-        def after_claiming(connection: sqlite3.Connection) -> _Result:
+        with self._claiming:
             if not self._claimed:
-                connection.execute(
-                    f"UPDATE matches SET state = ?, ended = ? WHERE {_UNENDED}",
-                    (int(State.INTERRUPTED), time.time()),
-                )
-            return job(connection)
-
-        result = self._database.work(after_claiming)
-        self._claimed = True
-        return result
+                self._names = self._database.work(_claim)
+                self._claimed = True
+        return self._database.work(job)
 
     def _say(self, fault: str) -> None:
         """Say in the log what is wrong, but not again and again."""
@@ -271,6 +280,22 @@ def _insert(connection: sqlite3.Connection, records: Iterable[Record]) -> None:
                 if record.state.ended or not is_progress(event)
             ],
         )
+
+
+def _claim(connection: sqlite3.Connection) -> set[int] | None:
+    """Say of what a former server did that it was interrupted.
+
+    Returns what tells the names that callers gave, or None if they are too many.
+    """
+    connection.execute(
+        f"UPDATE matches SET state = ?, ended = ? WHERE {_UNENDED}",
+        (int(State.INTERRUPTED), time.time()),
+    )
+    rows = connection.execute(
+        "SELECT caller, request_id FROM matches WHERE request_id != '' LIMIT ?", (_MOST_NAMES + 1,)
+    )
+    names = {hash(row) for row in rows}
+    return names if len(names) <= _MOST_NAMES else None
 
 
 def _used_bytes(connection: sqlite3.Connection) -> int:

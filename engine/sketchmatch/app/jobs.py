@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from google.protobuf.message import Message
 
 from sketchmatch.app import requests, responses
+from sketchmatch.app.costs import Costs
 from sketchmatch.app.setup import Setup
 from sketchmatch.errors import AnswerUnavailableError, InvalidInputError, ServerStoppingError
 from sketchmatch.pipeline.clock import Clock
@@ -117,7 +118,9 @@ def _match(
     begun(clock)
     with requests.paths_of(request), closing(engine.match(value, name, clock)) as events:
         try:
+            costs = Costs(setup.limits, engine.registry)
             for event in events:
+                costs.check(event)
                 yield writer.response(event)
         except AnswerUnavailableError:
             if clock.curtailed:

@@ -111,9 +111,10 @@ class Matches:
         if not wish.request_id:
             return None
         found = self.known(caller, wish.request_id)
-        if found is None and self._archive is not None:
+        archive = self._archive
+        if found is None and archive is not None and archive.may_know(caller, wish.request_id):
             try:
-                kept = await asyncio.to_thread(self._archive.same, caller, wish.request_id)
+                kept = await asyncio.to_thread(archive.same, caller, wish.request_id)
             except StoreError:
                 kept = None  # it is done; the log tells that nothing is kept
             found = self.known(caller, wish.request_id) or kept

@@ -243,6 +243,16 @@ def server_info(setup: Setup, uptime: float) -> catalog_service_pb2.GetServerInf
     limits.max_wait.FromMilliseconds(round(1e3 * given.max_wait))
     if given.max_time_budget is not None:
         limits.max_time_budget.FromMilliseconds(round(1e3 * given.max_time_budget))
+    if (usual := given.time_budget(None)) is not None:
+        limits.default_time_budget.FromMilliseconds(round(1e3 * usual))
+    for name, value in (
+        ("max_matches_per_caller", given.max_per_caller),
+        ("max_requests_per_minute", given.max_per_minute),
+        ("max_comparisons", given.max_comparisons),
+        ("max_candidates", given.max_candidates),
+    ):
+        if value is not None:
+            setattr(limits, name, value)
     return catalog_service_pb2.GetServerInfoResponse(
         version=sketchmatch.__version__,
         api_version="sketchmatch.v1",

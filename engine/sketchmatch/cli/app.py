@@ -20,6 +20,7 @@ from sketchmatch.cli import (
     health,
     interrupts,
     match,
+    matches,
     output,
     plugins,
     relate,
@@ -50,6 +51,7 @@ app.command("demo")(demo.demo)
 app.add_typer(plugins.app, name="plugins")
 app.add_typer(config.app, name="config")
 app.add_typer(tokens.app, name="tokens")
+app.add_typer(matches.app, name="matches")
 
 
 class ExitCode(IntEnum):

@@ -64,6 +64,22 @@ def serve(
             metavar="SECONDS", help="Longest match where a request does not say; 300 by default."
         ),
     ] = None,
+    max_matches_per_caller: Annotated[
+        int | None, typer.Option(help="Requests of one caller at the same time; more wait.")
+    ] = None,
+    max_requests_per_minute: Annotated[
+        int | None, typer.Option(help="Requests that one caller may begin in a minute.")
+    ] = None,
+    max_comparisons: Annotated[
+        int | None,
+        typer.Option(
+            help="Pairs of sketched objects × pairs of mapped objects × directions of a match."
+        ),
+    ] = None,
+    max_candidates: Annotated[
+        int | None,
+        typer.Option(help="Population × generations that a request may ask of a search."),
+    ] = None,
     grace: Annotated[
         float | None,
         typer.Option(
@@ -173,6 +189,10 @@ def serve(
         "server.max_wait_seconds": max_wait,
         "server.max_time_budget_seconds": max_time_budget,
         "server.default_time_budget_seconds": default_time_budget,
+        "server.max_matches_per_caller": max_matches_per_caller,
+        "server.max_requests_per_minute": max_requests_per_minute,
+        "server.max_comparisons": max_comparisons,
+        "server.max_candidates": max_candidates,
         "server.tls_certificate": tls_certificate,
         "server.tls_key": tls_key,
         "server.tls_client_ca": tls_client_ca,
@@ -276,6 +296,10 @@ def _setup(configuration: Configuration) -> Setup:
             max_wait=server.max_wait_seconds,
             max_time_budget=server.max_time_budget_seconds,
             default_time_budget=server.default_time_budget_seconds,
+            max_per_caller=server.max_matches_per_caller,
+            max_per_minute=server.max_requests_per_minute,
+            max_comparisons=server.max_comparisons,
+            max_candidates=server.max_candidates,
         ),
         Isolation(configuration.trusted, configuration.patience),
     )
