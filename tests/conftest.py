@@ -1,4 +1,6 @@
+import atexit
 import os
+import shutil
 import tempfile
 
 from hypothesis import HealthCheck, settings
@@ -23,5 +25,5 @@ settings.load_profile("same")
 let_children_be_interrupted()
 
 # No server of a test's keeps anything in the folder of the person who runs the tests.
-_state = tempfile.TemporaryDirectory(prefix="sketchmatch-state-")
-os.environ["XDG_STATE_HOME"] = _state.name
+os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="sketchmatch-state-")
+atexit.register(shutil.rmtree, os.environ["XDG_STATE_HOME"], ignore_errors=True)

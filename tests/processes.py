@@ -78,8 +78,8 @@ class Server:
 
     def __init__(self, *arguments: str, **options: Any) -> None:
         self.said: list[str] = []
-        self._state = tempfile.TemporaryDirectory(prefix="sketchmatch-server-")
-        own = {"XDG_STATE_HOME": self._state.name}
+        state = tempfile.mkdtemp(prefix="server-", dir=os.environ.get("XDG_STATE_HOME"))
+        own = {"XDG_STATE_HOME": state}
         options["env"] = {**(options.get("env") or os.environ), **own}
         self.process = subprocess.Popen(
             [*COMMAND, "serve", "--address", "127.0.0.1:0", *arguments],

@@ -84,6 +84,12 @@ async def matched(app, data, caller=ALICE):
     return (await app.matches.get(caller.name, match.id)).record()
 
 
+async def name_of(request_id):
+    """Return the name of the match that Alice calls so."""
+    async with serving() as app:
+        return (await matched(app, named(request_id))).id
+
+
 class TestOneLife:
     def test_a_request_sent_again_under_its_name_is_the_same_match_done_once(self):
         async def run():
@@ -130,6 +136,10 @@ class TestOneLife:
         other.request_id = "n1"
         elsewhere = Order("", "MatchRequest", other.SerializeToString()).wish(MIB)
         assert elsewhere.digest != wishes[0].digest
+
+    def test_a_match_has_the_same_name_where_all_that_was_known_of_it_is_lost(self):
+        first, again, other = (asyncio.run(name_of(name)) for name in ("n1", "n1", "n2"))
+        assert first == again != other
 
     def test_a_name_that_is_too_long_is_refused(self):
         async def run():
@@ -284,24 +294,25 @@ class TestKept:
     def test_what_ran_is_interrupted_after_a_loss_and_is_done_again_when_asked_for(self, tmp_path):
         kept = Kept(tmp_path)
         wish = Order("", "MatchRequest", named("n1")).wish(MIB)
-        lost = Record("m1", "alice", wish, State.RUNNING, time.time(), events=((1, b"\x0a\0"),))
-        kept.archive.keep(lost, "m1")
+        name = asyncio.run(name_of("n1"))
+        lost = Record(name, "alice", wish, State.RUNNING, time.time(), events=((1, b"\x0a\0"),))
+        kept.archive.keep(lost, name)
         kept.close()
 
         async def run():
             again = Kept(tmp_path)
             async with serving(again.archive) as app:
-                record = await app.matches.get("alice", "m1")
+                record = await app.matches.get("alice", name)
                 assert record.state is State.INTERRUPTED
                 assert record.ended is not None
                 with pytest.raises(MatchInterruptedError, match="lost or stopped"):
                     record.log.check()
                 done = await matched(app, named("n1"))
-                assert done.id == "m1"
+                assert done.id == name
                 assert done.state is State.SUCCEEDED
                 assert min(number for number, _ in done.events) > 1
                 again.archive.flush()
-                assert again.archive.find("alice", "m1").events == done.events
+                assert again.archive.find("alice", name).events == done.events
             again.store.close()
 
         asyncio.run(run())

@@ -92,7 +92,7 @@ def test_bytes_that_are_no_request_are_an_invalid_argument(address):
 
 
 def test_a_match_whose_worker_is_killed_may_be_sent_again_and_no_other_notices():
-    with server("--workers", "2") as running, Client(running.address) as client:
+    with server("--workers", "2") as running, Client(running.address, retries=0) as client:
         pid = running.process.pid
         small = [client.match(scene(5), scene(5)).object_map for _ in range(3)]
         events = searching(client)

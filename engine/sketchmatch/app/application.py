@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
+import json
 import logging
 import math
 import time
@@ -249,11 +251,13 @@ class Application:
         check_size(len(data), self._setup.limits.max_request_bytes)
         order = Order(uuid.uuid4().hex, MatchRequest.DESCRIPTOR.name, data)
         wish = await self._wish(order)
+        if wish.request_id:  # the same name again if all that was known of the match is lost
+            order = replace(order, id=_name_of(caller.name, wish.request_id))
         match = await self.matches.same(caller.name, wish)
         if match is None:
             match = self._begun(order, caller, wish)
         elif isinstance(match, Record) and match.state is State.INTERRUPTED:
-            match = self._begun(replace(order, id=match.id), caller, wish, match)
+            match = self._begun(order, caller, wish, match)
         with self.reading(match):
             yield match
 
@@ -504,6 +508,12 @@ class Application:
                 self._waiting.remove(task, task.caller)
                 problem = f"the request waited {longest:g} s for its turn, which is the limit"
                 self._finish(task, TooBusyError(problem, self._retry_seconds()))
+
+
+def _name_of(caller: str, request_id: str) -> str:
+    """Return the name of the match that a caller gave a name to."""
+    named = json.dumps([caller, request_id]).encode()
+    return hashlib.blake2b(named, digest_size=16).hexdigest()
 
 
 def _job(task: Task) -> Job:
