@@ -145,7 +145,8 @@ class Matches:
         if (archive := self._archive) is not None:
             kept = await asyncio.to_thread(archive.page, caller, before, size + 1)
             found = {record.id: record for record in kept}
-        for known in (*self._recent.values(), *self._live.values()):
+        in_memory: list[Task | Record] = [*self._recent.values(), *self._live.values()]
+        for known in in_memory:
             if _caller(known) == caller:
                 record = known.record()
                 if before is None or _place(record) < before:

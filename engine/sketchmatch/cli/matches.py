@@ -49,7 +49,7 @@ def list_(
     with client_of(address, "ADDRESS", access) as client:
         found = list(islice(client.matches(timeout=timeout), limit))
     if json:
-        output.write_json([_document(match) for match in found])
+        output.write_json({"matches": [_document(match) for match in found]})
         return
     for match in found:
         output.write_line(*_line(match))
