@@ -47,6 +47,12 @@ def test_a_match_goes_on_after_the_event_at_which_the_link_was_lost(call, server
     assert watched == WatchMatchRequest(match_id="m1", after=count)
 
 
+def test_a_link_that_is_lost_after_the_result_takes_nothing_away(call, server):
+    lost_link(server, len(NUMBERED))
+    assert call(server.address, "events", SKETCH, SKETCH, retries=3) == list(NUMBERED)
+    assert len(server.requests) == 1
+
+
 def test_a_match_that_was_interrupted_is_sent_again_and_told_once(call, server):
     lost_link(server, 3)
     server.unknown = True  # after its restart the server does not know the match

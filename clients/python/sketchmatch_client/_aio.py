@@ -275,6 +275,8 @@ class AsyncClient:
                         call.cancel()
                 return
             except SketchmatchError as error:
+                if course.complete:
+                    return
                 pause = course.pause_after(error, attempts)
                 if pause is None:
                     raise

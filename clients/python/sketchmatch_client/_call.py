@@ -132,7 +132,9 @@ class MatchCall(Generator[MatchResponse, None, None]):
                 with translated_errors(self._address):
                     response = next(call, None)
             except SketchmatchError as error:
-                if not self._starts_again(error):
+                if self._course.complete:
+                    self._end()
+                elif not self._starts_again(error):
                     self._end(error)
                 continue
             if self._attempts is not None:

@@ -9,6 +9,6 @@ lost, or does not stop when it is told to, is simply replaced (``workers``). Oth
 get workers of their own kind, which are watched besides, and at most half of the places. Without
 workers the same is done in threads of the server's process, and for the command line in its own.
 
-A match has a life beyond the call that began it (``matches``): whoever asks for it again under its name
-reads the same one, and it is kept on disk (``archive``) by a thread that nobody waits for.
+A match has a life beyond the call that began it (``matches``): whoever asks for it again under its
+name reads the same one, and it is kept on disk (``archive``) by a thread that nobody waits for.
 """

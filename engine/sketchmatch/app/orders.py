@@ -141,20 +141,24 @@ _PRIORITIES: dict[int, int] = {
 def _digest(data: bytes, outline: Message) -> bytes:
     """Return a digest that is the same however the maps of a message are ordered."""
     digest = hashlib.blake2b(outline.SerializeToString(deterministic=True), digest_size=16)
-    sources = _sources(outline)
+    sources = _SOURCES[outline.DESCRIPTOR]
     for number, _, first, _, end in _fields(data, 0, len(data)):
         if number in sources:
             digest.update(memoryview(data)[first:end])
     return digest.digest()
 
 
-def _sources(request: Message) -> set[int]:
-    """Return the numbers of the fields that are sources."""
-    return {field.number for field in request.DESCRIPTOR.fields if field.message_type is _SOURCE}
+_SOURCES = {
+    kind.DESCRIPTOR: frozenset(
+        field.number for field in kind.DESCRIPTOR.fields if field.message_type is _SOURCE
+    )
+    for kind in _TYPES.values()
+}
+"""The numbers of the fields that are sources."""
 
 
 def _outline(data: bytes, request: Message) -> bytes:
-    sources = _sources(request)
+    sources = _SOURCES[request.DESCRIPTOR]
     kept = bytearray()
     for number, wire_type, first, payload, end in _fields(data, 0, len(data)):
         if number in sources and wire_type == _MESSAGE:
