@@ -83,7 +83,7 @@ MATCHES = {
     ),
     "MatchRequest.named": (
         sources.polygons([[(1, 2), (4, 2), (4, 8)]]),
-        sources.image(b"ink"),
+        sources.polygons([[(5, 3), (9, 3), (9, 6)]]),
         {"request_id": "3f0e-17", "keep_running": True, "priority": "high"},
     ),
     "MatchRequest.turned": (

@@ -275,7 +275,7 @@ class AsyncClient:
                         call.cancel()
                 return
             except SketchmatchError as error:
-                if course.complete:
+                if course.ends(error):
                     return
                 pause = course.pause_after(error, attempts)
                 if pause is None:

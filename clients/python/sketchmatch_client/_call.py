@@ -132,7 +132,7 @@ class MatchCall(Generator[MatchResponse, None, None]):
                 with translated_errors(self._address):
                     response = next(call, None)
             except SketchmatchError as error:
-                if self._course.complete:
+                if self._course.ends(error):
                     self._end()
                 elif not self._starts_again(error):
                     self._end(error)

@@ -54,10 +54,9 @@ class Course:
             return WatchMatchRequest(match_id=self.match_id, after=self._after)
         return None
 
-    @property
-    def complete(self) -> bool:
-        """Whether the result was told: what is lost after it is none of the match."""
-        return "result" in self._told
+    def ends(self, error: SketchmatchError) -> bool:
+        """Whether all is told: a link that is lost after the result is none of the match."""
+        return "result" in self._told and isinstance(error, ServerUnavailableError)
 
     def take(self, response: MatchResponse | WatchMatchResponse) -> MatchResponse | None:
         """Return the event that came next; None if its like was told before."""

@@ -243,7 +243,8 @@ def server_info(setup: Setup, uptime: float) -> catalog_service_pb2.GetServerInf
     limits.max_wait.FromMilliseconds(round(1e3 * given.max_wait))
     if given.max_time_budget is not None:
         limits.max_time_budget.FromMilliseconds(round(1e3 * given.max_time_budget))
-    if (usual := given.time_budget(None)) is not None:
+    if given.default_time_budget is not None:
+        usual = given.time_budget(None) or given.default_time_budget
         limits.default_time_budget.FromMilliseconds(round(1e3 * usual))
     for name, value in (
         ("max_matches_per_caller", given.max_per_caller),
@@ -339,7 +340,7 @@ def _is_ours(error: BaseException) -> bool:
 
 def _timestamp(seconds: float) -> Timestamp:
     stamp = Timestamp()
-    stamp.FromNanoseconds(round(seconds * 1e9))
+    stamp.FromMicroseconds(round(seconds * 1e6))  # more a float does not hold
     return stamp
 
 
