@@ -96,7 +96,7 @@ async def _measured(
     return [_rate_table(alone_rates, loads), _latency_table(loads, beside)]
 
 
-def _processor_seconds(pid: int) -> float:
+def processor_seconds(pid: int) -> float:
     """Return the processor time of a process and of all that it started and that still run."""
     ticks = 0
     for each in (pid, *children_of(pid)):
@@ -109,7 +109,7 @@ def _processor_seconds(pid: int) -> float:
 async def _loaded(running: Server, request: bytes, clients: int, seconds: float) -> _Load:
     """Let some clients, each with a connection of its own, send one request after the other."""
     address, server_pid = running.address, running.process.pid
-    load, began, spent = _Load(), time.monotonic(), _processor_seconds(server_pid)
+    load, began, spent = _Load(), time.monotonic(), processor_seconds(server_pid)
 
     async def client() -> None:
         async with grpc.aio.insecure_channel(address, options=_OPTIONS) as channel:
@@ -128,7 +128,7 @@ async def _loaded(running: Server, request: bytes, clients: int, seconds: float)
 
     await asyncio.gather(*(client() for _ in range(clients)))
     load.rate = len(load.seconds) / (time.monotonic() - began)
-    load.processor = (_processor_seconds(server_pid) - spent) / max(1, len(load.seconds))
+    load.processor = (processor_seconds(server_pid) - spent) / max(1, len(load.seconds))
     return load
 
 
