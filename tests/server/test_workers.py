@@ -277,7 +277,7 @@ def test_a_process_group_that_is_told_to_end_comes_to_an_end_as_its_server_does(
 
 @pytest.mark.slow
 def test_no_worker_outlives_a_server_that_is_killed():
-    with server("--workers", "2") as running, Client(running.address) as client:
+    with server("--workers", "2") as running, Client(running.address, retries=0) as client:
         events = searching(client)
         processes = children_of(running.process.pid)
         assert len(processes) >= 3

@@ -141,7 +141,7 @@ _PRIORITIES: dict[int, int] = {
 def _digest(data: bytes, outline: Message) -> bytes:
     """Return a digest that is the same however the maps of a message are ordered."""
     digest = hashlib.blake2b(outline.SerializeToString(deterministic=True), digest_size=16)
-    sources = _SOURCES[outline.DESCRIPTOR]
+    sources = _SOURCES[outline.DESCRIPTOR.full_name]
     for number, _, first, _, end in _fields(data, 0, len(data)):
         if number in sources:
             digest.update(memoryview(data)[first:end])
@@ -149,7 +149,7 @@ def _digest(data: bytes, outline: Message) -> bytes:
 
 
 _SOURCES = {
-    kind.DESCRIPTOR: frozenset(
+    kind.DESCRIPTOR.full_name: frozenset(
         field.number for field in kind.DESCRIPTOR.fields if field.message_type is _SOURCE
     )
     for kind in _TYPES.values()
@@ -158,7 +158,7 @@ _SOURCES = {
 
 
 def _outline(data: bytes, request: Message) -> bytes:
-    sources = _SOURCES[request.DESCRIPTOR]
+    sources = _SOURCES[request.DESCRIPTOR.full_name]
     kept = bytearray()
     for number, wire_type, first, payload, end in _fields(data, 0, len(data)):
         if number in sources and wire_type == _MESSAGE:
