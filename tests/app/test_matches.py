@@ -19,6 +19,7 @@ from sketchmatch.errors import (
     MatchInterruptedError,
     NotFoundError,
     ServerStoppingError,
+    StoreError,
 )
 from sketchmatch_client import match_request, sources
 from sketchmatch_proto.v1.match_pb2 import OUTCOME_UNSPECIFIED
@@ -392,6 +393,24 @@ class TestStoreThatFails:
                 kept.archive.flush()
                 found = kept.archive.find("alice", later.id)
                 assert (found.state, found.events) == (later.state, later.events)
+
+        asyncio.run(run())
+        kept.store.close()
+
+    def test_what_cannot_be_told_for_certain_is_an_error_and_what_is_in_memory_is_told(
+        self, tmp_path
+    ):
+        (tmp_path / "matches.sqlite").write_bytes(b"no database" * 1000)
+        kept = Kept(tmp_path)
+
+        async def run():
+            async with serving(kept.archive) as app:
+                record = await matched(app, named("n1"))
+                assert (await app.matches.get("alice", record.id)).record() == record
+                with pytest.raises(StoreError, match="is damaged; move it away"):
+                    await app.matches.get("alice", "older")
+                with pytest.raises(StoreError, match="is damaged"):
+                    await app.matches.page("alice", 10, "")
 
         asyncio.run(run())
         kept.store.close()
