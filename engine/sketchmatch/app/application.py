@@ -389,6 +389,8 @@ class Application:
         limit = self._setup.limits.max_request_bytes
         if not order.is_large:
             return order.wish(limit)
+        if self._is_full and not self._has_room():
+            raise self._busy()  # before memory is spent on it
         async with self._inflating:  # one at a time: a few bytes may become very many
             return await asyncio.to_thread(order.wish, limit)
 
@@ -438,12 +440,22 @@ class Application:
             return
         crowded = self._waiting.crowd_out(task.caller)
         assert crowded is not None
-        there_are = f"the server runs {len(self._running)} requests already"
-        waiting = f" and {limits.max_waiting} wait" if limits.max_waiting else ""
-        error = TooBusyError(f"{there_are}{waiting}, which is its limit", self._retry_seconds())
+        error = self._busy()
         if crowded[0] is task:
             raise error
         self._finish(crowded[0], error)
+
+    @property
+    def _is_full(self) -> bool:
+        """Whether no more may wait."""
+        return len(self._waiting) >= self._setup.limits.max_waiting
+
+    def _busy(self) -> TooBusyError:
+        """Return the error of a request for which there is no room."""
+        most = self._setup.limits.max_waiting
+        there_are = f"the server runs {len(self._running)} requests already"
+        waiting = f" and {most} wait" if most else ""
+        return TooBusyError(f"{there_are}{waiting}, which is its limit", self._retry_seconds())
 
     def _dispatch(self) -> None:
         """Begin what waits, as far as there are places."""
