@@ -1,3 +1,8 @@
+import atexit
+import os
+import shutil
+import tempfile
+
 from hypothesis import HealthCheck, settings
 from hypothesis.database import DirectoryBasedExampleDatabase
 
@@ -18,3 +23,7 @@ settings.register_profile(
 settings.load_profile("same")
 
 let_children_be_interrupted()
+
+# No server of a test's keeps anything in the folder of the person who runs the tests.
+os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="sketchmatch-state-")
+atexit.register(shutil.rmtree, os.environ["XDG_STATE_HOME"], ignore_errors=True)

@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -70,13 +71,18 @@ def assert_all_end(pids: list[int]) -> None:
 
 
 class Server:
-    """A ``sketchmatch serve`` process and what it says on standard error."""
+    """A ``sketchmatch serve`` process and what it says on standard error.
+
+    It keeps things in a folder of its own, unless the arguments name one.
+    """
 
     def __init__(self, *arguments: str, **options: Any) -> None:
         self.said: list[str] = []
-        keeping = () if {"--store", "--no-store"} & {*arguments} else ("--no-store",)
+        state = tempfile.mkdtemp(prefix="server-", dir=os.environ.get("XDG_STATE_HOME"))
+        own = {"XDG_STATE_HOME": state}
+        options["env"] = {**(options.get("env") or os.environ), **own}
         self.process = subprocess.Popen(
-            [*COMMAND, "serve", "--address", "127.0.0.1:0", *arguments, *keeping],
+            [*COMMAND, "serve", "--address", "127.0.0.1:0", *arguments],
             stderr=subprocess.PIPE,
             text=True,
             encoding="utf-8",

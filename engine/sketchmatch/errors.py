@@ -15,10 +15,13 @@ from typing import Any, Self
 __all__ = [
     "AnswerUnavailableError",
     "InvalidInputError",
+    "MatchCancelledError",
+    "MatchInterruptedError",
     "NotAuthenticatedError",
     "NotFoundError",
     "PluginError",
     "Reason",
+    "RetryableError",
     "ServerStoppingError",
     "SketchmatchError",
     "StoreError",
@@ -76,6 +79,8 @@ class Reason(StrEnum):
     NOT_AUTHENTICATED = "NOT_AUTHENTICATED"
     NOT_FOUND = "NOT_FOUND"
     STORE_UNAVAILABLE = "STORE_UNAVAILABLE"
+    MATCH_CANCELLED = "MATCH_CANCELLED"
+    MATCH_INTERRUPTED = "MATCH_INTERRUPTED"
 
 
 class SketchmatchError(Exception):
@@ -152,7 +157,7 @@ class PluginError(SketchmatchError):
     reason = Reason.PLUGIN_FAILED
 
 
-class _RetryableError(SketchmatchError):
+class RetryableError(SketchmatchError):
     """The same request may succeed later.
 
     Parameters
@@ -163,6 +168,8 @@ class _RetryableError(SketchmatchError):
         When to ask again.
     """
 
+    reason: Reason
+
     def __init__(self, problem: str, retry_seconds: int = 1) -> None:
         super().__init__(f"{problem}; send the request again in {retry_seconds} s")
         self.problem = problem
@@ -172,19 +179,31 @@ class _RetryableError(SketchmatchError):
         return type(self), (self.problem, self.retry_seconds)
 
 
-class TooBusyError(_RetryableError):
+class MatchCancelledError(SketchmatchError):
+    """The match was cancelled by its caller."""
+
+    reason = Reason.MATCH_CANCELLED
+
+
+class TooBusyError(RetryableError):
     """There is no room for one more request now."""
 
     reason = Reason.LIMIT_EXCEEDED
 
 
-class ServerStoppingError(_RetryableError):
+class ServerStoppingError(RetryableError):
     """The server is about to stop."""
 
     reason = Reason.SERVER_STOPPING
 
 
-class WorkerLostError(_RetryableError):
+class WorkerLostError(RetryableError):
     """The process that answered the request has ended, through no fault of the request."""
 
     reason = Reason.WORKER_LOST
+
+
+class MatchInterruptedError(RetryableError):
+    """The match ended before its time, through no fault of the request."""
+
+    reason = Reason.MATCH_INTERRUPTED

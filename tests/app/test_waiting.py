@@ -82,3 +82,24 @@ def test_when_it_is_full_the_last_of_whoever_has_most_goes(waiting, newcomer, ou
 
 def test_nobody_is_crowded_out_of_an_empty_queue():
     assert FairQueue().crowd_out(Caller("a")) is None
+
+
+def test_of_a_callers_items_those_of_higher_priority_come_first_and_callers_take_turns():
+    queue = FairQueue(priority=int)
+    for item, name, connection in [
+        ("0", "a", "x"),
+        ("-1", "a", "x"),
+        ("2", "a", "y"),
+        ("1", "a", "x"),
+        ("-3", "b", "x"),
+        ("5", "b", "x"),
+    ]:
+        queue.add(item, Caller(name, connection))
+    assert emptied(queue) == ["2", "5", "1", "-3", "0", "-1"]
+
+
+def test_of_whoever_has_most_the_last_of_the_least_priority_is_crowded_out():
+    queue = FairQueue[tuple[str, int]](priority=lambda item: item[1])
+    for item in (("first", 1), ("low", -1), ("middle", 0), ("lower", -1)):
+        queue.add(item, Caller("a"))
+    assert [queue.crowd_out(Caller("b"))[0][0] for _ in range(3)] == ["lower", "low", "middle"]

@@ -12,17 +12,20 @@ def server():
         yield fake
 
 
+STREAMS = ("events", "watch", "matches")
+
+
 def call_sync(address, method, *arguments, retries=0, **options):
     with Client(address, timeout=60, retries=retries) as client:
         answer = getattr(client, method)(*arguments, **options)
-        return list(answer) if method == "events" else answer
+        return list(answer) if method in STREAMS else answer
 
 
 def call_async(address, method, *arguments, retries=0, **options):
     async def answer():
         async with AsyncClient(address, timeout=60, retries=retries) as client:
             answer = getattr(client, method)(*arguments, **options)
-            return [event async for event in answer] if method == "events" else await answer
+            return [event async for event in answer] if method in STREAMS else await answer
 
     return asyncio.run(answer())
 

@@ -66,17 +66,43 @@ class FakeServer(
         self.error: status_pb2.Status | None = None
         self.fails = 1_000_000  # times
         self.breaks_off = False
+        self.breaks_after: int | None = None
+        self.unknown = False
+        self.cancelled_match = Event()
+        self.pages: list[match_service_pb2.ListMatchesResponse] = []
         self.health = health.HealthServicer()
 
     def Match(self, request, context):
         context.add_callback(self.cancelled.set)
         self._take(request, context)
-        yield from self.events
-        if self.breaks_off:
+        breaks_off, self.breaks_off = self.breaks_off, False
+        yield from self.events[: self.breaks_after if breaks_off else None]
+        if breaks_off:
             context.abort(grpc.StatusCode.UNAVAILABLE, "away")
         while self.endless and context.is_active():
             yield EVENTS[2]
             time.sleep(0.01)
+
+    def WatchMatch(self, request, context):
+        self._take(request, context)
+        if self.unknown:
+            context.abort(grpc.StatusCode.NOT_FOUND, "no such match")
+        for event in self.events:
+            if event.number > request.after:
+                yield match_service_pb2.WatchMatchResponse(event=event)
+
+    def GetMatch(self, request, context):
+        self._take(request, context)
+        return match_service_pb2.GetMatchResponse()
+
+    def CancelMatch(self, request, context):
+        self._take(request, context)
+        self.cancelled_match.set()
+        return match_service_pb2.CancelMatchResponse()
+
+    def ListMatches(self, request, context):
+        self._take(request, context)
+        return self.pages.pop(0)
 
     def Segment(self, request, context):
         self._take(request, context)

@@ -5,6 +5,7 @@ from datetime import timedelta
 import pytest
 
 from sketchmatch_client import (
+    CallCancelledError,
     DeadlineExceededError,
     InvalidRequestError,
     NotFoundError,
@@ -16,6 +17,7 @@ from sketchmatch_client import (
     StoreError,
     sources,
 )
+from sketchmatch_proto.v1.match_service_pb2 import ListMatchesResponse
 from tests.contract.golden import NAMES, golden
 
 BAR = [[(2, 12), (8, 12), (8, 20), (2, 20)], [(3, 17), (5, 17), (5, 13), (3, 13)]]
@@ -81,6 +83,11 @@ MATCHES = {
             "allow_unmatched": False,
         },
     ),
+    "MatchRequest.named": (
+        sources.polygons([[(1, 2), (4, 2), (4, 8)]]),
+        sources.polygons([[(5, 3), (9, 3), (9, 6)]]),
+        {"request_id": "3f0e-17", "keep_running": True, "priority": "high"},
+    ),
     "MatchRequest.turned": (
         sources.polygons(
             [
@@ -120,17 +127,46 @@ def map_files(tmp_path):
     return tmp_path / "room.yaml"
 
 
+def asked(server, options):
+    """Return what was asked for; a name that the client made itself is nobody's to know."""
+    for request in server.requests:
+        if "request_id" not in options:
+            request.ClearField("request_id")
+    return server.requests
+
+
 class TestRequests:
     @pytest.mark.parametrize("name", MATCHES)
     def test_a_match_is_asked_for(self, call, server, name):
         sketch, map_, options = MATCHES[name]
         call(server.address, "match", sketch, map_, **options)
-        assert server.requests == [golden(name)]
+        assert asked(server, options) == [golden(name)]
 
     def test_a_time_budget_may_be_a_timedelta(self, call, server):
         options = MATCHES["MatchRequest"][2] | {"time_budget": timedelta(seconds=3.25)}
         call(server.address, "match", STROKES, GRID, **options)
-        assert server.requests == [golden("MatchRequest")]
+        assert asked(server, options) == [golden("MatchRequest")]
+
+    def test_each_match_has_a_name_of_its_own(self, call, server):
+        for _ in range(2):
+            call(server.address, "match", STROKES, GRID)
+        first, second = (request.request_id for request in server.requests)
+        assert first != second
+        assert min(len(first), len(second)) >= 32
+
+    def test_a_match_is_asked_for_by_its_name(self, call, server):
+        call(server.address, "get_match", "6f1c")
+        call(server.address, "cancel_match", "6f1c")
+        call(server.address, "watch", "6f1c", 2)
+        names = ["GetMatchRequest", "CancelMatchRequest", "WatchMatchRequest"]
+        assert server.requests == [golden(name) for name in names]
+
+    def test_each_page_of_matches_is_asked_for_where_the_one_before_ends(self, call, server):
+        server.pages = [golden("ListMatchesResponse"), ListMatchesResponse()]
+        found = call(server.address, "matches")
+        assert found == list(golden("ListMatchesResponse").matches)
+        tokens = [request.page_token for request in server.requests]
+        assert tokens == ["", golden("ListMatchesResponse").next_page_token]
 
     def test_a_segmentation_is_asked_for_with_a_segmenter(self, call, server):
         params = {"closing": 0.125, "mode": "neat"}
@@ -251,6 +287,17 @@ class TestStatuses:
     def test_a_store_that_fails_is_said(self, error):
         assert type(error) is StoreError
         assert error.reason == "STORE_UNAVAILABLE"
+
+    @pytest.mark.parametrize("error", ["cancelled"], indirect=True)
+    def test_a_match_that_was_cancelled_elsewhere_is_said(self, error):
+        assert type(error) is CallCancelledError
+        assert error.reason == "MATCH_CANCELLED"
+
+    @pytest.mark.parametrize("error", ["interrupted"], indirect=True)
+    def test_a_match_that_was_interrupted_may_be_sent_again(self, error):
+        assert type(error) is ServerUnavailableError
+        assert error.reason == "MATCH_INTERRUPTED"
+        assert error.retry_after == 1.0
 
     @pytest.mark.parametrize("error", ["internal"], indirect=True)
     def test_a_plugin_that_failed_is_the_servers_fault(self, error):

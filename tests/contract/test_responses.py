@@ -6,10 +6,15 @@ import pytest
 from google.rpc import code_pb2, status_pb2
 
 import sketchmatch
+from sketchmatch.app.archive import INTERRUPTED
+from sketchmatch.app.orders import Wish
 from sketchmatch.app.setup import RequestLimits, Setup
+from sketchmatch.app.tasks import Record, State
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
+    MatchCancelledError,
+    MatchInterruptedError,
     NotFoundError,
     PluginError,
     Reason,
@@ -21,7 +26,7 @@ from sketchmatch.model.limits import SourceLimits
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.events import Phase, Progress
 from tests.contract.conversions import responses, status
-from tests.contract.golden import NAMES, as_json, as_written
+from tests.contract.golden import NAMES, as_json, as_written, golden
 from tests.contract.values import (
     ACCEPTED,
     DEFAULTS,
@@ -58,6 +63,8 @@ REFUSALS = {
             "more bytes"
         )
     ),
+    "Status.cancelled": status.refusal(MatchCancelledError("the match was cancelled")),
+    "Status.interrupted": status.refusal(MatchInterruptedError("nobody read the match any more")),
     "Status.internal": status.refusal(
         PluginError("searcher guessing of acme-tiles 2.1 failed: it ended without any answer")
     ),
@@ -66,7 +73,8 @@ REFUSALS = {
 
 def test_every_golden_event_and_status_is_written_here():
     named = {name for name in NAMES if name.startswith(("MatchResponse.", "Status."))}
-    assert named - {"MatchResponse.turned"} == {*EVENTS, *REFUSALS}
+    others = {"MatchResponse.turned", "MatchResponse.numbered"}
+    assert named - others == {*EVENTS, *REFUSALS}
 
 
 def test_the_events_of_a_match_are_written_field_by_field():
@@ -106,6 +114,59 @@ def test_the_server_tells_versions_limits_and_its_age(monkeypatch):
         Setup(engine, RequestLimits(1_048_576, 12, 90.5, 40, 7.5)), 75.5
     )
     assert as_json(written) == as_written("GetServerInfoResponse")
+
+
+def test_limits_on_cost_and_on_callers_are_told():
+    given = RequestLimits(
+        default_time_budget=12.5,
+        max_per_caller=3,
+        max_per_minute=90,
+        max_comparisons=81_000_000,
+        max_candidates=2**53 + 1,
+    )
+    written = responses.server_info(Setup(Engine(REGISTRY), given), 0.0).limits
+    for field, value in golden("GetServerInfoResponse.limits").limits.ListFields():
+        assert getattr(written, field.name) == value
+
+
+def test_what_is_known_of_a_match_is_written():
+    expected = golden("GetMatchResponse")
+    match = expected.match
+    record = Record(
+        "6f1c",
+        "alice",
+        Wish("3f0e-17"),
+        State.SUCCEEDED,
+        match.created_at.ToNanoseconds() / 1e9,
+        match.ended_at.ToNanoseconds() / 1e9,
+        match.outcome,
+        events=tuple((event.number, unnumbered(event)) for event in expected.events),
+    )
+    assert responses.details(record) == expected
+    failed = golden("ListMatchesResponse").matches[1]
+    interrupted = replace(
+        record,
+        id=failed.match_id,
+        wish=Wish(failed.request_id),
+        state=State.INTERRUPTED,
+        created=float(failed.created_at.seconds),
+        ended=float(failed.ended_at.seconds),
+        outcome=0,
+        events=(*record.events[:1], (2, b"")),
+        error=MatchInterruptedError(INTERRUPTED),
+    )
+    assert responses.summary(interrupted) == failed
+    nobody = responses.summary(replace(record, error=ZeroDivisionError("secret"), ended=None))
+    assert not nobody.HasField("ended_at")
+    assert nobody.error_reason == ""
+    assert "secret" not in nobody.error_message
+
+
+def unnumbered(event):
+    copy = type(event)()
+    copy.CopyFrom(event)
+    copy.ClearField("number")
+    return copy.SerializeToString()
 
 
 @pytest.mark.parametrize("name", REFUSALS)

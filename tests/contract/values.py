@@ -286,6 +286,11 @@ MATCHES = {
         allow_unmatched=False,
         unmatched_price=None,
     ),
+    "MatchRequest.named": MatchRequest(
+        sketch=PolygonSet((LabelledPolygon((np.array([[1.0, 2.0], [4.0, 2.0], [4.0, 8.0]]),)),)),
+        map=PolygonSet((LabelledPolygon((np.array([[5.0, 3.0], [9.0, 3.0], [9.0, 6.0]]),)),)),
+        selection=NOTHING_CHOSEN,
+    ),
     "MatchRequest.turned": MatchRequest(
         sketch=PolygonSet(
             (

@@ -197,7 +197,7 @@ def test_sigterm_lets_a_running_match_end_within_the_grace():
 @pytest.mark.parametrize("workers", ["2", "0"])
 def test_sigterm_ends_matches_with_their_best_so_far_before_the_grace_ends(workers):
     said = ("--grace", "2", "--workers", workers)
-    with server(*said) as running, Client(running.address) as client:
+    with server(*said) as running, Client(running.address, retries=0) as client:
         searches = [client.events(scene(20), scene(20, 1), **ENDLESS) for _ in range(2)]
         for events in searches:
             while not next(events).progress.HasField("confidence"):
@@ -215,7 +215,7 @@ def test_sigterm_ends_matches_with_their_best_so_far_before_the_grace_ends(worke
 
 @pytest.mark.slow
 def test_sigterm_with_no_grace_at_all_ends_matches_at_once():
-    with server("--grace", "0") as running, Client(running.address) as client:
+    with server("--grace", "0") as running, Client(running.address, retries=0) as client:
         events = client.events(scene(20), scene(20, 1), **ENDLESS)
         while not next(events).progress.HasField("confidence"):
             pass

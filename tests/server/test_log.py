@@ -137,4 +137,4 @@ def test_an_address_that_a_reload_cannot_change_is_said_to_stay(tmp_path):
         assert not any("stay until" in line for line in running.said)
         file.write_text("[server]\ngrace_seconds = 7.5\n", encoding="utf-8")
         running.process.send_signal(signal.SIGHUP)
-        running.wait_for("server.workers and the names of files stay until the server is started")
+        running.wait_for("what is kept and the names of files stay until the server is started")

@@ -2,18 +2,19 @@
 
 import asyncio
 
+import grpc
 import pytest
-from grpc_health.v1 import health_pb2
+from grpc_health.v1 import health_pb2, health_pb2_grpc
 
 from sketchmatch.app.setup import Isolation, Setup
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.selection import UNCONFIGURED
 from sketchmatch.registry import default_registry
-from sketchmatch.server import serve
+from sketchmatch.server import readiness, serve
 from sketchmatch.server.readiness import Readiness
 from sketchmatch_client import Client, InvalidRequestError
 from tests.pace import wait_until
-from tests.server.harness import hosting, in_loop, registry_with
+from tests.server.harness import hosting, in_loop, registry_with, serving
 from tests.server.probes import SlowToWarm
 
 ALGORITHMS = {f"{item.kind}/{item.name}": item for item in default_registry().algorithms}
@@ -75,3 +76,26 @@ def test_after_a_reload_what_is_new_gets_ready_too(monkeypatch):
         wait_until(lambda: "the configuration is reloaded" in host.said, "it is not reloaded")
         wait_until(lambda: client.is_serving("searcher/slow-to-warm"), "it is never ready")
         assert client.is_serving("searcher/align")
+
+
+def test_no_more_streams_watch_health_than_probes_need(monkeypatch):
+    monkeypatch.setattr(readiness, "MOST_WATCHERS", 2)
+    with serving(warm=False) as host, grpc.insecure_channel(host.address) as channel:
+        stub = health_pb2_grpc.HealthStub(channel)
+        request = health_pb2.HealthCheckRequest()
+        watching = [stub.Watch(request) for _ in range(2)]
+        assert all(next(stream).status for stream in watching)
+        with pytest.raises(grpc.RpcError) as refused:
+            next(stub.Watch(request))
+        assert refused.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+        assert "use Check" in refused.value.details()
+        watching[0].cancel()
+
+        def again():
+            try:
+                return next(stub.Watch(request)).status
+            except grpc.RpcError:
+                return 0
+
+        wait_until(again, "a place is never given back")
+        assert stub.Check(request)

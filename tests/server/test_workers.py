@@ -92,7 +92,7 @@ def test_bytes_that_are_no_request_are_an_invalid_argument(address):
 
 
 def test_a_match_whose_worker_is_killed_may_be_sent_again_and_no_other_notices():
-    with server("--workers", "2") as running, Client(running.address) as client:
+    with server("--workers", "2") as running, Client(running.address, retries=0) as client:
         pid = running.process.pid
         small = [client.match(scene(5), scene(5)).object_map for _ in range(3)]
         events = searching(client)
@@ -277,7 +277,7 @@ def test_a_process_group_that_is_told_to_end_comes_to_an_end_as_its_server_does(
 
 @pytest.mark.slow
 def test_no_worker_outlives_a_server_that_is_killed():
-    with server("--workers", "2") as running, Client(running.address) as client:
+    with server("--workers", "2") as running, Client(running.address, retries=0) as client:
         events = searching(client)
         processes = children_of(running.process.pid)
         assert len(processes) >= 3

@@ -29,6 +29,7 @@ from sketchmatch_client._channel import (
     no_such_part,
     within,
 )
+from sketchmatch_client._course import Course, watched
 from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, tell_progress
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
 from sketchmatch_client._retry import Attempts, checked_retries
@@ -48,7 +49,14 @@ from sketchmatch_proto.v1.catalog_service_pb2 import (
     ListAlgorithmsResponse,
 )
 from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceStub
-from sketchmatch_proto.v1.match_service_pb2 import MatchRequest, MatchResponse
+from sketchmatch_proto.v1.match_service_pb2 import (
+    CancelMatchRequest,
+    GetMatchRequest,
+    GetMatchResponse,
+    ListMatchesRequest,
+    MatchResponse,
+    MatchSummary,
+)
 from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceStub
 from sketchmatch_proto.v1.scene_service_pb2 import (
     GetSceneResponse,
@@ -154,7 +162,49 @@ class AsyncClient:
         Closing the generator cancels the match. Python does not close it at the moment a loop
         over it is left; ``contextlib.aclosing`` does.
         """
-        return self._events(match_request(sketch, map, **options), self._limit(timeout))
+        request = match_request(sketch, map, **options)
+        return self._events(Course(request), self._limit(timeout))
+
+    def watch(
+        self, match_id: str, after: int = 0, *, timeout: float | None = None
+    ) -> AsyncGenerator[MatchResponse, None]:
+        """Read a match of one's own that was begun before; see :meth:`Client.watch`."""
+        return self._events(watched(match_id, after), self._limit(timeout))
+
+    async def get_match(self, match_id: str, *, timeout: float | None = None) -> GetMatchResponse:
+        """Return how a match of one's own is; see :meth:`Client.get_match`."""
+        request = GetMatchRequest(match_id=match_id)
+        return await self._asked(
+            lambda limit: self._matching.GetMatch(request, timeout=limit, metadata=self._metadata),
+            timeout,
+        )
+
+    async def cancel_match(self, match_id: str, *, timeout: float | None = None) -> MatchSummary:
+        """Stop a match of one's own, and return how it is; see :meth:`Client.cancel_match`."""
+        request = CancelMatchRequest(match_id=match_id)
+        answer = await self._asked(
+            lambda limit: self._matching.CancelMatch(
+                request, timeout=limit, metadata=self._metadata
+            ),
+            timeout,
+        )
+        return answer.match
+
+    async def matches(self, *, timeout: float | None = None) -> AsyncGenerator[MatchSummary, None]:
+        """Yield all matches of one's own, the latest first; see :meth:`Client.matches`."""
+        request = ListMatchesRequest()
+        while True:
+            page = await self._asked(
+                lambda limit: self._matching.ListMatches(
+                    request, timeout=limit, metadata=self._metadata
+                ),
+                timeout,
+            )
+            for match in page.matches:
+                yield match
+            if not page.next_page_token:
+                return
+            request.page_token = page.next_page_token
 
     async def segment(
         self,
@@ -290,24 +340,30 @@ class AsyncClient:
             return grpc.aio.insecure_channel(self._address, self._options)
         return grpc.aio.secure_channel(self._address, self._credentials, self._options)
 
+    @property
+    def _matching(self) -> MatchServiceAsyncStub:
+        return cast("MatchServiceAsyncStub", MatchServiceStub(self._channel))
+
     async def _events(
-        self, request: MatchRequest, limit: float | None
+        self, course: Course, limit: float | None
     ) -> AsyncGenerator[MatchResponse, None]:
-        stub = cast("MatchServiceAsyncStub", MatchServiceStub(self._channel))
-        attempts, told = Attempts(self._retries, limit), False
+        attempts = Attempts(self._retries, limit)
         while True:
             try:
                 with translated_errors(self._address):
-                    call = stub.Match(request, timeout=attempts.limit, metadata=self._metadata)
+                    call = self._begun(course, attempts.limit)
                     try:
-                        async for event in call:
-                            told = True
-                            yield event
+                        async for response in call:
+                            attempts.succeeded()
+                            if (event := course.take(response)) is not None:
+                                yield event
                     finally:
                         call.cancel()
                 return
             except SketchmatchError as error:
-                pause = None if told else attempts.pause_after(error)
+                if course.ends(error):
+                    return
+                pause = course.pause_after(error, attempts)
                 if pause is None:
                     raise
             await asyncio.sleep(pause)
@@ -327,6 +383,13 @@ class AsyncClient:
         return await self._asked(
             lambda limit: call(request, timeout=limit, metadata=self._metadata), timeout, retries
         )
+
+    def _begun(self, course: Course, seconds: float | None) -> Any:
+        """Return the call that tells of a match from where it is known."""
+        if (watching := course.watching) is not None:
+            return self._matching.WatchMatch(watching, timeout=seconds, metadata=self._metadata)
+        assert course.request is not None
+        return self._matching.Match(course.request, timeout=seconds, metadata=self._metadata)
 
     async def _asked(
         self,

@@ -7,10 +7,11 @@ from threading import Event, RLock
 from types import TracebackType
 from typing import Any, Protocol, Self
 
+from sketchmatch_client._course import Course
 from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, tell_progress
 from sketchmatch_client._retry import Attempts
 from sketchmatch_client.errors import CallCancelledError, SketchmatchError, translated_errors
-from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+from sketchmatch_proto.v1.match_service_pb2 import MatchResponse, WatchMatchResponse
 
 __all__ = ["MatchCall"]
 
@@ -18,7 +19,7 @@ __all__ = ["MatchCall"]
 class _Stream(Protocol):
     """What gRPC returns from a call that streams."""
 
-    def __next__(self) -> MatchResponse: ...
+    def __next__(self) -> MatchResponse | WatchMatchResponse: ...
 
     def cancel(self) -> object: ...
 
@@ -27,18 +28,26 @@ class MatchCall(Generator[MatchResponse, None, None]):
     """A match that a server is doing, as :meth:`Client.events` returns it.
 
     Iterate over its events, or wait for its :meth:`result`. It starts when the first event is asked
-    for. Leaving a ``with`` statement over it, closing it or dropping it stops the match. One thread
-    goes through the events; :meth:`cancel` and :meth:`close` may be called from any other.
+    for. Leaving a ``with`` statement over it, closing it or dropping it stops the match, unless it
+    is to keep running. One thread goes through the events; :meth:`cancel` and :meth:`close` may be
+    called from any other. When the link is lost or the server starts anew, it goes on by itself.
     """
 
     def __init__(
-        self, begin: Callable[[float | None], _Stream], address: str, begun: Callable[[], Attempts]
+        self,
+        course: Course,
+        begin: Callable[[Course, float | None], _Stream],
+        cancel: Callable[[str], object],
+        address: str,
+        begun: Callable[[], Attempts],
     ) -> None:
+        self._course = course
         self._begin = begin
+        self._cancel = cancel
+        self._cancelling: object = None  # what nobody holds gRPC cancels
         self._address = address
         self._begun = begun
         self._attempts: Attempts | None = None
-        self._told = False
         self._over = Event()
         self._lock = RLock()  # a handler of signals may cancel, too
         self._call: _Stream | None = None
@@ -51,6 +60,9 @@ class MatchCall(Generator[MatchResponse, None, None]):
 
         One that has ended stays as it is.
         """
+        request = self._course.request
+        if not self._ended and self._course.match_id and (request is None or request.keep_running):
+            self._cancelling = self._cancel(self._course.match_id)
         self._end(CallCancelledError("the match was cancelled before its end"))
 
     def close(self) -> None:
@@ -93,7 +105,6 @@ class MatchCall(Generator[MatchResponse, None, None]):
             raise
         if event is None:
             raise StopIteration
-        self._told = True
         self._collector.add(event)
         return event
 
@@ -119,11 +130,18 @@ class MatchCall(Generator[MatchResponse, None, None]):
         while (call := self._started()) is not None:
             try:
                 with translated_errors(self._address):
-                    event = next(call, None)
-                break
+                    response = next(call, None)
             except SketchmatchError as error:
-                if not self._starts_again(error):
+                if self._course.ends(error):
+                    self._end()
+                elif not self._starts_again(error):
                     self._end(error)
+                continue
+            if self._attempts is not None:
+                self._attempts.succeeded()
+            event = None if response is None else self._course.take(response)
+            if response is None or event is not None:
+                break
         if event is None:
             self._end()
             if self._error is not None:
@@ -136,14 +154,14 @@ class MatchCall(Generator[MatchResponse, None, None]):
             if self._attempts is None:
                 self._attempts = self._begun()
             if self._call is None and not self._ended:
-                self._call = self._begin(self._attempts.limit)
+                self._call = self._begin(self._course, self._attempts.limit)
             return None if self._ended else self._call
 
     def _starts_again(self, error: SketchmatchError) -> bool:
-        """Wait for the next attempt; False if there is none, as after the first event."""
-        if self._told or self._attempts is None:
+        """Wait for the next attempt; False if there is none."""
+        if self._attempts is None:
             return False
-        pause = self._attempts.pause_after(error)
+        pause = self._course.pause_after(error, self._attempts)
         if pause is None:
             return False
         self._over.wait(pause)

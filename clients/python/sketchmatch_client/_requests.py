@@ -96,6 +96,14 @@ class MatchOptions(TypedDict, total=False):
     profile
         Name of one of the server's pipelines, e.g. ``"proof"``, to start from; what
         the options above say wins. Left out: the server's default one.
+    request_id
+        A name for the request, at most 128 bytes: sent again under the same name it is the same
+        match, done once. Left out: the client makes one for each call.
+    keep_running
+        Whether the match goes on when nobody reads it; :meth:`Client.watch` reads it again.
+    priority
+        ``"low"``, ``"normal"`` or ``"high"``: which of one's own requests come first while they
+        wait. Left out: normal.
     """
 
     sketch_segmenter: str | None
@@ -114,6 +122,9 @@ class MatchOptions(TypedDict, total=False):
     pins: Pins | None
     synonyms: Iterable[Iterable[str]] | None
     profile: str | None
+    request_id: str | None
+    keep_running: bool | None
+    priority: str | None
 
 
 def match_request(
@@ -265,6 +276,12 @@ def _labels(group: Iterable[str]) -> list[str]:
     return list(group)
 
 
+def _priority(name: str) -> match_service_pb2.Priority.ValueType:
+    if not isinstance(name, str):
+        raise TypeError
+    return match_service_pb2.Priority.Value(f"PRIORITY_{name.upper()}")
+
+
 def _same(value: Any) -> Any:
     return value
 
@@ -286,6 +303,9 @@ _FIELDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
         _pins,
     ),
     "synonyms": ("give groups of labels, as in [('couch', 'sofa')]", _synonyms),
+    "request_id": ("give a text of at most 128 bytes", _same),
+    "keep_running": ("give True or False", _same),
+    "priority": ("give 'low', 'normal' or 'high'", _priority),
 }
 """Options that are fields of the request: what to give instead of a wrong value, and how to write
 one."""

@@ -19,6 +19,9 @@ __all__ = ["Attempts", "checked_retries"]
 
 _SHORTEST = 0.1
 _LONGEST = 5.0
+_LONGEST_BEGUN = 1.0
+_AWAY = 60.0
+"""Seconds in which a server is expected back that had begun to answer."""
 
 
 class Attempts:
@@ -36,17 +39,19 @@ class Attempts:
         self._retries = retries
         self._deadline = math.inf if limit is None else time.monotonic() + limit
         self._backoff = _SHORTEST
+        self._gives_up = math.inf
 
     @property
     def limit(self) -> float | None:
         """Seconds that the next attempt may take, for gRPC."""
         return within(self._deadline, time.monotonic())
 
-    def pause_after(self, error: SketchmatchError) -> float | None:
+    def pause_after(self, error: SketchmatchError, begun: bool = False) -> float | None:
         """Return the seconds after which to send the request again; None if it is in vain.
 
         They are no fewer than the server asks for, grow from one attempt to the next, and differ
-        from caller to caller, so that not all come back at once.
+        from caller to caller, so that not all come back at once. An answer that had begun is worth
+        a minute's attempts, whatever their number, unless there are to be none.
         """
         match error:
             case ServerBusyError(retry_after=float(asked)):
@@ -56,11 +61,18 @@ class Attempts:
             case _:
                 return None
         pause = max(shortest, self._backoff) * random.uniform(1.0, 1.5)
-        if self._retries < 1 or time.monotonic() + pause >= self._deadline:
+        if begun and self._gives_up == math.inf:
+            self._gives_up = time.monotonic() + _AWAY
+        if self._retries < 1 or time.monotonic() + pause >= min(self._deadline, self._gives_up):
             return None
-        self._retries -= 1
-        self._backoff = min(2.0 * self._backoff, _LONGEST)
+        if not begun:
+            self._retries -= 1
+        self._backoff = min(2.0 * self._backoff, _LONGEST_BEGUN if begun else _LONGEST)
         return pause
+
+    def succeeded(self) -> None:
+        """Hear that the server answers."""
+        self._backoff, self._gives_up = _SHORTEST, math.inf
 
 
 def checked_retries(retries: int) -> int:

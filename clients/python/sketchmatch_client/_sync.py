@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import TracebackType
 from typing import Any, Self, TypeVar, Unpack
 
@@ -26,6 +26,7 @@ from sketchmatch_client._channel import (
     no_such_part,
     within,
 )
+from sketchmatch_client._course import Course, watched
 from sketchmatch_client._match import Match, ProgressCallback
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
 from sketchmatch_client._retry import Attempts, checked_retries
@@ -45,6 +46,13 @@ from sketchmatch_proto.v1.catalog_service_pb2 import (
     ListAlgorithmsResponse,
 )
 from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceStub
+from sketchmatch_proto.v1.match_service_pb2 import (
+    CancelMatchRequest,
+    GetMatchRequest,
+    GetMatchResponse,
+    ListMatchesRequest,
+    MatchSummary,
+)
 from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceStub
 from sketchmatch_proto.v1.scene_service_pb2 import (
     GetSceneResponse,
@@ -63,6 +71,7 @@ from sketchmatch_proto.v1.transfer_service_pb2_grpc import TransferServiceStub
 __all__ = ["Client"]
 
 _Answer = TypeVar("_Answer")
+_CANCELLING = 10.0
 
 
 class Client:
@@ -85,7 +94,8 @@ class Client:
     retries
         How often a request is sent again where the server is not available or has no room, after a
         pause that the server asks for or that grows from 0.1 s. The timeout is for all attempts
-        together, and a match that has begun is not sent again.
+        together. A match that has begun goes on where the link was lost, with attempts for a
+        minute; where the server lost it too, it is done again. With 0 none of that is done.
     options
         Channel options of gRPC, beside or instead of this package's own.
     **access
@@ -189,13 +199,80 @@ class Client:
             ``cancel()`` stops the match from another thread, and its ``result()`` waits for the
             end.
         """
-        request, limit = match_request(sketch, map, **options), self._limit(timeout)
+        request = match_request(sketch, map, **options)
+        return self._reading(Course(request), self._limit(timeout))
+
+    def watch(self, match_id: str, after: int = 0, *, timeout: float | None = None) -> MatchCall:
+        """Read a match of one's own that was begun before, event by event.
+
+        Parameters
+        ----------
+        match_id
+            Its name, as :class:`MatchAccepted` has it.
+        after
+            The number of the last event that is known already.
+        timeout
+            Seconds after which the call fails.
+
+        Returns
+        -------
+        MatchCall
+            As :meth:`events` does; closing it does not stop a match that is to keep running or that
+            others read, and its ``cancel()`` does.
+
+        Raises
+        ------
+        NotFoundError
+            If the server keeps no such match, or it is another caller's.
+        """
+        return self._reading(watched(match_id, after), self._limit(timeout))
+
+    def get_match(self, match_id: str, *, timeout: float | None = None) -> GetMatchResponse:
+        """Return how a match of one's own is, with its events so far.
+
+        Raises
+        ------
+        NotFoundError
+            If the server keeps no such match, or it is another caller's.
+        """
+        request = GetMatchRequest(match_id=match_id)
         stub = MatchServiceStub(self._channel)
-        return MatchCall(
-            lambda seconds: stub.Match(request, timeout=seconds, metadata=self._metadata),
-            self._address,
-            lambda: Attempts(self._retries, limit),
+        return self._asked(
+            lambda limit: stub.GetMatch(request, timeout=limit, metadata=self._metadata), timeout
         )
+
+    def cancel_match(self, match_id: str, *, timeout: float | None = None) -> MatchSummary:
+        """Stop a match of one's own, and return how it is; one that has ended stays as it is.
+
+        Raises
+        ------
+        NotFoundError
+            If the server keeps no such match, or it is another caller's.
+        """
+        request = CancelMatchRequest(match_id=match_id)
+        stub = MatchServiceStub(self._channel)
+        return self._asked(
+            lambda limit: stub.CancelMatch(request, timeout=limit, metadata=self._metadata), timeout
+        ).match
+
+    def matches(self, *, timeout: float | None = None) -> Iterator[MatchSummary]:
+        """Yield all matches of one's own that the server knows, the latest first.
+
+        Parameters
+        ----------
+        timeout
+            Seconds after which each call for some of them fails.
+        """
+        stub, request = MatchServiceStub(self._channel), ListMatchesRequest()
+        while True:
+            page = self._asked(
+                lambda limit: stub.ListMatches(request, timeout=limit, metadata=self._metadata),
+                timeout,
+            )
+            yield from page.matches
+            if not page.next_page_token:
+                return
+            request.page_token = page.next_page_token
 
     def segment(
         self,
@@ -446,6 +523,23 @@ class Client:
         call = getattr(SketchServiceStub(self._channel), method)
         return self._asked(
             lambda limit: call(request, timeout=limit, metadata=self._metadata), timeout, retries
+        )
+
+    def _reading(self, course: Course, limit: float | None) -> MatchCall:
+        stub = MatchServiceStub(self._channel)
+
+        def begin(course: Course, seconds: float | None) -> Any:
+            if (watching := course.watching) is not None:
+                return stub.WatchMatch(watching, timeout=seconds, metadata=self._metadata)
+            assert course.request is not None
+            return stub.Match(course.request, timeout=seconds, metadata=self._metadata)
+
+        def cancel(match_id: str) -> object:
+            request = CancelMatchRequest(match_id=match_id)
+            return stub.CancelMatch.future(request, timeout=_CANCELLING, metadata=self._metadata)
+
+        return MatchCall(
+            course, begin, cancel, self._address, lambda: Attempts(self._retries, limit)
         )
 
     def _asked(

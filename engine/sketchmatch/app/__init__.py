@@ -13,4 +13,6 @@ Scenes are kept under the hash of what they are in one SQLite file (``scenes``, 
 workers read for themselves; what they remember of scenes (``remembered``) saves the next request
 about the same ones that work. Sketches in progress (``sketches``) live in the event loop, each with
 a runner that has its latest revision matched.
+A match has a life beyond the call that began it (``matches``): whoever asks for it again under its
+name reads the same one, and it is kept on disk (``archive``) by a thread that nobody waits for.
 """

@@ -3,32 +3,44 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
+import json
 import logging
 import math
 import time
 import uuid
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import AsyncIterator, Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, contextmanager, suppress
-from typing import Protocol
+from contextlib import asynccontextmanager, closing, contextmanager, suppress
+from dataclasses import replace
+from typing import Protocol, TypeVar
 
 from google.protobuf.message import Message
 
 from sketchmatch.app import responses
+from sketchmatch.app.archive import Archive
 from sketchmatch.app.frames import Flag
 from sketchmatch.app.jobs import Job, answers
 from sketchmatch.app.keeping import Keeping
-from sketchmatch.app.orders import Order
+from sketchmatch.app.matches import Matches
+from sketchmatch.app.orders import Order, Wish
 from sketchmatch.app.packed import check_size
+from sketchmatch.app.quotas import Rates
 from sketchmatch.app.remembered import Remembered
 from sketchmatch.app.setup import Setup
 from sketchmatch.app.sketches import Sketches
 from sketchmatch.app.store import Store
-from sketchmatch.app.tasks import Task
+from sketchmatch.app.tasks import Record, State, Task
 from sketchmatch.app.waiting import Caller, FairQueue
 from sketchmatch.app.worker import flags
 from sketchmatch.app.workers import Workers
-from sketchmatch.errors import ServerStoppingError, TooBusyError, WorkerLostError
+from sketchmatch.errors import (
+    MatchCancelledError,
+    MatchInterruptedError,
+    ServerStoppingError,
+    TooBusyError,
+    WorkerLostError,
+)
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.warmup import (
     COMPILING,
@@ -42,14 +54,18 @@ from sketchmatch_proto.v1.catalog_service_pb2 import (
     GetServerInfoResponse,
     ListAlgorithmsResponse,
 )
+from sketchmatch_proto.v1.match_service_pb2 import MatchRequest, MatchResponse
 
 __all__ = ["Application", "Place"]
 
 _log = logging.getLogger(__name__)
 _LOOK = 0.05
+_MOMENT = 0.005
 _LONGEST_RETRY = 60
 _FIRST_GUESS = 1.0
+_STOPS = "the server is about to stop"
 _Ended = Callable[[Task, BaseException | None], None]
+_Match = TypeVar("_Match", bound=Task | Record)
 
 
 class Place(Protocol):
@@ -130,6 +146,10 @@ class Application:
         this process, but for strangers' plugins.
     store
         Where scenes are kept; None where none are.
+    archive
+        Where matches are kept; None for nowhere.
+    matched
+        Called when a match has ended that has a result, with its events but progress.
 
     Attributes
     ----------
@@ -137,23 +157,36 @@ class Application:
         The scenes that are kept.
     sketches
         The sketches in progress.
+    matches
+        All matches that are known.
     """
 
-    def __init__(self, setup: Setup, workers: int = 0, store: Store | None = None) -> None:
+    def __init__(
+        self,
+        setup: Setup,
+        workers: int = 0,
+        store: Store | None = None,
+        archive: Archive | None = None,
+        matched: Callable[[list[MatchResponse]], None] = lambda _: None,
+    ) -> None:
         self.scenes = Keeping(self, store)
         self.sketches = Sketches(self)
         self._remembered = Remembered(self.scenes.path)
         self._setup = self._remembering(setup)
         self._kept = workers
+        self.matches = Matches(archive)
+        self._matched = matched
         self._began = time.monotonic()
         self._workers = Workers(workers, self._ended, self._dispatch)
         self._workers.scenes = self.scenes.path
         self._workers.described = self.scenes.keep
         self._here = Here(self._ended)
         self._running: set[Task] = set()
-        self._waiting = FairQueue[Task]()
+        self._waiting = FairQueue[Task](lambda task: task.wish.priority)
+        self._rates = Rates()
         self._typical = _FIRST_GUESS
         self._stopping = False
+        self._inflating = asyncio.Lock()
         self._looking: asyncio.Task[None] | None = None
         self._catalogue: tuple[Setup, ListAlgorithmsResponse] | None = None
 
@@ -191,6 +224,7 @@ class Application:
         caller: Caller = Caller(),  # noqa: B008
         brought: tuple[bytes, ...] = (),
         former: tuple[bytes, bytes] | None = None,
+        inner: bool = False,
     ) -> Iterator[Task]:
         """Admit a request and do it, in its turn, until the end of the block.
 
@@ -200,7 +234,7 @@ class Application:
             Name of the message, and the message.
         caller
             Who asks.
-        brought, former
+        brought, former, inner
             As of an :class:`~sketchmatch.app.orders.Order`.
 
         Raises
@@ -212,20 +246,64 @@ class Application:
         ServerStoppingError
             If nothing is begun any more.
         """
-        setup = self._setup
-        if self._stopping:
-            raise ServerStoppingError("the server is about to stop")
-        check_size(len(data), setup.limits.max_request_bytes)
-        order = Order(uuid.uuid4().hex, kind, data, caller.known, brought, former)
-        task = Task(order, setup, caller)
-        self._admit(task)
-        try:
+        order = Order(uuid.uuid4().hex, kind, data, caller.known, brought, former, inner)
+        with self.reading(self._begun(order, caller)) as task:
             yield task
+
+    @asynccontextmanager
+    async def matching(
+        self,
+        data: bytes,
+        caller: Caller = Caller(),  # noqa: B008
+    ) -> AsyncIterator[Task | Record]:
+        """Read the match that a request asks for, which begins if there is no such match yet.
+
+        It stops at the end of the block if nobody else reads it, unless it is to keep running.
+
+        Parameters
+        ----------
+        data
+            The request, encoded.
+        caller
+            Who asks.
+
+        Raises
+        ------
+        SketchmatchError
+            As :meth:`running` does.
+        InvalidInputError
+            If the caller gave the request's name to another.
+        """
+        check_size(len(data), self._setup.limits.max_request_bytes)
+        order = Order(uuid.uuid4().hex, MatchRequest.DESCRIPTOR.name, data, caller.known)
+        wish = await self._wish(order)
+        if wish.request_id:  # the same name again if all that was known of the match is lost
+            order = replace(order, id=_name_of(caller.name, wish.request_id))
+        match = await self.matches.same(caller.name, wish)
+        if match is None:
+            match = self._begun(order, caller, wish)
+        elif isinstance(match, Record) and match.state is State.INTERRUPTED:
+            match = self._begun(order, caller, wish, match)
+        with self.reading(match):
+            yield match
+
+    @contextmanager
+    def reading(self, match: _Match) -> Iterator[_Match]:
+        """Read a match until the end of the block, and stop it then as :meth:`matching` does."""
+        if isinstance(match, Record):
+            yield match
+            return
+        match.readers += 1
+        try:
+            yield match
         finally:
-            if self._waiting.remove(task, caller):
-                task.log.end()
-            elif task in self._running:
-                self._place(task).stop(task)
+            match.readers -= 1
+            if not (match.readers or match.wish.keep_running):
+                self._stop(match, MatchInterruptedError("nobody read the match any more"))
+
+    def cancel(self, task: Task) -> None:
+        """Stop a match, whoever reads it."""
+        self._stop(task, MatchCancelledError("the match was cancelled"))
 
     def algorithms(self) -> ListAlgorithmsResponse:
         """Return what there is to choose from, put together once for each setup."""
@@ -314,7 +392,7 @@ class Application:
         self.sketches.stop()
         for task in tuple(self._waiting):
             self._waiting.remove(task, task.caller)
-            task.log.end(ServerStoppingError("the server is about to stop"))
+            self._finish(task, ServerStoppingError(_STOPS))
         deadline = time.monotonic() + seconds
         while self._running and time.monotonic() < deadline:
             await asyncio.sleep(_LOOK)
@@ -326,9 +404,12 @@ class Application:
         self._stopping = True
         self.sketches.stop()
         for task in tuple(self._running):
-            self._place(task).stop(task)
+            self._stop(task, ServerStoppingError(_STOPS))
         await self._here.close()
         await self._workers.close()
+        while self._running:  # ends that threads told of
+            await asyncio.sleep(_MOMENT)
+        await self.matches.close()
         await self.scenes.close()
         if self._looking is not None:
             self._looking.cancel()
@@ -336,6 +417,53 @@ class Application:
     def _remembering(self, setup: Setup) -> Setup:
         """Return a setup with what this process remembers of scenes."""
         return self._remembered.setup(setup, self.scenes.keep_described)
+
+    async def _wish(self, order: Order) -> Wish:
+        limit = self._setup.limits.max_request_bytes
+        if not order.is_large:
+            return order.wish(limit)
+        if self._is_full and not self._has_room():
+            raise self._busy()  # before memory is spent on it
+        async with self._inflating:  # one at a time: a few bytes may become very many
+            return await asyncio.to_thread(order.wish, limit)
+
+    def _begun(
+        self,
+        order: Order,
+        caller: Caller,
+        wish: Wish = Wish(),  # noqa: B008
+        former: Record | None = None,
+    ) -> Task:
+        """Return a request that is admitted."""
+        setup = self._setup
+        if self._stopping:
+            raise ServerStoppingError(_STOPS)
+        check_size(len(order.data), setup.limits.max_request_bytes)
+        task = Task(order, setup, caller, wish, former)
+        if not order.inner:
+            self._rates.take(caller.name, setup.limits.max_per_minute)
+        self._admit(task)
+        if order.is_match:
+            self.matches.begin(task)
+        return task
+
+    def _stop(self, task: Task, why: BaseException) -> None:
+        """See that a task comes to an end, unless it has."""
+        if self._waiting.remove(task, task.caller):
+            self._finish(task, why)
+        elif task in self._running:
+            task.stop(why)
+            self.matches.changed(task)
+            self._place(task).stop(task)
+
+    def _finish(self, task: Task, error: BaseException | None = None) -> None:
+        """Tell of the end of a task."""
+        task.end(error)
+        if not task.order.is_match:
+            return
+        self.matches.end(task)
+        if task.state is State.SUCCEEDED:
+            self._matched(task.events())
 
     def _admit(self, task: Task) -> None:
         """Let a task begin or wait; if there is no room, it or the greediest one goes away."""
@@ -346,12 +474,22 @@ class Application:
             return
         crowded = self._waiting.crowd_out(task.caller)
         assert crowded is not None
-        there_are = f"the server runs {len(self._running)} requests already"
-        waiting = f" and {limits.max_waiting} wait" if limits.max_waiting else ""
-        error = TooBusyError(f"{there_are}{waiting}, which is its limit", self._retry_seconds())
+        error = self._busy()
         if crowded[0] is task:
             raise error
-        crowded[0].log.end(error)
+        self._finish(crowded[0], error)
+
+    @property
+    def _is_full(self) -> bool:
+        """Whether no more may wait."""
+        return len(self._waiting) >= self._setup.limits.max_waiting
+
+    def _busy(self) -> TooBusyError:
+        """Return the error of a request for which there is no room."""
+        most = self._setup.limits.max_waiting
+        there_are = f"the server runs {len(self._running)} requests already"
+        waiting = f" and {most} wait" if most else ""
+        return TooBusyError(f"{there_are}{waiting}, which is its limit", self._retry_seconds())
 
     def _dispatch(self) -> None:
         """Begin what waits, as far as there are places."""
@@ -360,6 +498,7 @@ class Application:
             if task is None:
                 return
             self._running.add(task)
+            task.begin()
             self._place(task).begin(task)
 
     def _has_room(self) -> bool:
@@ -369,7 +508,12 @@ class Application:
         return all_places and (not self._kept or short < self._kept)
 
     def _fits(self, task: Task) -> bool:
-        """Whether a task may have a place: strangers never have all of them."""
+        """Whether a task may have a place: neither strangers nor a caller ever have all."""
+        most = self._setup.limits.max_per_caller
+        if most is not None:
+            name = task.caller.name
+            if sum(1 for other in self._running if other.caller.name == name) >= most:
+                return False
         if not task.strangers:
             return True
         theirs = sum(1 for other in self._running if other.strangers)
@@ -387,7 +531,7 @@ class Application:
         self._running.discard(task)
         taken = time.monotonic() - task.asked
         self._typical += 0.1 * (min(taken, _LONGEST_RETRY) - self._typical)
-        task.log.end(error)
+        self._finish(task, error)
         self._dispatch()
 
     def _retry_seconds(self) -> int:
@@ -402,11 +546,21 @@ class Application:
             await asyncio.sleep(_LOOK)
             self._workers.look()
             self.sketches.look()
+            for task in self._running:
+                if task.order.is_match and task.log.kept > task.noted:
+                    task.noted = task.log.kept
+                    self.matches.changed(task)
             now, longest = time.monotonic(), self._setup.limits.max_wait
             for task in [task for task in self._waiting if now - task.asked > longest]:
                 self._waiting.remove(task, task.caller)
                 problem = f"the request waited {longest:g} s for its turn, which is the limit"
-                task.log.end(TooBusyError(problem, self._retry_seconds()))
+                self._finish(task, TooBusyError(problem, self._retry_seconds()))
+
+
+def _name_of(caller: str, request_id: str) -> str:
+    """Return the name of the match that a caller gave a name to."""
+    named = json.dumps([caller, request_id]).encode()
+    return hashlib.blake2b(named, digest_size=16).hexdigest()
 
 
 def _job(task: Task) -> Job:

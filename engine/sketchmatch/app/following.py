@@ -14,9 +14,9 @@ __all__ = ["followed"]
 _Item = TypeVar("_Item")
 
 
-async def followed(log: Log[_Item]) -> AsyncGenerator[_Item, None]:
-    """Yield what a log holds and gets, until it ends; raise the error that it ends with."""
-    loop, changed, seen = asyncio.get_running_loop(), asyncio.Event(), 0
+async def followed(log: Log[_Item], seen: int = 0) -> AsyncGenerator[tuple[int, _Item], None]:
+    """Yield what a log holds and gets after a number, until it ends; raise what it ends with."""
+    loop, changed = asyncio.get_running_loop(), asyncio.Event()
 
     here = threading.get_ident()
 
@@ -31,8 +31,8 @@ async def followed(log: Log[_Item]) -> AsyncGenerator[_Item, None]:
             changed.clear()
             ended, found = log.ended, log.next(seen)
             if found is not None:
-                seen, item = found
-                yield item
+                seen, _ = found
+                yield found
             elif ended:
                 break
             else:

@@ -10,9 +10,12 @@ from enum import IntEnum, unique
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
+    MatchCancelledError,
+    MatchInterruptedError,
     NotFoundError,
     PluginError,
     Reason,
+    RetryableError,
     ServerStoppingError,
     SketchmatchError,
     StoreError,
@@ -89,8 +92,13 @@ _SENTENCES: dict[str, type[SketchmatchError]] = {
     "unavailable": AnswerUnavailableError,
     "not found": NotFoundError,
     "store": StoreError,
+    "cancelled": MatchCancelledError,
 }
 """Errors that are a sentence and nothing else."""
+_RETRYABLE: dict[str, type[RetryableError]] = {
+    "stopping": ServerStoppingError,
+    "interrupted": MatchInterruptedError,
+}
 
 
 def failure(error: Exception, log: str) -> bytes:
@@ -103,6 +111,8 @@ def failure(error: Exception, log: str) -> bytes:
             told |= {"field": f"{error.field}", "problem": f"{error.problem}"}
         case ServerStoppingError():
             told |= {"kind": "stopping", "problem": f"{error.problem}"}
+        case RetryableError():
+            told |= {"kind": "interrupted", "problem": f"{error.problem}"}
         case SketchmatchError():
             told |= {"kind": sentence or "plugin", "problem": f"{error}"}
     return json.dumps(told).encode()
@@ -114,8 +124,8 @@ def failure_of(content: bytes) -> tuple[SketchmatchError | None, str]:
     match told:
         case {"kind": "input", "reason": reason, "field": field, "problem": problem}:
             return InvalidInputError(Reason(reason), field, problem), told["log"]
-        case {"kind": "stopping", "problem": problem}:
-            return ServerStoppingError(problem), told["log"]
+        case {"kind": str(kind), "problem": problem} if kind in _RETRYABLE:
+            return _RETRYABLE[kind](problem), told["log"]
         case {"kind": str(kind), "problem": problem}:
             return _SENTENCES.get(kind, PluginError)(problem), told["log"]
     return None, told["log"]

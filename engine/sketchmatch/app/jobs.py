@@ -12,6 +12,7 @@ from google.protobuf.wrappers_pb2 import BytesValue
 
 from sketchmatch.api import Segmentation, Segmenter
 from sketchmatch.app import requests, responses
+from sketchmatch.app.costs import Costs
 from sketchmatch.app.scenes import (
     LARGEST_KEPT,
     Described,
@@ -170,7 +171,9 @@ def _match(
         _stopping(clock),
         closing(engine.match(value, job.id, clock)) as events,
     ):
+        costs = Costs(setup.limits, engine.registry)
         for event in events:
+            costs.check(event)
             yield writer.response(event)
 
 

@@ -128,7 +128,7 @@ class Keeping:
     async def _found(self, data: bytes, caller: Caller) -> tuple[GetSceneResponse, list[bytes]]:
         """Return what is in a source, which comes with it unless it is kept, and histograms."""
         with self._app.running("PutSceneRequest", data, caller) as task:
-            told = [response async for response in followed(task.log)]
+            told = [response async for _, response in followed(task.log)]
         if not told:
             raise ServerStoppingError("the server is about to stop")
         histograms = [BytesValue.FromString(each).value for each in told[1:]]

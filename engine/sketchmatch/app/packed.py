@@ -11,7 +11,7 @@ from google.protobuf.message import DecodeError, Message
 from sketchmatch.app.unknown import read_whole
 from sketchmatch.errors import InvalidInputError, Reason
 
-__all__ = ["Packed", "check_size", "inflated"]
+__all__ = ["Packed", "check_size", "inflated", "is_compressed"]
 
 # How gzip and zlib begin. No message of ours does: their first byte would be a field's number and
 # kind, 3 with a kind that there is not, or 15 as a number, which no request has.
@@ -69,6 +69,11 @@ def check_size(size: int, limit: int) -> None:
         )
 
 
+def is_compressed(data: bytes) -> bool:
+    """Whether a request begins as what was compressed does."""
+    return data.startswith(_COMPRESSED)
+
+
 def inflated(data: bytes, limit: int) -> bytes:
     """Return what came as it was before it was compressed, if it was.
 
@@ -78,7 +83,7 @@ def inflated(data: bytes, limit: int) -> bytes:
         If it has more bytes than the limit, before or after; no more are spent on it.
     """
     check_size(len(data), limit)
-    if not data.startswith(_COMPRESSED):
+    if not is_compressed(data):
         return data
     stream = zlib.decompressobj(_ANY_HEADER)
     try:

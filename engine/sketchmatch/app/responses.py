@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from google.protobuf.duration_pb2 import Duration
+from google.protobuf.timestamp_pb2 import Timestamp
 
 import sketchmatch
 from sketchmatch.api import API_VERSION, Algorithm, Segmentation, Segmenter
 from sketchmatch.app.setup import Setup
+from sketchmatch.errors import SketchmatchError
 from sketchmatch.model import (
     Confidence,
     ConfidenceWeights,
@@ -53,9 +55,13 @@ from sketchmatch_proto.v1 import (
     transfer_service_pb2,
 )
 
+if TYPE_CHECKING:
+    from sketchmatch.app.tasks import Record
+
 __all__ = [
     "ResponseWriter",
     "catalogue",
+    "details",
     "fmap_entry",
     "result",
     "scene",
@@ -63,6 +69,7 @@ __all__ = [
     "selection",
     "server_info",
     "stored_scene",
+    "summary",
     "transferred",
 ]
 
@@ -258,6 +265,17 @@ def server_info(setup: Setup, uptime: float) -> catalog_service_pb2.GetServerInf
     limits.max_wait.FromMilliseconds(round(1e3 * given.max_wait))
     if given.max_time_budget is not None:
         limits.max_time_budget.FromMilliseconds(round(1e3 * given.max_time_budget))
+    if given.default_time_budget is not None:
+        usual = given.time_budget(None) or given.default_time_budget
+        limits.default_time_budget.FromMilliseconds(round(1e3 * usual))
+    for name, value in (
+        ("max_matches_per_caller", given.max_per_caller),
+        ("max_requests_per_minute", given.max_per_minute),
+        ("max_comparisons", given.max_comparisons),
+        ("max_candidates", given.max_candidates),
+    ):
+        if value is not None:
+            setattr(limits, name, value)
     return catalog_service_pb2.GetServerInfoResponse(
         version=sketchmatch.__version__,
         api_version="sketchmatch.v1",
@@ -307,6 +325,45 @@ def _relation(relation: ObjectRelation | None) -> match_pb2.ObjectRelation | Non
         phrase=relation.phrase,
         degree=relation.degree,
     )
+
+
+def summary(record: Record) -> match_service_pb2.MatchSummary:
+    """Return what is known of a match."""
+    error = record.error
+    return match_service_pb2.MatchSummary(
+        match_id=record.id,
+        request_id=record.wish.request_id,
+        state=match_service_pb2.MatchState.ValueType(record.state),
+        created_at=_timestamp(record.created),
+        ended_at=None if record.ended is None else _timestamp(record.ended),
+        outcome=match_pb2.Outcome.ValueType(record.outcome),
+        last_event=record.events[-1][0] if record.events else 0,
+        error_message="" if error is None else _UNFORESEEN if _is_ours(error) else str(error),
+        error_reason=getattr(error, "reason", ""),
+    )
+
+
+def details(record: Record) -> match_service_pb2.GetMatchResponse:
+    """Return what is known of a match, with its events."""
+    response = match_service_pb2.GetMatchResponse(match=summary(record))
+    for number, encoded in record.events:
+        event = response.events.add()
+        event.ParseFromString(encoded)
+        event.number = number
+    return response
+
+
+_UNFORESEEN = "the server failed in a way nobody foresaw"
+
+
+def _is_ours(error: BaseException) -> bool:
+    return not isinstance(error, SketchmatchError)
+
+
+def _timestamp(seconds: float) -> Timestamp:
+    stamp = Timestamp()
+    stamp.FromMicroseconds(round(seconds * 1e6))  # more a float does not hold
+    return stamp
 
 
 def _ambiguity(value: Ambiguity | None) -> match_pb2.Ambiguity | None:

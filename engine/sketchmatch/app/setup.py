@@ -35,6 +35,16 @@ class RequestLimits:
         Seconds that one may wait.
     default_time_budget
         Seconds for a match that does not say how long it may take, or None for the most.
+    max_per_caller
+        Requests of one caller that run at the same time, or None for all that may.
+    max_per_minute
+        Requests that one caller may begin in a minute, or None for no limit.
+    max_comparisons
+        Numbers that the relations of one match may be compared by, or None for no limit: pairs of
+        sketched objects × pairs of mapped objects × directions.
+    max_candidates
+        Maps that a search may weigh by its parameters, or None for no limit: population ×
+        generations.
     """
 
     max_request_bytes: int = 64 * 1024 * 1024
@@ -49,6 +59,10 @@ class RequestLimits:
         return max(1, self.max_concurrent_matches // 2)
 
     default_time_budget: float | None = None
+    max_per_caller: int | None = None
+    max_per_minute: int | None = None
+    max_comparisons: int | None = None
+    max_candidates: int | None = None
 
     def time_budget(self, asked: float | None) -> float | None:
         """Return the seconds for a match that asks for so many, or None for no limit."""

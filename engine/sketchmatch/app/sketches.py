@@ -211,7 +211,7 @@ class Sketches:
         )
         assert isinstance(opened, CreateSketchRequest)
         with self._app.running("CreateSketchRequest", data, caller) as task:
-            answers = [response async for response in followed(task.log)]
+            answers = [response async for _, response in followed(task.log)]
         if not answers:
             raise ServerStoppingError("the server is about to stop")
         found = GetSceneResponse.FromString(answers[0]).stored_scene
@@ -248,7 +248,7 @@ class Sketches:
         sketch.watchers += 1
         try:
             async with aclosing(followed(sketch.board)) as events:
-                async for event in events:
+                async for _, event in events:
                     yield event
         finally:
             sketch.watchers -= 1
@@ -373,9 +373,9 @@ class Sketches:
         """Tell one answer to a revision; return whether it is worth looking for a better one."""
         began, brought, better = time.monotonic(), (sketch.record,), False
         objects = SketchObjects()
-        with self._app.running("MatchRequest", data, sketch.caller, brought, former) as task:
+        with self._app.running("MatchRequest", data, sketch.caller, brought, former, True) as task:
             async with aclosing(followed(task.log)) as responses:
-                async for response in responses:
+                async for _, response in responses:
                     taken = time.monotonic() - began
                     if sketch.revision != revision and taken > _OVERTAKEN:
                         return False

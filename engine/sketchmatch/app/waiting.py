@@ -32,6 +32,11 @@ class Caller(NamedTuple):
 class FairQueue(Generic[_Item]):
     """Items that wait: callers take turns, and so do the connections of each.
 
+    Parameters
+    ----------
+    priority
+        Tells which of a caller's items come first: those for which it is larger.
+
     Examples
     --------
     >>> queue = FairQueue()
@@ -41,7 +46,8 @@ class FairQueue(Generic[_Item]):
     ['a1', 'b1', 'a2', 'a3']
     """
 
-    def __init__(self) -> None:
+    def __init__(self, priority: Callable[[_Item], int] = lambda _: 0) -> None:
+        self._priority = priority
         self._lines: OrderedDict[str, OrderedDict[str, deque[_Item]]] = OrderedDict()
 
     def __len__(self) -> int:
@@ -60,13 +66,18 @@ class FairQueue(Generic[_Item]):
     def take(self, fits: Callable[[_Item], bool] = lambda _: True) -> _Item | None:
         """Take out the item whose turn it is, of those that fit; None if there is none."""
         for name, lines in self._lines.items():
+            best: tuple[_Item, str] | None = None
             for connection, line in lines.items():
                 for item in line:
-                    if fits(item):
-                        self._lines.move_to_end(name)
-                        lines.move_to_end(connection)
-                        self.remove(item, Caller(name, connection))
-                        return item
+                    first = best is None or self._priority(item) > self._priority(best[0])
+                    if first and fits(item):
+                        best = item, connection
+            if best is not None:
+                item, connection = best
+                self._lines.move_to_end(name)
+                lines.move_to_end(connection)
+                self.remove(item, Caller(name, connection))
+                return item
         return None
 
     def remove(self, item: _Item, caller: Caller) -> bool:
@@ -83,7 +94,10 @@ class FairQueue(Generic[_Item]):
         return True
 
     def crowd_out(self, newcomer: Caller) -> tuple[_Item, Caller] | None:
-        """Take out the last item of whoever has most; of equals, of the newcomer."""
+        """Take out the last item of whoever has most, of the least priority there.
+
+        Of those who have as many, the newcomer is crowded out.
+        """
         if not self._lines:
             return None
 
@@ -97,6 +111,6 @@ class FairQueue(Generic[_Item]):
             return len(lines[connection]), Caller(name, connection) == newcomer
 
         caller = Caller(name, max(lines, key=length))
-        item = lines[caller.connection][-1]
+        item = min(reversed(lines[caller.connection]), key=self._priority)
         self.remove(item, caller)
         return item, caller

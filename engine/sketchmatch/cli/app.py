@@ -20,6 +20,7 @@ from sketchmatch.cli import (
     health,
     interrupts,
     match,
+    matches,
     output,
     plugins,
     relate,
@@ -61,6 +62,7 @@ app.add_typer(plugins.app, name="plugins")
 app.add_typer(config.app, name="config")
 app.add_typer(tokens.app, name="tokens")
 app.add_typer(scenes.app, name="scenes")
+app.add_typer(matches.app, name="matches")
 
 
 class ExitCode(IntEnum):

@@ -82,6 +82,14 @@ def match(
     pin: options.Pins = None,
     no_pin: options.Exclusions = None,
     synonyms: options.Synonyms = None,
+    keep_running: Annotated[
+        bool,
+        typer.Option(
+            "--keep-running",
+            help="With --server: let the match go on there if this command is ended; "
+            "`sketchmatch matches` finds it again.",
+        ),
+    ] = False,
     json: options.Json = False,
     overlay: options.Overlay = None,
     verbose: options.Verbose = False,
@@ -98,6 +106,9 @@ def match(
     from sketchmatch.cli.sources import in_metres, source_of, stored_of
 
     options.refuse_config(config, server)
+    if keep_running and server is None:
+        problem = "is for a server, and none is asked; give --server, or drop it"
+        raise InvalidInputError(Reason.INVALID_FIELD, "--keep-running", problem)
     if overlay is not None:
         pictures.check_path(overlay)
     known = options.parse_pins(pin, no_pin)
@@ -118,6 +129,7 @@ def match(
         "pins": list(known.values()),
         "synonyms": options.parse_synonyms(synonyms),
         "profile": profile,
+        "keep_running": keep_running or None,
     }
     named = options.pins_as_typed(list(known))
     with (

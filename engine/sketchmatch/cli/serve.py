@@ -65,6 +65,22 @@ def serve(
             metavar="SECONDS", help="Longest match where a request does not say; 300 by default."
         ),
     ] = None,
+    max_matches_per_caller: Annotated[
+        int | None, typer.Option(help="Requests of one caller at the same time; more wait.")
+    ] = None,
+    max_requests_per_minute: Annotated[
+        int | None, typer.Option(help="Requests that one caller may begin in a minute.")
+    ] = None,
+    max_comparisons: Annotated[
+        int | None,
+        typer.Option(
+            help="Pairs of sketched objects × pairs of mapped objects × directions of a match."
+        ),
+    ] = None,
+    max_candidates: Annotated[
+        int | None,
+        typer.Option(help="Population × generations that a request may ask of a search."),
+    ] = None,
     grace: Annotated[
         float | None,
         typer.Option(
@@ -127,6 +143,14 @@ def serve(
     no_store: Annotated[
         bool, typer.Option("--no-store", help="Keep nothing beyond the life of the server.")
     ] = False,
+    keep_matches_days: Annotated[
+        float | None,
+        typer.Option(metavar="DAYS", help="Keep a match so long after its end; 30 by default."),
+    ] = None,
+    keep_matches_mib: Annotated[
+        int | None,
+        typer.Option(help="Most that kept matches may take, in MiB; 1024 by default."),
+    ] = None,
     metrics_address: Annotated[
         str | None,
         typer.Option(
@@ -180,6 +204,10 @@ def serve(
         "server.max_wait_seconds": max_wait,
         "server.max_time_budget_seconds": max_time_budget,
         "server.default_time_budget_seconds": default_time_budget,
+        "server.max_matches_per_caller": max_matches_per_caller,
+        "server.max_requests_per_minute": max_requests_per_minute,
+        "server.max_comparisons": max_comparisons,
+        "server.max_candidates": max_candidates,
         "server.tls_certificate": tls_certificate,
         "server.tls_key": tls_key,
         "server.tls_client_ca": tls_client_ca,
@@ -187,6 +215,8 @@ def serve(
         "server.insecure": insecure or None,
         "server.store": store,
         "server.keep": False if no_store else None,
+        "server.keep_matches_days": keep_matches_days,
+        "server.keep_matches_mib": keep_matches_mib,
         "server.metrics_address": metrics_address,
         "server.web_address": web_address,
         "limits.max_bytes": max_bytes,
@@ -207,8 +237,8 @@ def serve(
         configuration = load(config, flags)
         if _server_settings(configuration) != settings:
             say(
-                "addresses, server.grace_seconds, server.workers and the names of files stay until "
-                "the server is started anew"
+                "addresses, server.grace_seconds, server.workers, what is kept and the names of "
+                "files stay until the server is started anew"
             )
         return _setup(configuration)
 
@@ -250,6 +280,9 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
         _store(server.store, server.keep),
         server.web_address,
         server.web_origins,
+        bool(server.store),
+        server.keep_matches_days,
+        server.keep_matches_mib * _MIB,
     )
 
 
@@ -283,6 +316,10 @@ def _setup(configuration: Configuration) -> Setup:
             max_wait=server.max_wait_seconds,
             max_time_budget=server.max_time_budget_seconds,
             default_time_budget=server.default_time_budget_seconds,
+            max_per_caller=server.max_matches_per_caller,
+            max_per_minute=server.max_requests_per_minute,
+            max_comparisons=server.max_comparisons,
+            max_candidates=server.max_candidates,
         ),
         Isolation(configuration.trusted, configuration.patience),
     )

@@ -21,6 +21,12 @@ if TYPE_CHECKING:
 __all__ = ["status"]
 
 _MIB = 1024 * 1024
+_LIMITS = {
+    "max_matches_per_caller": "requests of one caller at once",
+    "max_requests_per_minute": "requests of one caller a minute",
+    "max_comparisons": "comparisons a match",
+    "max_candidates": "maps a search",
+}
 _UNITS = (("d", 86_400), ("h", 3_600), ("min", 60), ("s", 1))
 
 
@@ -103,6 +109,12 @@ def _limits(limits: ServerLimits) -> Iterator[str]:
         yield f"{limits.max_objects} objects a scene"
     if limits.HasField("max_time_budget"):
         yield f"{_duration(limits.max_time_budget.ToTimedelta().total_seconds())} a match"
+    if limits.HasField("default_time_budget"):
+        usual = _duration(limits.default_time_budget.ToTimedelta().total_seconds())
+        yield f"{usual} where it does not say"
+    for name, what in _LIMITS.items():
+        if limits.HasField(name):  # type: ignore[arg-type]
+            yield f"{getattr(limits, name)} {what}"
 
 
 def _state(plugin: Plugin) -> str:

@@ -171,6 +171,37 @@ class _Server(_Section):
     default_time_budget_seconds: float = Field(
         300.0, ge=0.001, description="Longest match where the request does not say."
     )
+    max_matches_per_caller: int | None = Field(
+        None,
+        ge=1,
+        le=1000,
+        description="Requests of one caller at the same time, more wait; all places, when left "
+        "out.",
+        examples=[4],
+    )
+    max_requests_per_minute: int | None = Field(
+        None,
+        ge=1,
+        le=1_000_000,
+        description="Requests that one caller may begin in a minute; no limit, when left out.",
+        examples=[600],
+    )
+    max_comparisons: int | None = Field(
+        None,
+        ge=1,
+        le=10**15,
+        description="Pairs of sketched objects × pairs of mapped objects × directions of one "
+        "match; no limit beside memory, when left out.",
+        examples=[1_000_000_000],
+    )
+    max_candidates: int | None = Field(
+        None,
+        ge=1,
+        le=10**15,
+        description="Population × generations that a request may ask of a search; no limit, when "
+        "left out.",
+        examples=[100_000_000],
+    )
     tls_certificate: str | None = Field(
         None,
         description="PEM file of the server's certificate, with those between it and the "
@@ -199,6 +230,15 @@ class _Server(_Section):
         examples=["/var/lib/sketchmatch"],
     )
     keep: bool = Field(True, description="Keep things on disk, beyond the life of the server.")
+    keep_matches_days: float = Field(
+        30.0, gt=0, le=36_500, description="How long a match is kept after its end."
+    )
+    keep_matches_mib: int = Field(
+        1024,
+        ge=1,
+        le=1_000_000,
+        description="Most that kept matches may take, in MiB; the oldest go first.",
+    )
     metrics_address: Annotated[str | None, AfterValidator(_watched)] = Field(
         None,
         description="Host and port for Prometheus' /metrics and the probes /livez and /readyz over "

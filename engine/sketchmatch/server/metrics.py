@@ -17,6 +17,7 @@ from google.rpc import error_details_pb2, status_pb2
 
 from sketchmatch.server.wrapping import WrappingInterceptor, kind_of
 from sketchmatch_proto.v1.match_pb2 import MatchAccepted, MatchResult, Outcome
+from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
 __all__ = ["Counter", "Gauge", "Histogram", "Metric", "Metrics", "MetricsInterceptor"]
 
@@ -151,6 +152,9 @@ class Metrics:
         self.matches = Counter(
             Metric("sketchmatch_matches_total", "Matches with a result.", ("searcher", "outcome"))
         )
+        self.unkept = Counter(
+            Metric("sketchmatch_matches_not_kept_total", "Matches that the store failed to keep.")
+        )
         self.stage_seconds = Histogram(
             Metric(
                 "sketchmatch_stage_seconds",
@@ -170,7 +174,7 @@ class Metrics:
         self._gauges.append(Gauge(metric, read))
 
     def __iter__(self) -> Iterator[Counter | Histogram | Gauge]:
-        yield from (self.calls, self.refusals, self.matches)
+        yield from (self.calls, self.refusals, self.matches, self.unkept)
         yield from (self.call_seconds, self.stage_seconds)
         yield from self._gauges
 
@@ -190,8 +194,12 @@ class Metrics:
         if reason:
             self.refusals.add(reason)
 
-    def matched(self, accepted: MatchAccepted, result: MatchResult) -> None:
-        """Count a match with its outcome and its stages."""
+    def matched(self, events: Iterable[MatchResponse]) -> None:
+        """Count a match with its outcome and its stages, by its events."""
+        accepted, result = MatchAccepted(), MatchResult()
+        for event in events:
+            accepted = event.accepted if event.HasField("accepted") else accepted
+            result = event.result if event.HasField("result") else result
         pipeline, statistics = accepted.pipeline, result.statistics
         outcome = Outcome.Name(result.outcome).removeprefix("OUTCOME_").lower()
         self.matches.add(pipeline.searcher.name, outcome)

@@ -4,15 +4,41 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable
+from typing import Any
 
+import grpc
 from grpc_health.v1 import health, health_pb2
 
 from sketchmatch.registry import Registered
 
-__all__ = ["Readiness"]
+__all__ = ["MOST_WATCHERS", "Readiness"]
+
+MOST_WATCHERS = 1000
+"""Streams that may watch health at the same time."""
 
 _Status = health_pb2.HealthCheckResponse
 _WHOLE = ""
+
+
+class _Health(health.aio.HealthServicer):
+    """The standard service, with no more streams than a fleet's probes need."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._watchers = 0
+
+    async def Watch(self, request: Any, context: Any) -> None:  # noqa: N802
+        """Tell each change, unless too many are told already."""
+        if self._watchers >= MOST_WATCHERS:
+            await context.abort(
+                grpc.StatusCode.RESOURCE_EXHAUSTED,
+                f"{MOST_WATCHERS} streams watch the health of this server already; use Check",
+            )
+        self._watchers += 1
+        try:
+            await super().Watch(request, context)
+        finally:
+            self._watchers -= 1
 
 
 class Readiness:
@@ -28,7 +54,7 @@ class Readiness:
     """
 
     def __init__(self, services: Iterable[str]) -> None:
-        self.servicer = health.aio.HealthServicer()
+        self.servicer = _Health()
         self._services = tuple(services)
         self._loop = asyncio.get_running_loop()
         self._algorithms: set[str] = set()

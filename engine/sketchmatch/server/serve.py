@@ -17,6 +17,7 @@ from grpc_reflection.v1alpha import reflection
 
 import sketchmatch
 from sketchmatch.app.application import Application
+from sketchmatch.app.archive import Archive
 from sketchmatch.app.setup import Setup
 from sketchmatch.app.store import Store
 from sketchmatch.config.addresses import is_of_this_machine
@@ -52,6 +53,7 @@ _MOST_AT_ONCE = 1000
 _PING_MS = 10_000
 _IDLE_MS = 600_000
 _QUIET = 1.0
+_DAY = 86_400.0
 _LOOK = 0.05
 _COMING_TO_AN_END = 2.0
 """Seconds of the grace that are left to matches for coming to an end with what they have."""
@@ -109,6 +111,10 @@ class ServerSettings:
         Host and port for browsers; None for none.
     web_origins
         Of pages from elsewhere that may call there.
+    store_named
+        Whether somebody named that folder, so that the server is not to start without it.
+    matches_days, matches_bytes
+        For how long matches are kept there, and how large their file may grow.
     """
 
     address: str = "127.0.0.1:50051"
@@ -122,6 +128,9 @@ class ServerSettings:
     store: Path | None = None
     web_address: str | None = None
     web_origins: tuple[str, ...] = ()
+    store_named: bool = True
+    matches_days: float = 30.0
+    matches_bytes: int = 1 << 30
 
 
 async def serve(
@@ -155,9 +164,10 @@ async def serve(
     """
     lacking = _refuse_strangers(settings)
     files = _Files(settings, say)
-    store = _opened(settings.store, say)
-    app = Application(load(), settings.workers, store)
-    metrics = Metrics(_METHODS)
+    metrics, setup = Metrics(_METHODS), load()
+    store = _opened(settings, say)
+    archive = None if store is None else _archive(store, settings, metrics)
+    app = Application(setup, settings.workers, store, archive, metrics.matched)
     interceptors = [
         MetricsInterceptor(metrics),
         CallLogInterceptor(),
@@ -193,7 +203,7 @@ async def serve(
         ],
     )
     readiness = Readiness(_SERVICES)
-    services = _services(app, metrics)
+    services = _services(app)
     _add_services(server, services, readiness)
     _watch(metrics, app, files, readiness)
     port = _listen(server, settings.address, files.credentials)
@@ -228,21 +238,10 @@ async def serve(
         await ending
         await app.close()
         await beside.close()
-        if store:
+        if store is not None:
             store.close()
         unwatch()
     say("stopped")
-
-
-def _opened(folder: Path | None, say: Callable[[str], None]) -> Store | None:
-    """Return the store in a folder; one that cannot be used is said, and nothing is kept."""
-    if folder is None:
-        return None
-    try:
-        return Store(folder)
-    except StoreError as error:
-        say(f"{error}; nothing is kept until then")
-        return None
 
 
 class _Files:
@@ -411,13 +410,41 @@ def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readine
     )
 
 
-def _services(app: Application, metrics: Metrics) -> tuple[grpc.GenericRpcHandler, ...]:
+def _opened(settings: ServerSettings, say: Callable[[str], None]) -> Store | None:
+    """Return the folder in which things are kept; None for none, which is said if it is no choice.
+
+    Raises
+    ------
+    InvalidInputError
+        If somebody named one that is of no use.
+    """
+    if settings.store is None:
+        return None
+    try:
+        return Store(settings.store)
+    except StoreError as error:
+        if settings.store_named:
+            raise InvalidInputError(Reason.INVALID_FIELD, "server.store", str(error)) from None
+        say(f"nothing is kept beyond the life of this server: {error}")
+        return None
+
+
+def _archive(store: Store, settings: ServerSettings, metrics: Metrics) -> Archive:
+    return Archive(
+        store,
+        settings.matches_days * _DAY,
+        settings.matches_bytes,
+        lambda count: metrics.unkept.add(count=count),
+    )
+
+
+def _services(app: Application) -> tuple[grpc.GenericRpcHandler, ...]:
     """Return what answers the services of the contract, on whichever port."""
     catalog = _Collected()
     catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(
         CatalogService(app), cast(grpc.aio.Server, catalog)
     )
-    served = MatchService(app, metrics.matched), SceneService(app)
+    served = MatchService(app), SceneService(app)
     others = TransferService(app), SketchService(app)
     return (*(each.handler() for each in (*served, *others)), *catalog.handlers)
 

@@ -9,8 +9,11 @@ from typing import Any, TypeVar
 import grpc
 from google.protobuf.message import Message
 
+from sketchmatch.app import responses
 from sketchmatch.app.application import Application
 from sketchmatch.app.following import followed
+from sketchmatch.app.orders import varint
+from sketchmatch.app.tasks import Record, Task, is_progress
 from sketchmatch.app.waiting import Caller
 from sketchmatch.server.callers import caller_of
 from sketchmatch.server.calls import note
@@ -23,7 +26,6 @@ from sketchmatch_proto.v1 import (
     scene_service_pb2,
     transfer_service_pb2,
 )
-from sketchmatch_proto.v1.match_pb2 import MatchAccepted, MatchResult
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 from sketchmatch_proto.v1.scene_service_pb2 import (
     DeleteSceneRequest,
@@ -47,9 +49,13 @@ _MATCH = match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name
 _TRANSFER = transfer_service_pb2.DESCRIPTOR.services_by_name["TransferService"].full_name
 _SCENE = scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name
 
-_LENGTH_DELIMITED = 2
-_PROGRESS = bytes(
-    [MatchResponse.DESCRIPTOR.fields_by_name["progress"].number << 3 | _LENGTH_DELIMITED]
+_VARINT, _LENGTH_DELIMITED = 0, 2
+_NUMBER = bytes([MatchResponse.DESCRIPTOR.fields_by_name["number"].number << 3 | _VARINT])
+_EVENT = bytes(
+    [
+        match_service_pb2.WatchMatchResponse.DESCRIPTOR.fields_by_name["event"].number << 3
+        | _LENGTH_DELIMITED
+    ]
 )
 _Context = grpc.aio.ServicerContext[Any, Any]
 _Request = TypeVar("_Request", bound=Message)
@@ -59,36 +65,62 @@ _Response = TypeVar("_Response", bound=Message)
 class MatchService:
     """Matches, streaming the search while it runs; requests and responses pass as they come."""
 
-    def __init__(
-        self,
-        app: Application,
-        matched: Callable[[MatchAccepted, MatchResult], None] = lambda *_: None,
-    ) -> None:
+    def __init__(self, app: Application) -> None:
         self._app = app
-        self._matched = matched
 
     async def Match(self, request: bytes, context: _Context) -> None:  # noqa: N802
-        """Run a match and pass its events on."""
-        with self._app.running("MatchRequest", request, caller_from(context)) as task:
-            note(match=task.id)
-            pacing, accepted = Pacing(), MatchAccepted()
-            async with aclosing(followed(task.log)) as responses:
-                async for response in responses:
-                    if _is_progress(response):
-                        if pacing.is_due():
-                            await context.write(response)
-                        continue
-                    await context.write(response)
-                    event = MatchResponse.FromString(response)
-                    _note_event(event)
-                    if event.HasField("accepted"):
-                        accepted = event.accepted
-                    elif event.HasField("result"):
-                        self._matched(accepted, event.result)
+        """Run a match, or attach to the one that is the same, and pass its events on."""
+        async with self._app.matching(request, caller_from(context)) as match:
+            await _tell(match, 0, context.write)
+
+    async def WatchMatch(  # noqa: N802
+        self, request: match_service_pb2.WatchMatchRequest, context: _Context
+    ) -> None:
+        """Pass on what a match told after an event, and tells."""
+        match = await self._app.matches.get(caller_from(context).name, request.match_id)
+        with self._app.reading(match):
+            await _tell(
+                match,
+                request.after,
+                lambda event: context.write(_EVENT + varint(len(event)) + event),
+            )
 
     def handler(self) -> grpc.GenericRpcHandler:
         """Return what answers the calls of the service."""
-        return handler_of(_MATCH, Match=grpc.unary_stream_rpc_method_handler(self.Match))
+        return handler_of(
+            _MATCH,
+            Match=grpc.unary_stream_rpc_method_handler(self.Match),
+            WatchMatch=grpc.unary_stream_rpc_method_handler(
+                self.WatchMatch, match_service_pb2.WatchMatchRequest.FromString
+            ),
+            GetMatch=answering(match_service_pb2.GetMatchRequest, self._get),
+            CancelMatch=answering(match_service_pb2.CancelMatchRequest, self._cancel),
+            ListMatches=answering(match_service_pb2.ListMatchesRequest, self._list),
+        )
+
+    async def _get(
+        self, request: match_service_pb2.GetMatchRequest, caller: Caller
+    ) -> match_service_pb2.GetMatchResponse:
+        match = await self._app.matches.get(caller.name, request.match_id)
+        return responses.details(match.record())
+
+    async def _cancel(
+        self, request: match_service_pb2.CancelMatchRequest, caller: Caller
+    ) -> match_service_pb2.CancelMatchResponse:
+        match = await self._app.matches.get(caller.name, request.match_id)
+        if isinstance(match, Task):
+            self._app.cancel(match)
+        return match_service_pb2.CancelMatchResponse(match=responses.summary(match.record()))
+
+    async def _list(
+        self, request: match_service_pb2.ListMatchesRequest, caller: Caller
+    ) -> match_service_pb2.ListMatchesResponse:
+        found, token = await self._app.matches.page(
+            caller.name, request.page_size, request.page_token
+        )
+        return match_service_pb2.ListMatchesResponse(
+            matches=map(responses.summary, found), next_page_token=token
+        )
 
 
 class SceneService:
@@ -101,9 +133,9 @@ class SceneService:
         """Segment, and return what was found."""
         with self._app.running("SegmentRequest", request, caller_from(context)) as task:
             async with aclosing(followed(task.log)) as told:
-                responses = [response async for response in told]
+                found = [response async for _, response in told]
         # Nobody waits for an answer to a request that was stopped.
-        return responses[0] if responses else b""
+        return found[0] if found else b""
 
     async def PutScene(self, request: bytes, context: _Context) -> PutSceneResponse:  # noqa: N802
         """Keep a scene."""
@@ -136,7 +168,7 @@ class TransferService:
         with self._app.running("TransferRequest", request, caller_from(context)) as task:
             note(match=task.id)
             async with aclosing(followed(task.log)) as told:
-                async for response in told:
+                async for _, response in told:
                     answer = response
         return answer
 
@@ -174,9 +206,25 @@ def caller_from(context: _Context) -> Caller:
     return Caller(name or peer.rpartition(":")[0] or peer, peer, name)
 
 
-def _is_progress(response: bytes) -> bool:
-    """Whether an encoded event is progress; it has no other field."""
-    return response[:1] == _PROGRESS
+async def _tell(
+    match: Task | Record, after: int, write: Callable[[bytes], Awaitable[None]]
+) -> None:
+    """Pass on what a match told after an event, and tells, until its end."""
+    note(match=match.id)
+    pacing = Pacing()
+    async with aclosing(followed(match.log, after)) as told:
+        async for number, response in told:
+            if is_progress(response):
+                if pacing.is_due():
+                    await write(_numbered(number, response))
+                continue
+            await write(_numbered(number, response))
+            _note_event(match.event(number, response))
+
+
+def _numbered(number: int, response: bytes) -> bytes:
+    """Return an encoded event with its number."""
+    return response + _NUMBER + varint(number)
 
 
 def _note_event(event: MatchResponse) -> None:

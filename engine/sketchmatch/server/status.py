@@ -11,10 +11,13 @@ from google.rpc import code_pb2, error_details_pb2, status_pb2
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
+    MatchCancelledError,
+    MatchInterruptedError,
     NotAuthenticatedError,
     NotFoundError,
     PluginError,
     Reason,
+    RetryableError,
     ServerStoppingError,
     SketchmatchError,
     StoreError,
@@ -33,6 +36,8 @@ _CODES: dict[type[SketchmatchError], grpc.StatusCode] = {
     TooBusyError: grpc.StatusCode.RESOURCE_EXHAUSTED,
     ServerStoppingError: grpc.StatusCode.UNAVAILABLE,
     WorkerLostError: grpc.StatusCode.UNAVAILABLE,
+    MatchInterruptedError: grpc.StatusCode.UNAVAILABLE,
+    MatchCancelledError: grpc.StatusCode.CANCELLED,
     AnswerUnavailableError: grpc.StatusCode.DEADLINE_EXCEEDED,
     NotAuthenticatedError: grpc.StatusCode.UNAUTHENTICATED,
     NotFoundError: grpc.StatusCode.NOT_FOUND,
@@ -59,7 +64,7 @@ def refusal(error: BaseException) -> Refusal:
             )
             detail = error_details_pb2.BadRequest(field_violations=[violation])
             return _refusal(grpc.StatusCode.INVALID_ARGUMENT, error, error.reason, detail)
-        case TooBusyError() | ServerStoppingError() | WorkerLostError():
+        case RetryableError():
             delay = duration_pb2.Duration(seconds=error.retry_seconds)
             retry = error_details_pb2.RetryInfo(retry_delay=delay)
             return _refusal(_CODES[type(error)], error, error.reason, retry)
@@ -69,6 +74,7 @@ def refusal(error: BaseException) -> Refusal:
             | NotFoundError()
             | StoreError()
             | PluginError()
+            | MatchCancelledError()
         ):
             return _refusal(_CODES[type(error)], error, error.reason)
     return Refusal(

@@ -424,6 +424,11 @@ class ServerLimits(google.protobuf.message.Message):
     MAX_TIME_BUDGET_FIELD_NUMBER: builtins.int
     MAX_WAITING_FIELD_NUMBER: builtins.int
     MAX_WAIT_FIELD_NUMBER: builtins.int
+    DEFAULT_TIME_BUDGET_FIELD_NUMBER: builtins.int
+    MAX_MATCHES_PER_CALLER_FIELD_NUMBER: builtins.int
+    MAX_REQUESTS_PER_MINUTE_FIELD_NUMBER: builtins.int
+    MAX_COMPARISONS_FIELD_NUMBER: builtins.int
+    MAX_CANDIDATES_FIELD_NUMBER: builtins.int
     max_request_bytes: builtins.int
     """Largest request in bytes."""
     max_objects: builtins.int
@@ -432,6 +437,14 @@ class ServerLimits(google.protobuf.message.Message):
     """Most matches that run at the same time; more wait for their turn."""
     max_waiting: builtins.int
     """Most requests that wait for their turn; more are RESOURCE_EXHAUSTED."""
+    max_matches_per_caller: builtins.int
+    """Most requests of one caller that run at the same time; more wait for their turn."""
+    max_requests_per_minute: builtins.int
+    """Most requests that one caller may send in a minute; more are RESOURCE_EXHAUSTED."""
+    max_comparisons: builtins.int
+    """Most comparisons of relations: pairs of sketched objects × pairs of mapped objects × directions."""
+    max_candidates: builtins.int
+    """Most maps that a search may weigh: population × generations of searchers that have both."""
     @property
     def max_time_budget(self) -> google.protobuf.duration_pb2.Duration:
         """Longest time budget; a longer one is cut to it."""
@@ -439,6 +452,10 @@ class ServerLimits(google.protobuf.message.Message):
     @property
     def max_wait(self) -> google.protobuf.duration_pb2.Duration:
         """How long a request may wait for its turn; then it is RESOURCE_EXHAUSTED."""
+
+    @property
+    def default_time_budget(self) -> google.protobuf.duration_pb2.Duration:
+        """The time budget of a match that does not say one."""
 
     def __init__(
         self,
@@ -449,15 +466,28 @@ class ServerLimits(google.protobuf.message.Message):
         max_time_budget: google.protobuf.duration_pb2.Duration | None = ...,
         max_waiting: builtins.int | None = ...,
         max_wait: google.protobuf.duration_pb2.Duration | None = ...,
+        default_time_budget: google.protobuf.duration_pb2.Duration | None = ...,
+        max_matches_per_caller: builtins.int | None = ...,
+        max_requests_per_minute: builtins.int | None = ...,
+        max_comparisons: builtins.int | None = ...,
+        max_candidates: builtins.int | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_max_concurrent_matches", b"_max_concurrent_matches", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "_max_waiting", b"_max_waiting", "max_concurrent_matches", b"max_concurrent_matches", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_time_budget", b"max_time_budget", "max_wait", b"max_wait", "max_waiting", b"max_waiting"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_max_concurrent_matches", b"_max_concurrent_matches", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "_max_waiting", b"_max_waiting", "max_concurrent_matches", b"max_concurrent_matches", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_time_budget", b"max_time_budget", "max_wait", b"max_wait", "max_waiting", b"max_waiting"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_max_candidates", b"_max_candidates", "_max_comparisons", b"_max_comparisons", "_max_concurrent_matches", b"_max_concurrent_matches", "_max_matches_per_caller", b"_max_matches_per_caller", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "_max_requests_per_minute", b"_max_requests_per_minute", "_max_waiting", b"_max_waiting", "default_time_budget", b"default_time_budget", "max_candidates", b"max_candidates", "max_comparisons", b"max_comparisons", "max_concurrent_matches", b"max_concurrent_matches", "max_matches_per_caller", b"max_matches_per_caller", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_requests_per_minute", b"max_requests_per_minute", "max_time_budget", b"max_time_budget", "max_wait", b"max_wait", "max_waiting", b"max_waiting"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_max_candidates", b"_max_candidates", "_max_comparisons", b"_max_comparisons", "_max_concurrent_matches", b"_max_concurrent_matches", "_max_matches_per_caller", b"_max_matches_per_caller", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "_max_requests_per_minute", b"_max_requests_per_minute", "_max_waiting", b"_max_waiting", "default_time_budget", b"default_time_budget", "max_candidates", b"max_candidates", "max_comparisons", b"max_comparisons", "max_concurrent_matches", b"max_concurrent_matches", "max_matches_per_caller", b"max_matches_per_caller", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_requests_per_minute", b"max_requests_per_minute", "max_time_budget", b"max_time_budget", "max_wait", b"max_wait", "max_waiting", b"max_waiting"]) -> None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_max_candidates", b"_max_candidates"]) -> typing.Literal["max_candidates"] | None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_max_comparisons", b"_max_comparisons"]) -> typing.Literal["max_comparisons"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_max_concurrent_matches", b"_max_concurrent_matches"]) -> typing.Literal["max_concurrent_matches"] | None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_max_matches_per_caller", b"_max_matches_per_caller"]) -> typing.Literal["max_matches_per_caller"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_max_objects", b"_max_objects"]) -> typing.Literal["max_objects"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_max_request_bytes", b"_max_request_bytes"]) -> typing.Literal["max_request_bytes"] | None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_max_requests_per_minute", b"_max_requests_per_minute"]) -> typing.Literal["max_requests_per_minute"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_max_waiting", b"_max_waiting"]) -> typing.Literal["max_waiting"] | None: ...
 

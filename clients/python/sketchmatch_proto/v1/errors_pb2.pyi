@@ -80,6 +80,12 @@ class _ErrorReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._En
     """FAILED_PRECONDITION: what the server keeps on disk cannot be read or written; its operator has
     to act. Requests that need nothing of it are answered all the same.
     """
+    ERROR_REASON_MATCH_CANCELLED: _ErrorReason.ValueType  # 30
+    """CANCELLED: the match was cancelled by `CancelMatch`."""
+    ERROR_REASON_MATCH_INTERRUPTED: _ErrorReason.ValueType  # 31
+    """UNAVAILABLE: the match ended before its time, through no fault of its own. Send its request again
+    after the time in `RetryInfo`.
+    """
 
 class ErrorReason(_ErrorReason, metaclass=_ErrorReasonEnumTypeWrapper):
     """Why a request was refused, for programs. People read the status message.
@@ -152,5 +158,11 @@ ERROR_REASON_NOT_FOUND: ErrorReason.ValueType  # 22
 ERROR_REASON_STORE_UNAVAILABLE: ErrorReason.ValueType  # 23
 """FAILED_PRECONDITION: what the server keeps on disk cannot be read or written; its operator has
 to act. Requests that need nothing of it are answered all the same.
+"""
+ERROR_REASON_MATCH_CANCELLED: ErrorReason.ValueType  # 30
+"""CANCELLED: the match was cancelled by `CancelMatch`."""
+ERROR_REASON_MATCH_INTERRUPTED: ErrorReason.ValueType  # 31
+"""UNAVAILABLE: the match ended before its time, through no fault of its own. Send its request again
+after the time in `RetryInfo`.
 """
 global___ErrorReason = ErrorReason

@@ -13,28 +13,51 @@ _sym_db = _symbol_database.Default()
 
 
 from google.protobuf import duration_pb2 as google_dot_protobuf_dot_duration__pb2
+from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 from sketchmatch_proto.v1 import match_pb2 as sketchmatch_dot_v1_dot_match__pb2
 from sketchmatch_proto.v1 import pipeline_pb2 as sketchmatch_dot_v1_dot_pipeline__pb2
 from sketchmatch_proto.v1 import source_pb2 as sketchmatch_dot_v1_dot_source__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"sketchmatch/v1/match_service.proto\x12\x0esketchmatch.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1asketchmatch/v1/match.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1bsketchmatch/v1/source.proto\"\xe6\x03\n\x0cMatchRequest\x12&\n\x06sketch\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12#\n\x03map\x18\x02 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12*\n\x08pipeline\x18\x03 \x01(\x0b\x32\x18.sketchmatch.v1.Pipeline\x12\x11\n\x04seed\x18\x04 \x01(\x04H\x00\x88\x01\x01\x12.\n\x0btime_budget\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x32\n\x07weights\x18\x06 \x01(\x0b\x32!.sketchmatch.v1.ConfidenceWeights\x12\x19\n\x0c\x61lternatives\x18\x07 \x01(\rH\x01\x88\x01\x01\x12\x1c\n\x0f\x61llow_unmatched\x18\x08 \x01(\x08H\x02\x88\x01\x01\x12\x1c\n\x0funmatched_price\x18\t \x01(\x01H\x03\x88\x01\x01\x12!\n\x04pins\x18\n \x03(\x0b\x32\x13.sketchmatch.v1.Pin\x12*\n\x08synonyms\x18\x0b \x03(\x0b\x32\x18.sketchmatch.v1.SynonymsB\x07\n\x05_seedB\x0f\n\r_alternativesB\x12\n\x10_allow_unmatchedB\x12\n\x10_unmatched_price\"\x84\x01\n\x03Pin\x12\x36\n\rsketch_object\x18\x01 \x01(\x0b\x32\x1f.sketchmatch.v1.ObjectReference\x12\x33\n\nmap_object\x18\x02 \x01(\x0b\x32\x1f.sketchmatch.v1.ObjectReference\x12\x10\n\x08\x65xcluded\x18\x03 \x01(\x08\";\n\x0fObjectReference\x12\x0f\n\x05index\x18\x01 \x01(\rH\x00\x12\x0f\n\x05label\x18\x02 \x01(\tH\x00\x42\x06\n\x04kind\"\x1a\n\x08Synonyms\x12\x0e\n\x06labels\x18\x01 \x03(\t\"\xdc\x01\n\rMatchResponse\x12\x31\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x0b\x32\x1d.sketchmatch.v1.MatchAcceptedH\x00\x12-\n\x06scenes\x18\x02 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchScenesH\x00\x12\x31\n\x08progress\x18\x03 \x01(\x0b\x32\x1d.sketchmatch.v1.MatchProgressH\x00\x12-\n\x06result\x18\x04 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchResultH\x00\x42\x07\n\x05\x65vent2V\n\x0cMatchService\x12\x46\n\x05Match\x12\x1c.sketchmatch.v1.MatchRequest\x1a\x1d.sketchmatch.v1.MatchResponse0\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"sketchmatch/v1/match_service.proto\x12\x0esketchmatch.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1fgoogle/protobuf/timestamp.proto\x1a\x1asketchmatch/v1/match.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1bsketchmatch/v1/source.proto\"\xbc\x04\n\x0cMatchRequest\x12&\n\x06sketch\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12#\n\x03map\x18\x02 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12*\n\x08pipeline\x18\x03 \x01(\x0b\x32\x18.sketchmatch.v1.Pipeline\x12\x11\n\x04seed\x18\x04 \x01(\x04H\x00\x88\x01\x01\x12.\n\x0btime_budget\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x32\n\x07weights\x18\x06 \x01(\x0b\x32!.sketchmatch.v1.ConfidenceWeights\x12\x19\n\x0c\x61lternatives\x18\x07 \x01(\rH\x01\x88\x01\x01\x12\x1c\n\x0f\x61llow_unmatched\x18\x08 \x01(\x08H\x02\x88\x01\x01\x12\x1c\n\x0funmatched_price\x18\t \x01(\x01H\x03\x88\x01\x01\x12!\n\x04pins\x18\n \x03(\x0b\x32\x13.sketchmatch.v1.Pin\x12*\n\x08synonyms\x18\x0b \x03(\x0b\x32\x18.sketchmatch.v1.Synonyms\x12\x12\n\nrequest_id\x18\x0c \x01(\t\x12\x14\n\x0ckeep_running\x18\r \x01(\x08\x12*\n\x08priority\x18\x0e \x01(\x0e\x32\x18.sketchmatch.v1.PriorityB\x07\n\x05_seedB\x0f\n\r_alternativesB\x12\n\x10_allow_unmatchedB\x12\n\x10_unmatched_price\"\x84\x01\n\x03Pin\x12\x36\n\rsketch_object\x18\x01 \x01(\x0b\x32\x1f.sketchmatch.v1.ObjectReference\x12\x33\n\nmap_object\x18\x02 \x01(\x0b\x32\x1f.sketchmatch.v1.ObjectReference\x12\x10\n\x08\x65xcluded\x18\x03 \x01(\x08\";\n\x0fObjectReference\x12\x0f\n\x05index\x18\x01 \x01(\rH\x00\x12\x0f\n\x05label\x18\x02 \x01(\tH\x00\x42\x06\n\x04kind\"\x1a\n\x08Synonyms\x12\x0e\n\x06labels\x18\x01 \x03(\t\"\xec\x01\n\rMatchResponse\x12\x31\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x0b\x32\x1d.sketchmatch.v1.MatchAcceptedH\x00\x12-\n\x06scenes\x18\x02 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchScenesH\x00\x12\x31\n\x08progress\x18\x03 \x01(\x0b\x32\x1d.sketchmatch.v1.MatchProgressH\x00\x12-\n\x06result\x18\x04 \x01(\x0b\x32\x1b.sketchmatch.v1.MatchResultH\x00\x12\x0e\n\x06number\x18\x05 \x01(\x04\x42\x07\n\x05\x65vent\"\xa8\x02\n\x0cMatchSummary\x12\x10\n\x08match_id\x18\x01 \x01(\t\x12\x12\n\nrequest_id\x18\x02 \x01(\t\x12)\n\x05state\x18\x03 \x01(\x0e\x32\x1a.sketchmatch.v1.MatchState\x12.\n\ncreated_at\x18\x04 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12,\n\x08\x65nded_at\x18\x05 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12(\n\x07outcome\x18\x06 \x01(\x0e\x32\x17.sketchmatch.v1.Outcome\x12\x12\n\nlast_event\x18\x07 \x01(\x04\x12\x15\n\rerror_message\x18\x08 \x01(\t\x12\x14\n\x0c\x65rror_reason\x18\t \x01(\t\"#\n\x0fGetMatchRequest\x12\x10\n\x08match_id\x18\x01 \x01(\t\"n\n\x10GetMatchResponse\x12+\n\x05match\x18\x01 \x01(\x0b\x32\x1c.sketchmatch.v1.MatchSummary\x12-\n\x06\x65vents\x18\x02 \x03(\x0b\x32\x1d.sketchmatch.v1.MatchResponse\"4\n\x11WatchMatchRequest\x12\x10\n\x08match_id\x18\x01 \x01(\t\x12\r\n\x05\x61\x66ter\x18\x02 \x01(\x04\"B\n\x12WatchMatchResponse\x12,\n\x05\x65vent\x18\x01 \x01(\x0b\x32\x1d.sketchmatch.v1.MatchResponse\"&\n\x12\x43\x61ncelMatchRequest\x12\x10\n\x08match_id\x18\x01 \x01(\t\"B\n\x13\x43\x61ncelMatchResponse\x12+\n\x05match\x18\x01 \x01(\x0b\x32\x1c.sketchmatch.v1.MatchSummary\";\n\x12ListMatchesRequest\x12\x11\n\tpage_size\x18\x01 \x01(\x05\x12\x12\n\npage_token\x18\x02 \x01(\t\"]\n\x13ListMatchesResponse\x12-\n\x07matches\x18\x01 \x03(\x0b\x32\x1c.sketchmatch.v1.MatchSummary\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t*^\n\x08Priority\x12\x18\n\x14PRIORITY_UNSPECIFIED\x10\x00\x12\x10\n\x0cPRIORITY_LOW\x10\x01\x12\x13\n\x0fPRIORITY_NORMAL\x10\x02\x12\x11\n\rPRIORITY_HIGH\x10\x03*\xe1\x01\n\nMatchState\x12\x1b\n\x17MATCH_STATE_UNSPECIFIED\x10\x00\x12\x16\n\x12MATCH_STATE_QUEUED\x10\x01\x12\x17\n\x13MATCH_STATE_RUNNING\x10\x02\x12\x1a\n\x16MATCH_STATE_CANCELLING\x10\x03\x12\x19\n\x15MATCH_STATE_SUCCEEDED\x10\x04\x12\x16\n\x12MATCH_STATE_FAILED\x10\x05\x12\x19\n\x15MATCH_STATE_CANCELLED\x10\x06\x12\x1b\n\x17MATCH_STATE_INTERRUPTED\x10\x07\x32\xac\x03\n\x0cMatchService\x12\x46\n\x05Match\x12\x1c.sketchmatch.v1.MatchRequest\x1a\x1d.sketchmatch.v1.MatchResponse0\x01\x12M\n\x08GetMatch\x12\x1f.sketchmatch.v1.GetMatchRequest\x1a .sketchmatch.v1.GetMatchResponse\x12U\n\nWatchMatch\x12!.sketchmatch.v1.WatchMatchRequest\x1a\".sketchmatch.v1.WatchMatchResponse0\x01\x12V\n\x0b\x43\x61ncelMatch\x12\".sketchmatch.v1.CancelMatchRequest\x1a#.sketchmatch.v1.CancelMatchResponse\x12V\n\x0bListMatches\x12\".sketchmatch.v1.ListMatchesRequest\x1a#.sketchmatch.v1.ListMatchesResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'sketchmatch_proto.v1.match_service_pb2', _globals)
 if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
-  _globals['_MATCHREQUEST']._serialized_start=175
-  _globals['_MATCHREQUEST']._serialized_end=661
-  _globals['_PIN']._serialized_start=664
-  _globals['_PIN']._serialized_end=796
-  _globals['_OBJECTREFERENCE']._serialized_start=798
-  _globals['_OBJECTREFERENCE']._serialized_end=857
-  _globals['_SYNONYMS']._serialized_start=859
-  _globals['_SYNONYMS']._serialized_end=885
-  _globals['_MATCHRESPONSE']._serialized_start=888
-  _globals['_MATCHRESPONSE']._serialized_end=1108
-  _globals['_MATCHSERVICE']._serialized_start=1110
-  _globals['_MATCHSERVICE']._serialized_end=1196
+  _globals['_PRIORITY']._serialized_start=2079
+  _globals['_PRIORITY']._serialized_end=2173
+  _globals['_MATCHSTATE']._serialized_start=2176
+  _globals['_MATCHSTATE']._serialized_end=2401
+  _globals['_MATCHREQUEST']._serialized_start=208
+  _globals['_MATCHREQUEST']._serialized_end=780
+  _globals['_PIN']._serialized_start=783
+  _globals['_PIN']._serialized_end=915
+  _globals['_OBJECTREFERENCE']._serialized_start=917
+  _globals['_OBJECTREFERENCE']._serialized_end=976
+  _globals['_SYNONYMS']._serialized_start=978
+  _globals['_SYNONYMS']._serialized_end=1004
+  _globals['_MATCHRESPONSE']._serialized_start=1007
+  _globals['_MATCHRESPONSE']._serialized_end=1243
+  _globals['_MATCHSUMMARY']._serialized_start=1246
+  _globals['_MATCHSUMMARY']._serialized_end=1542
+  _globals['_GETMATCHREQUEST']._serialized_start=1544
+  _globals['_GETMATCHREQUEST']._serialized_end=1579
+  _globals['_GETMATCHRESPONSE']._serialized_start=1581
+  _globals['_GETMATCHRESPONSE']._serialized_end=1691
+  _globals['_WATCHMATCHREQUEST']._serialized_start=1693
+  _globals['_WATCHMATCHREQUEST']._serialized_end=1745
+  _globals['_WATCHMATCHRESPONSE']._serialized_start=1747
+  _globals['_WATCHMATCHRESPONSE']._serialized_end=1813
+  _globals['_CANCELMATCHREQUEST']._serialized_start=1815
+  _globals['_CANCELMATCHREQUEST']._serialized_end=1853
+  _globals['_CANCELMATCHRESPONSE']._serialized_start=1855
+  _globals['_CANCELMATCHRESPONSE']._serialized_end=1921
+  _globals['_LISTMATCHESREQUEST']._serialized_start=1923
+  _globals['_LISTMATCHESREQUEST']._serialized_end=1982
+  _globals['_LISTMATCHESRESPONSE']._serialized_start=1984
+  _globals['_LISTMATCHESRESPONSE']._serialized_end=2077
+  _globals['_MATCHSERVICE']._serialized_start=2404
+  _globals['_MATCHSERVICE']._serialized_end=2832
 # @@protoc_insertion_point(module_scope)

@@ -8,13 +8,97 @@ import collections.abc
 import google.protobuf.descriptor
 import google.protobuf.duration_pb2
 import google.protobuf.internal.containers
+import google.protobuf.internal.enum_type_wrapper
 import google.protobuf.message
+import google.protobuf.timestamp_pb2
 import sketchmatch_proto.v1.match_pb2
 import sketchmatch_proto.v1.pipeline_pb2
 import sketchmatch_proto.v1.source_pb2
+import sys
 import typing
 
+if sys.version_info >= (3, 10):
+    import typing as typing_extensions
+else:
+    import typing_extensions
+
 DESCRIPTOR: google.protobuf.descriptor.FileDescriptor
+
+class _Priority:
+    ValueType = typing.NewType("ValueType", builtins.int)
+    V: typing_extensions.TypeAlias = ValueType
+
+class _PriorityEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._EnumTypeWrapper[_Priority.ValueType], builtins.type):
+    DESCRIPTOR: google.protobuf.descriptor.EnumDescriptor
+    PRIORITY_UNSPECIFIED: _Priority.ValueType  # 0
+    """As `PRIORITY_NORMAL`."""
+    PRIORITY_LOW: _Priority.ValueType  # 1
+    """After all others."""
+    PRIORITY_NORMAL: _Priority.ValueType  # 2
+    """Where a request does not say."""
+    PRIORITY_HIGH: _Priority.ValueType  # 3
+    """Before all others: a person waits for it."""
+
+class Priority(_Priority, metaclass=_PriorityEnumTypeWrapper):
+    """Which of a caller's requests are begun first; those of different callers take turns all the same."""
+
+PRIORITY_UNSPECIFIED: Priority.ValueType  # 0
+"""As `PRIORITY_NORMAL`."""
+PRIORITY_LOW: Priority.ValueType  # 1
+"""After all others."""
+PRIORITY_NORMAL: Priority.ValueType  # 2
+"""Where a request does not say."""
+PRIORITY_HIGH: Priority.ValueType  # 3
+"""Before all others: a person waits for it."""
+global___Priority = Priority
+
+class _MatchState:
+    ValueType = typing.NewType("ValueType", builtins.int)
+    V: typing_extensions.TypeAlias = ValueType
+
+class _MatchStateEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._EnumTypeWrapper[_MatchState.ValueType], builtins.type):
+    DESCRIPTOR: google.protobuf.descriptor.EnumDescriptor
+    MATCH_STATE_UNSPECIFIED: _MatchState.ValueType  # 0
+    """Never sent."""
+    MATCH_STATE_QUEUED: _MatchState.ValueType  # 1
+    """It waits for its turn."""
+    MATCH_STATE_RUNNING: _MatchState.ValueType  # 2
+    """It is done."""
+    MATCH_STATE_CANCELLING: _MatchState.ValueType  # 3
+    """It was told to stop, and has not yet."""
+    MATCH_STATE_SUCCEEDED: _MatchState.ValueType  # 4
+    """It has a result."""
+    MATCH_STATE_FAILED: _MatchState.ValueType  # 5
+    """It ended with an error; the same request fails again."""
+    MATCH_STATE_CANCELLED: _MatchState.ValueType  # 6
+    """It was cancelled by `CancelMatch`."""
+    MATCH_STATE_INTERRUPTED: _MatchState.ValueType  # 7
+    """It ended before its time, through no fault of its own: the server stopped or was lost, had no room,
+    or nobody read it. The same request, with the same `request_id`, does it again.
+    """
+
+class MatchState(_MatchState, metaclass=_MatchStateEnumTypeWrapper):
+    """Where a match is in its life: queued, running, perhaps cancelling, and then one of the others."""
+
+MATCH_STATE_UNSPECIFIED: MatchState.ValueType  # 0
+"""Never sent."""
+MATCH_STATE_QUEUED: MatchState.ValueType  # 1
+"""It waits for its turn."""
+MATCH_STATE_RUNNING: MatchState.ValueType  # 2
+"""It is done."""
+MATCH_STATE_CANCELLING: MatchState.ValueType  # 3
+"""It was told to stop, and has not yet."""
+MATCH_STATE_SUCCEEDED: MatchState.ValueType  # 4
+"""It has a result."""
+MATCH_STATE_FAILED: MatchState.ValueType  # 5
+"""It ended with an error; the same request fails again."""
+MATCH_STATE_CANCELLED: MatchState.ValueType  # 6
+"""It was cancelled by `CancelMatch`."""
+MATCH_STATE_INTERRUPTED: MatchState.ValueType  # 7
+"""It ended before its time, through no fault of its own: the server stopped or was lost, had no room,
+or nobody read it. The same request, with the same `request_id`, does it again.
+"""
+global___MatchState = MatchState
 
 @typing.final
 class MatchRequest(google.protobuf.message.Message):
@@ -33,6 +117,9 @@ class MatchRequest(google.protobuf.message.Message):
     UNMATCHED_PRICE_FIELD_NUMBER: builtins.int
     PINS_FIELD_NUMBER: builtins.int
     SYNONYMS_FIELD_NUMBER: builtins.int
+    REQUEST_ID_FIELD_NUMBER: builtins.int
+    KEEP_RUNNING_FIELD_NUMBER: builtins.int
+    PRIORITY_FIELD_NUMBER: builtins.int
     seed: builtins.int
     """Seed of everything random: the same request with the same seed gives the same result. Absent: 0."""
     alternatives: builtins.int
@@ -51,6 +138,15 @@ class MatchRequest(google.protobuf.message.Message):
     proportion where it leaves out some: more makes it rarer. Above 0, at most 1000, and only where
     objects may stay unmatched. Absent: the judge's own.
     """
+    request_id: builtins.str
+    """A name that the caller gives the request, at most 128 bytes, such as a UUID: requests of the same
+    caller with the same name are the same match, done once, however many ask. Another request under
+    the same name is INVALID_ARGUMENT. Absent: each request is a match of its own.
+    """
+    keep_running: builtins.bool
+    """Whether the match goes on when nobody reads it. Without, it stops once its last reader has gone."""
+    priority: global___Priority.ValueType
+    """Which of the caller's own requests come first while they wait."""
     @property
     def sketch(self) -> sketchmatch_proto.v1.source_pb2.Source:
         """What the person drew. Required. It may have fewer or more objects than the map."""
@@ -99,9 +195,12 @@ class MatchRequest(google.protobuf.message.Message):
         unmatched_price: builtins.float | None = ...,
         pins: collections.abc.Iterable[global___Pin] | None = ...,
         synonyms: collections.abc.Iterable[global___Synonyms] | None = ...,
+        request_id: builtins.str = ...,
+        keep_running: builtins.bool = ...,
+        priority: global___Priority.ValueType = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["_allow_unmatched", b"_allow_unmatched", "_alternatives", b"_alternatives", "_seed", b"_seed", "_unmatched_price", b"_unmatched_price", "allow_unmatched", b"allow_unmatched", "alternatives", b"alternatives", "map", b"map", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_allow_unmatched", b"_allow_unmatched", "_alternatives", b"_alternatives", "_seed", b"_seed", "_unmatched_price", b"_unmatched_price", "allow_unmatched", b"allow_unmatched", "alternatives", b"alternatives", "map", b"map", "pins", b"pins", "pipeline", b"pipeline", "seed", b"seed", "sketch", b"sketch", "synonyms", b"synonyms", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["_allow_unmatched", b"_allow_unmatched", "_alternatives", b"_alternatives", "_seed", b"_seed", "_unmatched_price", b"_unmatched_price", "allow_unmatched", b"allow_unmatched", "alternatives", b"alternatives", "keep_running", b"keep_running", "map", b"map", "pins", b"pins", "pipeline", b"pipeline", "priority", b"priority", "request_id", b"request_id", "seed", b"seed", "sketch", b"sketch", "synonyms", b"synonyms", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_allow_unmatched", b"_allow_unmatched"]) -> typing.Literal["allow_unmatched"] | None: ...
     @typing.overload
@@ -198,6 +297,11 @@ class MatchResponse(google.protobuf.message.Message):
     SCENES_FIELD_NUMBER: builtins.int
     PROGRESS_FIELD_NUMBER: builtins.int
     RESULT_FIELD_NUMBER: builtins.int
+    NUMBER_FIELD_NUMBER: builtins.int
+    number: builtins.int
+    """The event's number, for `WatchMatchRequest.after`: from 1, and larger from one event of a match to
+    the next.
+    """
     @property
     def accepted(self) -> sketchmatch_proto.v1.match_pb2.MatchAccepted:
         """First: the request runs, and how."""
@@ -221,9 +325,238 @@ class MatchResponse(google.protobuf.message.Message):
         scenes: sketchmatch_proto.v1.match_pb2.MatchScenes | None = ...,
         progress: sketchmatch_proto.v1.match_pb2.MatchProgress | None = ...,
         result: sketchmatch_proto.v1.match_pb2.MatchResult | None = ...,
+        number: builtins.int = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["accepted", b"accepted", "event", b"event", "progress", b"progress", "result", b"result", "scenes", b"scenes"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["accepted", b"accepted", "event", b"event", "progress", b"progress", "result", b"result", "scenes", b"scenes"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["accepted", b"accepted", "event", b"event", "number", b"number", "progress", b"progress", "result", b"result", "scenes", b"scenes"]) -> None: ...
     def WhichOneof(self, oneof_group: typing.Literal["event", b"event"]) -> typing.Literal["accepted", "scenes", "progress", "result"] | None: ...
 
 global___MatchResponse = MatchResponse
+
+@typing.final
+class MatchSummary(google.protobuf.message.Message):
+    """What is known of a match."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    MATCH_ID_FIELD_NUMBER: builtins.int
+    REQUEST_ID_FIELD_NUMBER: builtins.int
+    STATE_FIELD_NUMBER: builtins.int
+    CREATED_AT_FIELD_NUMBER: builtins.int
+    ENDED_AT_FIELD_NUMBER: builtins.int
+    OUTCOME_FIELD_NUMBER: builtins.int
+    LAST_EVENT_FIELD_NUMBER: builtins.int
+    ERROR_MESSAGE_FIELD_NUMBER: builtins.int
+    ERROR_REASON_FIELD_NUMBER: builtins.int
+    match_id: builtins.str
+    """Its name."""
+    request_id: builtins.str
+    """`MatchRequest.request_id`; empty if there was none."""
+    state: global___MatchState.ValueType
+    """Where it is in its life."""
+    outcome: sketchmatch_proto.v1.match_pb2.Outcome.ValueType
+    """Why its search ended; unspecified unless it succeeded."""
+    last_event: builtins.int
+    """The number of its latest event; 0 if there is none."""
+    error_message: builtins.str
+    """What it ended with, for people; empty unless it failed, was cancelled or interrupted."""
+    error_reason: builtins.str
+    """The same for programs: a name of `ErrorReason` without its prefix; empty where there is none."""
+    @property
+    def created_at(self) -> google.protobuf.timestamp_pb2.Timestamp:
+        """When it was asked for."""
+
+    @property
+    def ended_at(self) -> google.protobuf.timestamp_pb2.Timestamp:
+        """When it ended. Absent until then."""
+
+    def __init__(
+        self,
+        *,
+        match_id: builtins.str = ...,
+        request_id: builtins.str = ...,
+        state: global___MatchState.ValueType = ...,
+        created_at: google.protobuf.timestamp_pb2.Timestamp | None = ...,
+        ended_at: google.protobuf.timestamp_pb2.Timestamp | None = ...,
+        outcome: sketchmatch_proto.v1.match_pb2.Outcome.ValueType = ...,
+        last_event: builtins.int = ...,
+        error_message: builtins.str = ...,
+        error_reason: builtins.str = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["created_at", b"created_at", "ended_at", b"ended_at"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["created_at", b"created_at", "ended_at", b"ended_at", "error_message", b"error_message", "error_reason", b"error_reason", "last_event", b"last_event", "match_id", b"match_id", "outcome", b"outcome", "request_id", b"request_id", "state", b"state"]) -> None: ...
+
+global___MatchSummary = MatchSummary
+
+@typing.final
+class GetMatchRequest(google.protobuf.message.Message):
+    """Asks how a match is."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    MATCH_ID_FIELD_NUMBER: builtins.int
+    match_id: builtins.str
+    """Its name. Required."""
+    def __init__(
+        self,
+        *,
+        match_id: builtins.str = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["match_id", b"match_id"]) -> None: ...
+
+global___GetMatchRequest = GetMatchRequest
+
+@typing.final
+class GetMatchResponse(google.protobuf.message.Message):
+    """How a match is, and what came of it."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    MATCH_FIELD_NUMBER: builtins.int
+    EVENTS_FIELD_NUMBER: builtins.int
+    @property
+    def match(self) -> global___MatchSummary:
+        """What is known of it."""
+
+    @property
+    def events(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___MatchResponse]:
+        """Its events so far, in order; of progress the latest alone."""
+
+    def __init__(
+        self,
+        *,
+        match: global___MatchSummary | None = ...,
+        events: collections.abc.Iterable[global___MatchResponse] | None = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["match", b"match"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["events", b"events", "match", b"match"]) -> None: ...
+
+global___GetMatchResponse = GetMatchResponse
+
+@typing.final
+class WatchMatchRequest(google.protobuf.message.Message):
+    """Asks for the events of a match."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    MATCH_ID_FIELD_NUMBER: builtins.int
+    AFTER_FIELD_NUMBER: builtins.int
+    match_id: builtins.str
+    """Its name. Required."""
+    after: builtins.int
+    """The number of the last event that is known already; 0 for none."""
+    def __init__(
+        self,
+        *,
+        match_id: builtins.str = ...,
+        after: builtins.int = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["after", b"after", "match_id", b"match_id"]) -> None: ...
+
+global___WatchMatchRequest = WatchMatchRequest
+
+@typing.final
+class WatchMatchResponse(google.protobuf.message.Message):
+    """The next event of a match."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    EVENT_FIELD_NUMBER: builtins.int
+    @property
+    def event(self) -> global___MatchResponse:
+        """The event."""
+
+    def __init__(
+        self,
+        *,
+        event: global___MatchResponse | None = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["event", b"event"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["event", b"event"]) -> None: ...
+
+global___WatchMatchResponse = WatchMatchResponse
+
+@typing.final
+class CancelMatchRequest(google.protobuf.message.Message):
+    """Asks a match to stop."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    MATCH_ID_FIELD_NUMBER: builtins.int
+    match_id: builtins.str
+    """Its name. Required."""
+    def __init__(
+        self,
+        *,
+        match_id: builtins.str = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["match_id", b"match_id"]) -> None: ...
+
+global___CancelMatchRequest = CancelMatchRequest
+
+@typing.final
+class CancelMatchResponse(google.protobuf.message.Message):
+    """How a match is that was asked to stop."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    MATCH_FIELD_NUMBER: builtins.int
+    @property
+    def match(self) -> global___MatchSummary:
+        """What is known of it."""
+
+    def __init__(
+        self,
+        *,
+        match: global___MatchSummary | None = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["match", b"match"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["match", b"match"]) -> None: ...
+
+global___CancelMatchResponse = CancelMatchResponse
+
+@typing.final
+class ListMatchesRequest(google.protobuf.message.Message):
+    """Asks for matches."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    PAGE_SIZE_FIELD_NUMBER: builtins.int
+    PAGE_TOKEN_FIELD_NUMBER: builtins.int
+    page_size: builtins.int
+    """The most to return, up to 1000. 0: 50."""
+    page_token: builtins.str
+    """Where to go on: `next_page_token` of the page before. Empty: the first page."""
+    def __init__(
+        self,
+        *,
+        page_size: builtins.int = ...,
+        page_token: builtins.str = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["page_size", b"page_size", "page_token", b"page_token"]) -> None: ...
+
+global___ListMatchesRequest = ListMatchesRequest
+
+@typing.final
+class ListMatchesResponse(google.protobuf.message.Message):
+    """A page of matches."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    MATCHES_FIELD_NUMBER: builtins.int
+    NEXT_PAGE_TOKEN_FIELD_NUMBER: builtins.int
+    next_page_token: builtins.str
+    """Where the next page begins; empty on the last one."""
+    @property
+    def matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___MatchSummary]:
+        """The matches, the latest first."""
+
+    def __init__(
+        self,
+        *,
+        matches: collections.abc.Iterable[global___MatchSummary] | None = ...,
+        next_page_token: builtins.str = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["matches", b"matches", "next_page_token", b"next_page_token"]) -> None: ...
+
+global___ListMatchesResponse = ListMatchesResponse

@@ -8,8 +8,10 @@ from sketchmatch_proto.v1 import match_service_pb2 as sketchmatch_dot_v1_dot_mat
 class MatchServiceStub(object):
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
-    matched while it is drawn is `SketchService`'s.
+    A match has a life of its own: it can be asked for, watched and cancelled by its name, `match_id`,
+    by the caller that began it and nobody else. Servers keep matches on disk, unless told not to, for
+    as long as their limits of age and size allow, and beyond a restart; one that keeps nothing
+    remembers the latest in memory. A sketch that is matched while it is drawn is `SketchService`'s.
     """
 
     def __init__(self, channel):
@@ -23,13 +25,35 @@ class MatchServiceStub(object):
                 request_serializer=sketchmatch_dot_v1_dot_match__service__pb2.MatchRequest.SerializeToString,
                 response_deserializer=sketchmatch_dot_v1_dot_match__service__pb2.MatchResponse.FromString,
                 )
+        self.GetMatch = channel.unary_unary(
+                '/sketchmatch.v1.MatchService/GetMatch',
+                request_serializer=sketchmatch_dot_v1_dot_match__service__pb2.GetMatchRequest.SerializeToString,
+                response_deserializer=sketchmatch_dot_v1_dot_match__service__pb2.GetMatchResponse.FromString,
+                )
+        self.WatchMatch = channel.unary_stream(
+                '/sketchmatch.v1.MatchService/WatchMatch',
+                request_serializer=sketchmatch_dot_v1_dot_match__service__pb2.WatchMatchRequest.SerializeToString,
+                response_deserializer=sketchmatch_dot_v1_dot_match__service__pb2.WatchMatchResponse.FromString,
+                )
+        self.CancelMatch = channel.unary_unary(
+                '/sketchmatch.v1.MatchService/CancelMatch',
+                request_serializer=sketchmatch_dot_v1_dot_match__service__pb2.CancelMatchRequest.SerializeToString,
+                response_deserializer=sketchmatch_dot_v1_dot_match__service__pb2.CancelMatchResponse.FromString,
+                )
+        self.ListMatches = channel.unary_unary(
+                '/sketchmatch.v1.MatchService/ListMatches',
+                request_serializer=sketchmatch_dot_v1_dot_match__service__pb2.ListMatchesRequest.SerializeToString,
+                response_deserializer=sketchmatch_dot_v1_dot_match__service__pb2.ListMatchesResponse.FromString,
+                )
 
 
 class MatchServiceServicer(object):
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
-    matched while it is drawn is `SketchService`'s.
+    A match has a life of its own: it can be asked for, watched and cancelled by its name, `match_id`,
+    by the caller that began it and nobody else. Servers keep matches on disk, unless told not to, for
+    as long as their limits of age and size allow, and beyond a restart; one that keeps nothing
+    remembers the latest in memory. A sketch that is matched while it is drawn is `SketchService`'s.
     """
 
     def Match(self, request, context):
@@ -39,8 +63,13 @@ class MatchServiceServicer(object):
         after them, one `result`, end. A slow reader misses old progress, and never one of the
         others. A reader must skip events that it does not know: later versions may add some.
 
-        Cancelling the call, or its deadline, stops the search. To get the best map until a certain
-        moment rather than an error, set `time_budget`, and a deadline well after it.
+        Cancelling the call, or its deadline, stops the search, unless `keep_running` is set or another
+        call reads the same match. To get the best map until a certain moment rather than an error, set
+        `time_budget`, and a deadline well after it.
+
+        Whoever sets `request_id` may send the request again, e.g. after a lost link, and gets the same
+        match from its first event on. Only a match that was interrupted is done again, under its name;
+        it tells `accepted` and `scenes` once more.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -63,6 +92,73 @@ class MatchServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def GetMatch(self, request, context):
+        """Tells how a match is, and what came of it.
+
+        Errors (with `ErrorInfo`, see `ErrorReason`):
+
+        * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+        * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+        * `INVALID_ARGUMENT`: `match_id` is not set.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed; allow more time.
+        * `UNAVAILABLE`: the server is starting, draining or away; send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def WatchMatch(self, request, context):
+        """Streams the events of a match after a certain one, as `Match` does, and ends as it does: with its
+        result, or with the error that it ended with. While the match runs, this counts as a reader.
+
+        Errors, beside those that `Match` may end with (with `ErrorInfo`, see `ErrorReason`):
+
+        * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+        * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+        * `INVALID_ARGUMENT`: `match_id` is not set.
+        * `CANCELLED`: the match was cancelled (`ERROR_REASON_MATCH_CANCELLED`), or the caller cancelled.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed; watch it again.
+        * `UNAVAILABLE`: the match was interrupted (`ERROR_REASON_MATCH_INTERRUPTED`): send its request
+        again; or the server is starting, draining or away: watch it again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def CancelMatch(self, request, context):
+        """Stops a match, and returns at once; its readers are told `CANCELLED`. One that has ended stays as
+        it is, which is no error.
+
+        Errors (with `ErrorInfo`, see `ErrorReason`):
+
+        * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+        * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+        * `INVALID_ARGUMENT`: `match_id` is not set.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed; send again.
+        * `UNAVAILABLE`: the server is starting, draining or away; send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def ListMatches(self, request, context):
+        """Lists the caller's matches, the latest first.
+
+        Errors (with `ErrorInfo`, see `ErrorReason`):
+
+        * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+        * `INVALID_ARGUMENT`: `page_token` is none that this method returned.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed; allow more time.
+        * `UNAVAILABLE`: the server is starting, draining or away; send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_MatchServiceServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -70,6 +166,26 @@ def add_MatchServiceServicer_to_server(servicer, server):
                     servicer.Match,
                     request_deserializer=sketchmatch_dot_v1_dot_match__service__pb2.MatchRequest.FromString,
                     response_serializer=sketchmatch_dot_v1_dot_match__service__pb2.MatchResponse.SerializeToString,
+            ),
+            'GetMatch': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetMatch,
+                    request_deserializer=sketchmatch_dot_v1_dot_match__service__pb2.GetMatchRequest.FromString,
+                    response_serializer=sketchmatch_dot_v1_dot_match__service__pb2.GetMatchResponse.SerializeToString,
+            ),
+            'WatchMatch': grpc.unary_stream_rpc_method_handler(
+                    servicer.WatchMatch,
+                    request_deserializer=sketchmatch_dot_v1_dot_match__service__pb2.WatchMatchRequest.FromString,
+                    response_serializer=sketchmatch_dot_v1_dot_match__service__pb2.WatchMatchResponse.SerializeToString,
+            ),
+            'CancelMatch': grpc.unary_unary_rpc_method_handler(
+                    servicer.CancelMatch,
+                    request_deserializer=sketchmatch_dot_v1_dot_match__service__pb2.CancelMatchRequest.FromString,
+                    response_serializer=sketchmatch_dot_v1_dot_match__service__pb2.CancelMatchResponse.SerializeToString,
+            ),
+            'ListMatches': grpc.unary_unary_rpc_method_handler(
+                    servicer.ListMatches,
+                    request_deserializer=sketchmatch_dot_v1_dot_match__service__pb2.ListMatchesRequest.FromString,
+                    response_serializer=sketchmatch_dot_v1_dot_match__service__pb2.ListMatchesResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -81,8 +197,10 @@ def add_MatchServiceServicer_to_server(servicer, server):
 class MatchService(object):
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
-    matched while it is drawn is `SketchService`'s.
+    A match has a life of its own: it can be asked for, watched and cancelled by its name, `match_id`,
+    by the caller that began it and nobody else. Servers keep matches on disk, unless told not to, for
+    as long as their limits of age and size allow, and beyond a restart; one that keeps nothing
+    remembers the latest in memory. A sketch that is matched while it is drawn is `SketchService`'s.
     """
 
     @staticmethod
@@ -99,5 +217,73 @@ class MatchService(object):
         return grpc.experimental.unary_stream(request, target, '/sketchmatch.v1.MatchService/Match',
             sketchmatch_dot_v1_dot_match__service__pb2.MatchRequest.SerializeToString,
             sketchmatch_dot_v1_dot_match__service__pb2.MatchResponse.FromString,
+            options, channel_credentials,
+            insecure, call_credentials, compression, wait_for_ready, timeout, metadata)
+
+    @staticmethod
+    def GetMatch(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(request, target, '/sketchmatch.v1.MatchService/GetMatch',
+            sketchmatch_dot_v1_dot_match__service__pb2.GetMatchRequest.SerializeToString,
+            sketchmatch_dot_v1_dot_match__service__pb2.GetMatchResponse.FromString,
+            options, channel_credentials,
+            insecure, call_credentials, compression, wait_for_ready, timeout, metadata)
+
+    @staticmethod
+    def WatchMatch(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_stream(request, target, '/sketchmatch.v1.MatchService/WatchMatch',
+            sketchmatch_dot_v1_dot_match__service__pb2.WatchMatchRequest.SerializeToString,
+            sketchmatch_dot_v1_dot_match__service__pb2.WatchMatchResponse.FromString,
+            options, channel_credentials,
+            insecure, call_credentials, compression, wait_for_ready, timeout, metadata)
+
+    @staticmethod
+    def CancelMatch(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(request, target, '/sketchmatch.v1.MatchService/CancelMatch',
+            sketchmatch_dot_v1_dot_match__service__pb2.CancelMatchRequest.SerializeToString,
+            sketchmatch_dot_v1_dot_match__service__pb2.CancelMatchResponse.FromString,
+            options, channel_credentials,
+            insecure, call_credentials, compression, wait_for_ready, timeout, metadata)
+
+    @staticmethod
+    def ListMatches(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(request, target, '/sketchmatch.v1.MatchService/ListMatches',
+            sketchmatch_dot_v1_dot_match__service__pb2.ListMatchesRequest.SerializeToString,
+            sketchmatch_dot_v1_dot_match__service__pb2.ListMatchesResponse.FromString,
             options, channel_credentials,
             insecure, call_credentials, compression, wait_for_ready, timeout, metadata)

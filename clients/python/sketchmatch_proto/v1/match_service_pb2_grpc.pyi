@@ -20,8 +20,10 @@ class _ServicerContext(grpc.ServicerContext, grpc.aio.ServicerContext):  # type:
 class MatchServiceStub:
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
-    matched while it is drawn is `SketchService`'s.
+    A match has a life of its own: it can be asked for, watched and cancelled by its name, `match_id`,
+    by the caller that began it and nobody else. Servers keep matches on disk, unless told not to, for
+    as long as their limits of age and size allow, and beyond a restart; one that keeps nothing
+    remembers the latest in memory. A sketch that is matched while it is drawn is `SketchService`'s.
     """
 
     def __init__(self, channel: typing.Union[grpc.Channel, grpc.aio.Channel]) -> None: ...
@@ -35,8 +37,13 @@ class MatchServiceStub:
     after them, one `result`, end. A slow reader misses old progress, and never one of the
     others. A reader must skip events that it does not know: later versions may add some.
 
-    Cancelling the call, or its deadline, stops the search. To get the best map until a certain
-    moment rather than an error, set `time_budget`, and a deadline well after it.
+    Cancelling the call, or its deadline, stops the search, unless `keep_running` is set or another
+    call reads the same match. To get the best map until a certain moment rather than an error, set
+    `time_budget`, and a deadline well after it.
+
+    Whoever sets `request_id` may send the request again, e.g. after a lost link, and gets the same
+    match from its first event on. Only a match that was interrupted is done again, under its name;
+    it tells `accepted` and `scenes` once more.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -56,11 +63,80 @@ class MatchServiceStub:
     * `CANCELLED`: the caller cancelled.
     """
 
+    GetMatch: grpc.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.match_service_pb2.GetMatchRequest,
+        sketchmatch_proto.v1.match_service_pb2.GetMatchResponse,
+    ]
+    """Tells how a match is, and what came of it.
+
+    Errors (with `ErrorInfo`, see `ErrorReason`):
+
+    * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+    * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+    * `INVALID_ARGUMENT`: `match_id` is not set.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed; allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away; send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    WatchMatch: grpc.UnaryStreamMultiCallable[
+        sketchmatch_proto.v1.match_service_pb2.WatchMatchRequest,
+        sketchmatch_proto.v1.match_service_pb2.WatchMatchResponse,
+    ]
+    """Streams the events of a match after a certain one, as `Match` does, and ends as it does: with its
+    result, or with the error that it ended with. While the match runs, this counts as a reader.
+
+    Errors, beside those that `Match` may end with (with `ErrorInfo`, see `ErrorReason`):
+
+    * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+    * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+    * `INVALID_ARGUMENT`: `match_id` is not set.
+    * `CANCELLED`: the match was cancelled (`ERROR_REASON_MATCH_CANCELLED`), or the caller cancelled.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed; watch it again.
+    * `UNAVAILABLE`: the match was interrupted (`ERROR_REASON_MATCH_INTERRUPTED`): send its request
+      again; or the server is starting, draining or away: watch it again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    CancelMatch: grpc.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.match_service_pb2.CancelMatchRequest,
+        sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse,
+    ]
+    """Stops a match, and returns at once; its readers are told `CANCELLED`. One that has ended stays as
+    it is, which is no error.
+
+    Errors (with `ErrorInfo`, see `ErrorReason`):
+
+    * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+    * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+    * `INVALID_ARGUMENT`: `match_id` is not set.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed; send again.
+    * `UNAVAILABLE`: the server is starting, draining or away; send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    ListMatches: grpc.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.match_service_pb2.ListMatchesRequest,
+        sketchmatch_proto.v1.match_service_pb2.ListMatchesResponse,
+    ]
+    """Lists the caller's matches, the latest first.
+
+    Errors (with `ErrorInfo`, see `ErrorReason`):
+
+    * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+    * `INVALID_ARGUMENT`: `page_token` is none that this method returned.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed; allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away; send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
 class MatchServiceAsyncStub:
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
-    matched while it is drawn is `SketchService`'s.
+    A match has a life of its own: it can be asked for, watched and cancelled by its name, `match_id`,
+    by the caller that began it and nobody else. Servers keep matches on disk, unless told not to, for
+    as long as their limits of age and size allow, and beyond a restart; one that keeps nothing
+    remembers the latest in memory. A sketch that is matched while it is drawn is `SketchService`'s.
     """
 
     Match: grpc.aio.UnaryStreamMultiCallable[
@@ -73,8 +149,13 @@ class MatchServiceAsyncStub:
     after them, one `result`, end. A slow reader misses old progress, and never one of the
     others. A reader must skip events that it does not know: later versions may add some.
 
-    Cancelling the call, or its deadline, stops the search. To get the best map until a certain
-    moment rather than an error, set `time_budget`, and a deadline well after it.
+    Cancelling the call, or its deadline, stops the search, unless `keep_running` is set or another
+    call reads the same match. To get the best map until a certain moment rather than an error, set
+    `time_budget`, and a deadline well after it.
+
+    Whoever sets `request_id` may send the request again, e.g. after a lost link, and gets the same
+    match from its first event on. Only a match that was interrupted is done again, under its name;
+    it tells `accepted` and `scenes` once more.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -94,11 +175,80 @@ class MatchServiceAsyncStub:
     * `CANCELLED`: the caller cancelled.
     """
 
+    GetMatch: grpc.aio.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.match_service_pb2.GetMatchRequest,
+        sketchmatch_proto.v1.match_service_pb2.GetMatchResponse,
+    ]
+    """Tells how a match is, and what came of it.
+
+    Errors (with `ErrorInfo`, see `ErrorReason`):
+
+    * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+    * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+    * `INVALID_ARGUMENT`: `match_id` is not set.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed; allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away; send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    WatchMatch: grpc.aio.UnaryStreamMultiCallable[
+        sketchmatch_proto.v1.match_service_pb2.WatchMatchRequest,
+        sketchmatch_proto.v1.match_service_pb2.WatchMatchResponse,
+    ]
+    """Streams the events of a match after a certain one, as `Match` does, and ends as it does: with its
+    result, or with the error that it ended with. While the match runs, this counts as a reader.
+
+    Errors, beside those that `Match` may end with (with `ErrorInfo`, see `ErrorReason`):
+
+    * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+    * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+    * `INVALID_ARGUMENT`: `match_id` is not set.
+    * `CANCELLED`: the match was cancelled (`ERROR_REASON_MATCH_CANCELLED`), or the caller cancelled.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed; watch it again.
+    * `UNAVAILABLE`: the match was interrupted (`ERROR_REASON_MATCH_INTERRUPTED`): send its request
+      again; or the server is starting, draining or away: watch it again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    CancelMatch: grpc.aio.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.match_service_pb2.CancelMatchRequest,
+        sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse,
+    ]
+    """Stops a match, and returns at once; its readers are told `CANCELLED`. One that has ended stays as
+    it is, which is no error.
+
+    Errors (with `ErrorInfo`, see `ErrorReason`):
+
+    * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+    * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+    * `INVALID_ARGUMENT`: `match_id` is not set.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed; send again.
+    * `UNAVAILABLE`: the server is starting, draining or away; send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
+    ListMatches: grpc.aio.UnaryUnaryMultiCallable[
+        sketchmatch_proto.v1.match_service_pb2.ListMatchesRequest,
+        sketchmatch_proto.v1.match_service_pb2.ListMatchesResponse,
+    ]
+    """Lists the caller's matches, the latest first.
+
+    Errors (with `ErrorInfo`, see `ErrorReason`):
+
+    * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+    * `INVALID_ARGUMENT`: `page_token` is none that this method returned.
+    * `DEADLINE_EXCEEDED`: the call's deadline passed; allow more time.
+    * `UNAVAILABLE`: the server is starting, draining or away; send again.
+    * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+    """
+
 class MatchServiceServicer(metaclass=abc.ABCMeta):
     """Finds out which sketched object is which mapped object.
 
-    Methods to come are additions: attaching again to a running match by its `match_id`. A sketch that is
-    matched while it is drawn is `SketchService`'s.
+    A match has a life of its own: it can be asked for, watched and cancelled by its name, `match_id`,
+    by the caller that began it and nobody else. Servers keep matches on disk, unless told not to, for
+    as long as their limits of age and size allow, and beyond a restart; one that keeps nothing
+    remembers the latest in memory. A sketch that is matched while it is drawn is `SketchService`'s.
     """
 
     @abc.abstractmethod
@@ -113,8 +263,13 @@ class MatchServiceServicer(metaclass=abc.ABCMeta):
         after them, one `result`, end. A slow reader misses old progress, and never one of the
         others. A reader must skip events that it does not know: later versions may add some.
 
-        Cancelling the call, or its deadline, stops the search. To get the best map until a certain
-        moment rather than an error, set `time_budget`, and a deadline well after it.
+        Cancelling the call, or its deadline, stops the search, unless `keep_running` is set or another
+        call reads the same match. To get the best map until a certain moment rather than an error, set
+        `time_budget`, and a deadline well after it.
+
+        Whoever sets `request_id` may send the request again, e.g. after a lost link, and gets the same
+        match from its first event on. Only a match that was interrupted is done again, under its name;
+        it tells `accepted` and `scenes` once more.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -132,6 +287,81 @@ class MatchServiceServicer(metaclass=abc.ABCMeta):
           for health SERVING and the time in `RetryInfo`, if there is one, and send again.
         * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
         * `CANCELLED`: the caller cancelled.
+        """
+
+    @abc.abstractmethod
+    def GetMatch(
+        self,
+        request: sketchmatch_proto.v1.match_service_pb2.GetMatchRequest,
+        context: _ServicerContext,
+    ) -> typing.Union[sketchmatch_proto.v1.match_service_pb2.GetMatchResponse, collections.abc.Awaitable[sketchmatch_proto.v1.match_service_pb2.GetMatchResponse]]:
+        """Tells how a match is, and what came of it.
+
+        Errors (with `ErrorInfo`, see `ErrorReason`):
+
+        * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+        * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+        * `INVALID_ARGUMENT`: `match_id` is not set.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed; allow more time.
+        * `UNAVAILABLE`: the server is starting, draining or away; send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+
+    @abc.abstractmethod
+    def WatchMatch(
+        self,
+        request: sketchmatch_proto.v1.match_service_pb2.WatchMatchRequest,
+        context: _ServicerContext,
+    ) -> typing.Union[collections.abc.Iterator[sketchmatch_proto.v1.match_service_pb2.WatchMatchResponse], collections.abc.AsyncIterator[sketchmatch_proto.v1.match_service_pb2.WatchMatchResponse]]:
+        """Streams the events of a match after a certain one, as `Match` does, and ends as it does: with its
+        result, or with the error that it ended with. While the match runs, this counts as a reader.
+
+        Errors, beside those that `Match` may end with (with `ErrorInfo`, see `ErrorReason`):
+
+        * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+        * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+        * `INVALID_ARGUMENT`: `match_id` is not set.
+        * `CANCELLED`: the match was cancelled (`ERROR_REASON_MATCH_CANCELLED`), or the caller cancelled.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed; watch it again.
+        * `UNAVAILABLE`: the match was interrupted (`ERROR_REASON_MATCH_INTERRUPTED`): send its request
+          again; or the server is starting, draining or away: watch it again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+
+    @abc.abstractmethod
+    def CancelMatch(
+        self,
+        request: sketchmatch_proto.v1.match_service_pb2.CancelMatchRequest,
+        context: _ServicerContext,
+    ) -> typing.Union[sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse, collections.abc.Awaitable[sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse]]:
+        """Stops a match, and returns at once; its readers are told `CANCELLED`. One that has ended stays as
+        it is, which is no error.
+
+        Errors (with `ErrorInfo`, see `ErrorReason`):
+
+        * `NOT_FOUND`: the server keeps no such match, or it is another caller's.
+        * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+        * `INVALID_ARGUMENT`: `match_id` is not set.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed; send again.
+        * `UNAVAILABLE`: the server is starting, draining or away; send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
+        """
+
+    @abc.abstractmethod
+    def ListMatches(
+        self,
+        request: sketchmatch_proto.v1.match_service_pb2.ListMatchesRequest,
+        context: _ServicerContext,
+    ) -> typing.Union[sketchmatch_proto.v1.match_service_pb2.ListMatchesResponse, collections.abc.Awaitable[sketchmatch_proto.v1.match_service_pb2.ListMatchesResponse]]:
+        """Lists the caller's matches, the latest first.
+
+        Errors (with `ErrorInfo`, see `ErrorReason`):
+
+        * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
+        * `INVALID_ARGUMENT`: `page_token` is none that this method returned.
+        * `DEADLINE_EXCEEDED`: the call's deadline passed; allow more time.
+        * `UNAVAILABLE`: the server is starting, draining or away; send again.
+        * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
         """
 
 def add_MatchServiceServicer_to_server(servicer: MatchServiceServicer, server: typing.Union[grpc.Server, grpc.aio.Server]) -> None: ...

@@ -1,0 +1,92 @@
+"""How much each caller may ask for, and what a match may cost."""
+
+import asyncio
+
+import pytest
+
+from sketchmatch.app.jobs import Job, answers
+from sketchmatch.app.quotas import Rates
+from sketchmatch.errors import InvalidInputError, Reason, TooBusyError
+from sketchmatch_client import match_request
+from tests.app.test_application import SCENE, Held, held, setup, until  # noqa: F401
+from tests.app.test_matches import ALICE, BOB, endless, matched, named, serving
+
+
+def test_a_caller_may_send_so_many_requests_in_a_minute_at_once_or_one_by_one():
+    now = [1000.0]
+    rates = Rates(lambda: now[0])
+    for _ in range(3):
+        rates.take("alice", 3)
+    with pytest.raises(TooBusyError, match="3 requests in a minute") as refused:
+        rates.take("alice", 3)
+    assert refused.value.retry_seconds == 20
+    rates.take("bob", 3)
+    now[0] += 19.0
+    with pytest.raises(TooBusyError) as refused:
+        rates.take("alice", 3)
+    assert refused.value.retry_seconds == 1
+    now[0] += 1.0
+    rates.take("alice", 3)
+    with pytest.raises(TooBusyError):
+        rates.take("alice", 3)
+    now[0] += 3600.0
+    for _ in range(3):
+        rates.take("alice", 3)
+    with pytest.raises(TooBusyError):
+        rates.take("alice", 3)
+    for _ in range(10):
+        rates.take("alice", None)
+
+
+def test_a_match_asked_for_again_counts_once():
+    async def run():
+        async with serving(max_per_minute=2) as app:
+            for _ in range(4):
+                await matched(app, named("n1"))
+            await matched(app, named("n2"))
+            with pytest.raises(TooBusyError, match="2 requests in a minute"):
+                await matched(app, named("n3"))
+            await matched(app, named("n3"), BOB)
+
+    asyncio.run(run())
+
+
+@pytest.mark.usefixtures("held")
+def test_a_caller_has_no_more_places_than_its_own_and_others_find_room():
+    async def run():
+        async with (
+            serving(max_concurrent_matches=4, max_per_caller=1) as app,
+            app.matching(endless("n0"), ALICE),
+            app.matching(named("n1"), ALICE) as own,
+        ):
+            await until(Held.began.is_set, "it does not begin")
+            await matched(app, named("n1"), BOB)
+            assert not own.log.begun
+            Held.go.set()
+            await until(lambda: own.log.ended, "it never has its turn")
+            own.log.check()
+
+    asyncio.run(run())
+
+
+def asked(request, **limits):
+    return list(answers(Job("", request), setup(**limits)))
+
+
+def test_a_match_of_too_many_comparisons_is_refused_before_it_makes_them():
+    request = match_request(SCENE, SCENE, params={"histogram": {"directions": 40}})
+    assert asked(request, max_comparisons=3 * 3 * 40)
+    with pytest.raises(InvalidInputError, match="makes 360 comparisons in 40 directions") as no:
+        asked(request, max_comparisons=3 * 3 * 40 - 1)
+    assert (no.value.reason, no.value.field) == (Reason.LIMIT_EXCEEDED, "sketch")
+
+
+def test_a_search_of_too_many_maps_is_refused_by_its_parameters():
+    params = {"searcher": {"population": 20, "generations": 30}}
+    request = match_request(SCENE, SCENE, searcher="easm", params=params)
+    assert asked(request, max_candidates=600)
+    with pytest.raises(InvalidInputError, match="makes 600 maps to weigh") as no:
+        asked(request, max_candidates=599)
+    assert no.value.reason is Reason.LIMIT_EXCEEDED
+    assert no.value.field == "pipeline.searcher.parameters.generations"
+    assert asked(match_request(SCENE, SCENE), max_candidates=1)  # it has no generations
