@@ -6,10 +6,10 @@ import asyncio
 import signal
 import socket
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import grpc
 from grpc_health.v1 import health, health_pb2_grpc
@@ -39,7 +39,6 @@ from sketchmatch.server.watchdog import watch
 from sketchmatch.server.watched import Watched
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
-    catalog_service_pb2_grpc,
     match_service_pb2,
     scene_service_pb2,
     sketch_service_pb2,
@@ -440,26 +439,8 @@ def _archive(store: Store, settings: ServerSettings, metrics: Metrics) -> Archiv
 
 def _services(app: Application) -> tuple[grpc.GenericRpcHandler, ...]:
     """Return what answers the services of the contract, on whichever port."""
-    catalog = _Collected()
-    catalog_service_pb2_grpc.add_CatalogServiceServicer_to_server(
-        CatalogService(app), cast(grpc.aio.Server, catalog)
-    )
-    served = MatchService(app), SceneService(app)
-    others = TransferService(app), SketchService(app)
-    return (*(each.handler() for each in (*served, *others)), *catalog.handlers)
-
-
-class _Collected:
-    """What generated code takes for a server, and hands its handlers to."""
-
-    def __init__(self) -> None:
-        self.handlers: list[grpc.GenericRpcHandler] = []
-
-    def add_generic_rpc_handlers(self, handlers: Iterable[grpc.GenericRpcHandler]) -> None:
-        self.handlers += handlers
-
-    def add_registered_method_handlers(self, service: str, handlers: Any) -> None:
-        """Do without: this is a second way to the same."""
+    services = (MatchService, SceneService, SketchService, TransferService, CatalogService)
+    return tuple(service(app).handler() for service in services)
 
 
 def _add_services(

@@ -20,11 +20,16 @@ from sketchmatch.server.calls import note
 from sketchmatch.server.pacing import Pacing
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
-    catalog_service_pb2_grpc,
     match_pb2,
     match_service_pb2,
     scene_service_pb2,
     transfer_service_pb2,
+)
+from sketchmatch_proto.v1.catalog_service_pb2 import (
+    GetServerInfoRequest,
+    GetServerInfoResponse,
+    ListAlgorithmsRequest,
+    ListAlgorithmsResponse,
 )
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 from sketchmatch_proto.v1.scene_service_pb2 import (
@@ -46,6 +51,7 @@ __all__ = [
 ]
 
 _MATCH = match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name
+_CATALOG = catalog_service_pb2.DESCRIPTOR.services_by_name["CatalogService"].full_name
 _TRANSFER = transfer_service_pb2.DESCRIPTOR.services_by_name["TransferService"].full_name
 _SCENE = scene_service_pb2.DESCRIPTOR.services_by_name["SceneService"].full_name
 
@@ -177,24 +183,24 @@ class TransferService:
         return handler_of(_TRANSFER, Transfer=grpc.unary_unary_rpc_method_handler(self.Transfer))
 
 
-class CatalogService(catalog_service_pb2_grpc.CatalogServiceServicer):
+class CatalogService:
     """Says what this server can do."""
 
     def __init__(self, app: Application) -> None:
         self._app = app
 
-    async def ListAlgorithms(  # noqa: N802
-        self, request: catalog_service_pb2.ListAlgorithmsRequest, context: _Context
-    ) -> catalog_service_pb2.ListAlgorithmsResponse:
-        """List what the registry holds."""
-        del request, context
+    def handler(self) -> grpc.GenericRpcHandler:
+        """Return what answers the calls of the service."""
+        return handler_of(
+            _CATALOG,
+            ListAlgorithms=answering(ListAlgorithmsRequest, self._algorithms),
+            GetServerInfo=answering(GetServerInfoRequest, self._info),
+        )
+
+    async def _algorithms(self, _: ListAlgorithmsRequest, __: Caller) -> ListAlgorithmsResponse:
         return self._app.algorithms()
 
-    async def GetServerInfo(  # noqa: N802
-        self, request: catalog_service_pb2.GetServerInfoRequest, context: _Context
-    ) -> catalog_service_pb2.GetServerInfoResponse:
-        """Tell versions and limits."""
-        del request, context
+    async def _info(self, _: GetServerInfoRequest, __: Caller) -> GetServerInfoResponse:
         return self._app.info()
 
 
