@@ -48,7 +48,16 @@ def divided_by_width(free: Mask, share: float, narrowest: float, least: float) -
     ndarray
         Shape of ``free``: places are components of cells joined by sides or corners.
     """
-    free = np.pad(free, 1)
+    cut = np.zeros_like(free)
+    rows, columns = np.nonzero(free)
+    if rows.size:
+        window = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+        cut[window] = _divided(np.pad(free[window], 1), share, narrowest, least)[1:-1, 1:-1]
+    return cut
+
+
+def _divided(free: Mask, share: float, narrowest: float, least: float) -> Mask:
+    """Return the same of free cells in a frame of cells that are not."""
     distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     places = _Places(np.zeros(free.shape, np.int32))
     width = float(distance.max())
@@ -66,7 +75,7 @@ def divided_by_width(free: Mask, share: float, narrowest: float, least: float) -
     large[0] = False
     labels = np.where(large, np.arange(len(large)), 0).astype(np.int32)[labels]
     grow(free, labels)
-    return np.asarray((free & (labels > 0) & ~along_borders(labels))[1:-1, 1:-1], dtype=np.uint8)
+    return np.asarray(free & (labels > 0) & ~along_borders(labels), dtype=np.uint8)
 
 
 @dataclass
