@@ -384,7 +384,8 @@ function handled(
     if (drawingBy !== event.pointerId) return;
     switch (tool.peek()) {
       case "pen":
-      case "route": {
+      case "route":
+      case "zone": {
         const events = event.getCoalescedEvents?.() ?? [];
         for (const each of events.length ? events : [event]) pending.stroke.push(inkAt(each));
         live.value = [...pending.stroke];
