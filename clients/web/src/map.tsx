@@ -149,10 +149,10 @@ function Way({ way, view }: { way: Carried; view: View }) {
         way.kind === "zone" ? (
           <polygon key={k} points={listed(points)} />
         ) : (
-          <>
-            <polyline key={k} points={listed(points)} />
+          <g key={k}>
+            <polyline points={listed(points)} />
             <Arrow points={points} />
-          </>
+          </g>
         ),
       )}
     </g>
