@@ -177,7 +177,9 @@ function Band({ way, view }: { way: Carried; view: View }) {
 }
 
 function Arrow({ points }: { points: readonly Xy[] }) {
-  const [end, before] = [points.at(-1), points.at(-6) ?? points[0]];
+  const end = points.at(-1);
+  // Ink has points so close together that the last two point anywhere.
+  const before = end && ([...points].reverse().find((one) => distance(one, end) > 12) ?? points[0]);
   if (!end || !before) return null;
   const turn = (Math.atan2(end[1] - before[1], end[0] - before[0]) * 180) / Math.PI;
   return <path d="M-9,-7L3,0L-9,7" transform={`translate(${end[0]} ${end[1]}) rotate(${turn})`} />;
