@@ -463,7 +463,7 @@ def test_a_map_of_ones_own_is_shown_and_its_things_are_found_otherwise_by_a_slid
     page.get_by_test_id("open-tuning").click()
     slider = page.locator("#tuning input[name=min_size]")
     slider.wait_for()
-    slider.fill("1.2")
+    slider.fill("1.0")
     things = page.locator(".floor .thing")
     wait_until(lambda: 2 <= things.count() < before, "the slider changes nothing")
 
