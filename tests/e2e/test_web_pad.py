@@ -1,10 +1,12 @@
 """The sketch pad in a real browser, against a real server."""
 
 import json
+import math
 import re
 from itertools import pairwise
 
 import pytest
+import yaml
 
 from sketchmatch.examples import LIVING_ROOM_MAP
 from tests import processes
@@ -164,25 +166,165 @@ def test_two_equal_readings_are_one_question_that_a_tap_answers(pad, visit, tmp_
     assert label in answer(page).values()
 
 
-def test_a_route_is_drawn_on_the_map_and_saved_in_metres(pad, visit):
+def test_each_change_is_one_update_of_what_changed_and_one_stream_tells_what_comes_of_it(
+    pad, visit
+):
+    page = visit(pad)
+    sent = []
+    page.on("request", lambda request: sent.append(request.url.rpartition("/")[2]))
+    hand = Hand(page)
+    for count, place in enumerate(KITCHEN.values(), start=1):
+        hand.box(*place)
+        if count > 1:
+            wait_for_answer(page, count)
+    page.get_by_test_id("tool-eraser").click()
+    x, y, width, _ = KITCHEN["stove"]
+    hand.tap(x - width / 2, y)
+    wait_for_answer(page, 5)
+    page.keyboard.press("Control+z")
+    wait_for_answer(page, 6)
+    assert answer(page) == names(), "what comes back has its number again"
+    assert sent.count("UpdateSketch") == 8
+    assert [sent.count(name) for name in ("CreateSketch", "WatchSketch", "Match")] == [1, 1, 0]
+
+
+def test_what_a_person_said_holds_when_the_numbers_of_things_change(pad, visit):
+    page = visit(pad)
+    hand = Hand(page)
+    draw_kitchen(hand)
+    wait_for_answer(page, 6)
+    hand.tap(*KITCHEN["bin"][:2])
+    page.locator(".floor .thing", has_text="bench").click()
+    said = page.locator("[data-testid=pairs] .line", has_text="you said so")
+    said.wait_for()
+    page.get_by_test_id("tool-eraser").click()
+    x, y, width, _ = KITCHEN["fridge"]
+    hand.tap(x - width / 2, y)
+    wait_for_answer(page, 5)
+    assert answer(page)[5] == "bench"
+    page.keyboard.press("Control+z")
+    wait_for_answer(page, 6)
+    assert answer(page)[6] == "bench"
+    assert said.count() == 1
+
+
+def saved_text(page, item):
+    page.get_by_test_id("open-file").click()
+    with page.expect_download() as saved:
+        page.get_by_test_id(item).click()
+    return saved.value.path().read_text()
+
+
+def test_a_route_is_carried_out_of_walls_with_its_deviation_and_saved_in_metres(pad, visit):
     page = visit(pad)
     hand = Hand(page)
     draw_kitchen(hand)
     wait_for_answer(page, 6)
     page.get_by_test_id("tool-route").click()
     hand.draw([(-100, -20), (-90, 90), (60, 90)], closed=False)
-    page.get_by_test_id("route").wait_for(state="attached")
-    wait_for_answer(page, 6)
-    page.get_by_test_id("open-file").click()
-    with page.expect_download() as saved:
-        page.get_by_test_id("save-route").click()
-    document = json.loads(saved.value.path().read_text())
-    line = document["features"][0]["geometry"]["coordinates"]
+    route = page.get_by_test_id("route")
+    route.wait_for(state="attached")
+    assert route.locator(".band line").count() > 2
+    assert float(route.locator(".band line").first.get_attribute("stroke-width")) > 0
+    assert answer(page) == names(), "a route is no thing"
+    feature = json.loads(saved_text(page, "save-carried"))["features"][0]
+    line = feature["geometry"]["coordinates"]
     # It goes down past the left of the island at (3.3, 2.75) and then to its right.
     (x0, y0), (x1, y1) = line[0], line[-1]
     assert 1.0 < x0 < 2.7
     assert x1 > x0 + 1.0
     assert y1 < y0 - 0.5
+    assert len(feature["properties"]["deviations"][0]) == len(line)
+    waypoints = yaml.safe_load(saved_text(page, "save-waypoints"))["waypoints"]
+    assert len(waypoints) == len(line)
+    assert waypoints["waypoint0"]["pose"][:2] == pytest.approx(line[0], abs=1e-5)
+    w, _, _, z = waypoints["waypoint0"]["orientation"]
+    yaw = math.atan2(line[1][1] - line[0][1], line[1][0] - line[0][0])
+    assert math.remainder(2 * math.atan2(z, w) - yaw, 2 * math.pi) == pytest.approx(0, abs=1e-3)
+
+
+def test_a_route_through_a_thing_is_led_around_it_and_the_page_says_so(pad, visit):
+    page = visit(pad)
+    hand = Hand(page)
+    draw_kitchen(hand)
+    wait_for_answer(page, 6)
+    page.get_by_test_id("tool-route").click()
+    hand.draw([(-90, -100), (40, 90)], closed=False)  # right through the island
+    said = page.get_by_test_id("carried")
+    said.get_by_text("It goes around what is in the way.").wait_for()
+    before = page.get_by_test_id("route").locator("polyline").get_attribute("points")
+    page.get_by_test_id("radius").fill("0.35")
+    page.get_by_test_id("radius").press("Enter")
+    route = page.get_by_test_id("route").locator("polyline")
+    wait_until(
+        lambda: route.count() and route.get_attribute("points") != before,
+        "a wider robot takes the same way",
+    )
+
+
+def test_a_zone_is_carried_named_saved_and_opened_again(pad, visit, tmp_path):
+    page = visit(pad)
+    hand = Hand(page)
+    draw_kitchen(hand)
+    wait_for_answer(page, 6)
+    page.get_by_test_id("tool-zone").click()
+    hand.box(-60, 40, 70, 50)
+    zone = page.get_by_test_id("zone")
+    zone.wait_for(state="attached")
+    page.get_by_test_id("tool-name").click()
+    x, y = hand.middle
+    page.mouse.click(x - 95, y + 40)
+    page.get_by_role("dialog").locator("input").fill("no go")
+    page.keyboard.press("Enter")
+    page.get_by_test_id("carried").get_by_text("no go").wait_for()
+    feature = json.loads(saved_text(page, "save-carried"))["features"][0]
+    assert feature["properties"]["name"] == "no go"
+    (ring,) = feature["geometry"]["coordinates"]
+    assert feature["geometry"]["type"] == "Polygon"
+    assert ring[0] == ring[-1]
+    # Below the left half of the island, whose middle is at (3.3, 2.75).
+    xs, ys = zip(*ring, strict=True)
+    assert 1.0 < sum(xs) / len(xs) < 3.3
+    assert sum(ys) / len(ys) < 2.75
+    assert answer(page) == names(), "a zone is no thing"
+    file = tmp_path / "sketch.json"
+    file.write_text(saved_text(page, "save-strokes"))
+    page.get_by_test_id("clear").click()
+    zone.wait_for(state="detached")
+    page.get_by_test_id("sketch-file").set_input_files(file)
+    wait_for_answer(page, 6)
+    page.get_by_test_id("carried").get_by_text("no go").wait_for()
+
+
+@pytest.mark.slow  # a server of its own
+def test_a_map_is_kept_by_the_server_under_a_name_and_chosen_again(visit, tmp_path):
+    with serving_pad("--store", str(tmp_path / "store")) as (_, url):
+        page = visit(url)
+        page.get_by_test_id("map-file").set_input_files(
+            [LIVING_ROOM_MAP, LIVING_ROOM_MAP.with_suffix(".pgm")]
+        )
+        title = page.locator(".map-pane .title")
+        title.get_by_text(LIVING_ROOM_MAP.name).wait_for()
+        things = page.locator(".floor .thing").count()
+        page.get_by_test_id("open-places").click()
+        page.get_by_label("Keep it as").fill("our flat")
+        page.get_by_test_id("keep-map").click()
+        page.get_by_test_id("notice").get_by_text("our flat").wait_for()
+        page.get_by_test_id("open-places").click()
+        page.get_by_test_id("place-kitchen").click()
+        title.get_by_text("Kitchen").wait_for()
+        page.get_by_test_id("open-places").click()
+        page.get_by_test_id("stored-map").get_by_text("our flat").click()
+        title.get_by_text("our flat").wait_for()
+        page.locator("image.grid").wait_for(state="attached")
+        assert page.locator(".floor .thing").count() == things
+        hand = Hand(page)
+        for x, y, width, height in ((-150, -80, 90, 50), (120, 60, 60, 80), (0, 90, 40, 40)):
+            hand.box(x, y, width, height)
+        page.get_by_test_id("pair-0").wait_for()
+        page.get_by_test_id("tool-zone").click()
+        hand.box(-20, 0, 60, 40)
+        page.get_by_test_id("zone").wait_for(state="attached")
 
 
 def test_undo_and_redo_go_all_the_way_and_nothing_is_lost_between_fast_strokes(pad, visit):
@@ -321,7 +463,7 @@ def test_a_map_of_ones_own_is_shown_and_its_things_are_found_otherwise_by_a_slid
     page.get_by_test_id("open-tuning").click()
     slider = page.locator("#tuning input[name=min_size]")
     slider.wait_for()
-    slider.fill("1.2")
+    slider.fill("1.0")
     things = page.locator(".floor .thing")
     wait_until(lambda: 2 <= things.count() < before, "the slider changes nothing")
 
@@ -372,6 +514,34 @@ def test_what_is_drawn_while_the_server_is_away_is_kept_and_matched_when_it_is_b
         page.reload()
         wait_for_answer(page, 6)
         assert answer(page) == names()
+
+
+@pytest.mark.slow  # two servers of its own
+def test_a_server_that_begins_anew_is_told_the_whole_sketch_and_what_was_said(visit):
+    with serving_pad() as (server, url):
+        page = visit(url)
+        hand = Hand(page)
+        draw_kitchen(hand)
+        wait_for_answer(page, 6)
+        hand.tap(*KITCHEN["bin"][:2])
+        page.locator(".floor .thing", has_text="bench").click()
+        said = page.locator("[data-testid=pairs] .line", has_text="you said so")
+        said.wait_for()
+        server.process.kill()
+        server.process.wait()
+        page.get_by_text("The server does not answer.").wait_for()
+    address = re.search(r"//(\S+)/", url)[1]
+    created = []
+    page.on("request", lambda request: created.append(request.url))
+    with processes.server("--web-address", address, "--workers", "0"):
+        page.get_by_text("The server does not answer.").wait_for(state="detached")
+        x, y, width, _ = KITCHEN["stove"]
+        page.get_by_test_id("tool-eraser").click()
+        hand.tap(x - width / 2, y)
+        wait_for_answer(page, 5)
+        assert answer(page)[5] == "bench"
+        assert said.count() == 1
+        assert any(each.endswith("CreateSketch") for each in created)
 
 
 def test_each_tab_has_its_own_sheet_and_a_new_one_begins_with_the_latest(pad, visit):

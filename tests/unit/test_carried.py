@@ -128,6 +128,17 @@ def test_a_door_that_is_too_narrow_is_none():
     assert "cannot be reached" in found.changes[0].sentence
 
 
+def test_a_route_through_a_thing_of_which_only_the_outline_was_seen_goes_on_behind_it():
+    ring = [np.s_[30:32, 40:60], np.s_[48:50, 40:60], np.s_[30:50, 40:42], np.s_[30:50, 58:60]]
+    grid = floor(walls=ring)
+    found, _ = led(route((2, 3.8), (8, 3.8)), grid)
+    assert reasons(found) == [ChangeReason.OBSTACLE]
+    assert found.feature.points[-1] == pytest.approx([8.0, 3.8], abs=1e-6)
+    assert distance(found, grid) >= 0.2 - 1e-9
+    into, _ = led(route((2, 3.8), (5, 3.8)), grid)
+    assert reasons(into) == [ChangeReason.UNREACHABLE]
+
+
 def test_a_clear_route_is_left_as_it_was_carried():
     found, _ = led(route((2, 2), (8, 2.5), (8, 8)), floor())
     assert found.changes == ()

@@ -20,7 +20,9 @@ import {
   SegmentRequestSchema,
   type SegmentResponse,
 } from "./gen/sketchmatch/v1/scene_service_pb.js";
+import { SketchService } from "./gen/sketchmatch/v1/sketch_service_pb.js";
 import type { Source } from "./gen/sketchmatch/v1/source_pb.js";
+import { TransferService } from "./gen/sketchmatch/v1/transfer_service_pb.js";
 
 /** How to get in at a server. */
 export interface Access {
@@ -50,8 +52,13 @@ export interface Answer {
 /** Asks a server at its address for browsers, as in `http://127.0.0.1:8080`. */
 export class SketchmatchClient {
   readonly #matches: Client<typeof MatchService>;
-  readonly #scenes: Client<typeof SceneService>;
   readonly #catalog: Client<typeof CatalogService>;
+  /** Scenes that the server keeps. Calls of this and the two below throw what `RequestFailed.from` reads. */
+  readonly scenes: Client<typeof SceneService>;
+  /** Sketches that are matched while they are drawn. */
+  readonly sketches: Client<typeof SketchService>;
+  /** Carries points, routes and zones from one scene to another. */
+  readonly transfers: Client<typeof TransferService>;
   /** Calls any service of the contract, those too that have no method here. */
   readonly transport: Transport;
 
@@ -60,10 +67,15 @@ export class SketchmatchClient {
       baseUrl: address,
       useBinaryFormat: true,
       interceptors: [showing(access.token ?? (() => ""))],
+      // A page that is closed still ends its sketch.
+      fetch: (input, init) =>
+        fetch(input, { ...init, keepalive: String(input).endsWith("/DeleteSketch") }),
     });
     this.#matches = createClient(MatchService, this.transport);
-    this.#scenes = createClient(SceneService, this.transport);
     this.#catalog = createClient(CatalogService, this.transport);
+    this.scenes = createClient(SceneService, this.transport);
+    this.sketches = createClient(SketchService, this.transport);
+    this.transfers = createClient(TransferService, this.transport);
   }
 
   /**
@@ -110,7 +122,7 @@ export class SketchmatchClient {
     signal?: AbortSignal,
   ): Promise<SegmentResponse> {
     const request = create(SegmentRequestSchema, { ...options, source });
-    return failing(() => this.#scenes.segment(request, stopping(signal)));
+    return failing(() => this.scenes.segment(request, stopping(signal)));
   }
 
   /** Return what there is to choose from. */

@@ -13,6 +13,7 @@ import {
  * - `busy`: send the same again after `retrySeconds`.
  * - `away`: nobody answers there, or not now; try again later.
  * - `unauthenticated`: the server wants a token, or another one.
+ * - `gone`: what the request names is not there, or no more; make it anew.
  * - `late`: the time was too short.
  * - `cancelled`: the caller wanted no answer any more.
  * - `failed`: the server or an algorithm is at fault.
@@ -22,6 +23,7 @@ export type Failure =
   | "busy"
   | "away"
   | "unauthenticated"
+  | "gone"
   | "late"
   | "cancelled"
   | "failed";
@@ -31,6 +33,7 @@ const FAILURES: Partial<Record<Code, Failure>> = {
   [Code.ResourceExhausted]: "busy",
   [Code.Unavailable]: "away",
   [Code.Unauthenticated]: "unauthenticated",
+  [Code.NotFound]: "gone",
   [Code.DeadlineExceeded]: "late",
   [Code.Canceled]: "cancelled",
 };

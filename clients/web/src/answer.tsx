@@ -1,5 +1,6 @@
 /** The answer in words: what is what, how sure that is, and what to ask. */
 
+import type { Carried } from "./carry";
 import { colourOf } from "./colours";
 import { drawing } from "./document";
 import { Icon } from "./icons";
@@ -9,12 +10,15 @@ import {
   asking,
   cancel,
   cancelled,
+  carried,
+  carryTrouble,
   elsewhere,
   isLit,
   leaveOut,
   lit,
   mapName,
   matchNow,
+  nameOfCarried,
   naming,
   type Pair,
   pairs,
@@ -23,13 +27,15 @@ import {
   place,
   progress,
   question,
+  radius,
   reading,
   readings,
   running,
+  setRadius,
   sketchName,
   trouble,
 } from "./state";
-import { type Texts, texts } from "./texts";
+import { language, type Texts, texts } from "./texts";
 
 type Sureness = keyof Texts["words"];
 
@@ -53,6 +59,7 @@ export function AnswerPanel() {
                 <Line key={pair.sketch} pair={pair} />
               ))}
             </ul>
+            <OnTheMap />
             <Unmatched />
           </>
         )}
@@ -305,6 +312,57 @@ function Line({ pair }: { pair: Pair }) {
         </span>
       </button>
     </li>
+  );
+}
+
+/** What became of routes and zones on the way to the map. */
+function OnTheMap() {
+  const t = texts.value;
+  if (!carried.value.length && !carryTrouble.value) return null;
+  return (
+    <section class="rest" data-testid="carried">
+      <h3>{t.onTheMap}</h3>
+      {carryTrouble.value && <p class="trouble">{carryTrouble.value}</p>}
+      <ul class="carried">
+        {carried.value.map((way) => (
+          <li key={way.id}>
+            <span class="row">
+              <span>{nameOfCarried(way)}</span>
+              <span class="muted">{within(way)}</span>
+            </span>
+            {[...new Set(way.changes.map(({ reason }) => reason))].map((reason) => (
+              <p key={reason} class="muted">
+                {t.changes[reason]}
+              </p>
+            ))}
+          </li>
+        ))}
+      </ul>
+      <label class="row radius">
+        <span class="muted">{t.radius}</span>
+        <input
+          type="number"
+          min="0"
+          max="5"
+          step="0.05"
+          value={radius.value}
+          data-testid="radius"
+          onChange={({ currentTarget: { valueAsNumber, validity } }) => {
+            if (validity.valid && Number.isFinite(valueAsNumber)) setRadius(valueAsNumber);
+          }}
+        />
+      </label>
+    </section>
+  );
+}
+
+function within({ lines }: Carried): string {
+  const t = texts.value;
+  if (!lines.length) return t.nowhere;
+  const most = Math.max(0, ...lines.flatMap(({ deviations }) => deviations));
+  const isGrid = place.value?.underlay?.grid ?? false;
+  return t.within(
+    `${most.toLocaleString(language.value, { maximumFractionDigits: 2 })}${isGrid ? " m" : ""}`,
   );
 }
 

@@ -3,6 +3,7 @@
 import { useEffect, useRef } from "preact/hooks";
 
 import { AnswerPanel, currentName } from "./answer";
+import { geoJson, waypoints } from "./carry";
 import { canRedo, canUndo, drawing, nameStrokes, redo, undo } from "./document";
 import { download, drawingSvg, inkOutline, pathOf, strokesJson } from "./files";
 import { boxOf } from "./geometry";
@@ -18,14 +19,18 @@ import {
   carried,
   choose,
   choosePlace,
+  chooseStored,
   fingerDraws,
+  keepShown,
   link,
+  lookForStored,
   naming,
   newSheet,
   notice,
   place,
   refit,
   showToken,
+  storedMaps,
   theme,
   type Theme,
   type Tool,
@@ -37,6 +42,7 @@ import { type Language, language, LANGUAGES, speak, texts } from "./texts";
 const TOOLS: readonly (readonly [Tool, string])[] = [
   ["pen", "P"],
   ["route", "R"],
+  ["zone", "Z"],
   ["eraser", "E"],
   ["move", "V"],
   ["name", "N"],
@@ -81,7 +87,7 @@ export function App() {
           <div class="panel-head">
             <h2 id="map-title">{t.map}</h2>
             <span class="muted title">{titleOfMap()}</span>
-            {place.value?.found && (
+            {place.value && !isPlace(place.value.place) && (
               <Menu id="tuning" icon="settings" label={t.tuning}>
                 <Tuning />
               </Menu>
@@ -183,6 +189,7 @@ function Menu(props: {
   id: string;
   icon: IconName;
   label: string;
+  opened?: () => void;
   children: preact.ComponentChildren;
 }) {
   return (
@@ -197,7 +204,12 @@ function Menu(props: {
         <Icon name={props.icon} />
         <span class="menu-name">{props.label}</span>
       </button>
-      <div id={props.id} popover="auto" class="sheet">
+      <div
+        id={props.id}
+        popover="auto"
+        class="sheet"
+        onToggle={({ newState }) => newState === "open" && props.opened?.()}
+      >
         {props.children}
       </div>
     </div>
@@ -211,7 +223,7 @@ function shut(id: string): void {
 function PlaceMenu() {
   const t = texts.value;
   return (
-    <Menu id="places" icon="map" label={t.chooseMap}>
+    <Menu id="places" icon="map" label={t.chooseMap} opened={() => void lookForStored()}>
       <h2>{t.places}</h2>
       <ul class="gallery">
         {PLACES.map((name) => (
@@ -241,7 +253,58 @@ function PlaceMenu() {
           void bringMap(files);
         }}
       />
+      <StoredMaps />
     </Menu>
+  );
+}
+
+function StoredMaps() {
+  const t = texts.value;
+  const [map, stored] = [place.value, storedMaps.value];
+  if (!stored) return null;
+  return (
+    <>
+      {map && !isPlace(map.place) && !map.found.stored && (
+        <form
+          class="row keep"
+          onSubmit={(event) => {
+            event.preventDefault();
+            const title = new FormData(event.currentTarget).get("title");
+            shut("places");
+            if (typeof title === "string") void keepShown(title.trim() || map.title);
+          }}
+        >
+          <input
+            key={map.title}
+            name="title"
+            aria-label={t.keepMapAs}
+            defaultValue={map.title}
+            maxLength={80}
+            autocomplete="off"
+          />
+          <button type="submit" class="quiet" data-testid="keep-map">
+            {t.keepMap}
+          </button>
+        </form>
+      )}
+      {stored.length > 0 && <h2>{t.stored}</h2>}
+      {stored.map((each) => (
+        <button
+          key={each.name}
+          type="button"
+          class="item"
+          data-testid="stored-map"
+          aria-pressed={map?.found.stored === each.name}
+          onClick={() => {
+            shut("places");
+            void chooseStored(each);
+          }}
+        >
+          <span>{each.title}</span>
+          <span class="muted">{t.things(each.things)}</span>
+        </button>
+      ))}
+    </>
   );
 }
 
@@ -320,28 +383,21 @@ function FileMenu() {
       )}
       {item(t.savePng, () => void savePng(), drawn, "save-png")}
       {item(
-        t.saveRoute,
-        () => save("route.geojson", "application/geo+json", routeGeoJson()),
-        carried.value !== null,
-        "save-route",
+        t.saveCarried,
+        () => save("routes.geojson", "application/geo+json", geoJson(carried.peek())),
+        carried.value.length > 0,
+        "save-carried",
+      )}
+      {item(
+        t.saveWaypoints,
+        () => save("waypoints.yaml", "application/yaml", waypoints(carried.peek())),
+        carried.value.some(({ kind, lines }) => kind === "route" && lines.length > 0),
+        "save-waypoints",
       )}
       <hr />
       {item(t.copyLink, () => void copyLink(), drawn && Boolean(place.value?.place), "copy-link")}
     </Menu>
   );
-}
-
-function routeGeoJson(): string {
-  const coordinates = (carried.peek() ?? []).map(([x, y]) => [
-    Number(x.toFixed(3)),
-    Number(y.toFixed(3)),
-  ]);
-  const feature = {
-    type: "Feature",
-    properties: { name: "route" },
-    geometry: { type: "LineString", coordinates },
-  };
-  return `${JSON.stringify({ type: "FeatureCollection", features: [feature] })}\n`;
 }
 
 async function savePng(): Promise<void> {

@@ -1,25 +1,163 @@
-/** A route carried from the sketch to the map, as a preview: one turn and one scale for all of it. */
+/** Routes and zones carried to the map, and the files that robots take them from. */
 
+import type { SketchmatchClient } from "@sketchmatch/client";
+import { sources } from "@sketchmatch/client";
+import type { ObjectMatch } from "@sketchmatch/client/v1/match";
+import { YAxis } from "@sketchmatch/client/v1/source";
+import {
+  ChangeReason,
+  type CarriedFeature,
+  type FeatureChange,
+} from "@sketchmatch/client/v1/transfer_service";
+
+import type { Stroke, StrokeKind } from "./document";
 import type { Xy } from "./geometry";
+import { parametersOf } from "./maps";
+import type { Answered } from "./session";
 
-/** Return a similarity that takes `from` to `to` as well as one can; null for fewer than two. */
-export function similarity(from: readonly Xy[], to: readonly Xy[]): ((point: Xy) => Xy) | null {
-  if (from.length < 2) return null;
-  const [fx, fy] = mean(from);
-  const [tx, ty] = mean(to);
-  let [along, across, spread] = [0, 0, 0];
-  from.forEach(([x, y], k) => {
-    const [u, v] = to[k] ?? [0, 0];
-    along += (x - fx) * (u - tx) + (y - fy) * (v - ty);
-    across += (x - fx) * (v - ty) - (y - fy) * (u - tx);
-    spread += (x - fx) ** 2 + (y - fy) ** 2;
-  });
-  if (!spread) return null;
-  const [a, b] = [along / spread, across / spread];
-  return ([x, y]) => [tx + a * (x - fx) - b * (y - fy), ty + b * (x - fx) + a * (y - fy)];
+/** A line of points, and the standard deviation of each, in units of the map. */
+export interface CarriedLine {
+  readonly points: readonly Xy[];
+  readonly deviations: readonly number[];
 }
 
-function mean(points: readonly Xy[]): Xy {
-  const sum = points.reduce<Xy>(([x, y], point) => [x + point[0], y + point[1]], [0, 0]);
-  return [sum[0] / points.length, sum[1] / points.length];
+/** A route or a zone on the map; without lines where nothing of it can be reached. */
+export interface Carried {
+  readonly id: string;
+  readonly kind: Exclude<StrokeKind, "thing">;
+  readonly name: string;
+  readonly lines: readonly CarriedLine[];
+  readonly changes: readonly FeatureChange[];
+}
+
+/** What to carry, and by what. */
+export interface ToCarry {
+  readonly strokes: readonly Stroke[];
+  readonly found: Answered;
+  /** The object map. */
+  readonly lines: readonly ObjectMatch[];
+  /** Half the width of the robot, in units of the map. */
+  readonly radius: number;
+}
+
+/**
+ * Carry routes and zones to the map.
+ *
+ * @throws ConnectError
+ */
+export async function carry(
+  client: SketchmatchClient,
+  { strokes, found, lines, radius }: ToCarry,
+  signal: AbortSignal,
+): Promise<Carried[]> {
+  const { source, stored, segmenter } = found.map.found;
+  const { features } = await client.transfers.transfer(
+    {
+      sketch: sources.polygons(found.sketched),
+      // The map as it was found, for its walls are no things.
+      map: stored ? { kind: { case: "storedScene", value: stored } } : source,
+      ...(stored
+        ? {}
+        : {
+            pipeline: {
+              mapSegmenter: { name: segmenter, parameters: parametersOf(found.map.found) },
+            },
+          }),
+      // Things that are left out of the map are still in its source.
+      objectMap: lines.map(({ sketchObject, mapObject }) => ({
+        sketchObject,
+        mapObject: Number(found.map.things[mapObject]?.id),
+      })),
+      yAxis: YAxis.DOWN,
+      radius,
+      features: strokes.map(({ points, kind }) => {
+        const line = { points: points.map(([x, y]) => ({ x, y })) };
+        return {
+          kind:
+            kind === "zone"
+              ? { case: "zone" as const, value: { rings: [line] } }
+              : { case: "route" as const, value: line },
+        };
+      }),
+    },
+    { signal },
+  );
+  return features.flatMap((feature, k) => {
+    const stroke = strokes[k];
+    return stroke ? [carriedOf(feature, stroke)] : [];
+  });
+}
+
+function carriedOf({ feature, lines, changes }: CarriedFeature, stroke: Stroke): Carried {
+  const kind = feature?.kind;
+  const there =
+    kind?.case === "zone" ? kind.value.rings : kind?.case === "route" ? [kind.value] : [];
+  return {
+    id: stroke.id,
+    kind: stroke.kind === "zone" ? "zone" : "route",
+    name: stroke.label,
+    lines: there.map(({ points }, k) => ({
+      points: points.map(({ x, y }) => [x, y] as const),
+      deviations: lines[k]?.deviations ?? [],
+    })),
+    changes,
+  };
+}
+
+/** Return what was carried as GeoJSON, in units of the map, as the command line saves it. */
+export function geoJson(carried: readonly Carried[]): string {
+  const features = carried.map(({ kind, name, lines, changes }) => {
+    const deviations = lines.map((line) => line.deviations.map((each) => round(each, 6)));
+    return {
+      type: "Feature",
+      properties: {
+        name: name || kind,
+        ...(lines.length ? { deviation: Math.max(...deviations.flat(), 0), deviations } : {}),
+        ...(changes.length ? { changes: changes.map(changeOf) } : {}),
+      },
+      geometry: geometryOf(kind, lines),
+    };
+  });
+  const all = { type: "FeatureCollection", crs: null, features };
+  return `${JSON.stringify(all)}\n`;
+}
+
+function changeOf({ reason, firstPoint, lastPoint, sentence }: FeatureChange) {
+  return { reason: ChangeReason[reason], first: firstPoint, last: lastPoint, sentence };
+}
+
+function geometryOf(kind: Carried["kind"], lines: readonly CarriedLine[]) {
+  const rings = lines.map(({ points }) => points.map(([x, y]) => [round(x, 6), round(y, 6)]));
+  const [first] = rings;
+  if (!first) return null;
+  if (kind === "route") return { type: "LineString", coordinates: first };
+  return { type: "Polygon", coordinates: rings.map((ring) => [...ring, ...ring.slice(0, 1)]) };
+}
+
+/** Return the points of routes as nav2's panel in RViz saves waypoints. */
+export function waypoints(carried: readonly Carried[]): string {
+  const rows = carried
+    .filter(({ kind }) => kind === "route")
+    .flatMap(({ name, lines }) =>
+      (lines[0]?.points ?? []).map((point, k, points) => ({ name, point, yaw: yawAt(points, k) })),
+    );
+  if (!rows.length) return "waypoints: {}\n";
+  const texts = rows.flatMap(({ name, point: [x, y], yaw }, k) => [
+    `  waypoint${k}:`,
+    `    pose: [${x.toFixed(6)}, ${y.toFixed(6)}, 0.0]`,
+    `    orientation: [${Math.cos(yaw / 2).toFixed(6)}, 0.0, 0.0, ${Math.sin(yaw / 2).toFixed(6)}]`,
+    ...(name ? [`    name: ${JSON.stringify(name)}`] : []),
+  ]);
+  return `waypoints:\n${texts.join("\n")}\n`;
+}
+
+/** Return where a robot looks at a point of a route: to the next, and at the last as before. */
+function yawAt(points: readonly Xy[], k: number): number {
+  const [from, to] = k + 1 < points.length ? [k, k + 1] : [k - 1, k];
+  const [a, b] = [points[from], points[to]];
+  return a && b ? Math.atan2(b[1] - a[1], b[0] - a[0]) : 0;
+}
+
+function round(value: number, digits: number): number {
+  return Number(value.toFixed(digits));
 }

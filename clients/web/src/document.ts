@@ -1,16 +1,18 @@
 /** What a person drew and said, with every step of it kept for undoing. */
 
-import { computed, signal } from "@preact/signals";
+import { computed, type ReadonlySignal, signal } from "@preact/signals";
 
 /** x and y in units of the paper, y down; seconds; pressure from 0 to 1. */
 export type InkPoint = readonly [number, number, number, number];
+
+/** What a stroke is: of a thing, the way that the robot shall take, or an area for it. */
+export type StrokeKind = "thing" | "route" | "zone";
 
 export interface Stroke {
   readonly id: string;
   readonly points: readonly InkPoint[];
   readonly label: string;
-  /** The way that the robot shall take, which is no thing. */
-  readonly route: boolean;
+  readonly kind: StrokeKind;
   /** Whether a pen drew it, whose pressure was felt. */
   readonly pressed: boolean;
 }
@@ -34,8 +36,25 @@ const future = signal<readonly Drawing[]>([]);
 
 /** What there is now. */
 export const drawing = computed(() => current.value);
+/** The strokes that show things, and those that are carried; the same lists while they say the same. */
+export const thingStrokes = sameWhile(() => strokesOf((kind) => kind === "thing"));
+export const carriedStrokes = sameWhile(() => strokesOf((kind) => kind !== "thing"));
+export const pins = sameWhile(() => current.value.pins);
 export const canUndo = computed(() => past.value.length > 0);
 export const canRedo = computed(() => future.value.length > 0);
+
+function strokesOf(wanted: (kind: StrokeKind) => boolean): readonly Stroke[] {
+  return current.value.strokes.filter(({ kind }) => wanted(kind));
+}
+
+function sameWhile<T>(list: () => readonly T[]): ReadonlySignal<readonly T[]> {
+  let before: readonly T[] = [];
+  return computed(() => {
+    const now = list();
+    const isSame = now.length === before.length && now.every((each, k) => each === before[k]);
+    return isSame ? before : (before = now);
+  });
+}
 
 /** Change the drawing by a step that can be undone. */
 export function change(next: (now: Drawing) => Drawing): void {
@@ -78,7 +97,10 @@ export function newId(): string {
 export function addStroke(stroke: Stroke): void {
   change((now) => ({
     ...now,
-    strokes: [...now.strokes.filter((other) => !(stroke.route && other.route)), stroke],
+    strokes: [
+      ...now.strokes.filter(({ kind }) => !(kind === "route" && stroke.kind === "route")),
+      stroke,
+    ],
   }));
 }
 

@@ -3,18 +3,28 @@
 import { RequestFailed } from "@sketchmatch/client";
 import { getStroke } from "perfect-freehand";
 
-import { type Drawing, type InkPoint, newId, type Pin, type Stroke } from "./document";
+import {
+  type Drawing,
+  type InkPoint,
+  newId,
+  type Pin,
+  type Stroke,
+  type StrokeKind,
+} from "./document";
 import { boxOf, type Xy } from "./geometry";
 
 const ROUTE_NAMES = new Set(["route", "path"]);
 
-/** Return strokes as our JSON has them. */
+/** Return strokes as our JSON has them; zones stand beside, for they are no things. */
 export function strokesJson({ strokes }: Drawing): string {
-  const saved = strokes.map(({ points, label, route }) => ({
-    ...(route ? { label: "route" } : label ? { label } : {}),
+  const saved = ({ points, label, kind }: Stroke) => ({
+    ...(kind === "route" ? { label: "route" } : label ? { label } : {}),
     points: points.map(([x, y, t]) => [round(x), round(y), round(t, 3)]),
-  }));
-  return `${JSON.stringify({ y_axis: "down", strokes: saved })}\n`;
+  });
+  const zones = strokes.filter(({ kind }) => kind === "zone").map(saved);
+  const others = strokes.filter(({ kind }) => kind !== "zone").map(saved);
+  const all = { y_axis: "down", strokes: others, ...(zones.length ? { zones } : {}) };
+  return `${JSON.stringify(all)}\n`;
 }
 
 /**
@@ -31,30 +41,33 @@ export function parseStrokes(text: string): Stroke[] | null {
   }
   if (typeof document !== "object" || document === null || !("strokes" in document)) return null;
   const down = "y_axis" in document && document.y_axis === "down" ? 1 : -1;
-  if (!Array.isArray(document.strokes)) throw broken("strokes is no list");
-  return document.strokes.map((stroke: unknown, k): Stroke => {
+  const strokes = parsed(document.strokes, "strokes", down).map((stroke): Stroke => {
+    const isRoute = ROUTE_NAMES.has(stroke.label.toLowerCase());
+    return isRoute ? { ...stroke, label: "", kind: "route" } : stroke;
+  });
+  const zones = "zones" in document ? parsed(document.zones, "zones", down) : [];
+  return [...strokes, ...zones.map((zone): Stroke => ({ ...zone, kind: "zone" }))];
+}
+
+function parsed(list: unknown, field: string, down: number): Stroke[] {
+  if (!Array.isArray(list)) throw broken(`${field} is no list`);
+  return list.map((stroke: unknown, k): Stroke => {
     const { points, label } = (stroke ?? {}) as { points?: unknown; label?: unknown };
-    if (!Array.isArray(points)) throw broken(`strokes[${k}].points is no list`);
-    const name = typeof label === "string" ? label : "";
-    return {
-      ...ink(
-        points.map((point: unknown, i): InkPoint => {
-          const [x, y, t = 0] = Array.isArray(point) ? (point as unknown[]) : [];
-          if (!Number.isFinite(x) || !Number.isFinite(y)) {
-            throw broken(`strokes[${k}].points[${i}] is no [x, y]`);
-          }
-          return [x as number, down * (y as number), typeof t === "number" ? t : 0, 0.5];
-        }),
-      ),
-      label: ROUTE_NAMES.has(name.toLowerCase()) ? "" : name,
-      route: ROUTE_NAMES.has(name.toLowerCase()),
-    };
+    if (!Array.isArray(points)) throw broken(`${field}[${k}].points is no list`);
+    const read = points.map((point: unknown, i): InkPoint => {
+      const [x, y, t = 0] = Array.isArray(point) ? (point as unknown[]) : [];
+      if (!Number.isFinite(x) || !Number.isFinite(y)) {
+        throw broken(`${field}[${k}].points[${i}] is no [x, y]`);
+      }
+      return [x as number, down * (y as number), typeof t === "number" ? t : 0, 0.5];
+    });
+    return { ...ink(read), label: typeof label === "string" ? label : "" };
   });
 }
 
 /** Return a stroke of these points. */
 export function ink(points: readonly InkPoint[], pressed = false): Stroke {
-  return { id: newId(), points, label: "", route: false, pressed };
+  return { id: newId(), points, label: "", kind: "thing", pressed };
 }
 
 /** Return what outlines look like when somebody draws them, about as large as a sheet. */
@@ -66,20 +79,20 @@ export function inkOf(outlines: readonly { points: Xy[]; label: string }[], rout
     ink(points.map(([x, y]) => [factor * (x - x0), factor * (y - y0), 0, 0.5] as const));
   return [
     ...outlines.map(({ points, label }) => ({ ...placed(points), label })),
-    ...(route.length ? [{ ...placed(route), route: true }] : []),
+    ...(route.length ? [{ ...placed(route), kind: "route" as const }] : []),
   ];
 }
 
 /** Return the outline of a stroke's ink. */
 export function inkOutline(
-  stroke: Pick<Stroke, "points" | "pressed" | "route">,
+  stroke: Pick<Stroke, "points" | "pressed" | "kind">,
   last: boolean,
 ): Xy[] {
   return getStroke(
     stroke.points.map(([x, y, , pressure]) => [x, y, pressure]),
     {
-      size: stroke.route ? 3.5 : 5,
-      thinning: stroke.route ? 0 : 0.45,
+      size: stroke.kind === "thing" ? 5 : 3.5,
+      thinning: stroke.kind === "thing" ? 0.45 : 0,
       smoothing: 0.5,
       streamline: 0.3,
       simulatePressure: !stroke.pressed,
@@ -99,12 +112,13 @@ export function pathOf(outline: readonly Xy[]): string {
   return `M${round(first[0])},${round(first[1])}Q${parts.join(" ")}Z`;
 }
 
-/** Return the drawing as SVG that our server reads, each stroke a line with its name. */
-export function drawingSvg({ strokes }: Drawing): string {
+/** Return the drawing as SVG that our server reads, each stroke but zones a line with its name. */
+export function drawingSvg(drawing: Drawing): string {
+  const strokes = drawing.strokes.filter(({ kind }) => kind !== "zone");
   const { x0, y0, x1, y1 } = boxOf(strokes.flatMap(({ points }) => points));
   const box = [x0 - 20, y0 - 20, x1 - x0 + 40, y1 - y0 + 40].map((n) => round(n)).join(" ");
-  const lines = strokes.map(({ points, label, route }) => {
-    const name = route ? "route" : label;
+  const lines = strokes.map(({ points, label, kind }) => {
+    const name = kind === "route" ? "route" : label;
     const title = name ? `<title>${escaped(name)}</title>` : "";
     const line = points.map(([x, y]) => `${round(x)},${round(y)}`).join(" ");
     return `  <polyline points="${line}">${title}</polyline>`;
@@ -126,20 +140,20 @@ export interface Shared {
 
 interface Packed {
   p: string;
-  s: { d: number[]; l?: string; r?: 1; i: string }[];
+  s: { d: number[]; l?: string; k?: StrokeKind; i: string }[];
   n: Pin[];
 }
 
 /** Return a drawing packed for a link: differences of whole points, deflated. */
 export async function packed({ place, drawing }: Shared): Promise<string> {
-  const s = drawing.strokes.map(({ points, label, route, id }) => {
+  const s = drawing.strokes.map(({ points, label, kind, id }) => {
     let [px, py] = [0, 0];
     const d = points.flatMap(([x, y]) => {
       const [dx, dy] = [Math.round(x) - px, Math.round(y) - py];
       [px, py] = [px + dx, py + dy];
       return [dx, dy];
     });
-    return { d, i: id, ...(label ? { l: label } : {}), ...(route ? { r: 1 as const } : {}) };
+    return { d, i: id, ...(label ? { l: label } : {}), ...(kind === "thing" ? {} : { k: kind }) };
   });
   const text = JSON.stringify({ p: place, s, n: [...drawing.pins] } satisfies Packed);
   const data = await through(new Blob([text]), new CompressionStream("deflate-raw"));
@@ -157,14 +171,14 @@ export async function unpacked(text: string): Promise<Shared | null> {
     );
     const plain = await through(new Blob([data]), new DecompressionStream("deflate-raw"));
     const { p, s, n } = JSON.parse(new TextDecoder().decode(plain)) as Packed;
-    const strokes = s.map(({ d, l, r, i }): Stroke => {
+    const strokes = s.map(({ d, l, k: kind, i }): Stroke => {
       let [x, y] = [0, 0];
       const points: InkPoint[] = [];
       for (let k = 0; k + 1 < d.length; k += 2) {
         [x, y] = [x + Number(d[k]), y + Number(d[k + 1])];
         points.push([x, y, k / 120, 0.5]);
       }
-      return { ...ink(points), id: i, label: l ?? "", route: r === 1 };
+      return { ...ink(points), id: i, label: l ?? "", kind: kind ?? "thing" };
     });
     return { place: p, drawing: { strokes, pins: n } };
   } catch {

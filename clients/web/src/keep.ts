@@ -1,6 +1,6 @@
 /** Keeps what was drawn in the browser, for when the server or the page goes away. */
 
-import { get, set } from "idb-keyval";
+import { get, getMany, set } from "idb-keyval";
 
 import type { Drawing } from "./document";
 import type { PlaceMap } from "./maps";
@@ -18,22 +18,37 @@ const mine = tab();
 /** Return what this tab had, or else a copy of what was drawn last in any. */
 export async function restored(): Promise<Kept | undefined> {
   try {
-    const own = await get<Kept>(mine);
-    if (own) return own;
-    const latest = await get<string>(LATEST);
-    return latest === undefined ? undefined : await get<Kept>(latest);
+    return (await sheet(mine)) ?? (await sheet((await get<string>(LATEST)) ?? mine));
   } catch {
     return undefined; // a private window keeps nothing
   }
 }
 
-export async function keep(kept: Kept): Promise<void> {
+async function sheet(name: string): Promise<Kept | undefined> {
+  const [drawing, map] = await getMany<Drawing | Kept["map"] | undefined>([name, mapOf(name)]);
+  return drawing && map ? { drawing: drawing as Drawing, map: map as Kept["map"] } : undefined;
+}
+
+export async function keepDrawing(drawing: Drawing): Promise<void> {
+  await kept(mine, drawing);
+  await kept(LATEST, mine);
+}
+
+/** Keep the map, which may be large and seldom changes, beside what is drawn. */
+export async function keepMap(map: Kept["map"]): Promise<void> {
+  await kept(mapOf(mine), map);
+}
+
+async function kept(name: string, value: unknown): Promise<void> {
   try {
-    await set(mine, kept);
-    await set(LATEST, mine);
+    await set(name, value);
   } catch {
     // What is on the screen is all there is then.
   }
+}
+
+function mapOf(name: string): string {
+  return `${name}/map`;
 }
 
 /** Return the name under which this tab keeps its sheet; it outlives the page, not the tab. */

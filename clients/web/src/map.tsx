@@ -3,6 +3,7 @@
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 
+import type { Carried } from "./carry";
 import { colourOf } from "./colours";
 import { badgePlace, boxOf, distance, toScreen, type View, type Xy, zoomed } from "./geometry";
 import { boxOfMap, type Underlay } from "./maps";
@@ -17,6 +18,7 @@ import {
   isLit,
   lit,
   mapName,
+  nameOfCarried,
   pairOf,
   pin,
   place,
@@ -90,7 +92,9 @@ export function MapPane() {
         {map?.things.map((thing, k) => (
           <MapThing key={thing.id} index={k} view={view.value} />
         ))}
-        <Route view={view.value} />
+        {carried.value.map((way) => (
+          <Way key={way.id} way={way} view={view.value} />
+        ))}
       </svg>
     </div>
   );
@@ -133,22 +137,56 @@ function MapThing({ index, view }: { index: number; view: View }) {
   );
 }
 
-function Route({ view }: { view: View }) {
-  const route = carried.value;
-  if (!route || route.length < 2) return null;
-  const points = route.map((point) => shown(view, point));
-  const [end, before] = [points.at(-1), points.at(-6) ?? points[0]];
-  if (!end || !before) return null;
-  const turn = (Math.atan2(end[1] - before[1], end[0] - before[0]) * 180) / Math.PI;
+/** A route or a zone, and beneath it a band as wide as what it may be off by. */
+function Way({ way, view }: { way: Carried; view: View }) {
+  const name = nameOfCarried(way);
+  const lines = way.lines.map(({ points }) => points.map((point) => shown(view, point)));
   return (
-    <g class="way" data-testid="route">
-      <title>{texts.value.preview}</title>
-      <polyline
-        points={points.map((point) => point.map((n) => n.toFixed(1)).join(",")).join(" ")}
-      />
-      <path d="M-9,-7L3,0L-9,7" transform={`translate(${end[0]} ${end[1]}) rotate(${turn})`} />
+    <g class={`way ${way.kind}`} data-testid={way.kind}>
+      <title>{texts.value.withBand(name)}</title>
+      <Band way={way} view={view} />
+      {lines.map((points, k) =>
+        way.kind === "zone" ? (
+          <polygon key={k} points={listed(points)} />
+        ) : (
+          <g key={k}>
+            <polyline points={listed(points)} />
+            <Arrow points={points} />
+          </g>
+        ),
+      )}
     </g>
   );
+}
+
+function Band({ way, view }: { way: Carried; view: View }) {
+  return (
+    <g class="band">
+      {way.lines.flatMap(({ points, deviations }, line) => {
+        const closed = way.kind === "zone" ? points : points.slice(0, -1);
+        return closed.map((point, k) => {
+          const next = points[(k + 1) % points.length] ?? point;
+          const after = deviations[(k + 1) % points.length] ?? 0;
+          const [[x1, y1], [x2, y2]] = [shown(view, point), shown(view, next)];
+          const width = view.scale * ((deviations[k] ?? 0) + after);
+          return <line key={`${line}-${k}`} {...{ x1, y1, x2, y2 }} stroke-width={width} />;
+        });
+      })}
+    </g>
+  );
+}
+
+function Arrow({ points }: { points: readonly Xy[] }) {
+  const end = points.at(-1);
+  // Ink has points so close together that the last two point anywhere.
+  const before = end && ([...points].reverse().find((one) => distance(one, end) > 12) ?? points[0]);
+  if (!end || !before) return null;
+  const turn = (Math.atan2(end[1] - before[1], end[0] - before[0]) * 180) / Math.PI;
+  return <path d="M-9,-7L3,0L-9,7" transform={`translate(${end[0]} ${end[1]}) rotate(${turn})`} />;
+}
+
+function listed(points: readonly Xy[]): string {
+  return points.map((point) => point.map((n) => n.toFixed(1)).join(",")).join(" ");
 }
 
 /** The map's y grows up, the screen's down: views are of the map turned over. */

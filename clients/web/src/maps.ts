@@ -29,13 +29,15 @@ export interface PlaceMap {
   readonly things: readonly Thing[];
   readonly underlay: Underlay | null;
   readonly warnings: readonly string[];
-  /** What its things were found in, and how; null where that is not kept. */
-  readonly found: Found | null;
+  /** What its things were found in, and how. */
+  readonly found: Found;
 }
 
 /** How the things of a map were found, so that they can be looked for otherwise. */
 export interface Found {
   readonly source: Source;
+  /** Its name among those that the server keeps; empty if it does not. */
+  readonly stored: string;
   readonly segmenter: string;
   readonly parameters: Readonly<Record<string, unknown>>;
 }
@@ -66,7 +68,7 @@ export async function openPlace(client: SketchmatchClient, place: Place): Promis
   const all = await found(client, source);
   // What the yaml does not name is a piece of a wall.
   const things = all.things.filter(({ label }) => label);
-  return { ...all, things, found: null, place, title: "", underlay: gridOf(yaml, pixels) };
+  return { ...all, things, place, title: "", underlay: gridOf(yaml, pixels) };
 }
 
 /** Return how a person drew a place of the gallery. */
@@ -103,13 +105,95 @@ export async function openMap(
   }
   if (!first) throw new RequestFailed(lacking(""), "invalid", "", "map", undefined);
   const source = sources.file(first.name, await bytesOf(first));
-  const seen = await shownPixels(first);
   return {
     ...(await found(client, source, first.name)),
     place: "",
     title: first.name,
-    underlay: seen && { pixels: seen, resolution: 1, origin: [0, 0, 0], grid: false },
+    underlay: await pictureOf(first),
   };
+}
+
+/** A map that the server keeps. */
+export interface StoredMap {
+  readonly name: string;
+  /** What it was called in this browser, or else what is on it. */
+  readonly title: string;
+  readonly things: number;
+}
+
+/** Return the maps that the server keeps, the latest first; null where it keeps none. */
+export async function listStored(client: SketchmatchClient): Promise<StoredMap[] | null> {
+  try {
+    const { scenes } = await client.scenes.listScenes({});
+    const titles = titlesOfStored();
+    return scenes.map(({ name, labels, objectCount }) => ({
+      name,
+      title: titles[name] ?? (labels.slice(0, 3).join(", ") || name.slice(0, 8)),
+      things: objectCount,
+    }));
+  } catch {
+    return null; // a server without a store says so
+  }
+}
+
+/** Load a map that the server keeps. */
+export async function openStored(
+  client: SketchmatchClient,
+  { name, title }: StoredMap,
+): Promise<PlaceMap> {
+  const { storedScene, source } = await client.scenes.getScene({ name, includeSource: true });
+  const kind = source?.kind;
+  const { scene, warnings, segmenter } = storedScene ?? {};
+  return {
+    place: "",
+    title,
+    things: thingsOf(scene),
+    warnings: warnings ?? [],
+    underlay: kind ? await underlayOf(kind) : null,
+    found: {
+      source: source ?? sources.polygons(thingsOf(scene)),
+      stored: name,
+      segmenter: segmenter?.name ?? "",
+      parameters: segmenter?.parameters ?? {},
+    },
+  };
+}
+
+/** Have the server keep a map as it was found, and remember here what it is called. */
+export async function keepOnServer(
+  client: SketchmatchClient,
+  map: PlaceMap,
+  title: string,
+): Promise<PlaceMap> {
+  const { source, segmenter } = map.found;
+  const { storedScene } = await client.scenes.putScene({
+    source,
+    segmenter: { name: segmenter, parameters: parametersOf(map.found) },
+  });
+  const stored = storedScene?.name ?? "";
+  localStorage.setItem(TITLES, JSON.stringify({ ...titlesOfStored(), [stored]: title }));
+  return { ...map, title, found: { ...map.found, stored } };
+}
+
+const TITLES = "stored-maps";
+
+function titlesOfStored(): Readonly<Record<string, string>> {
+  return JSON.parse(localStorage.getItem(TITLES) ?? "{}") as Record<string, string>;
+}
+
+async function underlayOf(kind: Source["kind"]): Promise<Underlay | null> {
+  if (kind.case === "mapServerMap") {
+    const seen = await shownPixels(new Blob([new Uint8Array(kind.value.image)]));
+    return seen && gridOf(kind.value.yaml, seen);
+  }
+  const isPicture = kind.case === "image" || kind.case === "file";
+  return isPicture ? pictureOf(new Blob([new Uint8Array(kind.value.data)])) : null;
+}
+
+/** Return a picture whose pixels are the units of the map. */
+async function pictureOf(blob: Blob): Promise<Underlay | null> {
+  const seen = await shownPixels(blob);
+  return seen && { pixels: seen, resolution: 1, origin: [0, 0, 0], grid: false };
 }
 
 /** Return the outlines that the server sees in a file, y down, as a sketch has them. */
@@ -147,7 +231,14 @@ async function found(
     client.segment(source, { segmenter: chosen }),
   );
   const how = { segmenter: segmenter?.name ?? "", parameters: segmenter?.parameters ?? {} };
-  return { things: thingsOf(scene), warnings, found: { source, ...how } };
+  return { things: thingsOf(scene), warnings, found: { source, stored: "", ...how } };
+}
+
+/** Return the parameters by which things were found, without those that stand for none. */
+export function parametersOf({ parameters }: Found): Tuned {
+  return Object.fromEntries(
+    Object.entries(parameters).filter(([, value]) => value !== null),
+  ) as Tuned;
 }
 
 /** What of a segmenter's parameters a person sets. */
@@ -159,7 +250,6 @@ export async function foundOtherwise(
   map: PlaceMap,
   parameters: Tuned,
 ): Promise<PlaceMap> {
-  if (!map.found) return map;
   const { source, segmenter } = map.found;
   return { ...map, ...(await found(client, source, map.title, { name: segmenter, parameters })) };
 }

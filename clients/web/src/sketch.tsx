@@ -12,6 +12,7 @@ import {
   moveStrokes,
   newId,
   type Stroke,
+  type StrokeKind,
 } from "./document";
 import { ink, inkOutline, pathOf } from "./files";
 import {
@@ -41,6 +42,7 @@ import {
   showMe,
   thingAt,
   tool,
+  type Tool,
 } from "./state";
 import { texts } from "./texts";
 
@@ -193,8 +195,10 @@ function prepared(canvas: HTMLCanvasElement | null, width: number, height: numbe
   return context;
 }
 
-function inkColour(route: boolean): string {
-  const name = route ? "--route" : "--ink";
+const INK: Record<StrokeKind, string> = { thing: "--ink", route: "--route", zone: "--zone" };
+
+function inkColour(kind: StrokeKind): string {
+  const name = INK[kind];
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim() || "#000";
 }
 
@@ -208,16 +212,27 @@ function paintStill(
   const context = prepared(canvas, width, height, view);
   if (!context) return;
   const moved = offset.value;
-  const [plain, way] = [inkColour(false), inkColour(true)];
+  const colours = {
+    thing: inkColour("thing"),
+    route: inkColour("route"),
+    zone: inkColour("zone"),
+  } satisfies Record<StrokeKind, string>;
   for (const stroke of strokes) {
     let path = paths.get(stroke);
     if (!path) paths.set(stroke, (path = new Path2D(pathOf(inkOutline(stroke, true)))));
-    context.fillStyle = stroke.route ? way : plain;
+    context.fillStyle = colours[stroke.kind];
     const shifted = moved?.ids.has(stroke.id) ? moved : null;
     if (shifted) context.translate(shifted.dx, shifted.dy);
     context.fill(path);
+    if (stroke.kind === "zone") fillArea(context, stroke);
     if (shifted) context.translate(-shifted.dx, -shifted.dy);
   }
+}
+
+function fillArea(context: CanvasRenderingContext2D, { points }: Stroke): void {
+  context.globalAlpha = 0.12;
+  context.fill(new Path2D(`M${points.map(([x, y]) => `${x},${y}`).join("L")}Z`));
+  context.globalAlpha = 1;
 }
 
 function paintWet(
@@ -229,9 +244,14 @@ function paintWet(
 ): void {
   const context = prepared(canvas, width, height, view);
   if (!context || !points?.length) return;
-  const route = tool.peek() === "route";
-  context.fillStyle = inkColour(route);
-  context.fill(new Path2D(pathOf(inkOutline({ points, pressed: pressed(points), route }, false))));
+  const kind = kindOf(tool.peek());
+  context.fillStyle = inkColour(kind);
+  context.fill(new Path2D(pathOf(inkOutline({ points, pressed: pressed(points), kind }, false))));
+}
+
+/** Return what a tool draws. */
+function kindOf(chosen: Tool): StrokeKind {
+  return chosen === "route" || chosen === "zone" ? chosen : "thing";
 }
 
 function pressed(points: readonly InkPoint[]): boolean {
@@ -270,7 +290,7 @@ function handled(
   /** The strokes of the thing at a point, or the one stroke that is near. */
   const touched = (point: Xy): string[] => {
     const stroke = near(point);
-    if (stroke?.route) return [stroke.id];
+    if (stroke && stroke.kind !== "thing") return [stroke.id];
     const thing = thingAt(point);
     const ids = thing === null ? [] : (answered.peek()?.strokesOf[thing] ?? []);
     return ids.length ? [...ids] : stroke ? [stroke.id] : [];
@@ -320,6 +340,7 @@ function handled(
     switch (tool.peek()) {
       case "pen":
       case "route":
+      case "zone":
         pending.stroke = [inkAt(event)];
         live.value = pending.stroke;
         break;
@@ -363,7 +384,8 @@ function handled(
     if (drawingBy !== event.pointerId) return;
     switch (tool.peek()) {
       case "pen":
-      case "route": {
+      case "route":
+      case "zone": {
         const events = event.getCoalescedEvents?.() ?? [];
         for (const each of events.length ? events : [event]) pending.stroke.push(inkAt(each));
         live.value = [...pending.stroke];
@@ -412,13 +434,14 @@ function handled(
     switch (chosen) {
       case "pen":
       case "route":
+      case "zone":
         if (lengthOf(points) * view.peek().scale >= TAP) {
           const began = points[0]?.[2] ?? 0;
           const timed = points.map(([x, y, t, p]) => [x, y, t - began, p] as const);
           const stroke: Stroke = {
             ...ink(timed, pressed(points)),
             id: newId(),
-            route: chosen === "route",
+            kind: kindOf(chosen),
           };
           addStroke(stroke);
         } else if (tapped) select(point);

@@ -4,26 +4,40 @@ import { RequestFailed, SketchmatchClient } from "@sketchmatch/client";
 import type { AlternativeMap, ObjectMatch } from "@sketchmatch/client/v1/match";
 import { batch, computed, effect, signal } from "@preact/signals";
 
-import { similarity } from "./carry";
-import { change, drawing, EMPTY, pinStrokes, replace, type Stroke } from "./document";
+import { type Carried, carry, type ToCarry } from "./carry";
+import {
+  carriedStrokes,
+  change,
+  drawing,
+  EMPTY,
+  pins,
+  pinStrokes,
+  replace,
+  type Stroke,
+  thingStrokes,
+} from "./document";
 import { ink, inkOf, packed, parseStrokes, unpacked } from "./files";
 import { isInside, type Xy } from "./geometry";
-import { keep, restored } from "./keep";
+import { keepDrawing, keepMap, restored } from "./keep";
 import {
   foundOtherwise,
   isPlace,
   openMap,
   openOutlines,
+  keepOnServer,
+  listStored,
   openPlace,
+  openStored,
   type Place,
   type PlaceMap,
   sampleSketch,
+  type StoredMap,
   type Tuned,
 } from "./maps";
 import { type Answered, type Progress, Session } from "./session";
 import { texts } from "./texts";
 
-export type Tool = "pen" | "route" | "eraser" | "move" | "name";
+export type Tool = "pen" | "route" | "zone" | "eraser" | "move" | "name";
 export type Theme = "auto" | "light" | "dark";
 export type Side = "sketch" | "map";
 
@@ -67,9 +81,9 @@ export const client = new SketchmatchClient(location.origin, {
   token: () => sessionStorage.getItem("token") ?? "",
 });
 
-/** Milliseconds from the pen up to the answer on the screen, the latest last. */
+/** Milliseconds from the pen up to the first answer on the screen, the latest last. */
 export const latencies: number[] = [];
-let asked = 0;
+let asked: number | null = null;
 
 const session = new Session(client, (event) =>
   batch(() => {
@@ -82,11 +96,12 @@ const session = new Session(client, (event) =>
         progress.value = event.progress;
         break;
       case "answered":
-        running.value = false;
+        running.value = event.answered.result.provisional;
         trouble.value = null;
         reading.value = 0;
         answered.value = event.answered;
-        requestAnimationFrame(() => latencies.push(performance.now() - asked));
+        if (asked !== null) timed(asked);
+        asked = null;
         break;
       case "failed":
         running.value = false;
@@ -96,15 +111,24 @@ const session = new Session(client, (event) =>
   }),
 );
 
+function timed(since: number): void {
+  requestAnimationFrame(() => latencies.push(performance.now() - since));
+}
+
 export const readings = computed(() => 1 + (answered.value?.result.alternatives.length ?? 0));
 
-/** The lines of the reading that is shown, in the order of the sketch. */
+/** The object map of the reading that is shown, in the order of the sketch. */
+const lines = computed<readonly ObjectMatch[]>(() => {
+  const result = answered.value?.result;
+  const other: AlternativeMap | undefined = result?.alternatives[reading.value - 1];
+  return (other ?? result)?.objectMatches ?? [];
+});
+
+/** Its lines as they are shown. */
 export const pairs = computed<readonly Pair[]>(() => {
   const found = answered.value;
   if (!found) return [];
-  const other: AlternativeMap | undefined = found.result.alternatives[reading.value - 1];
-  const lines: readonly ObjectMatch[] = (other ?? found.result).objectMatches;
-  return lines.map((line) => ({
+  return lines.value.map((line) => ({
     sketch: line.sketchObject,
     map: line.mapObject,
     probability: line.probability,
@@ -129,38 +153,62 @@ export const alone = computed(() => {
 
 /** What to ask where several readings fit: a sketched thing, and what it may be. */
 export const question = computed(() => {
-  const found = answered.value;
-  const ambiguity = found?.result.ambiguity;
-  const sketch = ambiguity?.decidingSketchObjects[0];
-  if (!found || !ambiguity || sketch === undefined) return null;
-  const maps = [
-    found.result.objectMatches,
-    ...ambiguity.alternatives.map((k) => found.result.alternatives[k]?.objectMatches ?? []),
-  ];
-  const candidates = new Set(
-    maps.flatMap((lines) =>
-      lines.filter((line) => line.sketchObject === sketch).map((line) => line.mapObject),
-    ),
+  const { question: asked, result } = answered.value ?? {};
+  if (!asked) return null;
+  const candidates = asked.options.flatMap(({ mapObject }) =>
+    mapObject === undefined ? [] : [mapObject],
   );
-  return { sketch, maps: ambiguity.maps, candidates: [...candidates] };
+  return { sketch: asked.sketchObject, maps: result?.ambiguity?.maps ?? 0, candidates };
 });
 
-/** The route as the robot would drive it; null where there is none, or nothing to carry it by. */
-export const carried = computed<readonly Xy[] | null>(() => {
-  const route = drawing.value.strokes.find((stroke) => stroke.route);
-  const found = answered.value;
-  if (!route || !found || elsewhere.value) return null;
-  const [from, to]: [Xy[], Xy[]] = [[], []];
-  for (const { sketch, map } of pairs.value) {
-    const [drawn, mapped] = [found.sketched[sketch], found.map.things[map]];
-    if (drawn && mapped) {
-      from.push(drawn.centroid);
-      to.push(mapped.centroid);
-    }
-  }
-  const carry = similarity(from, to);
-  return carry && route.points.map(([x, y]) => carry([x, -y]));
+/** Half the width of the robot, in metres: how far routes stay away from walls and things. */
+export const radius = signal(Number(localStorage.getItem("radius") ?? 0.2));
+
+export function setRadius(metres: number): void {
+  localStorage.setItem("radius", `${metres}`);
+  radius.value = metres;
+}
+
+/** Routes and zones as the robot would have them; empty where there are none, or nothing to carry by. */
+export const carried = signal<readonly Carried[]>([]);
+/** Why they could not be carried; empty if nothing is wrong. */
+export const carryTrouble = signal("");
+
+const toCarry = computed<ToCarry | null>(() => {
+  const [found, strokes] = [answered.value, carriedStrokes.value];
+  if (!found || !strokes.length || elsewhere.value || lines.value.length < 2) return null;
+  return { found, strokes, lines: lines.value, radius: radius.value };
 });
+
+let carrying: AbortController | null = null;
+
+effect(() => {
+  const wanted = toCarry.value;
+  carrying?.abort();
+  if (!wanted) {
+    carried.value = [];
+    carryTrouble.value = "";
+  } else if (!wanted.found.result.provisional) {
+    void carryOver(wanted, (carrying = new AbortController()).signal);
+  }
+});
+
+async function carryOver(wanted: ToCarry, signal: AbortSignal): Promise<void> {
+  try {
+    const there = await carry(client, wanted, signal);
+    if (signal.aborted) return;
+    carried.value = there;
+    carryTrouble.value = "";
+  } catch (thrown) {
+    if (signal.aborted) return;
+    const failed = RequestFailed.from(thrown);
+    carried.value = [];
+    carryTrouble.value = failed.message;
+    if (failed.failure !== "busy" && failed.failure !== "away") return;
+    const wait = 1000 * (failed.retrySeconds ?? 0) || 1500;
+    setTimeout(() => !signal.aborted && void carryOver(wanted, signal), wait);
+  }
+}
 
 /** Return the pair of a thing, if it has one. */
 export function pairOf(thing: Lit | null): Pair | undefined {
@@ -181,6 +229,14 @@ export function sketchName(index: number): string {
 
 export function mapName(index: number): string {
   return place.value?.things[index]?.label || texts.value.thing(index + 1);
+}
+
+/** Return what a route or a zone is called; zones without a name are counted. */
+export function nameOfCarried({ id, kind, name }: Carried): string {
+  const t = texts.value;
+  if (name || kind === "route") return name || t.route;
+  const zones = carried.value.filter((other) => other.kind === "zone");
+  return zones.length > 1 ? `${t.zone} ${1 + zones.findIndex((each) => each.id === id)}` : t.zone;
 }
 
 /** Say that a sketched thing is that thing of the map; null: none; undefined: say nothing of it. */
@@ -212,12 +268,12 @@ export function cancel(): void {
 
 export function matchNow(): void {
   const map = place.peek();
-  const now = drawing.peek();
+  const strokes = thingStrokes.peek();
   asked = performance.now();
   cancelled.value = false;
   trouble.value = null;
   asking.value = null;
-  if (map && now.strokes.some((stroke) => !stroke.route)) session.update(now, map);
+  if (map && strokes.length) session.update(strokes, pins.peek(), map);
   else {
     session.cancel();
     running.value = false;
@@ -253,6 +309,32 @@ export async function bringMap(files: readonly File[]): Promise<void> {
     change((now) => (now.pins.length ? { ...now, pins: [] } : now));
     notice.value = map.warnings.join(" ");
     refit.value++;
+  });
+}
+
+/** The maps that the server keeps; null where it keeps none. */
+export const storedMaps = signal<readonly StoredMap[] | null>(null);
+
+export async function lookForStored(): Promise<void> {
+  storedMaps.value = await listStored(client);
+}
+
+export async function chooseStored(map: StoredMap): Promise<void> {
+  await telling(async () => {
+    show(await openStored(client, map));
+    change((now) => (now.pins.length ? { ...now, pins: [] } : now));
+    refit.value++;
+  });
+}
+
+/** Have the server keep the map that is shown, under a name. */
+export async function keepShown(title: string): Promise<void> {
+  const map = place.peek();
+  if (!map) return;
+  await telling(async () => {
+    const kept = await keepOnServer(client, map, title);
+    if (place.peek() === map) place.value = kept;
+    notice.value = texts.peek().kept(title);
   });
 }
 
@@ -322,9 +404,10 @@ export async function start(): Promise<void> {
   replace(linked?.drawing ?? kept?.drawing ?? EMPTY);
   const map = linked?.place || kept?.map || "living-room";
   await mapped(map);
+  effect(() => void keepDrawing(drawing.value));
   effect(() => {
-    const [now, here] = [drawing.value, place.value];
-    if (here) void keep({ drawing: now, map: here.place || { ...here, found: null } });
+    const here = place.value;
+    if (here) void keepMap(here.place || here);
   });
 }
 
@@ -358,9 +441,17 @@ async function telling(work: () => Promise<void>): Promise<void> {
 }
 
 effect(() => {
-  void [drawing.value, place.value];
+  void [thingStrokes.value, pins.value, place.value];
   matchNow();
 });
+
+// Browsers hold few connections to a server, and a page that nobody looks at needs none.
+document.addEventListener("visibilitychange", () => {
+  if (document.visibilityState === "visible") session.wake();
+  else if (!running.peek()) session.rest();
+});
+addEventListener("pagehide", () => session.rest());
+addEventListener("pageshow", () => session.wake());
 
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");
 const paint = () => {

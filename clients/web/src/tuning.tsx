@@ -3,7 +3,7 @@
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 
-import type { Tuned } from "./maps";
+import { parametersOf } from "./maps";
 import { client, findOtherwise, place } from "./state";
 import { texts } from "./texts";
 
@@ -31,8 +31,7 @@ export function Tuning() {
   if (!found || !properties) return null;
   const change = (name: string, value: number | boolean | string) => {
     clearTimeout(waiting);
-    const values = Object.entries(found.parameters).filter(([, kept]) => kept !== null);
-    const tuned = { ...Object.fromEntries(values), [name]: value } as Tuned;
+    const tuned = { ...parametersOf(found), [name]: value };
     waiting = setTimeout(() => void findOtherwise(tuned), 120);
   };
   return (

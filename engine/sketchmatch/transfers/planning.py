@@ -33,6 +33,7 @@ _SLACK = 0.5
 _SHARES = np.arange(1, 17)[:, None, None] / 16.0
 """Where a leg is looked at."""
 _MOST_BARRIERS = 6
+_MOST_STRETCHES = 8
 _MANY_CELLS = 400_000
 """More than these are first searched by blocks."""
 
@@ -127,8 +128,11 @@ def kept_clear(
             until = at + int(blocked[0]) if blocked.size else last
             done, at = done + way.part(at + 1, until), until
             continue
-        beyond = at + 1 + int(np.argmax(clear[at + 1 :]))
-        found, sides = _around(way, at, beyond, obstacles, radius, landmarks)
+        # What is clear may be the hollow of a thing of which only the outline was seen.
+        for beyond in _reappearing(clear, at):
+            found, sides = _around(way, at, beyond, obstacles, radius, landmarks)
+            if found is not None:
+                break
         if found is None:
             sentence = (
                 f"What comes after point {len(done.points)} cannot be reached: obstacles leave no "
@@ -149,6 +153,12 @@ def kept_clear(
         moved = _moved(way, len(way.points) - 1, last, ChangeReason.MOVED_END, "ends", unit)
         changes.append(replace(moved, first=end, last=end))
     return _finished(done, changes)
+
+
+def _reappearing(clear: BoolArray, at: int) -> list[int]:
+    """Return where stretches that are clear begin after a point that ends one."""
+    begins = at + 1 + np.flatnonzero(clear[at + 1 :] & ~clear[at:-1])
+    return [int(k) for k in begins[:_MOST_STRETCHES]]
 
 
 def _finished(done: Way, changes: list[Change]) -> tuple[Way | None, tuple[Change, ...]]:
