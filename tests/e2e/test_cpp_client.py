@@ -8,7 +8,8 @@ import os
 import re
 import shutil
 import subprocess
-from contextlib import ExitStack
+import threading
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -92,6 +93,29 @@ def here(tmp_path):
     return tmp_path
 
 
+@contextmanager
+def phoenix_server(store):
+    """Run a server that, once it was killed, is started anew at the same place."""
+    first = Server("--store", str(store), "--workers", "0")
+    first.wait_for("serving$")
+    over = threading.Event()
+
+    def rise():
+        first.end(3600.0)
+        if not over.is_set():
+            with server("--store", str(store), "--workers", "0", "--address", first.address):
+                over.wait()
+
+    thread = threading.Thread(target=rise)
+    thread.start()
+    try:
+        yield first
+    finally:
+        over.set()
+        first.process.kill()
+        thread.join()
+
+
 @pytest.fixture(scope="module")
 def servers(tmp_path_factory):
     """Run servers of each kind, and return what the tests in C++ are told of them."""
@@ -110,12 +134,15 @@ def servers(tmp_path_factory):
         stack.callback(doomed.end)
         stack.callback(doomed.process.kill)
         doomed.wait_for("serving$")
+        phoenix = stack.enter_context(phoenix_server(folder / "store"))
         yield {
             "ADDRESS": plain.address,
             "TLS_ADDRESS": by_token.address.replace("127.0.0.1", "localhost"),
             "MUTUAL_ADDRESS": mutual.address.replace("127.0.0.1", "localhost"),
             "DOOMED_ADDRESS": doomed.address,
             "DOOMED_PID": str(doomed.process.pid),
+            "PHOENIX_ADDRESS": phoenix.address,
+            "PHOENIX_PID": str(phoenix.process.pid),
             "CA": str(authority.certificate),
             "CERTIFICATE": str(robot.certificate),
             "KEY": str(robot.key),
@@ -217,6 +244,7 @@ SAID = (
     "8 of 8 sketched objects matched",
     "desk is object",
     "8 of 8 sketched objects matched",
+    " events\n",
     "TOO_FEW_OBJECTS in ",
     "",
     "sketchmatch.v1\n",

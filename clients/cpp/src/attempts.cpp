@@ -13,6 +13,9 @@ namespace {
 
 constexpr Seconds kShortestPause{0.1};
 constexpr Seconds kLongestPause{5.0};
+constexpr Seconds kLongestPauseBegun{1.0};
+// In which a server is expected back that had begun to answer.
+constexpr std::chrono::seconds kAway{60};
 // gRPC fails at once where the deadline is further away than its clock can tell.
 constexpr Seconds kForEver{1e8};
 
@@ -48,19 +51,32 @@ void Attempts::limit(grpc::ClientContext& context) const {
   }
 }
 
-std::optional<Seconds> Attempts::pause_after(const Failure& failure) {
+std::optional<Seconds> Attempts::pause_after(const Failure& failure, bool begun) {
   const bool busy = failure.kind == Failure::Kind::busy && failure.retry_after.has_value();
   if (retries_ < 1 || (!busy && failure.kind != Failure::Kind::unavailable)) {
     return std::nullopt;
   }
   const Seconds asked = busy ? *failure.retry_after : Seconds(0.0);
   const Seconds pause = std::max(asked, backoff_) * between(1.0, 1.5);
-  if (deadline_ && Seconds(*deadline_ - std::chrono::steady_clock::now()) <= pause) {
-    return std::nullopt;
+  const auto now = std::chrono::steady_clock::now();
+  if (begun && !gives_up_) {
+    gives_up_ = now + kAway;
   }
-  --retries_;
-  backoff_ = std::min(2.0 * backoff_, kLongestPause);
+  for (const auto& end : {deadline_, gives_up_}) {
+    if (end && Seconds(*end - now) <= pause) {
+      return std::nullopt;
+    }
+  }
+  if (!begun) {
+    --retries_;
+  }
+  backoff_ = std::min(2.0 * backoff_, begun ? kLongestPauseBegun : kLongestPause);
   return pause;
+}
+
+void Attempts::succeeded() {
+  backoff_ = kShortestPause;
+  gives_up_.reset();
 }
 
 }  // namespace sketchmatch::detail

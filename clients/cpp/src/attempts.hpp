@@ -29,12 +29,18 @@ class Attempts {
   /// Returns after which time to send the request again; none if it is in vain. It is no less than
   /// the server asks for, grows from one attempt to the next, and differs from caller to caller, so
   /// that not all come back at once.
-  std::optional<Seconds> pause_after(const Failure& failure);
+  /// @param begun Whether the answer had begun: that is worth a minute's attempts, whatever their
+  ///   number, unless there are to be none.
+  std::optional<Seconds> pause_after(const Failure& failure, bool begun = false);
+
+  /// Hears that the server answers.
+  void succeeded();
 
  private:
   int retries_;
   std::optional<std::chrono::steady_clock::time_point> deadline_;
   Seconds backoff_;
+  std::optional<std::chrono::steady_clock::time_point> gives_up_;
 };
 
 }  // namespace sketchmatch::detail

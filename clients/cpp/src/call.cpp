@@ -18,13 +18,16 @@ std::optional<Seconds> Connection::limit(const CallOptions& call) const {
 }
 
 struct MatchStream::Attempt {
-  Attempt(const Connection& connection, v1::MatchService::Stub& stub,
-          const v1::MatchRequest& request, const Attempts& attempts,
-          const std::shared_ptr<CancellationState>& cancellation)
+  Attempt(const Connection& connection, v1::MatchService::Stub& stub, const Course& course,
+          const Attempts& attempts, const std::shared_ptr<CancellationState>& cancellation)
       : stop(cancellation, [this] { context.TryCancel(); }) {
     attempts.limit(context);
     connection.authorize(context);
-    reader = stub.Match(&context, request);
+    if (const auto watching = course.watching()) {
+      watched = stub.WatchMatch(&context, *watching);
+    } else {
+      begun = stub.Match(&context, course.request().value());
+    }
   }
   Attempt(const Attempt&) = delete;
   Attempt& operator=(const Attempt&) = delete;
@@ -33,30 +36,47 @@ struct MatchStream::Attempt {
   ~Attempt() {
     if (!finished) {
       context.TryCancel();
-      reader->Finish();
+      finish();
     }
+  }
+
+  /// Reads the next event; false at the end.
+  bool read(v1::MatchResponse& event) const {
+    if (begun) {
+      return begun->Read(&event);
+    }
+    v1::WatchMatchResponse response;
+    const bool is_one = watched->Read(&response);
+    event.Swap(response.mutable_event());
+    return is_one;
+  }
+
+  grpc::Status finish() {
+    finished = true;
+    return begun ? begun->Finish() : watched->Finish();
   }
 
   grpc::ClientContext context;
   OnCancel stop;
-  std::unique_ptr<grpc::ClientReader<v1::MatchResponse>> reader;
+  // One of these.
+  std::unique_ptr<grpc::ClientReader<v1::MatchResponse>> begun;
+  std::unique_ptr<grpc::ClientReader<v1::WatchMatchResponse>> watched;
   bool finished = false;
 };
 
-MatchStream::MatchStream(std::shared_ptr<const Connection> connection, v1::MatchRequest request,
+MatchStream::MatchStream(std::shared_ptr<const Connection> connection, Course course,
                          const CallOptions& call)
     : connection_(std::move(connection)),
       stub_(v1::MatchService::NewStub(connection_->channel)),
-      request_(std::move(request)),
+      course_(std::move(course)),
       limit_(connection_->limit(call)),
       own_(std::make_shared<CancellationState>()),
-      callers_(call.cancellation.state(), [own = own_] { own->cancel(); }) {}
+      callers_(call.cancellation.state(), [this] { cancel(); }) {}
 
-MatchStream::~MatchStream() = default;
+MatchStream::~MatchStream() { stop_what_keeps_running(); }
 
 std::optional<MatchEvent> MatchStream::next() {
   while (const auto message = read()) {
-    told_ = true;
     if (auto event = decoded(*message)) {
       keep(*event);
       return event;
@@ -94,35 +114,61 @@ std::optional<v1::MatchResponse> MatchStream::read() {
   }
   while (!ended_) {
     if (!attempt_) {
-      attempt_ = std::make_unique<Attempt>(*connection_, *stub_, request_, *attempts_, own_);
+      attempt_ = std::make_unique<Attempt>(*connection_, *stub_, course_, *attempts_, own_);
     }
     v1::MatchResponse message;
-    if (attempt_->reader->Read(&message)) {
-      return message;
+    if (attempt_->read(message)) {
+      attempts_->succeeded();
+      if (course_.take(message)) {
+        return message;
+      }
+      continue;
     }
-    const grpc::Status status = attempt_->reader->Finish();
-    attempt_->finished = true;
+    const grpc::Status status = attempt_->finish();
     attempt_.reset();
     if (status.ok()) {
       ended_ = true;
       break;
     }
-    failure_ = failure_of(status, connection_->address);
-    if (own_->cancelled() && failure_->kind == Failure::Kind::cancelled) {
-      failure_->message = "the match was cancelled before its end";
-    }
-    const auto pause = told_ ? std::nullopt : attempts_->pause_after(*failure_);
-    if (pause) {
-      own_->wait_for(*pause);
-      failure_.reset();
-    } else {
+    const auto failure = failure_of(status, connection_->address);
+    if (course_.ends(failure)) {
       ended_ = true;
+    } else if (const auto pause = course_.pause_after(failure, *attempts_)) {
+      own_->wait_for(*pause);
+    } else {
+      end(failure);
     }
   }
   if (failure_) {
     failure_->raise();
   }
   return std::nullopt;
+}
+
+void MatchStream::end(Failure failure) {
+  if (own_->cancelled() && failure.kind == Failure::Kind::cancelled) {
+    failure.message = "the match was cancelled before its end";
+  }
+  stop_what_keeps_running();
+  ended_ = true;
+  failure_ = std::move(failure);
+}
+
+void MatchStream::stop_what_keeps_running() {
+  constexpr std::chrono::seconds kCancelling{10};
+  const auto& request = course_.request();
+  if (!cancelled_ || ended_ || course_.match_id().empty() ||
+      (request && !request->keep_running())) {
+    return;
+  }
+  grpc::ClientContext context;
+  Attempts(0, kCancelling).limit(context);
+  connection_->authorize(context);
+  v1::CancelMatchRequest cancel;
+  cancel.set_match_id(course_.match_id());
+  v1::CancelMatchResponse answer;
+  // Whether it heard, the match itself tells.
+  static_cast<void>(stub_->CancelMatch(&context, cancel, &answer));
 }
 
 }  // namespace sketchmatch::detail

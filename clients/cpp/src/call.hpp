@@ -6,6 +6,8 @@
 #include <grpcpp/client_context.h>
 #include <sketchmatch/v1/match_service.grpc.pb.h>
 
+#include <atomic>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <sketchmatch/match.hpp>
@@ -14,6 +16,7 @@
 
 #include "attempts.hpp"
 #include "cancellation_state.hpp"
+#include "course.hpp"
 #include "statuses.hpp"
 
 namespace sketchmatch::detail {
@@ -63,8 +66,7 @@ Answer asked(const Connection& connection, const CallOptions& call, const Ask& a
 /// A match that a server is doing.
 class MatchStream {
  public:
-  MatchStream(std::shared_ptr<const Connection> connection, v1::MatchRequest request,
-              const CallOptions& call);
+  MatchStream(std::shared_ptr<const Connection> connection, Course course, const CallOptions& call);
   MatchStream(const MatchStream&) = delete;
   MatchStream& operator=(const MatchStream&) = delete;
   MatchStream(MatchStream&&) = delete;
@@ -77,25 +79,36 @@ class MatchStream {
   /// Waits for the end.
   Match result(const ProgressCallback& on_progress);
 
-  /// Stops the match; any thread may.
-  void cancel() { own_->cancel(); }
+  /// The number of the last event that the server told.
+  [[nodiscard]] std::uint64_t last_event() const { return course_.after(); }
+
+  /// Stops the match, also one that is to keep running; any thread may.
+  void cancel() {
+    cancelled_ = true;
+    own_->cancel();
+  }
+
+  /// Reads it no more; any thread may.
+  void leave() { own_->cancel(); }
 
  private:
   /// One attempt: it is stopped where it is left.
   struct Attempt;
 
   std::optional<v1::MatchResponse> read();
+  void end(Failure failure);
+  void stop_what_keeps_running();
   void keep(const MatchEvent& event);
 
   std::shared_ptr<const Connection> connection_;
   std::unique_ptr<v1::MatchService::Stub> stub_;
-  v1::MatchRequest request_;
+  Course course_;
   std::optional<Seconds> limit_;
+  std::atomic<bool> cancelled_ = false;
   std::shared_ptr<CancellationState> own_;
   OnCancel callers_;
   std::optional<Attempts> attempts_;
   std::unique_ptr<Attempt> attempt_;
-  bool told_ = false;
   bool ended_ = false;
   std::optional<Failure> failure_;
   Match match_;

@@ -122,9 +122,9 @@ class PendingMatch {
 
   void cancel() { stream_->cancel(); }
 
-  /// Stops the match, and waits until its thread has ended, unless that is this very thread.
+  /// Leaves the match, and waits until its thread has ended, unless that is this very thread.
   void end() {
-    cancel();
+    stream_->leave();
     if (thread_.get_id() == std::this_thread::get_id()) {
       thread_.detach();
     } else {
@@ -176,6 +176,8 @@ Match MatchCall::result(const ProgressCallback& on_progress) {
   return stream_->result(on_progress);
 }
 
+std::uint64_t MatchCall::last_event() const { return stream_->last_event(); }
+
 void MatchCall::cancel() { stream_->cancel(); }
 
 AsyncMatch::AsyncMatch(std::shared_ptr<detail::PendingMatch> pending)
@@ -202,14 +204,15 @@ void AsyncMatch::cancel() { pending_->cancel(); }
 
 struct Client::Impl {
   std::shared_ptr<const detail::Connection> connection;
+  std::unique_ptr<v1::MatchService::Stub> matches;
   std::unique_ptr<v1::SceneService::Stub> scenes;
   std::unique_ptr<v1::CatalogService::Stub> catalog;
 
   [[nodiscard]] std::unique_ptr<detail::MatchStream> stream(const Source& sketch, const Source& map,
                                                             const MatchOptions& options,
                                                             const CallOptions& call) const {
-    return std::make_unique<detail::MatchStream>(connection,
-                                                 detail::match_request(sketch, map, options), call);
+    return std::make_unique<detail::MatchStream>(
+        connection, detail::Course(detail::match_request(sketch, map, options)), call);
   }
 };
 
@@ -226,7 +229,8 @@ Client::Client(const std::string& address, const ClientOptions& options) {
   impl_ = std::make_shared<const Impl>(
       Impl{std::make_shared<const detail::Connection>(detail::Connection{
                address, access.authorization, timeout, options.retries, channel}),
-           v1::SceneService::NewStub(channel), v1::CatalogService::NewStub(channel)});
+           v1::MatchService::NewStub(channel), v1::SceneService::NewStub(channel),
+           v1::CatalogService::NewStub(channel)});
 }
 
 Client::Client(Client&& other) noexcept = default;
@@ -247,6 +251,31 @@ AsyncMatch Client::match_async(const Source& sketch, const Source& map, const Ma
                                MatchCallbacks callbacks, const CallOptions& call) const {
   return AsyncMatch(detail::PendingMatch::started(impl_->stream(sketch, map, options, call),
                                                   std::move(callbacks)));
+}
+
+MatchCall Client::watch(const std::string& match_id, std::uint64_t after,
+                        const CallOptions& call) const {
+  return MatchCall(std::make_unique<detail::MatchStream>(impl_->connection,
+                                                         detail::Course(match_id, after), call));
+}
+
+MatchRecord Client::get_match(const std::string& match_id, const CallOptions& call) const {
+  v1::GetMatchRequest request;
+  request.set_match_id(detail::checked_text(match_id, "match_id"));
+  return detail::decoded(detail::asked<v1::GetMatchResponse>(
+      *impl_->connection, call, [&](grpc::ClientContext* context, v1::GetMatchResponse* answer) {
+        return impl_->matches->GetMatch(context, request, answer);
+      }));
+}
+
+MatchSummary Client::cancel_match(const std::string& match_id, const CallOptions& call) const {
+  v1::CancelMatchRequest request;
+  request.set_match_id(detail::checked_text(match_id, "match_id"));
+  const auto answer = detail::asked<v1::CancelMatchResponse>(
+      *impl_->connection, call, [&](grpc::ClientContext* context, v1::CancelMatchResponse* told) {
+        return impl_->matches->CancelMatch(context, request, told);
+      });
+  return detail::decoded(answer.match());
 }
 
 Segmentation Client::segment(const Source& source, const SegmentOptions& options,

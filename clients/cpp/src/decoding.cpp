@@ -1,6 +1,7 @@
 #include "decoding.hpp"
 
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace sketchmatch {
@@ -33,6 +34,11 @@ namespace {
 Seconds decoded(const google::protobuf::Duration& message) {
   return std::chrono::seconds(message.seconds()) +
          Seconds(std::chrono::nanoseconds(message.nanos()));
+}
+
+MatchSummary::Time decoded(const google::protobuf::Timestamp& message) {
+  return MatchSummary::Time(std::chrono::duration_cast<MatchSummary::Time::duration>(
+      std::chrono::seconds(message.seconds()) + std::chrono::nanoseconds(message.nanos())));
 }
 
 Parameters decoded(const google::protobuf::Struct& message);
@@ -127,7 +133,11 @@ std::vector<std::uint32_t> numbers(const Field& field) {
 }
 
 SceneObject decoded(const v1::SceneObject& message) {
-  SceneObject object{{}, message.label(), message.area(), decoded(message.centroid())};
+  SceneObject object{{},
+                     message.label(),
+                     message.area(),
+                     decoded(message.centroid()),
+                     SKETCHMATCH_KNOWN(message, certainty)};
   for (const auto& ring : message.rings()) {
     object.rings.push_back(all(ring.points()));
   }
@@ -237,6 +247,7 @@ MatchResult decoded(const v1::MatchResult& message) {
   if (message.has_ambiguity()) {
     result.ambiguity = decoded(message.ambiguity());
   }
+  result.provisional = message.provisional();
   return result;
 }
 
@@ -298,6 +309,13 @@ ServerLimits decoded(const v1::ServerLimits& message) {
   if (message.has_max_wait()) {
     limits.max_wait = decoded(message.max_wait());
   }
+  if (message.has_default_time_budget()) {
+    limits.default_time_budget = decoded(message.default_time_budget());
+  }
+  limits.max_matches_per_caller = SKETCHMATCH_KNOWN(message, max_matches_per_caller);
+  limits.max_requests_per_minute = SKETCHMATCH_KNOWN(message, max_requests_per_minute);
+  limits.max_comparisons = SKETCHMATCH_KNOWN(message, max_comparisons);
+  limits.max_candidates = SKETCHMATCH_KNOWN(message, max_candidates);
   return limits;
 }
 
@@ -316,6 +334,28 @@ std::optional<MatchEvent> decoded(const v1::MatchResponse& message) {
     default:
       return std::nullopt;
   }
+}
+
+MatchSummary decoded(const v1::MatchSummary& message) {
+  return {message.match_id(),
+          message.request_id(),
+          static_cast<MatchState>(message.state()),
+          decoded(message.created_at()),
+          message.has_ended_at() ? std::optional(decoded(message.ended_at())) : std::nullopt,
+          static_cast<Outcome>(message.outcome()),
+          message.last_event(),
+          message.error_message(),
+          message.error_reason()};
+}
+
+MatchRecord decoded(const v1::GetMatchResponse& message) {
+  MatchRecord record{decoded(message.match()), {}};
+  for (const auto& each : message.events()) {
+    if (auto event = decoded(each)) {
+      record.events.push_back({each.number(), *std::move(event)});
+    }
+  }
+  return record;
 }
 
 Segmentation decoded(const v1::SegmentResponse& message) {

@@ -15,6 +15,8 @@ namespace sketchmatch::detail {
 
 /// Returns an event; none for one of a kind that this version does not know.
 std::optional<MatchEvent> decoded(const v1::MatchResponse& message);
+MatchSummary decoded(const v1::MatchSummary& message);
+MatchRecord decoded(const v1::GetMatchResponse& message);
 Segmentation decoded(const v1::SegmentResponse& message);
 Catalogue decoded(const v1::ListAlgorithmsResponse& message);
 ServerInfo decoded(const v1::GetServerInfoResponse& message);

@@ -187,6 +187,12 @@ Failure failure_of(const grpc::Status& status, const std::string& address) {
     case grpc::StatusCode::CANCELLED:
       failure.kind = Failure::Kind::cancelled;
       return failure;
+    case grpc::StatusCode::NOT_FOUND:
+      failure.kind = Failure::Kind::not_found;
+      return failure;
+    case grpc::StatusCode::FAILED_PRECONDITION:
+      failure.kind = Failure::Kind::store;
+      return failure;
     case grpc::StatusCode::UNIMPLEMENTED:
       failure.kind = Failure::Kind::not_supported;
       return failure;
@@ -211,6 +217,10 @@ void Failure::raise() const {
       throw DeadlineExceededError(message, reason);
     case Kind::not_authenticated:
       throw NotAuthenticatedError(message, reason);
+    case Kind::not_found:
+      throw NotFoundError(message, reason);
+    case Kind::store:
+      throw StoreError(message, reason);
     case Kind::not_supported:
       throw NotSupportedError(message, reason);
     case Kind::cancelled:

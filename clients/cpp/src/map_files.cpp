@@ -17,6 +17,8 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMostBytes = std::size_t{64} * 1024;
 constexpr std::size_t kMostFiles = 200;  // a folder of more is no map's
 constexpr std::size_t kMostNamed = 5;
+constexpr std::size_t kMostObjectBytes = std::size_t{16} * 1024 * 1024;
+constexpr const char* kObjects = ".objects.geojson";
 constexpr const char* kRemedy = "give the file that map_server saved";
 constexpr std::array kYamls{".yaml", ".yml"};
 constexpr std::array kPictures{".bmp", ".jpeg", ".jpg", ".pbm", ".pgm",
@@ -202,6 +204,21 @@ FoundFile find_picture(const fs::path& file, const std::vector<std::string>& ima
     }
   }
   return {there, {}};
+}
+
+std::optional<FoundObjects> find_objects(const fs::path& file) {
+  const auto path = file.parent_path() / (file.stem().string() + kObjects);
+  std::error_code ignored;
+  if (!is_file(path) || fs::file_size(path, ignored) > kMostObjectBytes) {
+    return std::nullopt;
+  }
+  try {
+    return FoundObjects{decoded_yaml(read_bytes(path)),
+                        "objects are those of " + path.filename().string() +
+                            " beside the map, unless a segmenter is chosen"};
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
 }
 
 }  // namespace sketchmatch::detail

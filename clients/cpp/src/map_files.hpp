@@ -48,4 +48,14 @@ std::vector<std::string> images_of(const std::string& text);
 /// than the one that saved it, one of that name beside the YAML file is taken.
 FoundFile find_picture(const std::filesystem::path& file, const std::vector<std::string>& images);
 
+/// What a map's objects are, and what there is to say of where that stands.
+struct FoundObjects {
+  std::string text;
+  std::string note;
+};
+
+/// Returns the text of the file beside a map, with its name, that says what its objects are; none
+/// where there is none, or it cannot be one. Whether it is of this map is the server's to say.
+std::optional<FoundObjects> find_objects(const std::filesystem::path& file);
+
 }  // namespace sketchmatch::detail

@@ -188,6 +188,9 @@ v1::MatchRequest match_request(const Source& sketch, const Source& map,
       synonyms->add_labels(checked_text(label, field));
     }
   }
+  request.set_request_id(checked_text(options.request_id, "request_id"));
+  request.set_keep_running(options.keep_running);
+  request.set_priority(static_cast<v1::Priority>(options.priority));
   return request;
 }
 

@@ -28,13 +28,19 @@ std::string label_of(const std::vector<std::string>& labels, std::size_t number)
   return detail::checked_text(labels.at(number), "labels[" + std::to_string(number) + "]");
 }
 
-void check_labels(const std::vector<std::string>& labels, std::size_t count, const char* what) {
-  if (!labels.empty() && labels.size() != count) {
-    throw InvalidRequestError("labels has " + std::to_string(labels.size()) + " names for " +
+/// Refuses what is not one for each thing.
+void check_count(const std::string& field, std::size_t given, const char* of, std::size_t count,
+                 const char* what) {
+  if (given != 0 && given != count) {
+    throw InvalidRequestError(field + " has " + std::to_string(given) + " " + of + " for " +
                                   std::to_string(count) + " " + what +
                                   "; give one for each, or none",
-                              "INVALID_FIELD", "labels");
+                              "INVALID_FIELD", field);
   }
+}
+
+void check_labels(const std::vector<std::string>& labels, std::size_t count, const char* what) {
+  check_count("labels", labels.size(), "names", count, what);
 }
 
 void write(const Ring& ring, v1::Ring& message) {
@@ -82,28 +88,39 @@ Source strokes(const std::vector<std::vector<StrokePoint>>& strokes,
 }
 
 Source polygons(const std::vector<Ring>& outlines, const std::vector<std::string>& labels,
-                YAxis y_axis) {
+                YAxis y_axis, const std::vector<std::optional<double>>& certainties) {
   std::vector<std::vector<Ring>> whole;
   whole.reserve(outlines.size());
   for (const auto& outline : outlines) {
     whole.push_back({outline});
   }
-  return polygons_with_holes(whole, labels, y_axis);
+  return polygons_with_holes(whole, labels, y_axis, certainties);
 }
 
 Source polygons_with_holes(const std::vector<std::vector<Ring>>& polygons,
-                           const std::vector<std::string>& labels, YAxis y_axis) {
+                           const std::vector<std::string>& labels, YAxis y_axis,
+                           const std::vector<std::optional<double>>& certainties) {
   check_labels(labels, polygons.size(), "polygons");
+  check_count("certainties", certainties.size(), "numbers", polygons.size(), "polygons");
   v1::Source source;
   auto* set = source.mutable_polygon_set();
   set->set_y_axis(written(y_axis));
   for (std::size_t k = 0; k < polygons.size(); ++k) {
     auto* polygon = set->add_polygons();
     polygon->set_label(label_of(labels, k));
+    if (!certainties.empty() && certainties.at(k)) {
+      polygon->set_certainty(*certainties.at(k));
+    }
     for (const auto& ring : polygons.at(k)) {
       write(ring, *polygon->add_rings());
     }
   }
+  return Source(source);
+}
+
+Source stored_scene(const std::string& name) {
+  v1::Source source;
+  source.set_stored_scene(detail::checked_text(name, "stored_scene"));
   return Source(source);
 }
 
@@ -139,12 +156,16 @@ Source map_server_map(const std::filesystem::path& path) {
           field + " (" + detail::text_of(file) + ") names no picture; add a line `image: FILE`",
           "INVALID_FILE", field);
     }
-    const auto picture = detail::find_picture(file, images);
+    auto picture = detail::find_picture(file, images);
     v1::Source source;
     auto* map = source.mutable_map_server_map();
     map->set_yaml(text);
     map->set_image(bytes_of(picture.path, "map_server_map.image",
                             ", as " + detail::text_of(file) + " names it"));
+    if (const auto objects = detail::find_objects(file)) {
+      map->set_objects(objects->text);
+      picture.notes.push_back(objects->note);
+    }
     return Source(source, picture.notes);
   } catch (const detail::MapFileError& error) {
     throw InvalidRequestError(field + " (" + detail::text_of(path) + ") " + error.what(),

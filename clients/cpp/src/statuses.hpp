@@ -19,6 +19,8 @@ struct Failure {
     busy,
     deadline_exceeded,
     not_authenticated,
+    not_found,
+    store,
     not_supported,
     cancelled,
     failed

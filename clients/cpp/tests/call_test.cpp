@@ -108,9 +108,8 @@ TEST_F(Calls, WhatWouldFailAgainIsNotSentAgain) {
   EXPECT_EQ(server.requests().size(), 3U);
 }
 
-TEST_F(Calls, AMatchThatHasBegunIsNotSentAgain) {
-  server.events.resize(3);
-  server.breaks_off = true;
+TEST_F(Calls, AMatchOfAServerThatNumbersNoEventsIsNotSentAgain) {
+  server.breaks_after = 3;
   EXPECT_THROW(static_cast<void>(client.match(room(), room())), ServerUnavailableError);
   EXPECT_EQ(server.requests().size(), 1U);
 }
@@ -118,6 +117,10 @@ TEST_F(Calls, AMatchThatHasBegunIsNotSentAgain) {
 TEST_F(Calls, EachStatusIsItsOwnError) {
   server.fail(status_of(grpc::StatusCode::UNIMPLEMENTED, "no"), 1);
   EXPECT_THROW(static_cast<void>(client.server_info()), NotSupportedError);
+  server.fail(status_of(grpc::StatusCode::NOT_FOUND, "no"), 1);
+  EXPECT_THROW(static_cast<void>(client.server_info()), NotFoundError);
+  server.fail(status_of(grpc::StatusCode::FAILED_PRECONDITION, "no"), 1);
+  EXPECT_THROW(static_cast<void>(client.server_info()), StoreError);
   server.fail(status_of(grpc::StatusCode::UNAUTHENTICATED, "no"), 1);
   EXPECT_THROW(static_cast<void>(client.server_info()), NotAuthenticatedError);
   server.fail(status_of(grpc::StatusCode::PERMISSION_DENIED, "no"), 1);

@@ -17,6 +17,16 @@ google::protobuf::Duration encoded(Seconds value) {
   return message;
 }
 
+google::protobuf::Timestamp encoded(MatchSummary::Time value) {
+  constexpr std::int64_t kNanos = 1'000'000'000;
+  const auto count =
+      std::chrono::duration_cast<std::chrono::nanoseconds>(value.time_since_epoch()).count();
+  google::protobuf::Timestamp message;
+  message.set_seconds(count / kNanos);
+  message.set_nanos(static_cast<std::int32_t>(count % kNanos));
+  return message;
+}
+
 google::protobuf::Value encoded(const Value& value) {
   google::protobuf::Value message;
   const auto& kind = value.kind();
@@ -94,6 +104,7 @@ v1::Scene encoded(const Scene& value) {
     object->set_label(each.label);
     object->set_area(each.area);
     *object->mutable_centroid() = encoded(each.centroid);
+    SET_IF_KNOWN(each, *object, certainty);
     for (const auto& ring : each.rings) {
       auto* points = object->add_rings();
       for (const auto& corner : ring) {
@@ -237,6 +248,23 @@ v1::MatchResult encoded(const MatchResult& value) {
     put_all(value.ambiguity->alternatives, ambiguity->mutable_alternatives());
     put_all(value.ambiguity->deciding_sketch_objects, ambiguity->mutable_deciding_sketch_objects());
   }
+  message.set_provisional(value.provisional);
+  return message;
+}
+
+v1::MatchSummary encoded(const MatchSummary& value) {
+  v1::MatchSummary message;
+  message.set_match_id(value.match_id);
+  message.set_request_id(value.request_id);
+  message.set_state(static_cast<v1::MatchState>(value.state));
+  *message.mutable_created_at() = encoded(value.created_at);
+  if (value.ended_at) {
+    *message.mutable_ended_at() = encoded(*value.ended_at);
+  }
+  message.set_outcome(static_cast<v1::Outcome>(value.outcome));
+  message.set_last_event(value.last_event);
+  message.set_error_message(value.error_message);
+  message.set_error_reason(value.error_reason);
   return message;
 }
 
@@ -313,6 +341,13 @@ v1::GetServerInfoResponse encoded(const ServerInfo& value) {
   if (value.limits.max_wait) {
     *limits->mutable_max_wait() = encoded(*value.limits.max_wait);
   }
+  if (value.limits.default_time_budget) {
+    *limits->mutable_default_time_budget() = encoded(*value.limits.default_time_budget);
+  }
+  SET_IF_KNOWN(value.limits, *limits, max_matches_per_caller);
+  SET_IF_KNOWN(value.limits, *limits, max_requests_per_minute);
+  SET_IF_KNOWN(value.limits, *limits, max_comparisons);
+  SET_IF_KNOWN(value.limits, *limits, max_candidates);
   *message.mutable_uptime() = encoded(value.uptime);
   return message;
 }

@@ -11,6 +11,7 @@ v1::MatchAccepted encoded(const MatchAccepted& value);
 v1::MatchScenes encoded(const MatchScenes& value);
 v1::MatchProgress encoded(const Progress& value);
 v1::MatchResult encoded(const MatchResult& value);
+v1::MatchSummary encoded(const MatchSummary& value);
 v1::SegmentResponse encoded(const Segmentation& value);
 v1::ListAlgorithmsResponse encoded(const Catalogue& value);
 v1::GetServerInfoResponse encoded(const ServerInfo& value);

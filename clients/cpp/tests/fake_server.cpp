@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <thread>
+#include <utility>
 
 #include "golden.hpp"
 
@@ -19,10 +20,11 @@ class FakeServer::Matches final : public v1::MatchService::Service {
     if (auto status = fake_.take(*request, *context); !status.ok()) {
       return status;
     }
-    for (const auto& event : fake_.events) {
-      writer->Write(event);
+    const auto breaks = fake_.take_break();
+    for (std::size_t k = 0; k < breaks.value_or(fake_.events.size()); ++k) {
+      writer->Write(fake_.events.at(k));
     }
-    if (fake_.breaks_off) {
+    if (breaks) {
       return {grpc::StatusCode::UNAVAILABLE, "away"};
     }
     v1::MatchResponse progress;
@@ -35,6 +37,36 @@ class FakeServer::Matches final : public v1::MatchService::Service {
       fake_.cancelled();
     }
     return grpc::Status::OK;
+  }
+
+  grpc::Status WatchMatch(grpc::ServerContext* context, const v1::WatchMatchRequest* request,
+                          grpc::ServerWriter<v1::WatchMatchResponse>* writer) override {
+    if (auto status = fake_.take(*request, *context); !status.ok()) {
+      return status;
+    }
+    if (fake_.forgets) {
+      return {grpc::StatusCode::NOT_FOUND, "no match is called so"};
+    }
+    for (const auto& event : fake_.events) {
+      if (event.number() > request->after()) {
+        v1::WatchMatchResponse response;
+        *response.mutable_event() = event;
+        writer->Write(response);
+      }
+    }
+    return grpc::Status::OK;
+  }
+
+  grpc::Status GetMatch(grpc::ServerContext* context, const v1::GetMatchRequest* request,
+                        v1::GetMatchResponse* answer) override {
+    *answer = fake_.record;
+    return fake_.take(*request, *context);
+  }
+
+  grpc::Status CancelMatch(grpc::ServerContext* context, const v1::CancelMatchRequest* request,
+                           v1::CancelMatchResponse* answer) override {
+    *answer = fake_.stopped;
+    return fake_.take(*request, *context);
   }
 
  private:
@@ -121,6 +153,11 @@ std::vector<std::string> FakeServer::authorizations() {
 bool FakeServer::wait_until_cancelled() {
   std::unique_lock lock(mutex_);
   return changed_.wait_for(lock, std::chrono::minutes(1), [this] { return cancelled_; });
+}
+
+std::optional<std::size_t> FakeServer::take_break() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(breaks_after, std::nullopt);
 }
 
 grpc::Status FakeServer::take(const google::protobuf::Message& request,

@@ -8,6 +8,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <sketchmatch/raw.hpp>
 #include <string>
 #include <vector>
@@ -34,8 +35,13 @@ class FakeServer {
   v1::GetServerInfoResponse info;
   /// Whether a match goes on with its first progress until somebody stops it.
   bool endless = false;
-  /// Whether a match breaks off after its events.
-  bool breaks_off = false;
+  /// After how many events the link of the next match is lost.
+  std::optional<std::size_t> breaks_after;
+  /// Whether it knows no match that was begun before.
+  bool forgets = false;
+  /// What it says of matches that have a name.
+  v1::GetMatchResponse record;
+  v1::CancelMatchResponse stopped;
 
   /// Fails with a status, so many times.
   void fail(const google::rpc::Status& status, int times = 1'000'000);
@@ -52,6 +58,7 @@ class FakeServer {
   class Scenes;
   class Catalog;
 
+  std::optional<std::size_t> take_break();
   grpc::Status take(const google::protobuf::Message& request, const grpc::ServerContext& context);
   void cancelled();
 

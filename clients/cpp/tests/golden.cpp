@@ -9,8 +9,10 @@
 
 namespace sketchmatch::test {
 
+std::string golden_folder() { return SKETCHMATCH_GOLDEN_DIR; }
+
 void read_golden(const std::string& name, google::protobuf::Message& message) {
-  std::ifstream file(std::string(SKETCHMATCH_GOLDEN_DIR) + "/" + name + ".json");
+  std::ifstream file(golden_folder() + "/" + name + ".json");
   const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   const auto status = google::protobuf::util::JsonStringToMessage(text, &message);
   if (!file.is_open() || !status.ok()) {

@@ -8,6 +8,9 @@
 
 namespace sketchmatch::test {
 
+/// Where the golden messages are.
+std::string golden_folder();
+
 /// Reads a golden message; its name begins with that of its type.
 void read_golden(const std::string& name, google::protobuf::Message& message);
 

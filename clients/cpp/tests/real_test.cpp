@@ -8,6 +8,7 @@
 #include <future>
 #include <sketchmatch/sketchmatch.hpp>
 #include <string>
+#include <variant>
 #include <vector>
 
 namespace sketchmatch::test {
@@ -126,7 +127,7 @@ TEST_F(Real, ASearchCanBeCancelled) {
 TEST_F(Real, AServerThatIsKilledAmidAStreamIsUnavailable) {
   const auto pid = static_cast<pid_t>(std::stol(variable("DOOMED_PID")));
   ClientOptions options;
-  options.retries = 1;
+  options.retries = 0;
   const Client known(variable("DOOMED_ADDRESS"), options);
   bool killed = false;
   EXPECT_THROW(static_cast<void>(known.match(squares(5), squares(6), long_search(),
@@ -138,6 +139,51 @@ TEST_F(Real, AServerThatIsKilledAmidAStreamIsUnavailable) {
                ServerUnavailableError);
   EXPECT_TRUE(killed);
   EXPECT_THROW(static_cast<void>(known.server_info()), ServerUnavailableError);
+}
+
+TEST_F(Real, AMatchGoesOnWhenItsServerIsKilledAndStartedAnew) {
+  const auto pid = static_cast<pid_t>(std::stol(variable("PHOENIX_PID")));
+  const Client known(variable("PHOENIX_ADDRESS"));
+  auto options = long_search();
+  options.time_budget = std::chrono::seconds(5);
+  options.request_id = "phoenix";
+  auto call = known.events(squares(5), squares(6), options);
+  std::string told;
+  bool killed = false;
+  while (const auto event = call.next()) {
+    if (event->index() != 2) {  // but for progress
+      told += std::to_string(event->index());
+    } else if (!killed) {
+      killed = kill(pid, SIGKILL) == 0;
+    }
+  }
+  EXPECT_TRUE(killed);
+  EXPECT_EQ(told, "013");
+  const auto match = call.result();
+  EXPECT_EQ(match.object_map().size(), 25U);
+  const auto record = known.get_match(match.accepted.match_id);
+  EXPECT_EQ(record.match.state, MatchState::succeeded);
+  EXPECT_EQ(record.match.request_id, "phoenix");
+  EXPECT_EQ(record.match.last_event, call.last_event());
+  EXPECT_EQ(known.watch(match.accepted.match_id).result().object_map(), match.object_map());
+}
+
+TEST_F(Real, AMatchThatIsToKeepRunningIsFoundAgain) {
+  const auto known = client();
+  auto options = long_search();
+  options.keep_running = true;
+  std::string match_id;
+  {
+    auto call = known.events(squares(5), squares(6), options);
+    const auto event = call.next();
+    ASSERT_TRUE(event);
+    match_id = std::get<MatchAccepted>(*event).match_id;
+  }
+  auto watched = known.watch(match_id);
+  EXPECT_TRUE(watched.next());
+  EXPECT_NE(known.cancel_match(match_id).state, MatchState::succeeded);
+  EXPECT_THROW(static_cast<void>(watched.result()), CallCancelledError);
+  EXPECT_THROW(static_cast<void>(known.get_match("none")), NotFoundError);
 }
 
 TEST_F(Real, ATokenOverTlsLetsIn) {

@@ -58,6 +58,8 @@ TEST(Sources, LabelsAreAsManyAsThings) {
               return sources::strokes({{{1, 2}}}, {"a", "b"});
             }),
             "INVALID_FIELD: labels has 2 names for 1 strokes; give one for each, or none");
+  EXPECT_EQ(refusal([&] { return sources::polygons(rooms, {}, YAxis::up, {0.5}); }),
+            "INVALID_FIELD: certainties has 1 numbers for 2 polygons; give one for each, or none");
 }
 
 TEST(Sources, TextThatIsNoUtf8IsRefused) {
@@ -152,6 +154,17 @@ TEST_F(MapFiles, APictureIsTakenFromWhereTheYamlSaysOrBesideIt) {
     ASSERT_EQ(found.notes().size(), 1U);
     EXPECT_NE(found.notes()[0].find("room.pgm beside moved.yaml was taken"), std::string::npos);
   }
+}
+
+TEST_F(MapFiles, AFileOfObjectsIsTakenIfItHasTheMapsNameAndIsText) {
+  static_cast<void>(write("room.pgm", "picture"));
+  const auto map = write("room.yaml", "image: room.pgm\nresolution: 0.05\n");
+  static_cast<void>(write("other.objects.geojson", "{}"));
+  static_cast<void>(write("room.objects.geojson", "\xFF"));
+  EXPECT_EQ(sources::map_server_map(map).message().map_server_map().objects(), "");
+  EXPECT_TRUE(sources::map_server_map(map).notes().empty());
+  static_cast<void>(write("room.objects.geojson", "\xEF\xBB\xBF{}"));
+  EXPECT_EQ(sources::map_server_map(map).message().map_server_map().objects(), "{}");
 }
 
 TEST_F(MapFiles, TheFirstOfTwoPicturesCounts) {

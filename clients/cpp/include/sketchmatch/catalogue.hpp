@@ -80,12 +80,17 @@ struct Catalogue {
 
 /// Limits on requests; one that is absent is not limited.
 struct ServerLimits {
-  std::optional<std::uint64_t> max_request_bytes;       ///< Largest request.
-  std::optional<std::uint32_t> max_objects;             ///< Most objects in a scene.
-  std::optional<std::uint32_t> max_concurrent_matches;  ///< Most matches at the same time.
-  std::optional<Seconds> max_time_budget;               ///< Longest time budget.
-  std::optional<std::uint32_t> max_waiting;             ///< Most requests that wait.
-  std::optional<Seconds> max_wait;                      ///< Longest wait.
+  std::optional<std::uint64_t> max_request_bytes;        ///< Largest request.
+  std::optional<std::uint32_t> max_objects;              ///< Most objects in a scene.
+  std::optional<std::uint32_t> max_concurrent_matches;   ///< Most matches at the same time.
+  std::optional<Seconds> max_time_budget;                ///< Longest time budget.
+  std::optional<std::uint32_t> max_waiting;              ///< Most requests that wait.
+  std::optional<Seconds> max_wait;                       ///< Longest wait.
+  std::optional<Seconds> default_time_budget;            ///< The budget where none is given.
+  std::optional<std::uint32_t> max_matches_per_caller;   ///< Most requests of one caller at once.
+  std::optional<std::uint32_t> max_requests_per_minute;  ///< Most that one caller may send.
+  std::optional<std::uint64_t> max_comparisons;          ///< Pairs × pairs × directions.
+  std::optional<std::uint64_t> max_candidates;           ///< Population × generations.
 };
 
 /// What a server is.

@@ -2,6 +2,7 @@
 /// The client.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <future>
 #include <memory>
@@ -30,8 +31,9 @@ class PendingMatch;
 
 /// A match that a server is doing, event by event, as `Client::events` returns it.
 ///
-/// It starts when the first event is asked for; dropping it stops it. One thread goes through the
-/// events; `cancel` may be called from any other.
+/// It starts when the first event is asked for; dropping it stops it, unless it is to keep running.
+/// One thread goes through the events; `cancel` may be called from any other. When the link is lost
+/// or the server starts anew, it goes on by itself.
 class MatchCall {
  public:
   /// @cond internal
@@ -55,8 +57,12 @@ class MatchCall {
   /// @throws SketchmatchError What ended the match before; `CallCancelledError` if it was stopped.
   Match result(const ProgressCallback& on_progress = {});
 
-  /// Stops the match: whoever waits for it gets a `CallCancelledError`. One that has ended stays
-  /// as it is.
+  /// The number of the last event that the server told, with which `Client::watch` goes on; 0
+  /// before there is any.
+  [[nodiscard]] std::uint64_t last_event() const;
+
+  /// Stops the match, also one that is to keep running: whoever waits for it gets a
+  /// `CallCancelledError`. One that has ended stays as it is.
   void cancel();
 
  private:
@@ -71,8 +77,8 @@ struct MatchCallbacks {
   std::function<void(const SketchmatchError&)> on_error;  ///< With what ended it before.
 };
 
-/// A match that runs beside, as `Client::match_async` returns it. Dropping it stops the match and
-/// waits until no callback runs any more.
+/// A match that runs beside, as `Client::match_async` returns it. Dropping it stops the match,
+/// unless it is to keep running, and waits until no callback runs any more.
 class AsyncMatch {
  public:
   /// @cond internal
@@ -142,6 +148,25 @@ class Client {
                                        const MatchOptions& options = {},
                                        MatchCallbacks callbacks = {},
                                        const CallOptions& call = {}) const;
+
+  /// Reads a match of one's own that was begun before, event by event.
+  /// @param match_id Its name, as `MatchAccepted` has it.
+  /// @param after The number of the last event that is known already; `MatchCall::result` holds
+  ///   those after it.
+  /// @param call Timeout and cancellation.
+  /// @throws NotFoundError By the call: if the server keeps no such match, or it is another
+  /// caller's.
+  [[nodiscard]] MatchCall watch(const std::string& match_id, std::uint64_t after = 0,
+                                const CallOptions& call = {}) const;
+
+  /// Returns how a match of one's own is, with its events so far.
+  /// @throws NotFoundError As `watch`.
+  [[nodiscard]] MatchRecord get_match(const std::string& match_id,
+                                      const CallOptions& call = {}) const;
+
+  /// Stops a match of one's own, and returns how it is; one that has ended stays as it is.
+  /// @throws NotFoundError As `watch`.
+  MatchSummary cancel_match(const std::string& match_id, const CallOptions& call = {}) const;
 
   /// Finds the objects of one source, without a match.
   [[nodiscard]] Segmentation segment(const Source& source, const SegmentOptions& options = {},

@@ -82,6 +82,16 @@ class NotAuthenticatedError : public SketchmatchError {
   using SketchmatchError::SketchmatchError;
 };
 
+/// The server keeps nothing of this name, or it is another caller's.
+class NotFoundError : public SketchmatchError {
+  using SketchmatchError::SketchmatchError;
+};
+
+/// The server cannot read or write what it keeps on disk; its operator has to act.
+class StoreError : public SketchmatchError {
+  using SketchmatchError::SketchmatchError;
+};
+
 /// The server does not know the method; it is older than this client, or another server.
 class NotSupportedError : public SketchmatchError {
   using SketchmatchError::SketchmatchError;

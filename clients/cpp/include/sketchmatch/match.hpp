@@ -2,6 +2,7 @@
 /// Matches: what a server answers, event by event and as a whole.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -165,6 +166,7 @@ struct MatchResult {
   std::optional<double> probability;                    ///< How likely the map is right, whole.
   std::optional<double> place_probability;              ///< How likely it is this place at all.
   std::optional<Ambiguity> ambiguity;                   ///< Which maps are about as likely.
+  bool provisional = false;                             ///< Whether the sketch goes on.
 };
 
 /// A finished match. Written to a stream it is a small table.
@@ -179,6 +181,45 @@ struct Match {
 
 /// An event of a match.
 using MatchEvent = std::variant<MatchAccepted, MatchScenes, Progress, MatchResult>;
+
+/// An event, and its place in the match.
+struct NumberedEvent {
+  std::uint64_t number = 0;  ///< From 1, and larger from one event of a match to the next.
+  MatchEvent event;          ///< The event.
+};
+
+/// Where a match is in its life: queued, running, perhaps cancelling, and then one of the others.
+enum class MatchState {
+  unspecified,
+  queued,
+  running,
+  cancelling,
+  succeeded,
+  failed,
+  cancelled,
+  interrupted
+};
+
+/// What is known of a match that has a name.
+struct MatchSummary {
+  using Time = std::chrono::system_clock::time_point;  ///< A moment.
+
+  std::string match_id;                        ///< Its name.
+  std::string request_id;                      ///< `MatchOptions::request_id`.
+  MatchState state = MatchState::unspecified;  ///< Where it is in its life.
+  Time created_at;                             ///< When it was asked for.
+  std::optional<Time> ended_at;                ///< When it ended; none until then.
+  Outcome outcome = Outcome::unspecified;      ///< Why its search ended, if it succeeded.
+  std::uint64_t last_event = 0;                ///< The number of its latest event; 0 for none.
+  std::string error_message;                   ///< What it ended with, if it did not succeed.
+  std::string error_reason;                    ///< The same for programs.
+};
+
+/// How a match is, and what came of it.
+struct MatchRecord {
+  MatchSummary match;                 ///< What is known of it.
+  std::vector<NumberedEvent> events;  ///< Its events so far; of progress the latest alone.
+};
 
 /// Called with each progress, at most 20 a second. What it throws ends the match.
 using ProgressCallback = std::function<void(const Progress&)>;

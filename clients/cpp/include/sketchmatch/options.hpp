@@ -62,6 +62,9 @@ struct Weights {
   std::optional<double> distance;  ///< β: rotations of objects d apart count for d^β.
 };
 
+/// Which of a caller's own requests come first while they wait.
+enum class Priority { unspecified, low, normal, high };
+
 /// How to match; whatever is left out is the server's to decide.
 struct MatchOptions {
   std::string sketch_segmenter;  ///< Name of an algorithm; `Client::algorithms` lists them.
@@ -91,6 +94,13 @@ struct MatchOptions {
   std::vector<std::vector<std::string>> synonyms;
   /// Name of one of the server's pipelines, such as "proof", to start from.
   std::string profile;
+  /// A name for the request, at most 128 bytes: sent again under the same name it is the same
+  /// match, done once. Left out: the client makes one for each match.
+  std::string request_id;
+  /// Whether the match goes on when nobody reads it; `Client::watch` reads it again.
+  bool keep_running = false;
+  /// Which of one's own requests come first while they wait. Left out: as `normal`.
+  Priority priority = Priority::unspecified;
 };
 
 /// How to find the objects of one source; whatever is left out is the server's to decide.
@@ -142,7 +152,8 @@ struct ClientOptions {
   std::optional<Seconds> timeout;
   /// How often a request is sent again where the server is not available or has no room, after a
   /// pause that the server asks for or that grows from 0.1 s. The timeout is for all attempts
-  /// together, and a match that has begun is not sent again.
+  /// together. A match that has begun goes on by itself where its link is lost, for a minute
+  /// whatever their number, unless it is 0.
   int retries = 3;
   /// Shown with every call: it says who calls.
   std::optional<std::string> token;

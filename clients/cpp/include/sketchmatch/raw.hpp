@@ -8,5 +8,7 @@
 #include <sketchmatch/v1/errors.pb.h>
 #include <sketchmatch/v1/match_service.grpc.pb.h>
 #include <sketchmatch/v1/scene_service.grpc.pb.h>
+#include <sketchmatch/v1/sketch_service.grpc.pb.h>
+#include <sketchmatch/v1/transfer_service.grpc.pb.h>
 
 #include <sketchmatch/client.hpp>

@@ -2,6 +2,7 @@
 /// Scenes: what segmenters make of sketches and maps.
 #pragma once
 
+#include <optional>
 #include <sketchmatch/value.hpp>
 #include <string>
 #include <vector>
@@ -19,10 +20,11 @@ using Ring = std::vector<Point>;
 
 /// One object of a scene: a polygon, perhaps with holes.
 struct SceneObject {
-  std::vector<Ring> rings;  ///< The outline counter-clockwise, then the holes clockwise.
-  std::string label;        ///< A name for people; empty if the source gave none.
-  double area = 0.0;        ///< Without the holes, in squared units of the scene.
-  Point centroid;           ///< Centre of that area; it may lie outside a concave object.
+  std::vector<Ring> rings;          ///< The outline counter-clockwise, then the holes clockwise.
+  std::string label;                ///< A name for people; empty if the source gave none.
+  double area = 0.0;                ///< Without the holes, in squared units of the scene.
+  Point centroid;                   ///< Centre of that area; it may lie outside a concave object.
+  std::optional<double> certainty;  ///< How sure it is one thing; none where it is sure.
 };
 
 /// The objects that a segmenter found, x to the right and y up; their order is their index.

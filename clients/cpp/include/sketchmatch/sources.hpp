@@ -73,14 +73,22 @@ Source strokes(const std::vector<std::vector<StrokePoint>>& strokes,
 /// @param outlines For each object the corners of its outline.
 /// @param labels A name for each polygon, or none at all.
 /// @param y_axis Which way y grows.
+/// @param certainties How sure it is, above 0 and up to 1, that each polygon is one thing; none
+///   where it is, or none at all.
 /// @throws InvalidRequestError As `strokes`.
 Source polygons(const std::vector<Ring>& outlines, const std::vector<std::string>& labels = {},
-                YAxis y_axis = YAxis::up);
+                YAxis y_axis = YAxis::up,
+                const std::vector<std::optional<double>>& certainties = {});
 
 /// Returns a sketch or map of polygons, each an outline and its holes, if any.
 /// @throws InvalidRequestError As `strokes`.
 Source polygons_with_holes(const std::vector<std::vector<Ring>>& polygons,
-                           const std::vector<std::string>& labels = {}, YAxis y_axis = YAxis::up);
+                           const std::vector<std::string>& labels = {}, YAxis y_axis = YAxis::up,
+                           const std::vector<std::optional<double>>& certainties = {});
+
+/// Returns a scene that the server keeps, by the name that it was given when it was put.
+/// @throws InvalidRequestError If the name is no UTF-8.
+Source stored_scene(const std::string& name);
 
 /// Returns a robot's occupancy grid as a map.
 /// @param cells −1 unknown, 0 free … 100 occupied, row by row from the lowest: `data` of a ROS
@@ -95,7 +103,9 @@ Source occupancy_grid(const std::vector<std::int8_t>& cells, std::uint32_t colum
 /// Returns a map as ROS map_server saved it.
 /// @param path The .yaml file; or the picture, which a .yaml beside it names; or the folder that
 ///   holds one map. A picture that is not where the .yaml says is taken from beside it, which
-///   `Source::notes` tells.
+///   `Source::notes` tells. So is the file beside it, of its name and ending in .objects.geojson,
+///   that says what its objects are, as `sketchmatch segment --out` saves it; the server ignores
+///   one that is of another content of the map.
 /// @throws InvalidRequestError If the file or its picture cannot be read, or it names none.
 Source map_server_map(const std::filesystem::path& path);
 
