@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+import shapely
 
 from sketchmatch.io.ros_map import decode_map_server
 from sketchmatch.model import Landmark, OccupancyGrid
+from sketchmatch_builtin.segmenters._landmarks import labels_of
 from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
 from tests.tools import ROOT, require
@@ -169,3 +171,11 @@ def test_montreal_names_things_of_which_its_map_shows_a_door():
     # for one, which stands out of its wall.
     assert labels(found(grid)) == ["door2", *[""] * 8]
     assert labels(found(grid, label_reach=2.2))[2] == "mary"
+
+
+def test_a_name_goes_first_to_what_is_certain_and_else_to_what_is_in_doubt():
+    name = [Landmark("piano", (1.05, 0.5), "furniture")]
+    near, far = shapely.box(0, 0, 1, 1), shapely.box(1.2, 0, 2, 1)
+    assert labels_of([near, far], name, 0.5, [True, False])[0] == ["", "piano"]
+    assert labels_of([near, far], name, 0.5, [True, True])[0] == ["piano", ""]
+    assert labels_of([near, far], name, 0.1, [True, False])[0] == ["piano", ""]

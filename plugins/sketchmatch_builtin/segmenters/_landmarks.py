@@ -39,7 +39,7 @@ def labels_of(
     reach
         In metres.
     doubtful
-        Which objects get only names whose place lies within them; left out, none.
+        Which objects get names whose place does not lie within them last; left out, none.
     """
     named = tuple(landmarks)
     labels, left = [""] * len(polygons), set(range(len(named)))
@@ -49,11 +49,9 @@ def labels_of(
     objects = np.array(polygons, dtype=object)
     k, j = shapely.STRtree(objects).query(points, predicate="dwithin", distance=reach)
     away = shapely.distance(points[k], objects[j])
-    if doubtful is not None:
-        kept = (away == 0.0) | ~np.asarray(doubtful, dtype=bool)[j]
-        k, j, away = k[kept], j[kept], away[kept]
+    last = (away > 0.0) & np.asarray(doubtful or [False] * len(polygons))[j]
     middle = shapely.distance(points[k], shapely.centroid(objects[j]))
-    for pair in np.lexsort((middle, away)).tolist():
+    for pair in np.lexsort((middle, away, last)).tolist():
         if k[pair] in left and not labels[j[pair]]:
             labels[j[pair]] = named[k[pair]].name
             left.remove(k[pair])
