@@ -48,6 +48,7 @@ def follow(shell, text):
         shell.follow(step)
 
 
+@pytest.mark.slow
 def test_each_line_does_what_the_page_says(operator):
     titles = [title for title, _ in SECTIONS]
     followed = titles[: titles.index("Metrics")]

@@ -132,6 +132,7 @@ def test_ways_into_a_server_are_of_no_use_without_one(command_line):
     )
 
 
+@pytest.mark.slow
 def test_the_demo_needs_no_token_whatever_the_configuration_says(tmp_path):
     (tmp_path / "sketchmatch.toml").write_text(
         '[server]\ntokens = "away"\ntls_certificate = "away"\ntls_key = "away"\n'

@@ -14,7 +14,7 @@ from tests.pace import wait_until
 from tests.tools import require
 from tests.web import CLIENTS, KITCHEN, Hand, answer, chromium, draw_kitchen, serving_pad
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.timeout(300), pytest.mark.slow]
 
 # Playwright waits by itself for what it is asked for, so long at most.
 _PATIENCE_MS = 60_000
@@ -296,7 +296,6 @@ def test_a_zone_is_carried_named_saved_and_opened_again(pad, visit, tmp_path):
     page.get_by_test_id("carried").get_by_text("no go").wait_for()
 
 
-@pytest.mark.slow  # a server of its own
 def test_a_map_is_kept_by_the_server_under_a_name_and_chosen_again(visit, tmp_path):
     with serving_pad("--store", str(tmp_path / "store")) as (_, url):
         page = visit(url)
@@ -475,7 +474,6 @@ def test_another_place_is_said_to_be_probably_another(pad, visit):
     assert "Probably not this place" in page.get_by_test_id("headline").inner_text()
 
 
-@pytest.mark.slow  # a server of its own
 def test_a_long_search_shows_how_it_goes_and_is_cancelled(visit, tmp_path):
     config = tmp_path / "endless.toml"
     config.write_text(
@@ -495,7 +493,6 @@ def test_a_long_search_shows_how_it_goes_and_is_cancelled(visit, tmp_path):
         cancel.wait_for()
 
 
-@pytest.mark.slow  # a server of its own
 def test_what_is_drawn_while_the_server_is_away_is_kept_and_matched_when_it_is_back(visit):
     with serving_pad() as (server, url):
         page = visit(url)
@@ -516,7 +513,6 @@ def test_what_is_drawn_while_the_server_is_away_is_kept_and_matched_when_it_is_b
         assert answer(page) == names()
 
 
-@pytest.mark.slow  # two servers of its own
 def test_a_server_that_begins_anew_is_told_the_whole_sketch_and_what_was_said(visit):
     with serving_pad() as (server, url):
         page = visit(url)
@@ -650,7 +646,6 @@ def test_it_speaks_german_to_who_asks_for_it(pad, visit):
     assert page.get_by_role("heading", name="Robot's map").is_visible()
 
 
-@pytest.mark.slow  # a server of its own
 def test_a_server_that_wants_a_token_is_given_it(tmp_path, browser):
     tokens = tmp_path / "tokens"
     token = processes.sketchmatch("tokens", "add", "pad", "--file", tokens).stdout.strip()

@@ -6,10 +6,13 @@ import sys
 import time
 from contextlib import contextmanager
 
+import pytest
 from grpc import insecure_channel
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 
 from sketchmatch.server.watchdog import HUNG
+
+pytestmark = pytest.mark.slow
 
 A_SERVER = """
 import asyncio, re, sys, threading
