@@ -267,7 +267,8 @@ def test_nothing_is_lost_or_mixed_up_among_hundreds_of_requests(address):
 
 
 def test_a_process_group_that_is_told_to_end_comes_to_an_end_as_its_server_does():
-    with server("--grace", "2", "--workers", "2") as running, Client(running.address) as client:
+    said = ("--grace", "4", "--workers", "2")
+    with server(*said) as running, Client(running.address, retries=0) as client:
         events = searching(client)
         for pid in (*children_of(running.process.pid), running.process.pid):
             os.kill(pid, signal.SIGTERM)
