@@ -88,7 +88,7 @@ fn polygons(polygons: Vec<LabelledPolygon>, y_axis: YAxis) -> Source {
 fn rectangle(label: &str, x: f64, y: f64, width: f64, height: f64) -> LabelledPolygon {
     let corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height)];
     let points = corners.into_iter().map(|(x, y)| Point { x, y }).collect();
-    LabelledPolygon { label: label.into(), rings: vec![Ring { points }] }
+    LabelledPolygon { label: label.into(), rings: vec![Ring { points }], ..Default::default() }
 }
 
 /// Prints what the server says of an error: a sentence for people, details for programs.
