@@ -35,6 +35,7 @@ class Authority:
         self.certificate, self._key = folder / f"{name}.pem", folder / f"{name}.key"
         _openssl(
             *("req", "-x509", *_KEY, "-days", "30", "-subj", f"/CN={name}"),
+            *("-addext", "keyUsage=critical,keyCertSign,cRLSign"),
             *("-keyout", self._key, "-out", self.certificate),
         )
 
