@@ -166,6 +166,8 @@ class Client {
 
   /// Stops a match of one's own, and returns how it is; one that has ended stays as it is.
   /// @throws NotFoundError As `watch`.
+  // Whoever cancels need not ask how the match ended.
+  // NOLINTNEXTLINE(modernize-use-nodiscard)
   MatchSummary cancel_match(const std::string& match_id, const CallOptions& call = {}) const;
 
   /// Finds the objects of one source, without a match.
