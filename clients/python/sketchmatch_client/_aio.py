@@ -76,6 +76,7 @@ if TYPE_CHECKING:  # these exist for type checkers alone
     from sketchmatch_proto.v1.catalog_service_pb2_grpc import CatalogServiceAsyncStub
     from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceAsyncStub
     from sketchmatch_proto.v1.scene_service_pb2_grpc import SceneServiceAsyncStub
+    from sketchmatch_proto.v1.sketch_service_pb2_grpc import SketchServiceAsyncStub
     from sketchmatch_proto.v1.transfer_service_pb2_grpc import TransferServiceAsyncStub
 
 __all__ = ["AsyncClient"]
@@ -174,32 +175,19 @@ class AsyncClient:
     async def get_match(self, match_id: str, *, timeout: float | None = None) -> GetMatchResponse:
         """Return how a match of one's own is; see :meth:`Client.get_match`."""
         request = GetMatchRequest(match_id=match_id)
-        return await self._asked(
-            lambda limit: self._matching.GetMatch(request, timeout=limit, metadata=self._metadata),
-            timeout,
-        )
+        return await self._asked(self._matching.GetMatch, request, timeout)
 
     async def cancel_match(self, match_id: str, *, timeout: float | None = None) -> MatchSummary:
         """Stop a match of one's own, and return how it is; see :meth:`Client.cancel_match`."""
         request = CancelMatchRequest(match_id=match_id)
-        answer = await self._asked(
-            lambda limit: self._matching.CancelMatch(
-                request, timeout=limit, metadata=self._metadata
-            ),
-            timeout,
-        )
+        answer = await self._asked(self._matching.CancelMatch, request, timeout)
         return answer.match
 
     async def matches(self, *, timeout: float | None = None) -> AsyncGenerator[MatchSummary, None]:
         """Yield all matches of one's own, the latest first; see :meth:`Client.matches`."""
         request = ListMatchesRequest()
         while True:
-            page = await self._asked(
-                lambda limit: self._matching.ListMatches(
-                    request, timeout=limit, metadata=self._metadata
-                ),
-                timeout,
-            )
+            page = await self._asked(self._matching.ListMatches, request, timeout)
             for match in page.matches:
                 yield match
             if not page.next_page_token:
@@ -217,10 +205,7 @@ class AsyncClient:
     ) -> SegmentResponse:
         """Find the objects of one source, without a match; see :meth:`Client.segment`."""
         request = segment_request(source, segmenter, params, profile)
-        stub = cast("SceneServiceAsyncStub", SceneServiceStub(self._channel))
-        return await self._asked(
-            lambda limit: stub.Segment(request, timeout=limit, metadata=self._metadata), timeout
-        )
+        return await self._asked(self._keeping.Segment, request, timeout)
 
     async def put_scene(
         self,
@@ -233,20 +218,20 @@ class AsyncClient:
     ) -> PutSceneResponse:
         """Have the server keep a scene; see :meth:`Client.put_scene`."""
         request = _scenes.put_request(source, segmenter, params, profile)
-        return await self._of_scenes("PutScene", request, timeout)  # type: ignore[no-any-return]
+        return await self._asked(self._keeping.PutScene, request, timeout)
 
     async def get_scene(
         self, name: str, *, include_source: bool = False, timeout: float | None = None
     ) -> GetSceneResponse:
         """Return a scene that you have put, with its source where that is wanted."""
         request = _scenes.get_request(name, include_source)
-        return await self._of_scenes("GetScene", request, timeout)  # type: ignore[no-any-return]
+        return await self._asked(self._keeping.GetScene, request, timeout)
 
     async def list_scenes(self, *, timeout: float | None = None) -> list[SceneSummary]:
         """Return what there is to say of all scenes that you have put, the latest first."""
         found, request = list[SceneSummary](), ListScenesRequest()
         while True:
-            page = await self._of_scenes("ListScenes", request, timeout)
+            page = await self._asked(self._keeping.ListScenes, request, timeout)
             found.extend(page.scenes)
             if not page.next_page_token:
                 return found
@@ -257,11 +242,11 @@ class AsyncClient:
     ) -> StoredScene:
         """Give objects of a kept scene other labels; see :meth:`Client.update_scene`."""
         request = _scenes.update_request(name, labels)
-        return (await self._of_scenes("UpdateScene", request, timeout)).stored_scene  # type: ignore[no-any-return]
+        return (await self._asked(self._keeping.UpdateScene, request, timeout)).stored_scene
 
     async def delete_scene(self, name: str, *, timeout: float | None = None) -> None:
         """Forget a scene; it stays for others who have put it."""
-        await self._of_scenes("DeleteScene", _scenes.delete_request(name), timeout)
+        await self._asked(self._keeping.DeleteScene, _scenes.delete_request(name), timeout)
 
     async def sketch(
         self,
@@ -273,7 +258,7 @@ class AsyncClient:
     ) -> AsyncSketch:
         """Begin a sketch that is matched while it is drawn; see :meth:`Client.sketch`."""
         request = create_request(map, y_axis, **options)
-        made = await self._sketched("CreateSketch", request, timeout)
+        made = await self._asked(self._drawing.CreateSketch, request, timeout)
         return AsyncSketch(self, made.sketch_id)
 
     async def transfer(
@@ -288,27 +273,19 @@ class AsyncClient:
         """Carry points, routes and zones; see :meth:`Client.transfer`."""
         request = transfer_request(sketch, map, features, **options)
         stub = cast("TransferServiceAsyncStub", TransferServiceStub(self._channel))
-        return await self._asked(
-            lambda limit: stub.Transfer(request, timeout=limit, metadata=self._metadata), timeout
-        )
+        return await self._asked(stub.Transfer, request, timeout)
 
     async def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""
         stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
         request = ListAlgorithmsRequest()
-        return await self._asked(
-            lambda limit: stub.ListAlgorithms(request, timeout=limit, metadata=self._metadata),
-            timeout,
-        )
+        return await self._asked(stub.ListAlgorithms, request, timeout)
 
     async def server_info(self, *, timeout: float | None = None) -> GetServerInfoResponse:
         """Return the server's versions and limits."""
         stub = cast("CatalogServiceAsyncStub", CatalogServiceStub(self._channel))
         request = GetServerInfoRequest()
-        return await self._asked(
-            lambda limit: stub.GetServerInfo(request, timeout=limit, metadata=self._metadata),
-            timeout,
-        )
+        return await self._asked(stub.GetServerInfo, request, timeout)
 
     async def is_serving(self, name: str = "", *, timeout: float | None = None) -> bool:
         """Return whether the server, or a part of it, is warm; see :meth:`Client.is_serving`."""
@@ -344,6 +321,14 @@ class AsyncClient:
     def _matching(self) -> MatchServiceAsyncStub:
         return cast("MatchServiceAsyncStub", MatchServiceStub(self._channel))
 
+    @property
+    def _keeping(self) -> SceneServiceAsyncStub:
+        return cast("SceneServiceAsyncStub", SceneServiceStub(self._channel))
+
+    @property
+    def _drawing(self) -> SketchServiceAsyncStub:
+        return cast("SketchServiceAsyncStub", SketchServiceStub(self._channel))
+
     async def _events(
         self, course: Course, limit: float | None
     ) -> AsyncGenerator[MatchResponse, None]:
@@ -368,22 +353,6 @@ class AsyncClient:
                     raise
             await asyncio.sleep(pause)
 
-    async def _of_scenes(self, method: str, request: Message, timeout: float | None) -> Any:
-        """Call a method of the service of scenes."""
-        call = getattr(SceneServiceStub(self._channel), method)
-        return await self._asked(
-            lambda limit: call(request, timeout=limit, metadata=self._metadata), timeout
-        )
-
-    async def _sketched(
-        self, method: str, request: Message, timeout: float | None, retries: int | None = None
-    ) -> Any:
-        """Call a method of the service of sketches."""
-        call = getattr(SketchServiceStub(self._channel), method)
-        return await self._asked(
-            lambda limit: call(request, timeout=limit, metadata=self._metadata), timeout, retries
-        )
-
     def _begun(self, course: Course, seconds: float | None) -> Any:
         """Return the call that tells of a match from where it is known."""
         if (watching := course.watching) is not None:
@@ -393,16 +362,17 @@ class AsyncClient:
 
     async def _asked(
         self,
-        call: Callable[[float | None], Awaitable[_Answer]],
+        method: Callable[..., Awaitable[_Answer]],
+        request: Message,
         timeout: float | None,
         retries: int | None = None,
     ) -> _Answer:
-        """Return what a call returns that is given the seconds it may take, perhaps made again."""
+        """Return what a method answers to a request, which is perhaps sent again."""
         attempts = Attempts(self._retries if retries is None else retries, self._limit(timeout))
         while True:
             try:
                 with translated_errors(self._address):
-                    return await call(attempts.limit)
+                    return await method(request, timeout=attempts.limit, metadata=self._metadata)
             except SketchmatchError as error:
                 pause = attempts.pause_after(error)
                 if pause is None:

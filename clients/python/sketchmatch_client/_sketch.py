@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncGenerator, Generator, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Self, Unpack
-
-import grpc
+from typing import TYPE_CHECKING, Self, Unpack
 
 from sketchmatch_client import sources
 from sketchmatch_client._requests import MatchOptions, Pins, match_request
@@ -21,7 +19,6 @@ from sketchmatch_proto.v1.sketch_service_pb2 import (
     WatchSketchRequest,
     WatchSketchResponse,
 )
-from sketchmatch_proto.v1.sketch_service_pb2_grpc import SketchServiceStub
 from sketchmatch_proto.v1.source_pb2 import Source
 
 if TYPE_CHECKING:
@@ -88,7 +85,7 @@ class Sketch:
             The number of the revision that this made, and how many strokes it has.
         """
         request = update_request(self.id, strokes or {}, erase, restore, labels or {}, pins)
-        return self._client._sketched("UpdateSketch", request, timeout, retries=0)  # type: ignore[no-any-return]
+        return self._client._asked(self._client._drawing.UpdateSketch, request, timeout, retries=0)
 
     def watch(self, *, timeout: float | None = None) -> Generator[WatchSketchResponse, None, None]:
         """Yield what comes of the sketch until it ends: the latest of each kind of event.
@@ -97,7 +94,7 @@ class Sketch:
         """
         client = self._client
         with translated_errors(client._address):
-            call = SketchServiceStub(client._channel).WatchSketch(
+            call = client._drawing.WatchSketch(
                 WatchSketchRequest(sketch_id=self.id),
                 timeout=client._limit(timeout),
                 metadata=client._metadata,
@@ -110,7 +107,9 @@ class Sketch:
     def delete(self, *, timeout: float | None = None) -> None:
         """End the sketch; one that has ended is no error."""
         try:
-            self._client._sketched("DeleteSketch", DeleteSketchRequest(sketch_id=self.id), timeout)
+            self._client._asked(
+                self._client._drawing.DeleteSketch, DeleteSketchRequest(sketch_id=self.id), timeout
+            )
         except NotFoundError:
             return
 
@@ -140,15 +139,17 @@ class AsyncSketch:
     ) -> UpdateSketchResponse:
         """Draw; see :meth:`Sketch.update`."""
         request = update_request(self.id, strokes or {}, erase, restore, labels or {}, pins)
-        return await self._client._sketched("UpdateSketch", request, timeout, retries=0)  # type: ignore[no-any-return]
+        return await self._client._asked(
+            self._client._drawing.UpdateSketch, request, timeout, retries=0
+        )
 
     async def watch(
         self, *, timeout: float | None = None
     ) -> AsyncGenerator[WatchSketchResponse, None]:
         """Yield what comes of the sketch until it ends; see :meth:`Sketch.watch`."""
-        client, stub = self._client, SketchServiceStub(self._client._channel)
+        client = self._client
         with translated_errors(client._address):
-            call: grpc.aio.UnaryStreamCall[Any, Any] = stub.WatchSketch(  # type: ignore[assignment]
+            call = client._drawing.WatchSketch(
                 WatchSketchRequest(sketch_id=self.id),
                 timeout=client._limit(timeout),
                 metadata=client._metadata,
@@ -163,7 +164,7 @@ class AsyncSketch:
         """End the sketch; one that has ended is no error."""
         request = DeleteSketchRequest(sketch_id=self.id)
         try:
-            await self._client._sketched("DeleteSketch", request, timeout)
+            await self._client._asked(self._client._drawing.DeleteSketch, request, timeout)
         except NotFoundError:
             return
 

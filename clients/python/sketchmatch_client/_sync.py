@@ -237,9 +237,7 @@ class Client:
         """
         request = GetMatchRequest(match_id=match_id)
         stub = MatchServiceStub(self._channel)
-        return self._asked(
-            lambda limit: stub.GetMatch(request, timeout=limit, metadata=self._metadata), timeout
-        )
+        return self._asked(stub.GetMatch, request, timeout)
 
     def cancel_match(self, match_id: str, *, timeout: float | None = None) -> MatchSummary:
         """Stop a match of one's own, and return how it is; one that has ended stays as it is.
@@ -251,9 +249,7 @@ class Client:
         """
         request = CancelMatchRequest(match_id=match_id)
         stub = MatchServiceStub(self._channel)
-        return self._asked(
-            lambda limit: stub.CancelMatch(request, timeout=limit, metadata=self._metadata), timeout
-        ).match
+        return self._asked(stub.CancelMatch, request, timeout).match
 
     def matches(self, *, timeout: float | None = None) -> Iterator[MatchSummary]:
         """Yield all matches of one's own that the server knows, the latest first.
@@ -265,10 +261,7 @@ class Client:
         """
         stub, request = MatchServiceStub(self._channel), ListMatchesRequest()
         while True:
-            page = self._asked(
-                lambda limit: stub.ListMatches(request, timeout=limit, metadata=self._metadata),
-                timeout,
-            )
+            page = self._asked(stub.ListMatches, request, timeout)
             yield from page.matches
             if not page.next_page_token:
                 return
@@ -304,10 +297,7 @@ class Client:
             The scene, warnings, and the segmenter as it ran.
         """
         request = segment_request(source, segmenter, params, profile)
-        stub = SceneServiceStub(self._channel)
-        return self._asked(
-            lambda limit: stub.Segment(request, timeout=limit, metadata=self._metadata), timeout
-        )
+        return self._asked(self._keeping.Segment, request, timeout)
 
     def put_scene(
         self,
@@ -333,20 +323,20 @@ class Client:
             The scene, under the hash of what it is, and whether you had not put it before.
         """
         request = _scenes.put_request(source, segmenter, params, profile)
-        return self._of_scenes("PutScene", request, timeout)  # type: ignore[no-any-return]
+        return self._asked(self._keeping.PutScene, request, timeout)
 
     def get_scene(
         self, name: str, *, include_source: bool = False, timeout: float | None = None
     ) -> GetSceneResponse:
         """Return a scene that you have put, with its source where that is wanted."""
         request = _scenes.get_request(name, include_source)
-        return self._of_scenes("GetScene", request, timeout)  # type: ignore[no-any-return]
+        return self._asked(self._keeping.GetScene, request, timeout)
 
     def list_scenes(self, *, timeout: float | None = None) -> list[SceneSummary]:
         """Return what there is to say of all scenes that you have put, the latest first."""
         found, request = list[SceneSummary](), ListScenesRequest()
         while True:
-            page = self._of_scenes("ListScenes", request, timeout)
+            page = self._asked(self._keeping.ListScenes, request, timeout)
             found.extend(page.scenes)
             if not page.next_page_token:
                 return found
@@ -372,11 +362,11 @@ class Client:
             The scene with these labels, under its own name.
         """
         request = _scenes.update_request(name, labels)
-        return (self._of_scenes("UpdateScene", request, timeout)).stored_scene  # type: ignore[no-any-return]
+        return self._asked(self._keeping.UpdateScene, request, timeout).stored_scene
 
     def delete_scene(self, name: str, *, timeout: float | None = None) -> None:
         """Forget a scene; it stays for others who have put it."""
-        self._of_scenes("DeleteScene", _scenes.delete_request(name), timeout)
+        self._asked(self._keeping.DeleteScene, _scenes.delete_request(name), timeout)
 
     def sketch(
         self,
@@ -405,7 +395,7 @@ class Client:
             Empty; ``update`` draws, ``watch`` tells what comes of it.
         """
         request = create_request(map, y_axis, **options)
-        made = self._sketched("CreateSketch", request, timeout)
+        made = self._asked(self._drawing.CreateSketch, request, timeout)
         return Sketch(self, made.sketch_id)
 
     def transfer(
@@ -439,25 +429,17 @@ class Client:
         """
         request = transfer_request(sketch, map, features, **options)
         stub = TransferServiceStub(self._channel)
-        return self._asked(
-            lambda limit: stub.Transfer(request, timeout=limit, metadata=self._metadata), timeout
-        )
+        return self._asked(stub.Transfer, request, timeout)
 
     def algorithms(self, *, timeout: float | None = None) -> ListAlgorithmsResponse:
         """Return the algorithms that the server offers, its profiles and its plugins."""
         stub, request = CatalogServiceStub(self._channel), ListAlgorithmsRequest()
-        return self._asked(
-            lambda limit: stub.ListAlgorithms(request, timeout=limit, metadata=self._metadata),
-            timeout,
-        )
+        return self._asked(stub.ListAlgorithms, request, timeout)
 
     def server_info(self, *, timeout: float | None = None) -> GetServerInfoResponse:
         """Return the server's versions and limits."""
         stub, request = CatalogServiceStub(self._channel), GetServerInfoRequest()
-        return self._asked(
-            lambda limit: stub.GetServerInfo(request, timeout=limit, metadata=self._metadata),
-            timeout,
-        )
+        return self._asked(stub.GetServerInfo, request, timeout)
 
     def is_serving(self, name: str = "", *, timeout: float | None = None) -> bool:
         """Return whether the server, or a part of it, is up and warm.
@@ -509,21 +491,13 @@ class Client:
                 raise never_served(self._address, timeout)
             time.sleep(HEALTH_POLL_SECONDS)
 
-    def _of_scenes(self, method: str, request: Message, timeout: float | None) -> Any:
-        """Call a method of the service of scenes."""
-        call = getattr(SceneServiceStub(self._channel), method)
-        return self._asked(
-            lambda limit: call(request, timeout=limit, metadata=self._metadata), timeout
-        )
+    @property
+    def _keeping(self) -> SceneServiceStub:
+        return SceneServiceStub(self._channel)
 
-    def _sketched(
-        self, method: str, request: Message, timeout: float | None, retries: int | None = None
-    ) -> Any:
-        """Call a method of the service of sketches."""
-        call = getattr(SketchServiceStub(self._channel), method)
-        return self._asked(
-            lambda limit: call(request, timeout=limit, metadata=self._metadata), timeout, retries
-        )
+    @property
+    def _drawing(self) -> SketchServiceStub:
+        return SketchServiceStub(self._channel)
 
     def _reading(self, course: Course, limit: float | None) -> MatchCall:
         stub = MatchServiceStub(self._channel)
@@ -544,16 +518,17 @@ class Client:
 
     def _asked(
         self,
-        call: Callable[[float | None], _Answer],
+        method: Callable[..., _Answer],
+        request: Message,
         timeout: float | None,
         retries: int | None = None,
     ) -> _Answer:
-        """Return what a call returns that is given the seconds it may take, perhaps made again."""
+        """Return what a method answers to a request, which is perhaps sent again."""
         attempts = Attempts(self._retries if retries is None else retries, self._limit(timeout))
         while True:
             try:
                 with translated_errors(self._address):
-                    return call(attempts.limit)
+                    return method(request, timeout=attempts.limit, metadata=self._metadata)
             except SketchmatchError as error:
                 pause = attempts.pause_after(error)
                 if pause is None:

@@ -69,6 +69,7 @@ CREATE TABLE histograms (
     bytes BLOB NOT NULL, PRIMARY KEY (outlines, described_by)
 )
 """
+_SOURCE_OF = "SELECT source FROM contents JOIN scenes USING (content) WHERE name = ?"
 LARGEST_KEPT = 32 * 1024 * 1024
 """Bytes of the histograms of a scene above which these are computed again."""
 
@@ -228,11 +229,7 @@ class SceneArchive:
             record = _record(connection, name, caller, field)
             source = None
             if include_source:
-                (packed,) = connection.execute(
-                    "SELECT source FROM contents JOIN scenes USING (content) WHERE name = ?",
-                    (name,),
-                ).fetchone()
-                source = source_pb2.Source.FromString(zlib.decompress(packed))
+                source = _source(connection.execute(_SOURCE_OF, (name,)).fetchone())
             return GetSceneResponse(stored_scene=StoredScene.FromString(record), source=source)
 
         return self._file.work(job)
@@ -397,9 +394,8 @@ class Shelf:
 
     def source(self, name: str) -> source_pb2.Source | None:
         """Return what a scene was found in, or None where it is not kept."""
-        query = "SELECT source FROM contents JOIN scenes USING (content) WHERE name = ?"
-        found = self._found(query, name)
-        return None if found is None else source_pb2.Source.FromString(zlib.decompress(found[0]))
+        found = self._found(_SOURCE_OF, name)
+        return None if found is None else _source(found)
 
     def histograms(self, scene: Scene, histogram: Histogram) -> FloatArray | None:
         """Return the histograms of a scene, or None where they are not kept."""
@@ -497,6 +493,11 @@ def _place(page_token: str) -> tuple[int, str]:
             f"is {quoted(page_token)}; give the next_page_token of the response before, or none",
         )
     return min(int(time_), 2**63 - 1), name
+
+
+def _source(row: tuple[bytes]) -> source_pb2.Source:
+    """Return the source in a row, where it is compressed."""
+    return source_pb2.Source.FromString(zlib.decompress(row[0]))
 
 
 def _points(points: Any) -> FloatArray:
