@@ -13,7 +13,7 @@ from sketchmatch import match
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import OccupancyGrid
-from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
+from sketchmatch_builtin.segmenters.rooms import RoomSegmenter, _coarser
 from tests.tools import ROOT, require
 
 CELL = 0.05
@@ -155,8 +155,9 @@ def test_a_room_that_opens_into_a_corridor_wider_than_a_door_is_a_room():
     assert areas(segmented(opened(), door_width=2.1)) == pytest.approx([84.0, 25.0], rel=0.05)
 
 
-def test_what_opens_as_wide_as_it_is_belongs_to_what_it_opens_into():
-    found = areas(segmented(opened((8.0, 6.0, 5.0, 0.2))))
+@pytest.mark.parametrize(("x", "width"), [(8.0, 5.0), (8.4, 4.2)])
+def test_what_opens_nearly_as_wide_as_it_is_belongs_to_what_it_opens_into(x, width):
+    found = areas(segmented(opened((x, 6.0, width, 0.2))))
     assert found == pytest.approx([84.0, 25.0], rel=0.05)
 
 
@@ -204,6 +205,39 @@ def test_min_area_leaves_small_rooms_out_and_the_others_as_they_are():
 def test_rooms_behind_closed_doors_count():
     cells = free(walls(9.0, 4.4), (0.2, 0.2, 4.0, 4.0), (4.4, 0.2, 4.0, 3.0))
     assert areas(segmented(cells)) == pytest.approx([16.0, 12.0])
+
+
+def test_a_map_of_millions_of_cells_has_the_rooms_of_the_same_on_fewer():
+    # 4.5 million, at places that are odd.
+    large = np.pad(np.kron(floor(), np.ones((10, 10), np.int8)), ((3, 0), (5, 4)))
+    large[:3] = large[:, :5] = large[:, -4:] = 100
+    found = segmented(OccupancyGrid(large, CELL / 10, (-5 * CELL / 10, -3 * CELL / 10, 0.0)))
+    plain = segmented(floor())
+    assert areas(found) == pytest.approx(areas(plain), rel=0.05)
+    for a, b in zip(found.scene.objects, plain.scene.objects, strict=True):
+        assert a.polygon.hausdorff_distance(b.polygon) < 4 * CELL
+
+
+def test_a_wall_one_cell_thick_parts_rooms_among_millions_of_cells():
+    cells = np.zeros((2101, 2101), np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = cells[:, 801] = 100
+    found = segmented(OccupancyGrid(cells, 0.01))
+    assert areas(found) == pytest.approx([8.0 * 20.99, 12.98 * 20.99], rel=0.003)
+
+
+@pytest.mark.parametrize(
+    ("cells", "door", "step"),
+    [
+        (4_000_000, 500.0, 1),
+        (4_000_001, 500.0, 2),
+        (16_000_001, 500.0, 3),
+        (16_000_001, 59.9, 2),
+        (16_000_001, 39.9, 1),
+        (16_000_001, 1.0, 1),
+    ],
+)
+def test_cells_are_looked_at_as_one_as_long_as_doorways_are_wide_enough(cells, door, step):
+    assert _coarser(cells, door) == step
 
 
 TOO_FEW = {

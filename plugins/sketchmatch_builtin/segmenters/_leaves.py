@@ -92,9 +92,9 @@ def _leaves(room: Mask, door: float, least: float) -> Iterator[Mask]:
 
 def _filling(mask: Mask) -> float:
     """Return how much of the convex hull of a mask's cells it fills."""
-    cells = cv2.findNonZero(mask)
-    hull = cv2.convexHull(cells).reshape(-1, 2)
+    borders, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    hull = cv2.convexHull(np.concatenate(borders)).reshape(-1, 2)
     steps = np.abs(np.roll(hull, -1, axis=0) - hull)
     # By Pick's theorem: how many cells' middles lie in the hull or on its border.
     held = cv2.contourArea(hull) + np.gcd(*steps.T).sum() / 2.0 + 1.0
-    return float(len(cells) / held)
+    return float(cv2.countNonZero(mask) / held)

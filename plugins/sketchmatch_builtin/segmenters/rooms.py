@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from typing import cast
 
@@ -45,6 +46,8 @@ _MOST_HOLES = 1000
 
 # In metres: no doorway is wider, unless a parameter says so.
 _WIDEST = 2.1
+# A map of more cells is looked at in larger ones, as long as a doorway is so many of these wide.
+_MANY, _FINE = 4_000_000, 20
 # In metres and square metres, likewise: longest furniture, smallest room.
 _FURNITURE, _SMALLEST = 2.0, 2.0
 # In a drawing, of the width of the wider room: what is narrower is another one.
@@ -68,7 +71,8 @@ class RoomSegmenter(Segmenter):
     the insides of cupboards' outlines are no rooms. Things that stand free in a room and are no
     longer than ``furniture`` neither cut it nor are holes in it; longer ones are holes. Unknown and
     occupied cells otherwise belong to no room, and two rooms are always at least a cell apart. A
-    turned map has the same rooms, turned.
+    turned map has the same rooms, turned. A map of more than four million cells is looked at in
+    cells twice as large, or larger, as long as a doorway is 20 of these wide.
 
     In a drawing walls are strokes, the borders of polygons, or one of two shades of a picture, in
     which either the walls or the free space may be dark; what joins the picture's border is
@@ -175,7 +179,10 @@ class RoomSegmenter(Segmenter):
         if not isinstance(source, OccupancyGrid):
             return self._of_drawing(source)
         params, cell = self.params, source.resolution
-        free, (left, below) = free_cells(source, params)
+        free, corner = free_cells(source, params)
+        widest = _WIDEST if params.door_width is None else params.door_width
+        step = _coarser(free.size, widest / cell)
+        free, cell = _coarse(free, step), step * cell
         inside = _furnished(
             free, (_FURNITURE if params.furniture is None else params.furniture) / cell
         )
@@ -185,8 +192,10 @@ class RoomSegmenter(Segmenter):
         least = max(area / cell**2, 1.0)
         rooms = (divided_at_openings if width is None else divided)(inside, door, least)
         cut = f"at passages of up to {door * cell:.2g} m"
-        outlines = self._outlines(rooms, area, cell, (left, below), "cells", cut)
-        rooms_in_map = [[in_map(ring, source) for ring in _rings(room)] for room in outlines]
+        outlines = self._outlines(rooms, area, cell, "cells", cut)
+        rooms_in_map = [
+            [in_map(step * ring + corner, source) for ring in _rings(room)] for room in outlines
+        ]
         labels, unplaced = labels_of(
             [shapely.Polygon(outer, inner) for outer, *inner in rooms_in_map],
             [item for item in source.landmarks if item.kind == ROOM],
@@ -212,7 +221,7 @@ class RoomSegmenter(Segmenter):
         else:
             parts = divided(inside, door, least)
             cut = f"at passages of up to {params.door_width:.2g}"
-        outlines = self._outlines(parts, area, cell, (0, 0), path, cut)
+        outlines = self._outlines(parts, area, cell, path, cut)
         rooms = [[cell * ring + plan.corner for ring in _rings(room)] for room in outlines]
         labels, unplaced = labels_of(
             [shapely.Polygon(outer, inner) for outer, *inner in rooms], _names(source), 0.0
@@ -225,16 +234,14 @@ class RoomSegmenter(Segmenter):
         rooms: Mask,
         area: float,
         cell: float,
-        corner: tuple[int, int],
         path: str,
         cut: str,
     ) -> list[shapely.Polygon]:
         """Return the outlines of rooms, components of cells, in cells, in reading order."""
         params = self.params
-        left, below = corner
         outlines = [
-            _polygon(mask, (x + left, y + below))
-            for mask, (x, y) in components(
+            _polygon(mask, corner)
+            for mask, corner in components(
                 rooms, max(area / cell**2, 1.0), source_limits().max_objects, "raise min_area"
             )
         ]
@@ -262,6 +269,22 @@ def _names(source: StrokeSet | PolygonSet | Image) -> list[Landmark]:
         if label and given[label] == 1 and len(points)
         for x, y in [(points.min(axis=0) + points.max(axis=0)) / 2.0]
     ]
+
+
+def _coarser(cells: int, door: float) -> int:
+    """Return how many cells along each side are looked at as one."""
+    return max(1, min(math.ceil(math.sqrt(cells / _MANY)), int(door / _FINE)))
+
+
+def _coarse(free: Mask, step: int) -> Mask:
+    """Return cells so many times as large, free where all that they hold are."""
+    if step == 1:
+        return free
+    rows, columns = (-(-side // step) * step for side in free.shape)
+    padded = np.zeros((rows, columns), np.uint8)
+    padded[: free.shape[0], : free.shape[1]] = free
+    down = np.minimum.reduce([padded[k::step] for k in range(step)])
+    return np.asarray(np.minimum.reduce([down[:, k::step] for k in range(step)]), dtype=np.uint8)
 
 
 def _furnished(free: Mask, longest: float) -> Mask:
@@ -321,7 +344,9 @@ def _from_farthest(ring: FloatArray) -> FloatArray:
     # As many times as there are corners: whole numbers and halves, and so without rounding.
     away = ((len(corners) * corners - corners.sum(axis=0)) ** 2).sum(axis=1)
     farthest = np.flatnonzero(away == away.max()).tolist()
-    first = max(farthest, key=lambda k: np.roll(away, -k).tolist())
+    first = farthest[0]
+    if len(farthest) > 1:
+        first = max(farthest, key=lambda k: np.roll(away, -k).tolist())
     return np.roll(corners, -first, axis=0)
 
 
