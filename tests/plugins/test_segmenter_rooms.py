@@ -14,6 +14,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import OccupancyGrid
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter, _coarser
+from tests.plugins.test_segmenter_lidar import lost, turned
 from tests.tools import ROOT, require
 
 CELL = 0.05
@@ -305,6 +306,13 @@ def test_a_turned_map_has_the_rooms_turned(seed, turns):
     assert apart_when_turned(offices(np.random.default_rng(seed))[0], turns) < 1e-9
 
 
+def test_rooms_that_meet_at_the_corners_of_a_cell_in_their_wall_are_two():
+    cells = free(walls(8.55, 4.4), (0.2, 0.2, 4.0, 4.0), (4.35, 0.2, 4.0, 4.0))
+    # A cell of each room's in the wall, and one between that touches them by its corners alone.
+    cells[50, 84] = cells[51, 85] = cells[50, 86] = 0
+    assert areas(segmented(cells)) == pytest.approx([16.0, 16.0], rel=0.01)
+
+
 @pytest.mark.parametrize("turns", [1, 2, 3])
 @pytest.mark.parametrize("second", [4.0, 3.0])
 def test_the_middle_of_a_doorway_goes_to_one_room_however_the_map_lies(second, turns):
@@ -411,6 +419,40 @@ FLOORS = {
 """How many of the rooms marked by hand are found, of the floor empty and with furniture."""
 
 
+TURNED = {
+    "Freiburg101_scan": (10, 10),
+    "Freiburg52_scan": (9, 8),
+    "lab_a_scan": (63, 63),
+    "lab_c_scan": (20, 20),
+    "lab_intel": (27, 26),
+    "office_a": (30, 29),
+    "office_c": (34, 34),
+    "office_e": (37, 37),
+    "office_g": (36, 36),
+    "office_i": (27, 27),
+}
+"""How many rooms are found, and how many of these on the floor turned by 37°."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TURNED)
+def test_turning_a_floor_by_37_degrees_loses_few_rooms(name):
+    grid = OccupancyGrid(floor_of(name), CELL)
+    moved, back = turned(grid)
+    before = [item.polygon for item in segmented(grid).scene.objects]
+    after = [back(item.polygon) for item in segmented(moved).scene.objects]
+    count, kept = TURNED[name]
+    assert len(before) == count
+    assert lost(before, after) <= count - kept
+
+
+def floor_of(name):
+    path = ROOT.parent / "shared" / "data" / "floors-ipa" / f"{name}.png"
+    require(path.exists(), f"the floor {name}")
+    shades = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    return np.where(shades > 250, 0, 100).astype(np.int8)[::-1].copy()
+
+
 def marked(name):
     """The rooms of a floor that people marked, numbered from 1."""
     path = ROOT.parent / "shared" / "data" / "floors-ipa" / f"{name}_gt_segmentation.png"
@@ -427,11 +469,8 @@ def marked(name):
 
 def found_of(name, truth, count):
     """How many of the marked rooms have a room that shares half of what both cover."""
-    shades = cv2.imread(
-        str(ROOT.parent / "shared" / "data" / "floors-ipa" / f"{name}.png"), cv2.IMREAD_GRAYSCALE
-    )
-    cells = np.where(shades > 250, 0, 100).astype(np.int8)[::-1]
-    found = np.zeros(shades.shape, np.int32)
+    cells = floor_of(name)
+    found = np.zeros(cells.shape, np.int32)
     for number, item in enumerate(segmented(cells).scene.objects, 1):
         corners = [np.round(ring / CELL - 0.5).astype(np.int32) for ring in item.rings]
         cv2.fillPoly(found, corners, number)

@@ -22,6 +22,7 @@ __all__ = [
     "passages",
     "roomed",
     "widths",
+    "without_borders",
 ]
 
 Labels = NDArray[np.int32]
@@ -75,8 +76,7 @@ def divided(free: Mask, door: float, least: float) -> Mask:
         closets that no room reaches are among them, however small, but not rays of a laser
         through glass, nor what is closed and too narrow for anyone.
     """
-    free, labels = roomed(free, door, least)
-    return np.asarray((free & ~along_borders(labels))[1:-1, 1:-1], dtype=np.uint8)
+    return without_borders(*roomed(free, door, least))
 
 
 def roomed(free: Mask, door: float, least: float) -> tuple[Mask, Labels]:
@@ -223,6 +223,15 @@ def _without_shafts(free: Mask, width: _Widths, door: float) -> Mask:
     widest = np.zeros(count, np.float32)
     np.maximum.at(widest, spaces.reshape(-1), width.reshape(-1))
     return np.asarray((2.0 * widest >= _SHAFT * door)[spaces], dtype=np.uint8)
+
+
+def without_borders(free: Mask, labels: Labels) -> Mask:
+    """Return free cells without those along borders between rooms, and without the padding."""
+    # Cells in a thin wall, which no room reaches by a side, would join by their corners what lies
+    # on both sides of it.
+    reached = cv2.dilate((labels > 0).view(np.uint8), np.ones((3, 3), np.uint8))
+    cut = along_borders(labels) | ((labels == 0) & (reached > 0))
+    return np.asarray((free & ~cut)[1:-1, 1:-1], dtype=np.uint8)
 
 
 def along_borders(labels: Labels) -> NDArray[np.bool_]:

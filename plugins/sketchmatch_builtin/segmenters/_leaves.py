@@ -15,6 +15,7 @@ from sketchmatch_builtin.segmenters._doorways import (
     passages,
     roomed,
     widths,
+    without_borders,
 )
 
 __all__ = ["divided_at_openings"]
@@ -44,7 +45,7 @@ def divided_at_openings(free: Mask, door: float, least: float) -> Mask:
     """
     free, labels = roomed(free, door, least)
     _number_leaves(labels, door, least)
-    return np.asarray((free & ~along_borders(labels))[1:-1, 1:-1], dtype=np.uint8)
+    return without_borders(free, labels)
 
 
 def _number_leaves(labels: Labels, door: float, least: float) -> None:

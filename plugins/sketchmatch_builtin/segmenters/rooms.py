@@ -89,7 +89,8 @@ class RoomSegmenter(Segmenter):
     On ten of the twenty floors of [1]_, each empty and with furniture, 506 of 560 rooms marked by
     hand are found, and of the 532 from 0.3 m² on 95 %: a room shares more than half of what both
     cover. It was tuned on every second building by name, where 294 of 322 are found; on the others
-    212 of 238. Recall and precision as [1]_ measures them, how much of a room and of a segment the
+    212 of 238. Of the 293 rooms found on the ten empty floors 290 are found when these are turned
+    by 37°. Recall and precision as [1]_ measures them, how much of a room and of a segment the
     largest overlap is, are 97.9 and 95.4 % empty, 92.3 and 95.7 % with furniture, of outlines and
     without the rooms below 0.3 m². Of all twenty floors its own figures, as others quote them:
     morphological 98.1 and 88.5 %, 84.6 and 90.5 %; distance transform 96.9 and 88.4 %, 76.1 and
