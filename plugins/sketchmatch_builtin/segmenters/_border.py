@@ -44,7 +44,7 @@ def outer_border(mask: NDArray[np.uint8]) -> FloatArray:
     shape = cv2.dilate(centres, np.ones((3, 3), np.uint8))
     contours, _ = cv2.findContours(shape, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     contour: NDArray[Any] = contours[0][:, 0, :]
-    following = np.roll(contour, -1, axis=0)
+    following = np.concatenate([contour[1:], contour[:1]])
     corner = np.where(contour % 2 == 0, contour, following)
     cut = (contour != following).all(axis=1)
     cut[cut] = _filled_around(mask, corner[cut] // 2) == 3

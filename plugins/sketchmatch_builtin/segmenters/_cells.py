@@ -151,8 +151,9 @@ def outline(mask: Mask) -> FloatArray:
     """Return the corners of a mask's outer border, see :func:`outer_border`, shape (k, 2)."""
     points = outer_border(mask)
     # The border names some points twice.
-    points = points[(points != np.roll(points, 1, axis=0)).any(axis=1)]
-    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    points = points[(points != np.concatenate([points[-1:], points[:-1]])).any(axis=1)]
+    before = points - np.concatenate([points[-1:], points[:-1]])
+    after = np.concatenate([before[1:], before[:1]])
     turns = before[:, 0] * after[:, 1] != before[:, 1] * after[:, 0]
     return np.asarray(points[turns])
 

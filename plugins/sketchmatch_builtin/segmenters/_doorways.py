@@ -12,9 +12,20 @@ from sketchmatch.model import FloatArray, IntArray
 from sketchmatch_builtin.segmenters._cells import Mask
 from sketchmatch_builtin.segmenters._merging import groups
 
-__all__ = ["along_borders", "divided", "doorway", "grow"]
+__all__ = [
+    "Labels",
+    "along_borders",
+    "bodies",
+    "divided",
+    "doorway",
+    "grow",
+    "passages",
+    "roomed",
+    "widths",
+    "without_borders",
+]
 
-_Labels = NDArray[np.int32]
+Labels = NDArray[np.int32]
 _Widths = NDArray[np.float32]
 
 # Of the wider part's width: a passage as wide as this is no doorway, but the same corridor.
@@ -37,10 +48,10 @@ def doorway(free: Mask, most: float) -> float:
     most
         The widest doorway there is, in cells.
     """
-    return min(_DOORWAY * float(_widths(np.pad(free, 1))[1:-1, 1:-1][free > 0].mean()), most)
+    return min(_DOORWAY * float(widths(np.pad(free, 1))[1:-1, 1:-1][free > 0].mean()), most)
 
 
-def _widths(free: Mask) -> _Widths:
+def widths(free: Mask) -> _Widths:
     """Return how far each free cell is from the nearest that is not."""
     widths = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     return np.asarray(widths, dtype=np.float32)
@@ -65,18 +76,41 @@ def divided(free: Mask, door: float, least: float) -> Mask:
         closets that no room reaches are among them, however small, but not rays of a laser
         through glass, nor what is closed and too narrow for anyone.
     """
+    return without_borders(*roomed(free, door, least))
+
+
+def roomed(free: Mask, door: float, least: float) -> tuple[Mask, Labels]:
+    """Return free cells, without rays and shafts, and the number of each one's room, both padded.
+
+    Cells that no room reaches have the number 0.
+    """
     free = np.pad(free, 1)
-    width = _widths(free)
+    width = widths(free)
     free = _without_shafts(free, width, door)
     free &= _near(width > _RAY * door, 2.0 * _RAY * door)
-    labels = _bodies(free, width, door / 2.0 + 0.5)
-    labels = _with_narrow_rooms(free, labels, least)
+    return free, _joined(bodies(free, width, door, least), width)
+
+
+def bodies(free: Mask, width: _Widths, door: float, least: float) -> Labels:
+    """Return parts of free space cut at one width, numbered from 1: free cells that are joined.
+
+    Parameters
+    ----------
+    free
+        1 where a cell is free, 0 elsewhere, and along the border.
+    width
+        How far each free cell is from the nearest that is not.
+    door
+        Widest doorway, in cells.
+    least
+        Area in cells from which a corridor as narrow as a door is a part.
+    """
+    labels = _with_narrow_rooms(free, _covered(free, width, door / 2.0 + 0.5), least)
     grow(free, labels)
-    labels = _joined(labels, width)
-    return np.asarray((free & ~along_borders(labels))[1:-1, 1:-1], dtype=np.uint8)
+    return labels
 
 
-def _bodies(free: Mask, width: _Widths, radius: float) -> _Labels:
+def _covered(free: Mask, width: _Widths, radius: float) -> Labels:
     """Return which discs of a radius cover each cell, one label for discs that are joined."""
     cores = (width > radius).astype(np.uint8)
     if not cores.any():
@@ -88,7 +122,7 @@ def _bodies(free: Mask, width: _Widths, radius: float) -> _Labels:
     return nearest
 
 
-def _nearest(labels: _Labels) -> _Labels:
+def _nearest(labels: Labels) -> Labels:
     """Return for each cell the label of the nearest one that has one, of several the highest."""
     found = np.zeros_like(labels)
     # Which of several OpenCV takes depends on the direction, and so all four are asked.
@@ -104,7 +138,7 @@ def _nearest(labels: _Labels) -> _Labels:
     return found
 
 
-def _with_narrow_rooms(free: Mask, labels: _Labels, least: float) -> _Labels:
+def _with_narrow_rooms(free: Mask, labels: Labels, least: float) -> Labels:
     """Add as rooms what is free, without a label, and large: corridors as narrow as a door."""
     rest = (free > 0) & (labels == 0)
     parts, sizes = _numbered(rest.view(np.uint8), 4)
@@ -114,7 +148,7 @@ def _with_narrow_rooms(free: Mask, labels: _Labels, least: float) -> _Labels:
     return np.asarray(labels + narrow[parts], dtype=np.int32)
 
 
-def _numbered(mask: Mask, connectivity: int) -> tuple[_Labels, IntArray]:
+def _numbered(mask: Mask, connectivity: int) -> tuple[Labels, IntArray]:
     """Return a mask's components, numbered from 1, and how many cells each number has.
 
     The highest number wins a cell that is as near to another, and so must not depend on how the
@@ -133,7 +167,7 @@ def _numbered(mask: Mask, connectivity: int) -> tuple[_Labels, IntArray]:
     return numbers[parts], sizes[order]
 
 
-def grow(free: Mask, labels: _Labels) -> None:
+def grow(free: Mask, labels: Labels) -> None:
     """Give free cells without a label that of the nearest, in steps from side to side.
 
     Of several that are as near it is the highest.
@@ -149,17 +183,17 @@ def grow(free: Mask, labels: _Labels) -> None:
         rest = rest[found == 0]
 
 
-def _joined(labels: _Labels, width: _Widths) -> _Labels:
+def _joined(labels: Labels, width: _Widths) -> Labels:
     """Join parts whose passage is nearly as wide as the wider of them."""
     count = int(labels.max()) + 1
     widest = np.zeros(count, np.float32)
     np.maximum.at(widest, labels.reshape(-1), width.reshape(-1))
-    pairs, passage = _passages(labels, width)
+    pairs, passage = passages(labels, width)
     same = passage >= _SAME_WIDTH * widest[pairs].max(axis=1)
     return groups(count, pairs[same].T).astype(np.int32)[labels]
 
 
-def _passages(labels: _Labels, width: _Widths) -> tuple[IntArray, FloatArray]:
+def passages(labels: Labels, width: _Widths) -> tuple[IntArray, FloatArray]:
     """Return which labels touch, shape (k, 2), and how wide each passage is, shape (k,)."""
     pairs: list[IntArray] = []
     widths: list[FloatArray] = []
@@ -191,7 +225,16 @@ def _without_shafts(free: Mask, width: _Widths, door: float) -> Mask:
     return np.asarray((2.0 * widest >= _SHAFT * door)[spaces], dtype=np.uint8)
 
 
-def along_borders(labels: _Labels) -> NDArray[np.bool_]:
+def without_borders(free: Mask, labels: Labels) -> Mask:
+    """Return free cells without those along borders between rooms, and without the padding."""
+    # Cells in a thin wall, which no room reaches by a side, would join by their corners what lies
+    # on both sides of it.
+    reached = cv2.dilate((labels > 0).view(np.uint8), np.ones((3, 3), np.uint8))
+    cut = along_borders(labels) | ((labels == 0) & (reached > 0))
+    return np.asarray((free & ~cut)[1:-1, 1:-1], dtype=np.uint8)
+
+
+def along_borders(labels: Labels) -> NDArray[np.bool_]:
     """Return the cells that touch, by a side or a corner, a cell of another room."""
     around = np.ones((3, 3), np.uint8)
     # Labels are few, far below 2²⁴, and so exact as float32, which OpenCV can dilate.
