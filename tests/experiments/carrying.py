@@ -26,6 +26,7 @@ import shapely.affinity
 
 import sketchmatch
 from sketchmatch.model import FloatArray, IntArray, OccupancyGrid, Scene
+from sketchmatch.pipeline.slices import finish
 from sketchmatch.testing import World, plan_tour, random_scene, spacing, survey
 from sketchmatch.transfers.carrying import carried, course_between
 from sketchmatch.transfers.features import Feature, FeatureKind
@@ -127,7 +128,7 @@ def _measure(case: WayCase, found: Ways) -> None:
     course = course_between(case.sketch, case.map, pairs, features=[feature])
     radius = _RADIUS * spacing(case.map)
     obstacles = Obstacles.of_scene(case.map, course.warp(case.drawn), radius)
-    (answer,) = carried([feature], course, obstacles, radius)
+    (answer,) = finish(carried([feature], course, obstacles, radius))
     assert answer.feature is not None
     points = answer.feature.points
     size = float(np.median([math.sqrt(item.area) for item in case.map.objects]))
