@@ -1,6 +1,7 @@
 """Scenes under the hash of what they are: what makes the name, whose they are, and broken files."""
 
 import sqlite3
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -52,6 +53,13 @@ def archive(store):
     archive.open()
     yield archive
     archive.close()
+
+
+@pytest.fixture
+def shelf(archive):
+    shelf = Shelf(archive.path)
+    yield shelf
+    shelf.close()
 
 
 @pytest.fixture
@@ -111,7 +119,7 @@ class TestOwners:
         assert archive.get(name, "bert", True).source == SOURCE
         archive.delete(name, "bert")
         assert archive.claim(name, "bert") is None
-        with sqlite3.connect(archive.path) as file:
+        with closing(sqlite3.connect(archive.path)) as file:
             for table in ("contents", "scenes", "owners"):
                 assert file.execute(f"SELECT count(*) FROM {table}").fetchone() == (0,)
 
@@ -184,8 +192,7 @@ class TestLists:
 
 
 class TestShelf:
-    def test_a_scene_is_read_as_it_was_found_and_decoded_once(self, archive, name):
-        shelf = Shelf(archive.path)
+    def test_a_scene_is_read_as_it_was_found_and_decoded_once(self, shelf, name):
         read = shelf.segmentation(name, "anna", "map.stored_scene")
         assert read.scene.identity == Scene.from_polygons(BOXES).identity
         assert read.scene.labels == ("bed", "")
@@ -195,14 +202,12 @@ class TestShelf:
         assert shelf.holds(read.scene)
         assert not shelf.holds(Scene.from_polygons(BOXES))
 
-    def test_anothers_scene_is_not_there_even_where_it_was_decoded(self, archive, name):
-        shelf = Shelf(archive.path)
+    def test_anothers_scene_is_not_there_even_where_it_was_decoded(self, shelf, name):
         shelf.segmentation(name, "anna", "map.stored_scene")
         with pytest.raises(NotFoundError, match=f"^map.stored_scene is {name}, and you"):
             shelf.segmentation(name, "bert", "map.stored_scene")
 
-    def test_histograms_come_back_to_the_last_digit(self, archive, name):
-        shelf = Shelf(archive.path)
+    def test_histograms_come_back_to_the_last_digit(self, archive, shelf, name):
         scene = shelf.segmentation(name, "anna", "map").scene
         histogram = in_directions(REGISTRY.find(Kind.HISTOGRAM, "constant").algorithm(), 8)
         values = np.random.default_rng(0).random((1, 8))
@@ -215,7 +220,7 @@ class TestShelf:
 
     def test_histograms_of_what_is_not_kept_are_not_kept(self, archive):
         archive.keep(Described("outlines of another scene", "h", np.ones((1, 8))))
-        with sqlite3.connect(archive.path) as file:
+        with closing(sqlite3.connect(archive.path)) as file:
             assert file.execute("SELECT count(*) FROM histograms").fetchone() == (0,)
 
     def test_without_a_store_the_field_is_named(self):
@@ -233,9 +238,9 @@ class TestBrokenFiles:
             archive.put(large, "anna")
         assert archive.get(found().stored_scene.name, "anna")
         archive.keep(Described("x", "y", np.zeros((9000, 180))))  # which is not worth an error
+        archive.close()
 
-    def test_a_damaged_file_says_so_to_who_writes_and_who_reads(self, archive, name):
-        shelf = Shelf(archive.path)
+    def test_a_damaged_file_says_so_to_who_writes_and_who_reads(self, archive, shelf, name):
         archive.close()
         for file in archive.path.parent.glob("scenes.sqlite*"):
             file.write_bytes(b"no database " * 1000)
@@ -245,8 +250,7 @@ class TestBrokenFiles:
             shelf.segmentation(name, "anna", "map")
         assert shelf.record(name) is None
 
-    def test_a_file_that_is_gone_is_said_and_another_one_is_read(self, archive, name):
-        shelf = Shelf(archive.path)
+    def test_a_file_that_is_gone_is_said_and_another_one_is_read(self, archive, shelf, name):
         shelf.segmentation(name, "anna", "map")
         for file in archive.path.parent.glob("scenes.sqlite*"):
             file.unlink()

@@ -2,6 +2,7 @@
 
 import re
 import sqlite3
+from contextlib import ExitStack
 
 import pytest
 
@@ -36,14 +37,23 @@ def names(database):
     )
 
 
-def reopened(store, version=1, max_bytes=MIB):
-    return store.database("things", TABLE, version, max_bytes)
+@pytest.fixture
+def reopened(store):
+    """The file of the things, as another server opens it."""
+    with ExitStack() as opened:
+
+        def reopen(version=1, max_bytes=MIB):
+            database = store.database("things", TABLE, version, max_bytes)
+            opened.callback(database.close)
+            return database
+
+        yield reopen
 
 
-def test_what_is_put_is_there_after_a_restart(store, things):
+def test_what_is_put_is_there_after_a_restart(reopened, things):
     put(things, "chair")
     things.close()
-    assert names(reopened(store)) == ["chair"]
+    assert names(reopened()) == ["chair"]
 
 
 def test_a_job_that_raises_leaves_nothing_behind(things):
@@ -73,8 +83,8 @@ def test_strangers_on_the_machine_cannot_read_the_folder(store):
     assert store.folder.stat().st_mode & 0o077 == 0
 
 
-def test_a_full_file_says_so_keeps_what_it_had_and_takes_more_after_a_deletion(store):
-    database = reopened(store, max_bytes=400_000)
+def test_a_full_file_says_so_keeps_what_it_had_and_takes_more_after_a_deletion(reopened):
+    database = reopened(max_bytes=400_000)
     put(database, "chair", bytes(250_000))
     with pytest.raises(StoreError, match=r"things\.sqlite is full; delete what is not needed"):
         put(database, "table", bytes(250_000))
@@ -118,11 +128,11 @@ def test_a_file_that_another_process_holds_is_said(monkeypatch, things):
     assert names(things) == ["chair", "table"]
 
 
-def test_a_file_of_another_version_is_left_as_it_is(store, things):
+def test_a_file_of_another_version_is_left_as_it_is(reopened, things):
     put(things, "chair")
     things.close()
-    other = reopened(store, version=2)
+    other = reopened(version=2)
     sentence = f"the store's file {other.path} is of another version of sketchmatch; move it away"
     with pytest.raises(StoreError, match=f"^{re.escape(sentence)}$"):
         names(other)
-    assert names(reopened(store)) == ["chair"]
+    assert names(reopened()) == ["chair"]

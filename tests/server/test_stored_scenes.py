@@ -2,6 +2,7 @@
 
 import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 
 import pytest
 
@@ -163,7 +164,7 @@ def test_the_histograms_of_a_scene_are_kept_with_it_and_no_others(tmp_path):
     with hosting(setup(), store=store) as host, Client(host.address, timeout=60) as client:
         client.put_scene(MAP)
         client.sketch(scene(5, 3)).delete()  # of a map that comes along, and is not kept
-    with sqlite3.connect(store / "scenes.sqlite") as file:
+    with closing(sqlite3.connect(store / "scenes.sqlite")) as file:
         rows = file.execute("SELECT outlines, length(bytes) FROM histograms").fetchall()
     assert rows
     assert {outlines for outlines, _ in rows} == {Scene.from_polygons(shapes(6, 1)).identity}

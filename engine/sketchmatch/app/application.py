@@ -411,6 +411,7 @@ class Application:
             await asyncio.sleep(_MOMENT)
         await self.matches.close()
         await self.scenes.close()
+        self._remembered.close()
         if self._looking is not None:
             self._looking.cancel()
 

@@ -36,6 +36,10 @@ class Remembered:
         engine = replace(setup.engine, memory=self._memory)
         return replace(setup, engine=engine, shelf=self._shelf)
 
+    def close(self) -> None:
+        """Close the file, until it is read again."""
+        self._shelf.close()
+
     def _fetch(self, scene: Scene, histogram: Histogram) -> FloatArray | None:
         return self._shelf.histograms(scene, histogram) if self._shelf.holds(scene) else None
 

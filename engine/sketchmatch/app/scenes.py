@@ -359,6 +359,11 @@ class Shelf:
         self._lock = Lock()
         self._held: OrderedDict[str, Segmentation] = OrderedDict()
 
+    def close(self) -> None:
+        """Close the file, until it is read again."""
+        if self._file is not None:
+            self._file.close()
+
     def segmentation(self, name: str, caller: str, field: str) -> Segmentation:
         """Return a scene of a caller as it was found.
 

@@ -75,20 +75,38 @@ class Store:
         self._lock.close()
 
 
-class Database:
+class _File:
     """One SQLite file, for one thread at a time.
 
     A file that fails is opened anew at the next use, so that what was mended is in use again
     without a restart.
     """
 
-    def __init__(self, path: Path, schema: str, version: int, max_bytes: int) -> None:
+    def __init__(self, path: Path) -> None:
         self.path = path
+        self._connection: sqlite3.Connection | None = None
+        self._one_at_a_time = Lock()
+
+    def close(self) -> None:
+        """Close the file, until it is used again."""
+        with self._one_at_a_time:
+            self._close()
+
+    def _close(self) -> None:
+        if self._connection is not None:
+            with suppress(sqlite3.Error):
+                self._connection.close()
+            self._connection = None
+
+
+class Database(_File):
+    """A file that this process alone writes."""
+
+    def __init__(self, path: Path, schema: str, version: int, max_bytes: int) -> None:
+        super().__init__(path)
         self._schema = schema
         self._version = version
         self._max_pages = max(max_bytes // _PAGE_BYTES, _FEWEST_PAGES)
-        self._connection: sqlite3.Connection | None = None
-        self._one_at_a_time = Lock()
 
     def work(self, job: Callable[[sqlite3.Connection], _Result]) -> _Result:
         """Do something with it in one transaction: all of it, or nothing where it raises.
@@ -105,11 +123,6 @@ class Database:
             with connection:
                 connection.execute("BEGIN IMMEDIATE")
                 return job(connection)
-
-    def close(self) -> None:
-        """Close the file."""
-        with self._one_at_a_time:
-            self._close()
 
     def _opened(self) -> sqlite3.Connection:
         connection = sqlite3.connect(
@@ -136,12 +149,6 @@ class Database:
             )
         return connection
 
-    def _close(self) -> None:
-        if self._connection is not None:
-            with suppress(sqlite3.Error):
-                self._connection.close()
-            self._connection = None
-
     @contextmanager
     def _told(self) -> Iterator[None]:
         """Say in a sentence what is wrong with the file."""
@@ -157,14 +164,12 @@ class Database:
             raise _said(self.path, error) from error
 
 
-class Reading:
-    """A file of the store as other processes see it, for one thread at a time: to read alone."""
+class Reading(_File):
+    """A file as other processes than the one that writes it see it."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        super().__init__(path)
         self._opened: int | None = None
-        self._connection: sqlite3.Connection | None = None
-        self._one_at_a_time = Lock()
 
     def work(self, job: Callable[[sqlite3.Connection], _Result]) -> _Result:
         """Read something.
@@ -191,12 +196,6 @@ class Reading:
             except sqlite3.Error as error:
                 self._close()
                 raise _said(self.path, error) from error
-
-    def _close(self) -> None:
-        if self._connection is not None:
-            with suppress(sqlite3.Error):
-                self._connection.close()
-            self._connection = None
 
 
 def _inode(path: Path) -> int | None:

@@ -170,6 +170,7 @@ class _Worker:
     def _set_up(self, content: bytes, registry: Registry) -> None:
         given: WorkerSetup = pickle.loads(content)
         if given.scenes != self._remembered.path:
+            self._remembered.close()
             self._remembered = Remembered(given.scenes)
         self._setup = self._remembered.setup(
             Setup(Engine(registry, given.defaults, given.sources), given.limits),
