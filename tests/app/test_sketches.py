@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 from sketchmatch.app.application import Application
-from sketchmatch.app.setup import Setup
-from sketchmatch.app.sketches import Sketches, SketchLimits, _unless_changed
+from sketchmatch.app.setup import RequestLimits, Setup, SketchLimits
+from sketchmatch.app.sketches import _unless_changed
 from sketchmatch.app.waiting import Caller
 from sketchmatch.errors import (
     InvalidInputError,
@@ -38,8 +38,8 @@ def with_sketches(scenario, **limits):
     """Run a scenario that is given sketches of an application of its own."""
 
     async def run():
-        app = Application(Setup(Engine(default_registry(), limits=LIMITS)))
-        app.sketches = Sketches(app, SketchLimits(**limits))
+        engine = Engine(default_registry(), limits=LIMITS)
+        app = Application(Setup(engine, RequestLimits(sketches=SketchLimits(**limits))))
         try:
             await scenario(app.sketches)
         finally:

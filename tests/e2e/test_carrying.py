@@ -188,6 +188,22 @@ def test_in_python_it_is_the_same(zones):
             "--keepout needs a map with cells",
         ),
         (["carry", "DRAWN", LIVING_ROOM_MAP, "gone.yaml"], "gone.yaml does not exist"),
+        *(
+            ([*command, option, value], words)
+            for command in (["transfer", *ROOM, "DRAWN"], ["carry", "DRAWN", *ROOM[1:] * 2])
+            for option, value, words in (
+                ("--searcher", "luck", "'luck', which is no searcher"),
+                ("--judge", "solomon", "'solomon', which is no judge"),
+                ("--histogram", "none", "'none', which is no histogram"),
+                ("--similarity", "taste", "'taste', which is no similarity"),
+                ("--seed", "-1", "seed"),
+                ("--time-budget", "0", "time_budget"),
+                ("--weights", "1,2", "--weights '1,2' is not three, five or six numbers"),
+                ("--unmatched-price", "-1", "unmatched_price"),
+                ("--set", "searcher.maps=0", "maps"),
+                ("--synonyms", "couch", "--synonyms 'couch' is not two labels or more"),
+            )
+        ),
         (["carry", LIVING_ROOM_SKETCH, *ROOM[1:], *ROOM[1:]], "is not JSON"),
     ],
 )

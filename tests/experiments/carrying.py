@@ -2,7 +2,8 @@
 
 ``python -m tests.experiments.carrying --sketches 100 --maps 20`` prints a table of
 
-- ways through rooms, drawn by the study's people and by those of both generators, carried through
+- ways through rooms, drawn by the study's people, by those of both generators, and by the study's
+  where they stretch a room and draw one side of it larger than the other, carried through
   the objects that are the same (the truth, so that no mistake of a match counts): the share of
   things that they pass on the same side as the true way, and of those that it passes closely; how
   much of that a similarity would do, too; how far they are from the true way in units of a
@@ -26,6 +27,7 @@ import shapely.affinity
 
 import sketchmatch
 from sketchmatch.model import FloatArray, IntArray, OccupancyGrid, Scene
+from sketchmatch.pipeline.slices import finish
 from sketchmatch.testing import World, plan_tour, random_scene, spacing, survey
 from sketchmatch.transfers.carrying import carried, course_between
 from sketchmatch.transfers.features import Feature, FeatureKind
@@ -38,14 +40,17 @@ from tests.experiments.ways import drawn_way, swept, true_way
 
 __all__ = ["PEOPLE", "WayCase", "Ways", "carried_ways", "carried_zones", "way_case"]
 
-PEOPLE = ("study", *KINDS)
-"""Who draws."""
+PEOPLE = ("study", *KINDS, "uneven")
+"""Who draws; the last are the study's who draw one side of a room larger than the other."""
 
 _PASSING = math.pi / 4.0
 _RADIUS = 0.04
 _CLOSE = 0.5
 """Of a thing's size: nearer than this to its outline a way passes it close by."""
 _MOVED = 0.1
+_STRETCH, _GROWTH = 1.5, 0.5
+"""How much longer than wide a room is drawn, and by what share its sides are drawn larger or
+smaller than its middle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +75,9 @@ class Ways:
     close: int = 0
     close_same_side: int = 0
     stiff_same_side: int = 0
+    stiff_close_same_side: int = 0
     stiff_through: int = 0
+    stiff_away: list[float] = field(default_factory=list)
     undrawable: int = 0
     away: list[float] = field(default_factory=list)
     standardised: list[FloatArray] = field(default_factory=list)
@@ -84,21 +91,25 @@ class Ways:
             f"{self.same_side / self.passings:.4f}, of {self.close} close ones "
             f"{self.close_same_side / self.close:.4f}, through {self.through}, median away "
             f"{np.median(self.away):.3f} sizes, within 1 σ {within[0]:.2f}, 2 σ {within[1]:.2f}; "
-            f"by a similarity alone {self.stiff_same_side / self.passings:.4f}, through "
-            f"{self.stiff_through}; {self.undrawable} could not be drawn"
+            f"by a similarity alone {self.stiff_same_side / self.passings:.4f}, of close ones "
+            f"{self.stiff_close_same_side / self.close:.4f}, through "
+            f"{self.stiff_through}, median away {np.median(self.stiff_away):.3f}; "
+            f"{self.undrawable} could not be drawn"
         )
 
 
 def way_case(people: str, number: int) -> WayCase | None:
     """Return a way and its drawing; the same for the same number, None if nobody could draw it."""
     rng = np.random.default_rng([1611, PEOPLE.index(people), number])
-    if people == "study":
+    if people in ("study", "uneven"):
         place = (PLACES["A"].furniture, PLACES["B"].furniture, None)[number % 3]
         room = random_scene(rng, int(rng.integers(6, 14))) if place is None else place
         names = [str(k) for k in range(len(room))]
         map_ = Scene.from_polygons([item.rings[0] for item in room.objects], names)
         sketch = remembered(map_, Person(STRENGTH), rng)
         truth = np.array([int(label) for label in sketch.labels])
+        if people == "uneven":
+            sketch = _uneven(sketch, rng)
     else:
         found = sample(people, number, objects=20, drawn=12)
         sketch = found.scene
@@ -107,6 +118,25 @@ def way_case(people: str, number: int) -> WayCase | None:
     way = true_way(map_, rng)
     drawn = drawn_way(way, map_, sketch, truth, rng)
     return None if drawn is None else WayCase(map_, sketch, truth, way, drawn)
+
+
+def _uneven(sketch: Scene, rng: np.random.Generator) -> Scene:
+    """Return a sketch stretched in some direction, along which it also grows."""
+    axis = np.exp(1j * rng.uniform(-np.pi, np.pi))
+    corners = np.vstack([ring for item in sketch.objects for ring in item.rings]) @ [1.0, 1j]
+    middle = corners.mean() / axis
+    half = float(np.abs((corners / axis - middle).real).max())
+
+    def drawn(ring: FloatArray) -> FloatArray:
+        place = ring @ [1.0, 1j] / axis - middle
+        along = place.real / half
+        # The scale is 1 + growth·along: its integral goes along, itself across.
+        there = _STRETCH * half * (along + 0.5 * _GROWTH * along**2)
+        moved = axis * (there + 1j * place.imag * (1.0 + _GROWTH * along))
+        return np.stack([moved.real, moved.imag], axis=1)
+
+    rings = [[drawn(ring) for ring in item.rings] for item in sketch.objects]
+    return Scene.from_polygons(rings, sketch.labels)
 
 
 def carried_ways(people: str, numbers: range) -> Ways:
@@ -127,7 +157,7 @@ def _measure(case: WayCase, found: Ways) -> None:
     course = course_between(case.sketch, case.map, pairs, features=[feature])
     radius = _RADIUS * spacing(case.map)
     obstacles = Obstacles.of_scene(case.map, course.warp(case.drawn), radius)
-    (answer,) = carried([feature], course, obstacles, radius)
+    (answer,) = finish(carried([feature], course, obstacles, radius))
     assert answer.feature is not None
     points = answer.feature.points
     size = float(np.median([math.sqrt(item.area) for item in case.map.objects]))
@@ -138,6 +168,7 @@ def _measure(case: WayCase, found: Ways) -> None:
     warped, deviations = course.warp(case.drawn), course.warp.deviations(case.drawn)
     found.standardised.append((np.abs(warped - case.way) / deviations[:, None]).ravel())
     stiff = _by_similarity(case)
+    found.stiff_away.append(float(np.median(np.hypot(*(stiff - case.way).T))) / size)
     found.through += _goes_through(points, case.map)
     found.stiff_through += _goes_through(stiff, case.map)
     true_line = shapely.LineString(case.way)
@@ -152,7 +183,9 @@ def _measure(case: WayCase, found: Ways) -> None:
         found.same_side += same
         found.close += close
         found.close_same_side += close and same
-        found.stiff_same_side += abs(swept(stiff, centre) - turn) < math.pi
+        stiff_same = abs(swept(stiff, centre) - turn) < math.pi
+        found.stiff_same_side += stiff_same
+        found.stiff_close_same_side += close and stiff_same
 
 
 def _by_similarity(case: WayCase) -> FloatArray:

@@ -118,6 +118,32 @@ def test_max_gap_decides_what_is_open():
     assert segmented(outline, TRIANGLE, max_gap=0.35).warnings == ()
 
 
+def test_strokes_that_stay_are_the_same_objects_whatever_is_drawn_beside_them():
+    square = np.array([[0, 0], [2, 0], [2, 2], [0, 2.5], [0, 0]], float)
+    before = segmented(Stroke(square, label="desk"), TRIANGLE).scene.objects
+    moved, other = segmented(square + 3.0, TRIANGLE).scene.objects
+    assert other is before[1]
+    assert moved.rings[0].min() == 3.0
+    renamed = segmented(Stroke(square.copy(), label="bed"), TRIANGLE).scene
+    assert renamed.labels == ("bed", "")
+    assert before[0].label == "desk"
+
+
+def test_what_a_stroke_encloses_is_asked_anew_for_another_gap():
+    open_ = circle(0.93)
+    first_object(open_)
+    with pytest.raises(InvalidInputError):
+        segmented(open_, TRIANGLE, max_gap=0.2)
+    assert first_object(open_)[1] == ()
+
+
+def test_a_stroke_of_very_many_points_is_not_kept():
+    long = circle(1.0, samples=5000)
+    first, again = (first_object(long, simplify=0.0)[0] for _ in range(2))
+    assert first.area == again.area == pytest.approx(np.pi, rel=1e-3)
+    assert first is not again
+
+
 def test_simplify_is_relative_to_the_size():
     fine, _ = first_object(circle(1.0, samples=1000), simplify=0.0)
     coarse, _ = first_object(circle(1.0, samples=1000))

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import grpc
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -21,11 +22,16 @@ from sketchmatch_client import (
     InvalidRequestError,
     NotFoundError,
     ServerUnavailableError,
+    StoreError,
     sources,
 )
 from sketchmatch_proto.v1.match_pb2 import MatchResult
+from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
+from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest
+from sketchmatch_proto.v1.sketch_service_pb2_grpc import SketchServiceStub
 from tests.contract.golden import golden
 from tests.pace import slowness
+from tests.processes import server
 from tests.server.harness import hosting, scene, shapes, turned
 from tests.tools import ROOT
 
@@ -374,3 +380,26 @@ def test_the_example_of_the_clients_readme_runs(client, capsys):
     (example,) = re.findall(r"^~~~python\n(.*?)^~~~", page, re.DOTALL | re.MULTILINE)
     exec(example, {"client": client, "room": MAP, "sources": sources})
     assert "map_object" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_options_of_serve_say_how_many_sketches_there_are_and_how_long_and_how_much_is_kept(
+    tmp_path,
+):
+    options = ["--max-sketches-per-caller", "1", "--sketch-idle", "7.5", "--keep-scenes-mib", "1"]
+    rough = np.random.default_rng(0).uniform(1.0, 1.001, 40_000)
+    angles = np.linspace(0.0, 2.0 * np.pi, len(rough), endpoint=False)
+    outline_ = np.stack([rough * np.cos(angles), rough * np.sin(angles)], axis=1)
+    with (
+        server("--store", tmp_path / "store", *options) as running,
+        Client(running.address, timeout=60) as client,
+        grpc.insecure_channel(running.address) as channel,
+    ):
+        service = SketchServiceStub(channel)
+        request = CreateSketchRequest(match=MatchRequest(map=MAP))
+        assert service.CreateSketch(request).idle_timeout.ToMilliseconds() == 7500
+        with pytest.raises(grpc.RpcError, match="you have 1 sketches in progress, the limit"):
+            service.CreateSketch(request)
+        client.put_scene(MAP)
+        with pytest.raises(StoreError, match="is full; delete what is not needed"):
+            client.put_scene(sources.polygons([outline_, outline_ + 3.0]))

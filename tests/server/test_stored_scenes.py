@@ -4,6 +4,7 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
 
+import numpy as np
 import pytest
 
 from sketchmatch.app.setup import RequestLimits, Setup
@@ -140,6 +141,28 @@ def test_a_damaged_store_is_said_and_inline_sources_are_matched(tmp_path):
         with pytest.raises(StoreError, match="is damaged"):
             client.match(SKETCH, sources.stored_scene(MISSING))
         assert client.match(SKETCH, MAP).object_map
+
+
+@pytest.mark.slow
+def test_a_full_store_is_said_then_a_lost_one_and_inline_sources_are_matched(tmp_path):
+    store, rough = tmp_path / "store", np.random.default_rng(0).uniform(1.0, 1.01, 10_000)
+    angles = np.linspace(0.0, 2.0 * np.pi, len(rough), endpoint=False)
+    outline = np.stack([rough * np.cos(angles), rough * np.sin(angles)], axis=1)
+    with (
+        hosting(setup(), store=store, scenes_bytes=1 << 18) as host,
+        Client(host.address, timeout=60) as client,
+    ):
+        name = client.put_scene(MAP).stored_scene.name
+        expected = answer(client.match(SKETCH, MAP))
+        with pytest.raises(StoreError, match=r"scenes\.sqlite is full; delete what is not needed"):
+            client.put_scene(sources.polygons([outline, outline + 3.0]))
+        assert answer(client.match(SKETCH, MAP)) == expected
+        assert answer(client.match(SKETCH, sources.stored_scene(name))) == expected
+        for file in store.glob("scenes.sqlite*"):
+            file.unlink()
+        with pytest.raises(StoreError, match=r"scenes\.sqlite cannot be used"):
+            client.match(SKETCH, sources.stored_scene(name))
+        assert answer(client.match(SKETCH, MAP)) == expected
 
 
 def test_scenes_outlive_the_server_and_workers_match_with_them(tmp_path):

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.model import OccupancyGrid, Scene
+from sketchmatch.pipeline.slices import finish
 from sketchmatch.transfers.carrying import carried, course_between
 from sketchmatch.transfers.features import ChangeReason, Feature, FeatureKind
 from sketchmatch.transfers.obstacles import Obstacles
@@ -43,7 +44,7 @@ def led(feature, grid, radius=0.2, allow_unknown=False):
     """Carry a feature onto a grid by a warp that changes nothing."""
     course = course_between(SCENE, SCENE, SAME, features=[feature])
     obstacles = Obstacles.of_grid(grid, allow_unknown)
-    (found,) = carried([feature], course, obstacles, radius, "m")
+    (found,) = finish(carried([feature], course, obstacles, radius, "m"))
     return found, obstacles
 
 
@@ -68,7 +69,7 @@ def test_points_routes_and_zones_are_carried_in_their_order_with_names_and_speed
         Feature(FeatureKind.POINT, (np.array([[3.0, 7.0]]),), "dock"),
         zone,
     ]
-    found = carried(features, course_between(SCENE, TURNED, SAME, features=features))
+    found = finish(carried(features, course_between(SCENE, TURNED, SAME, features=features)))
     assert [each.feature.name for each in found] == ["patrol", "dock", "no-go"]
     assert [each.kind for each in found] == ["route", "point", "zone"]
     way, dock, area = (each.feature for each in found)
@@ -88,7 +89,7 @@ def test_points_routes_and_zones_are_carried_in_their_order_with_names_and_speed
 
 def test_a_straight_line_gets_no_more_points_than_it_needs():
     feature = route((1, 2), (8, 2), (8, 8))
-    (found,) = carried([feature], course_between(SCENE, TURNED, SAME))
+    (found,) = finish(carried([feature], course_between(SCENE, TURNED, SAME)))
     assert len(found.feature.points) == 3
 
 
@@ -96,7 +97,7 @@ def test_a_bent_line_gets_the_points_that_it_needs():
     bent = Scene.from_polygons([box(0, 0), box(9, 0), box(0, 9), box(9, 9), box(4, 5.5, 2, 2)])
     feature = route((0.5, 5.0), (9.5, 5.0))
     course = course_between(SCENE, bent, SAME, features=[feature])
-    (found,) = carried([feature], course)
+    (found,) = finish(carried([feature], course))
     along = np.linspace(0.5, 9.5, 200)
     true = course.warp(np.stack([along, np.full(200, 5.0)], axis=1))
     line = shapely.LineString(found.feature.points)
@@ -231,7 +232,7 @@ def test_a_grid_may_lie_turned_anywhere():
     target = Scene.from_polygons([o.rings[0] @ turn + (2.0, -3.0) for o in SCENE.objects])
     feature = route((2, 2), (8, 2))
     course = course_between(SCENE, target, SAME, features=[feature])
-    (found,) = carried([feature], course, Obstacles.of_grid(there, False), 0.2)
+    (found,) = finish(carried([feature], course, Obstacles.of_grid(there, False), 0.2))
     flat = (found.feature.points - (2.0, -3.0)) @ turn.T
     plain, _ = led(feature, grid)
     line, other = (shapely.LineString(each) for each in (flat, plain.feature.points))
@@ -265,7 +266,7 @@ def test_objects_of_a_scene_are_obstacles_too():
     feature = route((2, 5), (8, 5.1))
     course = course_between(SCENE, SCENE, SAME, features=[feature])
     obstacles = Obstacles.of_scene(SCENE, feature.points, 0.3)
-    (found,) = carried([feature], course, obstacles, 0.3, "units")
+    (found,) = finish(carried([feature], course, obstacles, 0.3, "units"))
     line = shapely.LineString(found.feature.points)
     assert SCENE.objects[4].polygon.distance(line) > 0.28
     assert found.changes[0].sentence == "Led around table, to stay 0.3 units away from obstacles."

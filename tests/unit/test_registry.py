@@ -91,6 +91,13 @@ def test_the_built_in_algorithms_are_found_like_any_others():
     assert (status.distribution, status.state, status.reason) == ("sketchmatch", "ACTIVE", "")
 
 
+def test_what_a_third_party_offers_is_not_the_engine_s_own():
+    searcher = default_registry().find(Kind.SEARCHER, "align").algorithm
+    assert default_registry().is_own(searcher())
+    for own in ("acme-search", "sketchmatch-more"):
+        assert not Registry([Registered(Kind.SEARCHER, searcher, own, "1")]).is_own(searcher())
+
+
 def test_every_built_in_algorithm_describes_itself_and_its_parameters():
     for item in discover().algorithms:
         assert item.algorithm.summary.endswith(".")

@@ -27,6 +27,7 @@ from sketchmatch.app.orders import Order, Wish
 from sketchmatch.app.packed import check_size
 from sketchmatch.app.quotas import Rates
 from sketchmatch.app.remembered import Remembered
+from sketchmatch.app.scenes import SCENES_BYTES
 from sketchmatch.app.setup import Setup
 from sketchmatch.app.sketches import Sketches
 from sketchmatch.app.store import Store
@@ -150,6 +151,8 @@ class Application:
         Where matches are kept; None for nowhere.
     matched
         Called when a match has ended that has a result, with its events but progress.
+    scenes_bytes
+        Bytes that kept scenes may take.
 
     Attributes
     ----------
@@ -168,8 +171,9 @@ class Application:
         store: Store | None = None,
         archive: Archive | None = None,
         matched: Callable[[list[MatchResponse]], None] = lambda _: None,
+        scenes_bytes: int = SCENES_BYTES,
     ) -> None:
-        self.scenes = Keeping(self, store)
+        self.scenes = Keeping(self, store, scenes_bytes)
         self.sketches = Sketches(self)
         self._remembered = Remembered(self.scenes.path)
         self._setup = self._remembering(setup)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 from google.protobuf.wrappers_pb2 import BytesValue
 
 from sketchmatch.app.following import followed
-from sketchmatch.app.scenes import Described, SceneArchive, without_store
+from sketchmatch.app.scenes import SCENES_BYTES, Described, SceneArchive, without_store
 from sketchmatch.app.store import Store
 from sketchmatch.app.waiting import Caller
 from sketchmatch.errors import InvalidInputError, Reason, ServerStoppingError
@@ -44,11 +44,15 @@ class Keeping:
         Finds objects.
     store
         Where scenes are kept; None where none are.
+    max_bytes
+        Bytes that they may take together.
     """
 
-    def __init__(self, app: Application, store: Store | None) -> None:
+    def __init__(
+        self, app: Application, store: Store | None, max_bytes: int = SCENES_BYTES
+    ) -> None:
         self._app = app
-        self._archive = None if store is None else SceneArchive(store)
+        self._archive = None if store is None else SceneArchive(store, max_bytes)
         self._writing: set[asyncio.Future[None]] = set()
 
     @property

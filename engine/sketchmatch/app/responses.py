@@ -22,6 +22,7 @@ from sketchmatch.model import (
     PolygonSet,
     RequestWeights,
     Scene,
+    SceneObject,
     StrokeSet,
 )
 from sketchmatch.pipeline.events import Accepted, Finished, MatchEvent, Progress, Segmented
@@ -191,17 +192,18 @@ def fmap_entry(entry: Correspondence) -> match_pb2.FmapEntry:
 @lru_cache(maxsize=32)
 def scene(value: Scene) -> scene_pb2.Scene:
     """Return a scene as a message, which is not to be changed: one is made of each scene."""
-    return scene_pb2.Scene(
-        objects=[
-            scene_pb2.SceneObject(
-                rings=[source_pb2.Ring(points=_points(ring)) for ring in item.rings],
-                label=item.label,
-                area=item.area,
-                centroid=source_pb2.Point(x=item.centroid[0], y=item.centroid[1]),
-                certainty=item.certainty if item.certainty < 1.0 else None,
-            )
-            for item in value.objects
-        ]
+    return scene_pb2.Scene(objects=map(_scene_object, value.objects))
+
+
+@lru_cache(maxsize=1024)
+def _scene_object(item: SceneObject) -> scene_pb2.SceneObject:
+    """Return an object as a message: the next revision of a sketch has most of them again."""
+    return scene_pb2.SceneObject(
+        rings=[source_pb2.Ring(points=_points(ring)) for ring in item.rings],
+        label=item.label,
+        area=item.area,
+        centroid=source_pb2.Point(x=item.centroid[0], y=item.centroid[1]),
+        certainty=item.certainty if item.certainty < 1.0 else None,
     )
 
 

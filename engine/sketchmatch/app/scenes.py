@@ -38,6 +38,7 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
 
 __all__ = [
     "LARGEST_KEPT",
+    "SCENES_BYTES",
     "Described",
     "SceneArchive",
     "Shelf",
@@ -48,7 +49,9 @@ __all__ = [
 ]
 
 _FILE, _VERSION = "scenes", 1
-_MAX_BYTES = 1024 * 1024 * 1024
+SCENES_BYTES = 1024 * 1024 * 1024
+"""Bytes of all scenes together, where nobody says another number."""
+
 _SCHEMA = """
 CREATE TABLE contents (
     content TEXT PRIMARY KEY, source BLOB NOT NULL, labels TEXT NOT NULL
@@ -163,7 +166,7 @@ class SceneArchive:
         Bytes of all together.
     """
 
-    def __init__(self, store: Store, max_bytes: int = _MAX_BYTES) -> None:
+    def __init__(self, store: Store, max_bytes: int = SCENES_BYTES) -> None:
         self._file: Database = store.database(_FILE, _SCHEMA, _VERSION, max_bytes)
 
     @property

@@ -12,9 +12,29 @@ from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import OWN_DISTRIBUTION, Registered, RegisteredReader
 from sketchmatch.registry.distributions import canonical
 
-__all__ = ["Isolation", "RequestLimits", "Setup"]
+__all__ = ["Isolation", "RequestLimits", "Setup", "SketchLimits"]
 
 _Offered = TypeVar("_Offered", Registered, Registered | RegisteredReader)
+
+
+@dataclass(frozen=True)
+class SketchLimits:
+    """How many sketches in progress a server keeps, and for how long.
+
+    Attributes
+    ----------
+    sketches, of_one
+        Of all callers, and of one.
+    strokes
+        Of one sketch.
+    idle_seconds
+        For which a sketch is kept that is neither drawn nor watched.
+    """
+
+    sketches: int = 1000
+    of_one: int = 100
+    strokes: int = 2000
+    idle_seconds: float = 1800.0
 
 
 @dataclass(frozen=True)
@@ -45,6 +65,8 @@ class RequestLimits:
     max_candidates
         Maps that a search may weigh by its parameters, or None for no limit: population ×
         generations.
+    sketches
+        How many sketches may be in progress.
     """
 
     max_request_bytes: int = 64 * 1024 * 1024
@@ -63,6 +85,7 @@ class RequestLimits:
     max_per_minute: int | None = None
     max_comparisons: int | None = None
     max_candidates: int | None = None
+    sketches: SketchLimits = SketchLimits()
 
     def time_budget(self, asked: float | None) -> float | None:
         """Return the seconds for a match that asks for so many, or None for no limit."""

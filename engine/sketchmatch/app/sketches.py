@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from sketchmatch.app.following import followed
 from sketchmatch.app.packed import Packed
+from sketchmatch.app.setup import SketchLimits
 from sketchmatch.app.tasks import Log
 from sketchmatch.app.waiting import Caller
 from sketchmatch.errors import (
@@ -55,7 +56,7 @@ from sketchmatch_proto.v1.source_pb2 import Stroke
 if TYPE_CHECKING:
     from sketchmatch.app.application import Application
 
-__all__ = ["SketchLimits", "Sketches", "question"]
+__all__ = ["Sketches", "question"]
 
 _log = logging.getLogger(__name__)
 
@@ -69,26 +70,6 @@ _PEN_RESTS = 0.15
 
 _OVERTAKEN = 0.5
 """Seconds after which a match of a revision that is not the latest is given up."""
-
-
-@dataclass(frozen=True)
-class SketchLimits:
-    """How many sketches a server keeps, and for how long.
-
-    Attributes
-    ----------
-    sketches, of_one
-        Of all callers, and of one.
-    strokes
-        Of one sketch.
-    idle_seconds
-        For which a sketch is kept that is neither drawn nor watched.
-    """
-
-    sketches: int = 1000
-    of_one: int = 100
-    strokes: int = 2000
-    idle_seconds: float = 1800.0
 
 
 @dataclass(frozen=True)
@@ -192,14 +173,11 @@ class Sketches:
     Parameters
     ----------
     app
-        Matches them.
-    limits
-        How many are kept, and for how long.
+        Matches them, and says how many are kept, and for how long.
     """
 
-    def __init__(self, app: Application, limits: SketchLimits = SketchLimits()) -> None:
+    def __init__(self, app: Application) -> None:
         self._app = app
-        self._limits = limits
         self._all: dict[str, _Sketch] = {}
         self._closed = False
 
@@ -278,6 +256,10 @@ class Sketches:
                         f"nobody drew or watched the sketch for {seconds}; create another"
                     ),
                 )
+
+    @property
+    def _limits(self) -> SketchLimits:
+        return self._app.setup.limits.sketches
 
     def _end(self, name: str, error: SketchmatchError) -> None:
         sketch = self._all.pop(name)

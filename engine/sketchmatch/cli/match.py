@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,7 +12,6 @@ from sketchmatch.cli.output import answering
 from sketchmatch.errors import InvalidInputError, Reason
 
 if TYPE_CHECKING:
-    from sketchmatch.model import RequestWeights
     from sketchmatch_client import MatchOptions
 
 __all__ = ["match"]
@@ -42,40 +41,12 @@ def match(
     access: options.Access = options.Access(),  # noqa: B008
     config: options.Config = None,
     profile: options.Profile = "",
-    searcher: Annotated[str | None, typer.Option(help="Searcher.")] = None,
-    judge: Annotated[str | None, typer.Option(help="Judge of the maps found.")] = None,
-    histogram: Annotated[str | None, typer.Option(help="Histogram.")] = None,
-    similarity: Annotated[str | None, typer.Option(help="Similarity measure.")] = None,
+    search: options.Search = options.Search(),  # noqa: B008
     sketch_segmenter: options.SketchSegmenter = "",
     map_segmenter: options.MapSegmenter = "",
     segmenter_sketch: options.FormerSketchSegmenter = "",
     segmenter_map: options.FormerMapSegmenter = "",
     settings: options.Settings = None,
-    seed: Annotated[int, typer.Option(help="Same seed, same answer.")] = 0,
-    time_budget: Annotated[
-        float | None,
-        typer.Option(metavar="SECONDS", help="Give the best answer so far after this time."),
-    ] = None,
-    weights: Annotated[
-        str | None,
-        typer.Option(
-            metavar="W1,W2,W3[,W4,W5[,β]]",
-            help="Weights of ζσ, ζR and ζL in ζ, and of the objects' shapes and sizes; rotations "
-            "of pairs d apart count for d^β; 1,1,1 by default.",
-        ),
-    ] = None,
-    allow_unmatched: Annotated[
-        bool | None,
-        typer.Option(
-            "--allow-unmatched/--no-allow-unmatched",
-            help="Leave objects without partner on both sides where that is likelier.",
-            show_default=False,
-        ),
-    ] = None,
-    unmatched_price: Annotated[
-        float | None,
-        typer.Option(metavar="PRICE", help="What leaving out all objects costs, in units of ζ."),
-    ] = None,
     alternatives: Annotated[
         int | None, typer.Option(metavar="K", help="How many of the next best maps; 3 by default.")
     ] = None,
@@ -113,18 +84,10 @@ def match(
         pictures.check_path(overlay)
     known = options.parse_pins(pin, no_pin)
     chosen: MatchOptions = {
+        **search.chosen(),
         "sketch_segmenter": sketch_segmenter or segmenter_sketch,
         "map_segmenter": map_segmenter or segmenter_map,
-        "histogram": histogram,
-        "similarity": similarity,
-        "searcher": searcher,
-        "judge": judge,
         "params": options.parse_settings(settings),
-        "seed": seed,
-        "time_budget": time_budget,
-        "weights": None if weights is None else _weights(weights),
-        "allow_unmatched": allow_unmatched,
-        "unmatched_price": unmatched_price,
         "alternatives": alternatives,
         "pins": list(known.values()),
         "synonyms": options.parse_synonyms(synonyms),
@@ -153,20 +116,3 @@ def match(
     else:
         display.show_match(answer, metres, verbose)
     options.say_renamed(segmenter_sketch, segmenter_map)
-
-
-def _weights(text: str) -> RequestWeights:
-    from sketchmatch.model.maps import WEIGHT_COUNTS
-
-    try:
-        weights = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        weights = ()
-    if len(weights) not in WEIGHT_COUNTS:
-        raise InvalidInputError(
-            Reason.INVALID_FIELD,
-            "--weights",
-            f"{text!r} is not three, five or six numbers, as in 1,1,1 or 1,1,1,0.5,0.5 or "
-            "1,2,0.1,2,0.3,1",
-        )
-    return cast("RequestWeights", weights)

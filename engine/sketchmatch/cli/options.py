@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
 
 import typer
 
@@ -17,7 +17,8 @@ from sketchmatch.cli.output import clean, tell
 from sketchmatch.errors import InvalidInputError, Reason
 
 if TYPE_CHECKING:
-    from sketchmatch_client import Pin
+    from sketchmatch.model import RequestWeights
+    from sketchmatch_client import MatchOptions, Pin
 
 __all__ = [
     "Access",
@@ -33,6 +34,7 @@ __all__ = [
     "Overlay",
     "Pins",
     "Profile",
+    "Search",
     "Server",
     "Settings",
     "SketchSegmenter",
@@ -44,6 +46,7 @@ __all__ = [
     "parse_pins",
     "parse_settings",
     "parse_synonyms",
+    "parse_weights",
     "pins_as_typed",
     "refuse_config",
     "say",
@@ -189,19 +192,91 @@ class Access:
     ] = None
 
 
+@dataclass(frozen=True)
+class Search:
+    """How maps are compared, searched and judged; what is left out, profile or default say.
+
+    Attributes
+    ----------
+    searcher, judge, histogram, similarity, seed, time_budget, weights, allow_unmatched, \
+unmatched_price
+        As a match takes them; the weights as they are typed.
+    """
+
+    searcher: Annotated[str | None, typer.Option(help="Searcher.")] = None
+    judge: Annotated[str | None, typer.Option(help="Judge of the maps found.")] = None
+    histogram: Annotated[str | None, typer.Option(help="Histogram.")] = None
+    similarity: Annotated[str | None, typer.Option(help="Similarity measure.")] = None
+    seed: Annotated[int, typer.Option(help="Same seed, same answer.")] = 0
+    time_budget: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Give the best answer so far after this time."),
+    ] = None
+    weights: Annotated[
+        str | None,
+        typer.Option(
+            metavar="W1,W2,W3[,W4,W5[,β]]",
+            help="Weights of ζσ, ζR and ζL in ζ, and of the objects' shapes and sizes; rotations "
+            "of pairs d apart count for d^β; 1,1,1 by default.",
+        ),
+    ] = None
+    allow_unmatched: Annotated[
+        bool | None,
+        typer.Option(
+            "--allow-unmatched/--no-allow-unmatched",
+            help="Leave objects without partner on both sides where that is likelier.",
+            show_default=False,
+        ),
+    ] = None
+    unmatched_price: Annotated[
+        float | None,
+        typer.Option(metavar="PRICE", help="What leaving out all objects costs, in units of ζ."),
+    ] = None
+
+    def chosen(self) -> MatchOptions:
+        """Return the options of a request.
+
+        Raises
+        ------
+        InvalidInputError
+            If the weights have another form.
+        """
+        return {
+            "searcher": self.searcher,
+            "judge": self.judge,
+            "histogram": self.histogram,
+            "similarity": self.similarity,
+            "seed": self.seed,
+            "time_budget": self.time_budget,
+            "weights": None if self.weights is None else parse_weights(self.weights),
+            "allow_unmatched": self.allow_unmatched,
+            "unmatched_price": self.unmatched_price,
+        }
+
+
+_GROUPS: Mapping[str, type[Any]] = {"access": Access, "search": Search}
+"""Options that several commands share, by the name of the parameter that takes them."""
+
+
 def asking(command: Callable[..., _Value]) -> Callable[..., _Value]:
-    """Give a command that asks a server the options of getting in; it takes them as ``access``."""
+    """Give a command the options that it takes in groups, as ``access`` and as ``search``."""
     own = inspect.signature(command, eval_str=True)
-    ways = inspect.signature(Access, eval_str=True)
+    groups = {
+        name: inspect.signature(group, eval_str=True).parameters
+        for name, group in _GROUPS.items()
+        if name in own.parameters
+    }
 
     @functools.wraps(command)
     def run(*arguments: Any, **options: Any) -> _Value:
-        access = Access(**{name: options.pop(name, None) for name in ways.parameters})
-        return command(*arguments, access=access, **options)
+        for name, fields in groups.items():
+            given = {each.name: options.pop(each.name, each.default) for each in fields.values()}
+            options[name] = _GROUPS[name](**given)
+        return command(*arguments, **options)
 
     parameters = []
     for parameter in own.parameters.values():
-        added = ways.parameters.values() if parameter.name == "access" else (parameter,)
+        added = groups[parameter.name].values() if parameter.name in groups else (parameter,)
         parameters += [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in added]
     run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in parameters}
@@ -399,6 +474,35 @@ def parse_synonyms(groups: Iterable[str] | None) -> list[tuple[str, ...]]:
             )
         read.append(labels)
     return read
+
+
+def parse_weights(text: str) -> RequestWeights:
+    """Read the weights of ζ.
+
+    Raises
+    ------
+    InvalidInputError
+        If they are not three, five or six numbers.
+
+    Examples
+    --------
+    >>> parse_weights("1,2,0.5")
+    (1.0, 2.0, 0.5)
+    """
+    from sketchmatch.model.maps import WEIGHT_COUNTS
+
+    try:
+        weights = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        weights = ()
+    if len(weights) not in WEIGHT_COUNTS:
+        raise InvalidInputError(
+            Reason.INVALID_FIELD,
+            "--weights",
+            f"{text!r} is not three, five or six numbers, as in 1,1,1 or 1,1,1,0.5,0.5 or "
+            "1,2,0.1,2,0.3,1",
+        )
+    return cast("RequestWeights", weights)
 
 
 def say_renamed(sketch_segmenter: str, map_segmenter: str) -> None:

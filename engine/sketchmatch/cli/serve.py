@@ -151,6 +151,24 @@ def serve(
         int | None,
         typer.Option(help="Most that kept matches may take, in MiB; 1024 by default."),
     ] = None,
+    keep_scenes_mib: Annotated[
+        int | None,
+        typer.Option(help="Most that kept scenes may take, in MiB; 1024 by default."),
+    ] = None,
+    max_sketches: Annotated[
+        int | None,
+        typer.Option(help="Sketches in progress at the same time; 1000 by default."),
+    ] = None,
+    max_sketches_per_caller: Annotated[
+        int | None, typer.Option(help="Sketches in progress of one caller; 100 by default.")
+    ] = None,
+    sketch_idle: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS",
+            help="Keep a sketch so long that nobody draws or watches; 1800 by default.",
+        ),
+    ] = None,
     metrics_address: Annotated[
         str | None,
         typer.Option(
@@ -217,6 +235,10 @@ def serve(
         "server.keep": False if no_store else None,
         "server.keep_matches_days": keep_matches_days,
         "server.keep_matches_mib": keep_matches_mib,
+        "server.keep_scenes_mib": keep_scenes_mib,
+        "server.max_sketches": max_sketches,
+        "server.max_sketches_per_caller": max_sketches_per_caller,
+        "server.sketch_idle_seconds": sketch_idle,
         "server.metrics_address": metrics_address,
         "server.web_address": web_address,
         "limits.max_bytes": max_bytes,
@@ -283,6 +305,7 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
         bool(server.store),
         server.keep_matches_days,
         server.keep_matches_mib * _MIB,
+        server.keep_scenes_mib * _MIB,
     )
 
 
@@ -297,7 +320,7 @@ def _store(folder: str | None, keep: bool) -> Path | None:
 
 def _setup(configuration: Configuration) -> Setup:
     """Return what requests are answered with; plugins are looked for anew."""
-    from sketchmatch.app.setup import Isolation, RequestLimits, Setup
+    from sketchmatch.app.setup import Isolation, RequestLimits, Setup, SketchLimits
     from sketchmatch.config import refuse_faults
     from sketchmatch.pipeline.engine import Engine
     from sketchmatch.registry import discover
@@ -320,6 +343,11 @@ def _setup(configuration: Configuration) -> Setup:
             max_per_minute=server.max_requests_per_minute,
             max_comparisons=server.max_comparisons,
             max_candidates=server.max_candidates,
+            sketches=SketchLimits(
+                server.max_sketches,
+                server.max_sketches_per_caller,
+                idle_seconds=server.sketch_idle_seconds,
+            ),
         ),
         Isolation(configuration.trusted, configuration.patience),
     )

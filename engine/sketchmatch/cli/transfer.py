@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -75,6 +75,7 @@ def transfer(
     access: options.Access = options.Access(),  # noqa: B008
     config: options.Config = None,
     profile: options.Profile = "",
+    search: options.Search = options.Search(),  # noqa: B008
     sketch_segmenter: options.SketchSegmenter = "",
     map_segmenter: options.MapSegmenter = "",
     settings: options.Settings = None,
@@ -112,6 +113,7 @@ def transfer(
     forth = direction is _Direction.SKETCH_TO_MAP
     carried.check_keepout(keepout, map_ if forth else sketch)
     chosen: TransferOptions = {
+        **cast("TransferOptions", search.chosen()),
         "sketch_segmenter": sketch_segmenter,
         "map_segmenter": map_segmenter,
         "params": options.parse_settings(settings),
@@ -156,14 +158,17 @@ def carry(
     access: options.Access = options.Access(),  # noqa: B008
     config: options.Config = None,
     profile: options.Profile = "",
+    search: options.Search = options.Search(),  # noqa: B008
     segmenter: Annotated[
         str,
         typer.Option(
             help="Segmenter of both maps; rooms or objects, whichever tells more, by default."
         ),
     ] = "",
+    settings: options.Settings = None,
     pin: options.Pins = None,
     no_pin: options.Exclusions = None,
+    synonyms: options.Synonyms = None,
     radius: _Radius = None,
     allow_unknown: _AllowUnknown = False,
     out: _Out = None,
@@ -201,9 +206,12 @@ def carry(
         answers, problems = [], []
         for name in carried.segmenters(segmenter, grids and not known):
             chosen: TransferOptions = {
+                **cast("TransferOptions", search.chosen()),
                 "sketch_segmenter": name,
                 "map_segmenter": name,
+                "params": options.parse_settings(settings),
                 "pins": list(known.values()),
+                "synonyms": options.parse_synonyms(synonyms),
                 "profile": profile,
                 "radius": radius,
                 "allow_unknown": allow_unknown,

@@ -239,6 +239,23 @@ class _Server(_Section):
         le=1_000_000,
         description="Most that kept matches may take, in MiB; the oldest go first.",
     )
+    keep_scenes_mib: int = Field(
+        1024,
+        ge=1,
+        le=1_000_000,
+        description="Most that kept scenes may take, in MiB; what does not fit is refused.",
+    )
+    max_sketches: int = Field(
+        1000, ge=0, le=1_000_000, description="Sketches in progress at the same time."
+    )
+    max_sketches_per_caller: int = Field(
+        100, ge=0, le=1_000_000, description="Sketches in progress of one caller."
+    )
+    sketch_idle_seconds: float = Field(
+        1800.0,
+        gt=0,
+        description="How long a sketch in progress is kept that nobody draws or watches.",
+    )
     metrics_address: Annotated[str | None, AfterValidator(_watched)] = Field(
         None,
         description="Host and port for Prometheus' /metrics and the probes /livez and /readyz over "

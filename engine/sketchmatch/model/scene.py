@@ -141,12 +141,12 @@ class SceneObject:
         """Whether it is less than :data:`DOUBTFUL` that this is one thing."""
         return self.certainty < DOUBTFUL
 
-    @property
+    @cached_property
     def area(self) -> float:
         """Area without the holes, in squared scene units."""
         return float(sum(_signed_area(ring) for ring in self.rings))
 
-    @property
+    @cached_property
     def centroid(self) -> tuple[float, float]:
         """Centre of the area."""
         point = self.polygon.centroid

@@ -199,14 +199,17 @@ def object_map(matrix: Occm) -> ObjectMap:
 
     Ties go to the pairing that the order of the entries implies, then to the lower indices.
     """
-    evidence, implied = matrix.evidence.copy(), matrix.implied.copy()
+    evidence, implied = matrix.evidence.copy(), matrix.implied
     objects = len(evidence)
     partners = np.full(objects, -1, dtype=np.int64)
     confidences = np.zeros(objects)
     for _ in range(objects):
-        best = evidence >= evidence.max() - _TIE
-        best &= implied >= implied[best].max() - _TIE
-        g, h = (int(k) for k in np.unravel_index(int(best.argmax()), best.shape))
+        first = int(evidence.argmax())
+        (best,) = np.nonzero(evidence.ravel() >= evidence.flat[first] - _TIE)
+        if len(best) > 1:
+            told = implied.flat[best]
+            first = int(best[np.argmax(told >= told.max() - _TIE)])
+        g, h = divmod(first, evidence.shape[1])
         partners[g], confidences[g] = h, matrix.evidence[g, h] / (objects - 1)
         evidence[g, :], evidence[:, h] = -np.inf, -np.inf
     return ObjectMap(partners, confidences, float(confidences.mean()))

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.model import FloatArray, IntArray, Scene, SceneDescriptor
+from sketchmatch.model import BoolArray, FloatArray, IntArray, Scene, SceneDescriptor
 from sketchmatch.model.arrays import sealed
 from sketchmatch.pipeline.result import ObjectRelation
 
@@ -48,7 +48,7 @@ _TURNS = _EIGHTH * np.arange(8.0)
 _PLAIN_FIRST = np.array([0, 2, 4, 6, 1, 3, 5, 7])
 # Degrees this close are a tie: what differs is rounding.
 _DECIMALS = 9
-_ROWS = 4096
+_ROWS = 256
 
 
 @dataclass(frozen=True)
@@ -193,55 +193,64 @@ def directional_degrees(histograms: FloatArray, directions: FloatArray) -> Float
     bins = rows.shape[1]
     mirrored = rows[:, -np.arange(bins) % bins]
     totals = np.maximum(rows.sum(axis=1), 1.0)
-    degrees = np.empty((len(rows), len(directions)))
-    for k, direction in enumerate(directions.tolist()):
-        start = direction * bins / (2.0 * math.pi)
-        left, left_moment = _effective(rows, start)
-        right, right_moment = _effective(mirrored, -start)
-        # share · (1 − 2|φ|/π), where φ is the moment over the forces, times 2π/n.
-        loss = np.abs(left_moment - right_moment) * 4.0 / bins
-        degrees[:, k] = (left + right - loss) / totals
-    return np.clip(degrees, 0.0, 1.0)
+    starts = directions * bins / (2.0 * math.pi)
+    left, left_moments = _effective(rows, starts)
+    right, right_moments = _effective(mirrored, -starts)
+    # share · (1 − 2|φ|/π), where φ is the moment over the forces, times 2π/n.
+    loss = np.abs(left_moments - right_moments) * 4.0 / bins
+    degrees: FloatArray = np.clip((left + right - loss) / totals[:, None], 0.0, 1.0)
+    return degrees
 
 
-def _effective(rows: FloatArray, start: float) -> tuple[FloatArray, FloatArray]:
-    """Return the effective forces counter-clockwise of a direction, and their first moment.
+def _effective(rows: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the effective forces counter-clockwise of directions, and their first moments.
 
     Parameters
     ----------
     rows
         Shape (m, n).
-    start
-        The direction, in bins; so is the deviation from it that the moment is about.
+    starts
+        Shape (d,): the directions, in bins; so is the deviation that the moments are about.
 
     Returns
     -------
     forces, moments : ndarray
-        Shape (m,).
+        Shape (m, d).
     """
-    places, low, width = _half_turn(rows.shape[1], start)
-    ahead = np.searchsorted(low, rows.shape[1] / 4.0)
-    forces = rows[:, places] * width
-    against = forces[:, ahead:].sum(axis=1)
-    forces, low, width = forces[:, :ahead], low[:ahead], width[:ahead]
-    effective = np.maximum(forces.sum(axis=1) - against, 0.0)
-    before = np.cumsum(forces, axis=1) - forces
-    kept = np.clip(effective[:, None] - before, 0.0, forces)
+    places, low, width, ahead = _half_turns(rows.shape[1], tuple(starts.tolist()))
+    every = rows[:, places] * width
+    forces = np.where(ahead, every, 0.0)
+    against = np.where(ahead, 0.0, every).sum(axis=2)
+    effective = np.maximum(forces.sum(axis=2) - against, 0.0)
+    before = np.cumsum(forces, axis=2) - forces
+    kept = np.clip(effective[:, :, None] - before, 0.0, forces)
     share = np.divide(kept, forces, out=np.zeros_like(kept), where=forces > 0.0)
-    return effective, (kept * (low + 0.5 * width * share)).sum(axis=1)
+    return effective, (kept * (low + 0.5 * width * share)).sum(axis=2)
 
 
 @lru_cache(maxsize=64)
-def _half_turn(bins: int, start: float) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the bins of half a turn from a direction: which, how far off, and how much of each.
+def _half_turns(
+    bins: int, starts: tuple[float, ...]
+) -> tuple[IntArray, FloatArray, FloatArray, BoolArray]:
+    """Return the bins of half a turn from each of some directions.
 
-    A quarter turn away one begins.
+    Returns
+    -------
+    places, low, width, ahead : ndarray
+        Shape (d, k): which they are, how far off, how much of each, and whether they lie within a
+        quarter turn, where one ends. Where a direction needs fewer, the last ones count nothing.
     """
-    edges = np.arange(bins // 2 + 1) + (0.5 - start) % 1.0
-    stops = np.unique([0.0, bins / 4.0, *edges[edges < bins / 2.0], bins / 2.0])
-    low, width = stops[:-1], np.diff(stops)
-    places = np.floor(start + low + width / 2.0 + 0.5).astype(np.int64) % bins
-    return sealed(places), sealed(low), sealed(width)
+    half, least = bins / 2.0, bins // 2 + 3
+    places = np.zeros((len(starts), least), dtype=np.int64)
+    low, width = np.full(places.shape, half), np.zeros(places.shape)
+    for k, start in enumerate(starts):
+        edges = np.arange(bins // 2 + 1) + (0.5 - start) % 1.0
+        stops = np.unique([0.0, bins / 4.0, *edges[edges < half], half])
+        count = len(stops) - 1
+        low[k, :count], width[k, :count] = stops[:-1], np.diff(stops)
+        middles = start + low[k, :count] + width[k, :count] / 2.0
+        places[k, :count] = np.floor(middles + 0.5).astype(np.int64) % bins
+    return sealed(places), sealed(low), sealed(width), sealed(low < bins / 4.0)
 
 
 def _relation(degrees: FloatArray) -> DirectionalRelation:

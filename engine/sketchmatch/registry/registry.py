@@ -169,6 +169,8 @@ class Registry:
         for item in algorithms:
             offered.setdefault((item.kind, item.name), []).append(item)
         self.algorithms = tuple(item for items in offered.values() for item in _selectable(items))
+        ours = (item for item in self.algorithms if item.distribution == OWN_DISTRIBUTION)
+        self._own = frozenset(item.algorithm for item in ours)
         self.conflicts = tuple(_conflict(items) for items in offered.values() if len(items) > 1)
         self.statuses = tuple(self._with_conflicts(status) for status in statuses)
 
@@ -184,6 +186,10 @@ class Registry:
             if item.algorithm in (algorithm, type(algorithm)):
                 return item.origin
         return f"algorithm {algorithm.name}"
+
+    def is_own(self, algorithm: Algorithm) -> bool:
+        """Whether an algorithm is the engine's own."""
+        return type(algorithm) in self._own
 
     @property
     def problems(self) -> tuple[str, ...]:

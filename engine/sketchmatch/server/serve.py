@@ -114,6 +114,8 @@ class ServerSettings:
         Whether somebody named that folder, so that the server is not to start without it.
     matches_days, matches_bytes
         For how long matches are kept there, and how large their file may grow.
+    scenes_bytes
+        How large the file of kept scenes may grow.
     """
 
     address: str = "127.0.0.1:50051"
@@ -130,6 +132,7 @@ class ServerSettings:
     store_named: bool = True
     matches_days: float = 30.0
     matches_bytes: int = 1 << 30
+    scenes_bytes: int = 1 << 30
 
 
 async def serve(
@@ -166,7 +169,9 @@ async def serve(
     metrics, setup = Metrics(_METHODS), load()
     store = _opened(settings, say)
     archive = None if store is None else _archive(store, settings, metrics)
-    app = Application(setup, settings.workers, store, archive, metrics.matched)
+    app = Application(
+        setup, settings.workers, store, archive, metrics.matched, settings.scenes_bytes
+    )
     interceptors = [
         MetricsInterceptor(metrics),
         CallLogInterceptor(),

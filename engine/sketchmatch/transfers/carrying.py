@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import shapely
 
 from sketchmatch.model import FloatArray, Scene
+from sketchmatch.pipeline.slices import retold
 from sketchmatch.transfers.features import Carried, Change, ChangeReason, Feature, FeatureKind
 from sketchmatch.transfers.obstacles import Obstacles
 from sketchmatch.transfers.planning import Landmarks, Way, kept_clear
@@ -93,8 +95,8 @@ def carried(
     obstacles: Obstacles | None = None,
     radius: float = 0.0,
     unit: str = "",
-) -> tuple[Carried, ...]:
-    """Carry features, in their order.
+) -> Generator[float, None, tuple[Carried, ...]]:
+    """Carry features, in their order, yielding the share that is done.
 
     Parameters
     ----------
@@ -109,14 +111,23 @@ def carried(
     unit
         Of the target, for sentences.
     """
-    return tuple(_carried(feature, course, obstacles, radius, unit) for feature in features)
+    found: list[Carried] = []
+    for k, feature in enumerate(features):
+        done = partial(_done, k / len(features))
+        found.append((yield from retold(_carried(feature, course, obstacles, radius, unit), done)))
+        yield (k + 1) / len(features)
+    return tuple(found)
+
+
+def _done(share: float, _: None) -> tuple[float]:
+    return (share,)
 
 
 def _carried(
     feature: Feature, course: Course, obstacles: Obstacles | None, radius: float, unit: str
-) -> Carried:
+) -> Generator[None, None, Carried]:
     if feature.kind is FeatureKind.ROUTE:
-        return _carried_route(feature, course, obstacles, radius, unit)
+        return (yield from _carried_route(feature, course, obstacles, radius, unit))
     ways = [_dense(ring, course, feature.kind is FeatureKind.ZONE) for ring in feature.rings]
     thin = [_thinned(way, course.extent * _COARSE) for way in ways]
     if feature.kind is FeatureKind.ZONE and not _is_area(thin):
@@ -154,13 +165,13 @@ def _noted(
 
 def _carried_route(
     feature: Feature, course: Course, obstacles: Obstacles | None, radius: float, unit: str
-) -> Carried:
+) -> Generator[None, None, Carried]:
     step = course.extent * _FINE if obstacles is None else obstacles.resolution
     way: Way | None = _dense(feature.points, course, closed=False, step=step)
     assert way is not None
     if obstacles is None:
         return _result(feature, [_thinned(way, course.extent * _COARSE)], course)
-    way, changes = kept_clear(way, obstacles, radius, course.landmarks, unit)
+    way, changes = yield from kept_clear(way, obstacles, radius, course.landmarks, unit)
     if way is None:
         return Carried(feature.kind, feature.name, None, (), (), changes)
     thin = _thinned(way, obstacles.resolution / 2.0, obstacles, radius)

@@ -10,8 +10,9 @@ again.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -26,6 +27,8 @@ __all__ = ["Landmarks", "Way", "kept_clear"]
 _MARGIN = 2.0
 """Metres, or radii times 8, around a part that is planned again, at first."""
 _STRAY = 1.0
+_FARTHEST_STRAY = 20.0
+"""In radii: how far from the carried way it is all one."""
 _HUG = 0.5
 _SMOOTHINGS = 40
 _SLACK = 0.5
@@ -35,7 +38,11 @@ _SHARES = np.arange(1, 17)[:, None, None] / 16.0
 _MOST_BARRIERS = 6
 _MOST_STRETCHES = 8
 _MANY_CELLS = 400_000
-"""More than these are first searched by blocks."""
+"""Four times more than these are first searched by blocks, about so many."""
+_PIECE = 100
+"""Blocks along a way that is searched at once."""
+_NEAR_BLOCKS = 2
+"""How far it may be from them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +98,10 @@ class Way:
 
 def kept_clear(
     way: Way, obstacles: Obstacles, radius: float, landmarks: Landmarks, unit: str = "m"
-) -> tuple[Way | None, tuple[Change, ...]]:
+) -> Generator[None, None, tuple[Way | None, tuple[Change, ...]]]:
     """Return a way that keeps its distance from obstacles, and what was changed.
+
+    It yields after each search, so that it can be stopped.
 
     Parameters
     ----------
@@ -130,7 +139,7 @@ def kept_clear(
             continue
         # What is clear may be the hollow of a thing of which only the outline was seen.
         for beyond in _reappearing(clear, at):
-            found, sides = _around(way, at, beyond, obstacles, radius, landmarks)
+            found, sides = yield from _around(way, at, beyond, obstacles, radius, landmarks)
             if found is not None:
                 break
         if found is None:
@@ -192,13 +201,13 @@ def _named(part: Way, landmarks: Landmarks) -> str:
 
 def _around(
     way: Way, first: int, last: int, obstacles: Obstacles, radius: float, landmarks: Landmarks
-) -> tuple[Way | None, list[Change]]:
+) -> Generator[None, None, tuple[Way | None, list[Change]]]:
     """Return a way from one clear point to another, without the first, and what is odd of it."""
     carried = way.part(first, last)
     wanted = [_swept(carried.drawn, place) for place in landmarks.drawn]
     barriers: list[FloatArray] = []
     closed: set[int] = set()
-    found = line = _planned(carried, obstacles, radius, barriers)
+    found = line = yield from _planned(carried, obstacles, radius, barriers)
     while found is not None and len(closed) < _MOST_BARRIERS:
         wrong = [
             k
@@ -210,7 +219,7 @@ def _around(
             break
         closed.update(wrong)
         barriers += [_barrier(carried, landmarks, k, obstacles) for k in wrong]
-        found = _planned(carried, obstacles, radius, barriers)
+        found = yield from _planned(carried, obstacles, radius, barriers)
     if line is None:
         return None, []
     odd = [
@@ -258,77 +267,151 @@ def _barrier(carried: Way, landmarks: Landmarks, k: int, obstacles: Obstacles) -
 
 def _planned(
     carried: Way, obstacles: Obstacles, radius: float, barriers: Sequence[FloatArray]
-) -> FloatArray | None:
+) -> Generator[None, None, FloatArray | None]:
     """Return the cheapest way between the ends of a carried part; None if there is none."""
     cells = obstacles.cells(carried.points)
     within = ((cells >= 0) & (cells < obstacles.blocked.shape)).all(axis=1)
     margin = math.ceil(max(_MARGIN, 8.0 * radius) / obstacles.resolution)
     while True:
         window = Window.around(obstacles, cells[within], margin)
-        found = _cheapest(carried, cells, window, obstacles, radius, barriers)
-        if found is not None or window.is_all_of(obstacles):
-            return found
+        open_ = window.of(obstacles.clearance) >= obstacles.needed(radius)
+        for barrier in barriers:
+            open_ &= ~_drawn(obstacles.cells(barrier) - window.low, open_.shape)
+        ends = cells[[0, -1]] - window.low
+        open_[tuple(ends.T)] = True
+        yield
+        if _joined(open_, ends):
+            ground = _Ground(open_, window, cells - window.low, obstacles, radius)
+            path = yield from _path(ground, ends)
+            points = obstacles.places(path + window.low)
+            points[0], points[-1] = carried.points[0], carried.points[-1]
+            return points if len(points) > 1 else carried.points[[0, -1]]
+        if window.is_all_of(obstacles):
+            return None
         margin *= 4
 
 
-def _cheapest(
-    carried: Way,
-    cells: IntArray,
-    window: Window,
-    obstacles: Obstacles,
-    radius: float,
-    barriers: Sequence[FloatArray],
-) -> FloatArray | None:
-    room = window.of(obstacles.clearance)
-    shape = room.shape
-    open_ = room >= obstacles.needed(radius)
-    for barrier in barriers:
-        open_ = open_ & ~_drawn(barrier, obstacles, window, shape)
-    ends = cells[[0, -1]] - window.low
-    open_[tuple(ends.T)] = True
-    stray = _strayed(carried, obstacles, window, shape)
-    unit = max(radius, 2.0 * obstacles.resolution)
-    costs = 1.0 + _STRAY * np.minimum(stray / unit, 20.0) ** 2 / 20.0
-    costs += _HUG * np.clip(2.0 - room / unit, 0.0, 1.0) ** 2
-    if not _joined(open_, ends):
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """What there is to go by in a window.
+
+    Attributes
+    ----------
+    open
+        Which cells of the window may be crossed.
+    window
+        Where it is.
+    carried
+        The cells of the carried way, from the window's corner.
+    obstacles, radius
+        What is kept away from, and how far.
+    """
+
+    open: BoolArray
+    window: Window
+    carried: IntArray
+    obstacles: Obstacles
+    radius: float
+
+    def costs(self, low: IntArray, high: IntArray) -> FloatArray:
+        """Return what each cell of a rectangle costs; below 0 where nobody may go."""
+        around = math.ceil(_FARTHEST_STRAY * self._unit / self.obstacles.resolution)
+        least, shape = np.maximum(low - around, 0), self.open.shape
+        most = np.minimum(high + around, shape)
+        away = _away(self.carried - least, tuple(most - least))
+        part = _part(low, high)
+        costs = self._priced(
+            away[_part(low - least, high - least)], self.window.of(self.obstacles.clearance)[part]
+        )
+        costs[~self.open[part]] = -1.0
+        return costs
+
+    def blocks(self, size: int) -> FloatArray:
+        """Return what blocks of cells cost; below 0 where they are not wholly open."""
+        shape = tuple(-(-side // size) for side in self.open.shape)
+        margins = [(0, c * size - side) for c, side in zip(shape, self.open.shape, strict=True)]
+        whole = np.pad(self.open, margins).reshape(shape[0], size, shape[1], size).all(axis=(1, 3))
+        room = self.window.of(self.obstacles.clearance)[::size, ::size]
+        costs = self._priced(size * _away(self.carried // size, shape), room)
+        costs[~whole] = -1.0
+        return costs
+
+    @property
+    def _unit(self) -> float:
+        return max(self.radius, 2.0 * self.obstacles.resolution)
+
+    def _priced(self, away: FloatArray, room: FloatArray) -> FloatArray:
+        stray = away * (self.obstacles.resolution / self._unit)
+        costs: FloatArray = np.minimum(stray, _FARTHEST_STRAY) ** 2
+        costs *= _STRAY / _FARTHEST_STRAY
+        costs += 1.0 + _HUG * np.clip(2.0 - room / self._unit, 0.0, 1.0) ** 2
+        return costs
+
+
+def _part(low: IntArray, high: IntArray) -> tuple[slice, slice]:
+    return slice(int(low[0]), int(high[0])), slice(int(low[1]), int(high[1]))
+
+
+def _path(ground: _Ground, ends: IntArray) -> Generator[None, None, IntArray]:
+    """Return the cells of the cheapest way; on many cells, near the cheapest over blocks of them.
+
+    Blocks are as large as leaves few of them, and smaller where there is no way over such.
+    """
+    shape = np.array(ground.open.shape)
+    size = math.isqrt(ground.open.size // _MANY_CELLS)
+    while size > 1:
+        found = yield from _path_by_blocks(ground, ends, size)
+        if found is not None:
+            return found
+        size = 2 if size == 3 else size // 2
+    return _searched(ground.costs(np.zeros(2, dtype=np.int64), shape), ends)
+
+
+def _path_by_blocks(
+    ground: _Ground, ends: IntArray, size: int
+) -> Generator[None, None, IntArray | None]:
+    """Return a way that stays near the cheapest over blocks that are wholly open, if there is one.
+
+    It is searched in pieces, from block to block: what a piece takes does not grow with the grid.
+    """
+    costs = ground.blocks(size)
+    whole = costs > 0.0
+    over = ends // size
+    for end in over:
+        near = costs[max(0, end[0] - 1) : end[0] + 2, max(0, end[1] - 1) : end[1] + 2]
+        near[near < 0.0] = costs.max()
+    yield
+    if not _joined(costs > 0.0, over):
         return None
-    costs[~open_] = -1.0
-    path = _path(costs, ends)
-    points = obstacles.places(path + window.low)
-    points[0], points[-1] = carried.points[0], carried.points[-1]
-    return points if len(points) > 1 else carried.points[[0, -1]]
+    blocks = _searched(costs, over)
+    yield
+    stops = [k for k in range(_PIECE, len(blocks) - _PIECE // 2, _PIECE) if whole[tuple(blocks[k])]]
+    places = [ends[0], *(blocks[k] * size + size // 2 for k in stops), ends[1]]
+    found: list[IntArray] = []
+    for k, (first, last) in enumerate(pairwise([0, *stops, len(blocks) - 1])):
+        piece = _piece(ground, blocks[first : last + 1], size, np.array(places[k : k + 2]))
+        if piece is None:
+            return None
+        found.append(piece if not k else piece[1:])
+        yield
+    return np.vstack(found)
 
 
-def _path(costs: FloatArray, ends: IntArray) -> IntArray:
-    """Return the cells of the cheapest way; on many cells, near the cheapest of coarser ones."""
-    coarse = math.isqrt(costs.size // _MANY_CELLS)
-    if coarse > 1:
-        corridor = _corridor(costs, ends, coarse)
-        if corridor is not None and _joined(corridor, ends):
-            costs = np.where(corridor, costs, -1.0)
-    return _searched(costs, ends)
-
-
-def _corridor(costs: FloatArray, ends: IntArray, size: int) -> BoolArray | None:
-    """Return what is near the cheapest way over blocks of cells that are wholly open."""
-    rows, columns = (-(-side // size) for side in costs.shape)
-    margins = [
-        (0, count * size - side) for count, side in zip((rows, columns), costs.shape, strict=True)
-    ]
-    blocks = np.pad(costs, margins, constant_values=-1.0).reshape(rows, size, columns, size)
-    coarse = np.where(blocks.min(axis=(1, 3)) < 0.0, -1.0, blocks[:, 0, :, 0])
-    first, last = ends // size
-    for end in (first, last):
-        near = coarse[max(0, end[0] - 1) : end[0] + 2, max(0, end[1] - 1) : end[1] + 2]
-        near[near < 0.0] = coarse.max()
-    if not _joined(coarse > 0.0, np.array([first, last])):
+def _piece(ground: _Ground, blocks: IntArray, size: int, ends: IntArray) -> IntArray | None:
+    """Return the cheapest way between two cells that stays near a row of blocks, if any does."""
+    low = np.maximum(blocks.min(axis=0) - _NEAR_BLOCKS, 0)
+    drawn = np.zeros(blocks.max(axis=0) + _NEAR_BLOCKS + 1 - low, dtype=np.uint8)
+    drawn[tuple((blocks - low).T)] = 1
+    wide = cv2.dilate(drawn, np.ones((2 * _NEAR_BLOCKS + 1,) * 2, dtype=np.uint8)).astype(bool)
+    corner = low * size
+    high = np.minimum(corner + np.array(wide.shape) * size, ground.open.shape)
+    costs = ground.costs(corner, high)
+    near = wide.repeat(size, axis=0).repeat(size, axis=1)[: costs.shape[0], : costs.shape[1]]
+    costs[~near] = -1.0
+    if not _joined(costs > 0.0, ends - corner):
         return None
-    path = _searched(coarse, np.array([first, last]))
-    drawn = np.zeros((rows, columns), dtype=np.uint8)
-    drawn[tuple(path.T)] = 1
-    wide = cv2.dilate(drawn, np.ones((5, 5), dtype=np.uint8)).astype(bool)
-    fine = wide.repeat(size, axis=0).repeat(size, axis=1)[: costs.shape[0], : costs.shape[1]]
-    return np.asarray(fine & (costs > 0.0))
+    found: IntArray = _searched(costs, ends - corner) + corner
+    return found
 
 
 def _searched(costs: FloatArray, ends: IntArray) -> IntArray:
@@ -346,25 +429,17 @@ def _joined(open_: BoolArray, ends: IntArray) -> bool:
     return bool(first == second)
 
 
-def _strayed(
-    carried: Way, obstacles: Obstacles, window: Window, shape: tuple[int, ...]
-) -> FloatArray:
-    """Return how far cells are from a carried way."""
-    off = (~_drawn(carried.points, obstacles, window, shape)).astype(np.uint8)
-    away = cv2.distanceTransform(off, cv2.DIST_L2, cv2.DIST_MASK_5)
-    found: FloatArray = away.astype(np.float64) * obstacles.resolution
-    return found
+def _away(line: IntArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return how far the cells of a picture are from a line of cells, in cells."""
+    off = (~_drawn(line, shape)).astype(np.uint8)
+    return cv2.distanceTransform(off, cv2.DIST_L2, cv2.DIST_MASK_5).astype(np.float64)
 
 
-def _drawn(
-    line: FloatArray, obstacles: Obstacles, window: Window, shape: tuple[int, ...]
-) -> BoolArray:
-    """Return the cells of a window that a line goes through, and such that none gets across."""
+def _drawn(line: IntArray, shape: tuple[int, ...]) -> BoolArray:
+    """Return the cells of a picture that a line goes through, and such that none gets across."""
     picture = np.zeros(shape, dtype=np.uint8)
-    steps = obstacles.cells(line) - window.low
-    cv2.polylines(
-        picture, [steps[:, ::-1].astype(np.int32)], isClosed=False, color=1, lineType=cv2.LINE_4
-    )
+    steps = line[:, ::-1].astype(np.int32)
+    cv2.polylines(picture, [steps], isClosed=False, color=1, lineType=cv2.LINE_4)
     return picture.astype(bool)
 
 

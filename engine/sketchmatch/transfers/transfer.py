@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from numbers import Integral
@@ -20,6 +20,7 @@ from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.events import Finished, MatchEvent, Phase, Progress, Segmented
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import MatchResult
+from sketchmatch.pipeline.slices import retold
 from sketchmatch.transfers.carrying import Course, carried, course_between
 from sketchmatch.transfers.features import Carried, Feature, FeatureKind
 from sketchmatch.transfers.obstacles import Obstacles
@@ -198,12 +199,17 @@ def run_transfer(
     given = sides[1] if forth else sides[0]
     obstacles = _obstacles(request, given, target.scene, course, features)
     unit = "m" if isinstance(given, OccupancyGrid) else "units"
-    found: list[Carried] = []
-    for k, feature in enumerate(features):
-        found += carried((feature,), course, obstacles, request.radius or 0.0, unit)
-        if clock.is_time_to_tell():
-            yield Progress(Phase.SEARCH, clock.elapsed(), (k + 1) / len(features))
-    return TransferResult(tuple(found), len(drawn), course.warp, pairs, sketch, map_, match)
+    work = carried(features, course, obstacles, request.radius or 0.0, unit)
+    found = yield from retold(work, lambda share: _told(share, clock))
+    return TransferResult(found, len(drawn), course.warp, pairs, sketch, map_, match)
+
+
+def _told(share: float, clock: Clock) -> Iterator[Progress]:
+    """Give a sign of life, where whoever stops the work stops it; the budget is the match's."""
+    if clock.is_time_to_tell():
+        yield Progress(Phase.SEARCH, clock.elapsed(), share)
+    if clock.curtailed:
+        clock.check(Phase.SEARCH)
 
 
 def _matched(

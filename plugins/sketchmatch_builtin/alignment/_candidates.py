@@ -59,7 +59,7 @@ _PAIRINGS = 100_000
 """Pairings to weigh for poses that are refined between two pauses, or a few more."""
 
 _NEAR = -1
-_NEAR_PAIRS, _NEAR_POSES = 1, 10
+_NEAR_PAIRS, _NEAR_POSES = 3, 10
 """Sketched pairs that are laid on all others, and maps that follow, beside those that are near."""
 
 _LOSS = 9.0
@@ -135,7 +135,7 @@ def laid_maps(
 
 
 def near_maps(
-    sides: Sides, start: Iterable[IntArray], maps: int = 100, partial: bool = True
+    sides: Sides, start: Iterable[IntArray], maps: int = 50, partial: bool = True
 ) -> list[Laid]:
     """Lay a sketch upon a map near maps that were right a moment ago, and in a few other ways.
 
@@ -229,11 +229,15 @@ def completed(laid: Laid | None, sides: Sides) -> IntArray:
     rows, columns = worths.shape
     costs, candidates = np.empty((rows, columns)), np.empty((rows, columns), dtype=np.int64)
     sizes, holders = np.empty(rows, dtype=np.int64), np.empty(columns, dtype=np.int64)
-    for k, row in enumerate(worths):
-        free = np.flatnonzero(np.isfinite(row))
-        sizes[k] = len(free)
-        candidates[k, : len(free)] = free
-        costs[k, : len(free)] = np.minimum(row.max() - row[free], _FARTHEST)
+    if np.isfinite(worths).all():
+        sizes[:], candidates[:] = columns, np.arange(columns)
+        np.minimum(worths.max(axis=1, keepdims=True) - worths, _FARTHEST, out=costs)
+    else:
+        for k, row in enumerate(worths):
+            free = np.flatnonzero(np.isfinite(row))
+            sizes[k] = len(free)
+            candidates[k, : len(free)] = free
+            costs[k, : len(free)] = np.minimum(row.max() - row[free], _FARTHEST)
     if reduce_by_assignment(costs, candidates, sizes, holders) >= FORBIDDEN:
         return np.arange(rows)
     found = np.empty(rows, dtype=np.int64)
@@ -254,12 +258,15 @@ def template_maps(laid: Iterable[Laid], sides: Sides) -> list[IntArray]:
 def _guessed(
     sides: Sides, most: int, fewest_pairs: int = _FEWEST_PAIRS
 ) -> Generator[int, None, Guesses]:
-    """Weigh the poses that follow from two pairings each, about so many at most."""
+    """Weigh the poses that follow from two pairings each, about so many at most.
+
+    Where that is none, those of the fewest pairs alone.
+    """
     drawn, mapped = sides.drawn, sides.mapped
     rough = TOLERANCES._replace(omission=_ROUGH)
     guesses = empty_guesses(_ROOM, -_FLOOR * _ROUGH * len(drawn.places))
     grid = grid_of(mapped)
-    pairs = _pairs(drawn)
+    pairs = _pairs(drawn, None if most else fewest_pairs)
     allowed = np.isfinite(sides.bonus).astype(np.float64)
     there_are = len(mapped.places)
     fewest = min(len(pairs), fewest_pairs) * there_are
@@ -341,13 +348,13 @@ def _varied(laid: list[Laid], sides: Sides, most: int) -> list[Laid]:
     return [*different.values()]
 
 
-def _pairs(drawn: Things) -> IntArray:
+def _pairs(drawn: Things, most: int | None = None) -> IntArray:
     """Return the sketched pairs to lay on others: far ones first, and each object soon."""
     n = len(drawn.places)
     a, b = np.triu_indices(n, k=1)
     apart, used = np.abs(drawn.places[a] - drawn.places[b]), np.zeros(n)
     chosen = []
-    for _ in range(min(len(a), max(_PAIRS, 2 * n))):
+    for _ in range(min(len(a), max(_PAIRS, 2 * n) if most is None else most)):
         best = int(np.argmax(apart / (1.0 + used[a] + used[b])))
         chosen.append((a[best], b[best]))
         used[[a[best], b[best]]] += 1.0

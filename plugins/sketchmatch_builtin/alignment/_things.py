@@ -62,6 +62,7 @@ def things_of(scene: Scene) -> Things:
     )
 
 
+@lru_cache(maxsize=1024)
 def _moments(item: SceneObject) -> tuple[float, ...]:
     """Return area, centroid, and central second moments by area."""
     area = sx = sy = sxx = sxy = syy = 0.0

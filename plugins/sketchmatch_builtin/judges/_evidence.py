@@ -226,20 +226,37 @@ def place_numbers(known: Described, layers: Layers) -> FloatArray:
     )
 
 
-def weighed(known: Described, learned: Posterior) -> Weighed:
-    """Return what the numbers of maps come to."""
+def weighed(known: Described, learned: Posterior, elsewhere: float | None = None) -> Weighed:
+    """Return what the numbers of maps come to.
+
+    Parameters
+    ----------
+    known
+        The maps.
+    learned
+        What was learned.
+    elsewhere
+        How likely the sketch does not show this place, where that is known.
+    """
     measured = known.measured.at(slice(JUDGED))
     values = worths(known, measured, learned.layers(known.related), known.related)
     labels = measured.wholes[:, [Whole.ALIKE, Whole.UNLIKE]] @ learned.labels
     shares = np.zeros(len(known.maps))
     shares[: len(values)] = np.exp(values + labels - (values + labels).max())
     shares /= shares.sum()
+    lost = float(lost_numbers(shares, known.drawn, known.mapped) @ learned.lost)
+    if elsewhere is None:
+        elsewhere = _elsewhere(known, learned)
+    return Weighed(shares, _logistic(lost), elsewhere)
+
+
+def _elsewhere(known: Described, learned: Posterior) -> float:
+    """Return how likely a sketch does not show the place of a map."""
     numbers, layers = place_numbers(known, learned.bare), learned.place
     numbers = within(numbers, layers.of_places)
     hidden = np.maximum(numbers @ layers.first + layers.first_bias, 0.0)
     here = float(hidden @ layers.last + numbers @ layers.direct) + layers.constant
-    lost = float(lost_numbers(shares, known.drawn, known.mapped) @ learned.lost)
-    return Weighed(shares, _logistic(lost), _logistic(-here))
+    return _logistic(-here)
 
 
 def lost_numbers(shares: FloatArray, drawn: int, mapped: int) -> FloatArray:

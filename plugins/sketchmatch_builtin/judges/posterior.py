@@ -85,7 +85,7 @@ class Posterior(Judge):
             related=problem.usual,
             quick=problem.elsewhere is not None,
         )
-        found = weighed(known, POSTERIOR)
+        found = weighed(known, POSTERIOR, problem.elsewhere)
         mapped = problem.template if problem.swapped else problem.argument
         shares = _as_certain(found.shares, known.maps, mapped)
         order = np.argsort(-shares, kind="stable")
@@ -93,8 +93,7 @@ class Posterior(Judge):
         told = problem.alternatives + 1
         # Whoever says that a sketched object is a mapped one says that this is the place.
         pinned = problem.pinned is not None and bool((problem.pinned >= 0).any())
-        judged = found.elsewhere if problem.elsewhere is None else problem.elsewhere
-        elsewhere = 0.0 if pinned else judged
+        elsewhere = 0.0 if pinned else found.elsewhere
         here = 1.0 - elsewhere
         likely = here * (1.0 - found.lost) * shares[order]
         lines = _lines(maps, likely, problem.table)
@@ -127,8 +126,8 @@ def _lines(maps: list[IntArray], likely: FloatArray, table: RelationTable) -> Fl
     """Return how likely each template object has each partner, or, last, none."""
     lines = np.zeros((table.template_objects, table.argument_objects + 1))
     rows = np.arange(len(lines))
-    for partners, probability in zip(maps, likely, strict=True):
-        lines[rows, partners] += probability
+    for k in np.flatnonzero(likely).tolist():
+        lines[rows, maps[k]] += likely[k]
     return lines
 
 

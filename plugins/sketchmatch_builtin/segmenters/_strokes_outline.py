@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sketchmatch.model import FloatArray, IntArray
 
-from ._strokes_trace import Trace
+from ._strokes_trace import Trace, once
 
 __all__ = ["areas_of", "enclosed_by", "own_gap", "tangled", "total_of"]
 
@@ -31,7 +31,8 @@ _MOST_CROSSINGS = 8_000
 _PAIRS = 1024
 
 
-def enclosed_by(stroke: Trace, max_gap: float) -> list[shapely.Polygon]:
+@once
+def enclosed_by(stroke: Trace, max_gap: float) -> tuple[shapely.Polygon, ...]:
     """Return the separate areas that a stroke encloses by itself, largest first.
 
     A stroke that crosses itself near its ends is closed at the crossing and its tails are cut;
@@ -43,17 +44,18 @@ def enclosed_by(stroke: Trace, max_gap: float) -> list[shapely.Polygon]:
     if not areas or total_of(areas) < _MAIN_LOOP * total_of(areas_of(_joined(stroke.points))):
         closed = _closed(stroke, max_gap * stroke.size)
         areas = [] if closed is None else areas_of(closed)
-    return areas if total_of(areas) > _ROUNDING * stroke.size**2 else []
+    return tuple(areas) if total_of(areas) > _ROUNDING * stroke.size**2 else ()
 
 
 def tangled(strokes: Sequence[Trace]) -> set[int]:
     """Return which strokes cross themselves too often to look at all; the others are the least."""
-    counts = np.array([_crossings(stroke.points) for stroke in strokes])
+    counts = np.array([_crossings(stroke) for stroke in strokes])
     order = np.argsort(counts, kind="stable")
     beyond = np.cumsum(counts[order]) > _MOST_CROSSINGS
     return set(order[beyond].tolist())
 
 
+@once
 def own_gap(stroke: Trace) -> float:
     """Return the length of the gap that closes a stroke; 0 if its ends cross."""
     if not shapely.LineString(stroke.points).is_simple:
@@ -75,13 +77,15 @@ def areas_of(line: shapely.LineString) -> list[shapely.Polygon]:
     return sorted(shapely.get_parts(enclosed), key=lambda area: -area.area)
 
 
-def total_of(areas: list[shapely.Polygon]) -> float:
+def total_of(areas: Sequence[shapely.Polygon]) -> float:
     """Return the sum of areas."""
     return sum(area.area for area in areas)
 
 
-def _crossings(points: FloatArray) -> float:
-    """Return about how often a line crosses itself."""
+@once
+def _crossings(stroke: Trace) -> float:
+    """Return about how often a stroke crosses itself."""
+    points = stroke.points
     segments = len(points) - 1
     total = segments * (segments - 1) // 2
     if not total:

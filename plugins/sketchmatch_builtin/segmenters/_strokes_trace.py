@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache, wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
 from sketchmatch.model import FloatArray
+from sketchmatch.model.caching import cached_property
 
-__all__ = ["SAMPLES", "Trace", "span_of", "traced"]
+__all__ = ["LATELY", "LONGEST", "SAMPLES", "Trace", "once", "span_of", "traced"]
 
 # Points that stand for a stroke where strokes are compared; outlines are made of all.
 SAMPLES = 24
+# What is drawn is looked at again and again, while most strokes stay: so many of those met lately
+# are known, up to so many points each.
+LATELY = 512
+LONGEST = 2048
+
+_Asked = ParamSpec("_Asked")
+_Found = TypeVar("_Found")
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +46,11 @@ class Trace:
     samples: FloatArray
     span: float
 
+    @cached_property
+    def known(self) -> dict[Any, Any]:
+        """What was found out about it, for :func:`once`."""
+        return {}
+
     @property
     def length(self) -> float:
         """Length of the stroke."""
@@ -57,7 +73,34 @@ class Trace:
 
 
 def traced(points: FloatArray) -> Trace:
-    """Return a stroke with its measures."""
+    """Return a stroke with its measures: the same one for the same points, if met lately."""
+    if len(points) > LONGEST:
+        return _measured(points)
+    return _met_lately(np.ascontiguousarray(points, dtype=np.float64).tobytes())
+
+
+def once(
+    work: Callable[Concatenate[Trace, _Asked], _Found],
+) -> Callable[Concatenate[Trace, _Asked], _Found]:
+    """Let a function find out about each stroke once what it is asked, as long as that is known."""
+
+    @wraps(work)
+    def known(stroke: Trace, /, *asked: _Asked.args, **named: _Asked.kwargs) -> _Found:
+        key = (work.__name__, *asked, *named.items())
+        if key not in stroke.known:
+            stroke.known[key] = work(stroke, *asked, **named)
+        found: _Found = stroke.known[key]
+        return found
+
+    return known
+
+
+@lru_cache(maxsize=LATELY)
+def _met_lately(points: bytes) -> Trace:
+    return _measured(np.frombuffer(points).reshape(-1, 2))
+
+
+def _measured(points: FloatArray) -> Trace:
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     samples = _at(points, way, np.linspace(0.0, way[-1], SAMPLES))
     return Trace(points, way, samples, span_of(samples))

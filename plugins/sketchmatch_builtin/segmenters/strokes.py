@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -17,7 +19,7 @@ from ._strokes_chains import closed_chains
 from ._strokes_drawing import DOT, FLICK, LONGHAND, ROUTE, TANGLED, Drawing, Outline
 from ._strokes_marks import along_others, hosts, places, repeated, typical_span
 from ._strokes_outline import areas_of, enclosed_by, own_gap, tangled, total_of
-from ._strokes_trace import traced
+from ._strokes_trace import LATELY, LONGEST, traced
 
 __all__ = ["StrokeSegmenter"]
 
@@ -149,18 +151,15 @@ class StrokeSegmenter(Segmenter):
                 drawing.note(k, f"{drawing.named([k], found=True)} was left out: {why}")
         if len(objects) < 2:
             raise _too_few(len(objects), len(points) - len(drawn), self.params.max_gap)
-        scene = [
-            SceneObject.from_rings([shapely.get_coordinates(item.area)], item.label)
-            for item in objects
-        ]
+        scene = tuple(map(_object, objects))
         way = None if route is None else points[route]
         warnings = (*_without_points(empty), *drawing.sentences())
-        return Segmentation(Scene(tuple(scene)), warnings, way)
+        return Segmentation(Scene(scene), warnings, way)
 
     def _outlines(self, drawing: Drawing, route: int | None) -> list[Outline]:
         """Return all closed outlines, of single strokes and of chains."""
         strokes, max_gap = drawing.strokes, self.params.max_gap
-        closed: dict[int, list[shapely.Polygon]] = {}
+        closed: dict[int, Sequence[shapely.Polygon]] = {}
         pool: dict[int, float] = {}
         dots = set(drawing.explained)
         if unseen := tangled(strokes) - {route} - dots:
@@ -168,7 +167,7 @@ class StrokeSegmenter(Segmenter):
         seen = [k for k in range(len(strokes)) if k not in unseen | dots]
         for k, over in zip(seen, along_others([strokes[k] for k in seen]), strict=True):
             stroke = strokes[k]
-            areas = enclosed_by(stroke, max_gap) if k != route else []
+            areas = enclosed_by(stroke, max_gap) if k != route else ()
             if areas and areas[0].area < _LOOP * total_of(areas):
                 drawing.explain([k], LONGHAND)
             elif areas:
@@ -193,7 +192,7 @@ class StrokeSegmenter(Segmenter):
         self,
         drawing: Drawing,
         members: tuple[int, ...],
-        areas: list[shapely.Polygon],
+        areas: Sequence[shapely.Polygon],
         share: float = 0.0,
     ) -> Outline:
         size = (
@@ -260,6 +259,19 @@ class StrokeSegmenter(Segmenter):
             else:
                 others.append(k)
         return others
+
+
+def _object(outline: Outline) -> SceneObject:
+    """Return the object of an outline: the same one for the same outline, if met lately."""
+    ring = shapely.get_coordinates(outline.area)
+    if len(ring) > LONGEST:
+        return SceneObject.from_rings([ring], outline.label)
+    return _met_lately(ring.tobytes(), outline.label)
+
+
+@lru_cache(maxsize=LATELY)
+def _met_lately(ring: bytes, label: str) -> SceneObject:
+    return SceneObject.from_rings([np.frombuffer(ring).reshape(-1, 2)], label)
 
 
 def _retraces(outline: Outline, host: Outline) -> bool:
