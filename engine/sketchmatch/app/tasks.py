@@ -276,7 +276,7 @@ class Task:
     again
         Whether it was begun before, by a worker that was lost.
     long
-        Whether it has turned out to take long, so that it gives way to others.
+        Whether it has turned out to take long, or is expected to, so that it gives way to others.
     readers
         How many read it.
     noted
