@@ -71,6 +71,10 @@ def serve(
     max_requests_per_minute: Annotated[
         int | None, typer.Option(help="Requests that one caller may begin in a minute.")
     ] = None,
+    max_stored_mib_per_caller: Annotated[
+        int | None,
+        typer.Option(metavar="MIB", help="Scenes that one caller keeps, with their sources."),
+    ] = None,
     max_comparisons: Annotated[
         int | None,
         typer.Option(
@@ -158,6 +162,12 @@ def serve(
             help="Tell metrics, as Prometheus reads them, and probes over HTTP here.",
         ),
     ] = None,
+    traces_endpoint: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL", help="Send OpenTelemetry traces to the collector here, OTLP over gRPC."
+        ),
+    ] = None,
     web: Annotated[
         bool,
         typer.Option(
@@ -206,6 +216,7 @@ def serve(
         "server.default_time_budget_seconds": default_time_budget,
         "server.max_matches_per_caller": max_matches_per_caller,
         "server.max_requests_per_minute": max_requests_per_minute,
+        "server.max_stored_mib_per_caller": max_stored_mib_per_caller,
         "server.max_comparisons": max_comparisons,
         "server.max_candidates": max_candidates,
         "server.tls_certificate": tls_certificate,
@@ -218,6 +229,7 @@ def serve(
         "server.keep_matches_days": keep_matches_days,
         "server.keep_matches_mib": keep_matches_mib,
         "server.metrics_address": metrics_address,
+        "server.traces_endpoint": traces_endpoint,
         "server.web_address": web_address,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
@@ -283,6 +295,7 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
         bool(server.store),
         server.keep_matches_days,
         server.keep_matches_mib * _MIB,
+        server.traces_endpoint,
     )
 
 
@@ -307,6 +320,7 @@ def _setup(configuration: Configuration) -> Setup:
         registry.refuse_problems()
     refuse_faults(configuration, registry)
     server = configuration.settings.server
+    stored = server.max_stored_mib_per_caller
     return Setup(
         Engine(registry, configuration.defaults, configuration.limits),
         RequestLimits(
@@ -318,6 +332,7 @@ def _setup(configuration: Configuration) -> Setup:
             default_time_budget=server.default_time_budget_seconds,
             max_per_caller=server.max_matches_per_caller,
             max_per_minute=server.max_requests_per_minute,
+            max_stored_bytes=stored and stored * _MIB,
             max_comparisons=server.max_comparisons,
             max_candidates=server.max_candidates,
         ),

@@ -35,6 +35,7 @@ from sketchmatch.server.services import CatalogService, MatchService, SceneServi
 from sketchmatch.server.sketching import SketchService
 from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
 from sketchmatch.server.tokens import read_tokens
+from sketchmatch.server.traces import Traces
 from sketchmatch.server.watchdog import watch
 from sketchmatch.server.watched import Watched
 from sketchmatch_proto.v1 import (
@@ -114,6 +115,8 @@ class ServerSettings:
         Whether somebody named that folder, so that the server is not to start without it.
     matches_days, matches_bytes
         For how long matches are kept there, and how large their file may grow.
+    traces_endpoint
+        URL of a collector of OpenTelemetry traces; None for none.
     """
 
     address: str = "127.0.0.1:50051"
@@ -130,6 +133,7 @@ class ServerSettings:
     store_named: bool = True
     matches_days: float = 30.0
     matches_bytes: int = 1 << 30
+    traces_endpoint: str | None = None
 
 
 async def serve(
@@ -167,7 +171,9 @@ async def serve(
     store = _opened(settings, say)
     archive = None if store is None else _archive(store, settings, metrics)
     app = Application(setup, settings.workers, store, archive, metrics.matched)
+    traces = Traces.sent_to(settings.traces_endpoint)
     interceptors = [
+        *traces.interceptors,
         MetricsInterceptor(metrics),
         CallLogInterceptor(),
         *files.interceptors,
@@ -206,7 +212,9 @@ async def serve(
     _add_services(server, services, readiness)
     _watch(metrics, app, files, readiness)
     port = _listen(server, settings.address, files.credentials)
-    beside = _Beside(settings, app, files, Handlers(services, interceptors), metrics, readiness)
+    beside = _Beside(
+        settings, app, files, Handlers(services, interceptors), metrics, readiness, traces
+    )
     await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
     beside.start()
@@ -276,7 +284,7 @@ class _Files:
 
 
 class _Beside:
-    """What answers over HTTP beside the gRPC server: monitors, and browsers.
+    """What is beside the gRPC server: monitors, browsers, and a collector of traces.
 
     Attributes
     ----------
@@ -292,8 +300,10 @@ class _Beside:
         handlers: Handlers,
         metrics: Metrics,
         readiness: Readiness,
+        traces: Traces,
     ) -> None:
         self.sentences: list[str] = []
+        self._traces = traces
         self._monitor: Monitor | None = None
         self._gateway: Gateway | None = None
         if settings.metrics_address:
@@ -317,9 +327,10 @@ class _Beside:
             await self._gateway.stop(grace)
 
     async def close(self) -> None:
-        """Tell monitors nothing more."""
+        """Tell monitors nothing more, and the collector of traces the last."""
         if self._monitor:
             await asyncio.to_thread(self._monitor.close)
+        await asyncio.to_thread(self._traces.close)
 
 
 class _Warming:
