@@ -9,9 +9,10 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import grpc
+from google.protobuf.descriptor_pool import DescriptorPool
 from grpc_health.v1 import health, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
@@ -31,6 +32,7 @@ from sketchmatch.server.metrics import Metric, Metrics, MetricsInterceptor
 from sketchmatch.server.monitor import Monitor
 from sketchmatch.server.notify import notify
 from sketchmatch.server.readiness import Readiness
+from sketchmatch.server.reflected import Reflected
 from sketchmatch.server.services import CatalogService, MatchService, SceneService, TransferService
 from sketchmatch.server.sketching import SketchService
 from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
@@ -460,7 +462,9 @@ def _add_services(
     server.add_generic_rpc_handlers(services)
     health_pb2_grpc.add_HealthServicer_to_server(readiness.servicer, server)
     reflection.enable_server_reflection(
-        (*_SERVICES, health.SERVICE_NAME, reflection.SERVICE_NAME), server
+        (*_SERVICES, health.SERVICE_NAME, reflection.SERVICE_NAME),
+        server,
+        cast(DescriptorPool, Reflected()),
     )
 
 
