@@ -340,6 +340,7 @@ class _Warming:
 
     def __init__(self, app: Application, readiness: Readiness, stopping: asyncio.Event) -> None:
         self._app, self._readiness, self._stopping = app, readiness, stopping
+        self._latest = 0
 
     async def begin(self, say: Callable[[str], None]) -> None:
         """Compile what the default pipeline needs."""
@@ -351,8 +352,14 @@ class _Warming:
         await self.go_on()
 
     async def go_on(self) -> None:
-        """Compile the rest, while no request is under way."""
-        unwanted = _unless_quiet(self._app, self._stopping)
+        """Compile the rest, while no request is under way; a later call takes the place of it.
+
+        Those that wait for quiet would else take all threads of a server that is reloaded while it
+        is busy, and nothing else would have its turn in them.
+        """
+        self._latest += 1
+        own = self._latest
+        unwanted = _unless_quiet(self._app, lambda: self._stopping.is_set() or self._latest != own)
         await self._app.warm_up_others(unwanted, self._readiness.ready)
 
 
@@ -563,8 +570,8 @@ def _on_signals(actions: Mapping[str, Callable[[], None]]) -> None:
             continue
 
 
-def _unless_quiet(app: Application, stopping: asyncio.Event) -> Callable[[], bool]:
-    """Return a function that waits for quiet, and says whether the server was stopped instead.
+def _unless_quiet(app: Application, unwanted: Callable[[], bool]) -> Callable[[], bool]:
+    """Return a function that waits for quiet, and says whether nobody wants it any more instead.
 
     It is quiet when no request has been under way for a second: to compile beside one would slow
     it down.
@@ -573,11 +580,11 @@ def _unless_quiet(app: Application, stopping: asyncio.Event) -> Callable[[], boo
 
     def stopped() -> bool:
         nonlocal busy
-        while not stopping.is_set() and time.monotonic() - busy < _QUIET:
+        while not unwanted() and time.monotonic() - busy < _QUIET:
             time.sleep(_LOOK)
             if not app.idle:
                 busy = time.monotonic()
-        return stopping.is_set()
+        return unwanted()
 
     return stopped
 
