@@ -20,6 +20,7 @@ __all__ = [
     "NotAuthenticatedError",
     "NotFoundError",
     "PluginError",
+    "QuotaError",
     "Reason",
     "RetryableError",
     "ServerStoppingError",
@@ -149,6 +150,12 @@ class StoreError(SketchmatchError):
     """What the server keeps on disk cannot be read or written."""
 
     reason = Reason.STORE_UNAVAILABLE
+
+
+class QuotaError(SketchmatchError):
+    """The caller would keep more than it may; it has to delete something first."""
+
+    reason = Reason.LIMIT_EXCEEDED
 
 
 class PluginError(SketchmatchError):

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import functools
 import inspect
+import math
 import pickle
 import threading
 import time
@@ -309,3 +310,26 @@ def test_errors_survive_the_way_between_processes():
     assert str(pickle.loads(pickle.dumps(PluginError("it failed")))) == "it failed"
     busy = pickle.loads(pickle.dumps(TooBusyError("it is full", 7)))
     assert str(busy) == "it is full; send the request again in 7 s"
+
+
+def test_what_is_expected_to_be_long_begins_beside_short_ones_and_leaves_them_their_places():
+    fine = [[math.cos(k / 500), math.sin(k / 500)] for k in range(3000)]
+    large, small = match_request(sources.polygons([fine]), SCENE), match_request(SCENE, SCENE)
+
+    async def run():
+        app = Application(setup(max_concurrent_matches=5), workers=2)
+        given = []
+        app._workers.begin = given.append
+        with contextlib.ExitStack() as stack:
+            for request in (large, large, large, large, small, small, small):
+                stack.enter_context(begun(app, request))
+            assert [task.long for task in given] == [True, True, True, False, False]
+            app._ended(given[0], None)
+            assert [task.long for task in given[5:]] == [True]
+            app._ended(given[3], None)
+            assert [task.long for task in given[6:]] == [False]
+        for task in (given[1], given[2], *given[4:]):
+            app._ended(task, None)
+        await app.close()
+
+    asyncio.run(run())

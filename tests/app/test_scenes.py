@@ -10,7 +10,7 @@ from sketchmatch.api import Segmentation
 from sketchmatch.app import responses
 from sketchmatch.app.scenes import Described, SceneArchive, Shelf, described_by, name_of
 from sketchmatch.app.store import Store
-from sketchmatch.errors import InvalidInputError, NotFoundError, StoreError
+from sketchmatch.errors import InvalidInputError, NotFoundError, QuotaError, StoreError
 from sketchmatch.model import Scene
 from sketchmatch.pipeline.describe import in_directions
 from sketchmatch.registry import Kind, default_registry
@@ -226,6 +226,56 @@ class TestShelf:
     def test_without_a_store_the_field_is_named(self):
         with pytest.raises(StoreError, match=r"^map\.stored_scene needs a store, and this server"):
             Shelf(None).segmentation("x", "anna", "map.stored_scene")
+
+
+class TestQuotas:
+    """Noise cannot be compressed: each of these sources takes a little over a mebibyte."""
+
+    MIB = 1024 * 1024
+
+    @pytest.fixture
+    def large(self):
+        noise = np.random.default_rng(0)
+        return [found(sources.image(noise.bytes(self.MIB))) for _ in range(3)]
+
+    def test_a_caller_keeps_what_it_may_and_others_theirs(self, archive, large):
+        for each in large[:2]:
+            assert archive.put(each, "anna", 2 * self.MIB + 20_000)
+        said = (
+            r"with this scene you would keep 3 MiB here, and 2\.02 MiB are the limit for each "
+            "caller; delete scenes that you do not need"
+        )
+        with pytest.raises(QuotaError, match=said):
+            archive.put(large[2], "anna", 2 * self.MIB + 20_000)
+        with pytest.raises(NotFoundError):
+            archive.get(large[2].stored_scene.name, "anna")
+        assert archive.put(large[2], "bert", 2 * self.MIB + 20_000)
+        with pytest.raises(QuotaError):
+            archive.claim(large[2].stored_scene.name, "anna", 2 * self.MIB + 20_000)
+        archive.delete(large[0].stored_scene.name, "anna")
+        assert archive.claim(large[2].stored_scene.name, "anna", 2 * self.MIB + 20_000)
+
+    def test_what_is_refused_leaves_nothing_behind(self, archive, large):
+        with pytest.raises(QuotaError):
+            archive.put(large[0], "anna", self.MIB)
+        with sqlite3.connect(archive.path) as file:
+            for table in ("scenes", "contents", "owners"):
+                assert file.execute(f"SELECT count(*) FROM {table}").fetchone() == (0,)
+
+    def test_what_is_put_again_takes_nothing_and_a_lower_limit_takes_nothing_away(
+        self, archive, large
+    ):
+        assert archive.put(large[0], "anna")
+        assert not archive.put(large[0], "anna", 1)
+        assert archive.get(large[0].stored_scene.name, "anna")
+
+    def test_a_source_counts_once_however_many_labels_it_is_given(self, archive, large):
+        archive.put(large[0], "anna")
+        name = large[0].stored_scene.name
+        for label in ("chair", "table"):
+            archive.relabel(name, [(0, label)], "anna", self.MIB + 20_000)
+        with pytest.raises(QuotaError, match="limit for each caller"):
+            archive.relabel(name, [(0, "lamp")], "anna", self.MIB)
 
 
 class TestBrokenFiles:

@@ -1,8 +1,11 @@
 """How many matches a server answers, and how soon, beside one thread in a process of its own.
 
 Run it with ``make bench-server``. Every round measures each row anew, so that rows compare on a
-machine that is busy otherwise: look at the ratios. Clients send bytes that were serialised once and
-read answers as bytes, as a load generator does; they share the machine with the server.
+machine that is busy otherwise: look at the ratios. Where it is very busy, one thread more or less
+decides what share of it a program gets; so the table says, too, what the ratio is at most where
+all processors are free, by the processor time that an answer costs, that of the clients with it.
+Clients send bytes that were serialised once and read answers as bytes, as a load generator does;
+they share the machine with the server.
 """
 
 from __future__ import annotations
@@ -49,12 +52,15 @@ class _Load:
         Answers a second.
     processor
         Seconds of the server's processor time for each answer.
+    clients
+        Seconds of the clients' processor time for each answer.
     """
 
     seconds: list[float] = field(default_factory=list)
     refused: int = 0
     rate: float = 0.0
     processor: float = 0.0
+    clients: float = 0.0
 
 
 def main() -> None:
@@ -110,6 +116,7 @@ async def _loaded(running: Server, request: bytes, clients: int, seconds: float)
     """Let some clients, each with a connection of its own, send one request after the other."""
     address, server_pid = running.address, running.process.pid
     load, began, spent = _Load(), time.monotonic(), processor_seconds(server_pid)
+    own = time.process_time()
 
     async def client() -> None:
         async with grpc.aio.insecure_channel(address, options=_OPTIONS) as channel:
@@ -128,7 +135,9 @@ async def _loaded(running: Server, request: bytes, clients: int, seconds: float)
 
     await asyncio.gather(*(client() for _ in range(clients)))
     load.rate = len(load.seconds) / (time.monotonic() - began)
-    load.processor = (processor_seconds(server_pid) - spent) / max(1, len(load.seconds))
+    answers = max(1, len(load.seconds))
+    load.processor = (processor_seconds(server_pid) - spent) / answers
+    load.clients = (time.process_time() - own) / answers
     return load
 
 
@@ -228,18 +237,29 @@ def _rate_table(alone: list[tuple[float, float]], loads: dict[int, list[_Load]])
         "median",
         "× one thread in process",
         "processor ms",
+        "clients' ms",
+        "× at most by processor time",
         "refused",
     )
     spent = 1e3 * median(seconds for _, seconds in alone)
     rates = [rate for rate, _ in alone]
-    table.add_row("one thread in process", f"{median(rates):.0f}", "1.00", f"{spent:.1f}", "")
+    table.add_row(
+        "one thread in process", f"{median(rates):.0f}", "1.00", f"{spent:.1f}", *[""] * 3
+    )
     for count, rounds in loads.items():
+        most = min(count, os.cpu_count() or 1)
+        bounds = [
+            most * seconds / (load.processor + load.clients)
+            for load, (_, seconds) in zip(rounds, alone, strict=True)
+        ]
         ratios = [load.rate / rate for load, rate in zip(rounds, rates, strict=True)]
         table.add_row(
             f"{count} clients",
             f"{median(load.rate for load in rounds):.0f}",
             f"{median(ratios):.2f} ({min(ratios):.2f} … {max(ratios):.2f})",
             f"{1e3 * median(load.processor for load in rounds):.1f}",
+            f"{1e3 * median(load.clients for load in rounds):.1f}",
+            f"{median(bounds):.2f}",
             f"{sum(load.refused for load in rounds)}",
         )
     return table

@@ -100,10 +100,10 @@ def test_check_says_every_fault_in_a_line(command_line, mine):
         f"sketchmatch: {mine}: server.colour is no setting; server has: address, grace_seconds, "
         "max_request_mib, max_matches, workers, max_waiting, max_wait_seconds, "
         "max_time_budget_seconds, default_time_budget_seconds, max_matches_per_caller, "
-        "max_requests_per_minute, max_comparisons, max_candidates, tls_certificate, tls_key, "
-        "tls_client_ca, tokens, store, keep, keep_matches_days, keep_matches_mib, "
-        "keep_scenes_mib, max_sketches, max_sketches_per_caller, sketch_idle_seconds, "
-        "metrics_address, web_address, web_origins, insecure",
+        "max_requests_per_minute, max_stored_mib_per_caller, max_comparisons, max_candidates, "
+        "tls_certificate, tls_key, tls_client_ca, tokens, store, keep, keep_matches_days, "
+        "keep_matches_mib, keep_scenes_mib, max_sketches, max_sketches_per_caller, "
+        "sketch_idle_seconds, metrics_address, traces_endpoint, web_address, web_origins, insecure",
     ]
 
 

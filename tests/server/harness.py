@@ -92,13 +92,23 @@ def serving(
     **limits: float,
 ) -> Iterator[Host]:
     """Run a server that offers the built-in algorithms and ``plugins``, without workers."""
-    setup = Setup(
+    setup = serving_setup(*plugins, defaults=defaults, sources=sources, **limits)
+    with hosting(setup, warm, grace) as host:
+        yield host
+
+
+def serving_setup(
+    *plugins: type[Algorithm],
+    defaults: Defaults = UNCONFIGURED,
+    sources: SourceLimits = SourceLimits(),  # noqa: B008
+    **limits: float,
+) -> Setup:
+    """Return what a server answers with that offers the built-in algorithms and ``plugins``."""
+    return Setup(
         Engine(registry_with(*plugins), defaults, sources),
         RequestLimits(**{**_LONGEST, **limits}),
         Isolation(trusted=frozenset("*")),
     )
-    with hosting(setup, warm, grace) as host:
-        yield host
 
 
 @contextmanager

@@ -119,8 +119,14 @@ def test_reflection_lists_the_services_and_describes_them(address):
         database = ProtoReflectionDescriptorDatabase(channel)
         listed = database.get_services()
         file = database.FindFileContainingSymbol("sketchmatch.v1.MatchService")
+        # As the protocol has it, and as ghz asks.
+        by_method = database.FindFileContainingSymbol("sketchmatch.v1.MatchService.CancelMatch")
+        for unknown in ("sketchmatch.v1.Unheard.Match", "Unheard", ""):
+            with pytest.raises(KeyError):
+                database.FindFileContainingSymbol(unknown)
     assert {*SERVICES, "grpc.health.v1.Health"} <= set(listed)
     assert [service.name for service in file.service] == ["MatchService"]
+    assert by_method == file
 
 
 def test_the_catalogue_tells_what_there_is_and_what_is_the_default(address):

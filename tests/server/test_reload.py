@@ -1,9 +1,13 @@
 """SIGHUP reads the configuration again, and no request under way notices."""
 
+import asyncio
 import signal
+import time
+from types import SimpleNamespace
 
 import pytest
 
+from sketchmatch.server.serve import _Warming
 from sketchmatch_client import Client, InvalidRequestError
 from tests.processes import server
 from tests.server.harness import ENDLESS, scene
@@ -83,3 +87,32 @@ def test_a_configuration_that_is_wrong_changes_nothing_and_the_server_says_why(r
     ]:
         reload(text, f"the configuration stays as it is: .*{words}")
         assert searcher_of(client.match(scene(4), scene(4))) == "easm"
+
+
+class Busy:
+    """An application that is never quiet."""
+
+    idle = False
+
+    async def warm_up(self, unwanted, warm):
+        pass
+
+    async def warm_up_others(self, unwanted, warm):  # noqa: ARG002
+        assert await asyncio.to_thread(unwanted)
+
+
+def test_a_busy_server_may_be_reloaded_any_number_of_times():
+    async def run():
+        stopping = asyncio.Event()
+        warming = _Warming(Busy(), SimpleNamespace(ready=None), stopping)
+        reloads = [asyncio.create_task(warming.again()) for _ in range(50)]
+        try:
+            await asyncio.wait_for(asyncio.gather(*reloads[:-1]), 60)
+            # There is a thread for others.
+            await asyncio.wait_for(asyncio.to_thread(time.sleep, 0), 60)
+            assert not reloads[-1].done()
+        finally:
+            stopping.set()
+        await asyncio.wait_for(reloads[-1], 60)
+
+    asyncio.run(run())

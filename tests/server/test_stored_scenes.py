@@ -3,7 +3,9 @@
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 
+import grpc
 import numpy as np
 import pytest
 
@@ -11,7 +13,14 @@ from sketchmatch.app.setup import RequestLimits, Setup
 from sketchmatch.model import Scene
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import default_registry
-from sketchmatch_client import Client, InvalidRequestError, NotFoundError, StoreError, sources
+from sketchmatch_client import (
+    Client,
+    InvalidRequestError,
+    NotFoundError,
+    ServerBusyError,
+    StoreError,
+    sources,
+)
 from tests.server.harness import Host, hosting, scene, shapes, turned
 
 LABELS = [f"thing {k}" for k in range(6)]
@@ -118,6 +127,21 @@ def test_what_cannot_be_kept_is_refused_by_field(client, name):
     with pytest.raises(InvalidRequestError) as caught:
         client.get_scene("")
     assert caught.value.field == "name"
+
+
+def test_a_caller_who_keeps_as_much_as_it_may_is_told_to_delete(tmp_path):
+    limited = replace(setup(), limits=RequestLimits(max_stored_bytes=8_000))
+    with (
+        hosting(limited, store=tmp_path / "store") as host,
+        Client(host.address, timeout=60) as client,
+    ):
+        kept = client.put_scene(MAP).stored_scene.name
+        with pytest.raises(ServerBusyError, match="the limit for each caller; delete") as refused:
+            client.put_scene(scene(100, 2))
+        assert refused.value.reason == "LIMIT_EXCEEDED"
+        assert refused.value.retry_after is None
+        assert refused.value.__cause__.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+        assert [each.name for each in client.list_scenes()] == [kept]
 
 
 def test_without_a_store_inline_sources_are_matched_and_the_rest_is_said(address):

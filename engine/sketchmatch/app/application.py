@@ -447,6 +447,7 @@ class Application:
         task = Task(order, setup, caller, wish, former)
         if not order.inner:
             self._rates.take(caller.name, setup.limits.max_per_minute)
+        task.long = bool(self._kept) and not task.strangers and self._workers.lengths.is_long(order)
         self._admit(task)
         if order.is_match:
             self.matches.begin(task)
@@ -498,8 +499,8 @@ class Application:
 
     def _dispatch(self) -> None:
         """Begin what waits, as far as there are places."""
-        while self._has_room():
-            task = self._waiting.take(self._fits)
+        while len(self._running) < self._setup.limits.max_concurrent_matches:
+            task = self._waiting.take(self._fits if self._has_room() else self._gives_way)
             if task is None:
                 return
             self._running.add(task)
@@ -513,16 +514,26 @@ class Application:
         return all_places and (not self._kept or short < self._kept)
 
     def _fits(self, task: Task) -> bool:
-        """Whether a task may have a place: neither strangers nor a caller ever have all."""
+        """Whether a task may have a place: neither strangers nor a caller ever have all.
+
+        What is expected to be long leaves those to the others that short ones are likely to want.
+        """
         most = self._setup.limits.max_per_caller
         if most is not None:
             name = task.caller.name
             if sum(1 for other in self._running if other.caller.name == name) >= most:
                 return False
+        if task.long:
+            places = self._setup.limits.max_concurrent_matches - self._kept
+            return sum(1 for other in self._running if other.long) < max(1, places)
         if not task.strangers:
             return True
         theirs = sum(1 for other in self._running if other.strangers)
         return theirs < self._setup.limits.strangers_places
+
+    def _gives_way(self, task: Task) -> bool:
+        """Whether a task may have a place where those for short ones are taken."""
+        return task.long and self._fits(task)
 
     def _place(self, task: Task) -> Place:
         return self._workers if self._kept or task.strangers else self._here

@@ -67,11 +67,12 @@ class Keeping:
         while True:
             found, histograms = await self._found(data, caller)
             if found.HasField("source"):
-                created = await asyncio.to_thread(archive.put, found, caller.known)
+                created = await asyncio.to_thread(archive.put, found, caller.known, self._most)
                 for packed in histograms:
                     self.keep(packed)
                 return PutSceneResponse(stored_scene=found.stored_scene, created=created)
-            claimed = await asyncio.to_thread(archive.claim, found.stored_scene.name, caller.known)
+            name = found.stored_scene.name
+            claimed = await asyncio.to_thread(archive.claim, name, caller.known, self._most)
             if claimed is not None:
                 record, created = claimed
                 return PutSceneResponse(stored_scene=record, created=created)
@@ -100,8 +101,9 @@ class Keeping:
     async def update(self, request: UpdateSceneRequest, caller: Caller) -> UpdateSceneResponse:
         """Keep a scene of a caller with other labels."""
         labels = [(each.object, each.label) for each in request.labels]
+        most = self._most
         record = await self._asked(
-            request.name, lambda archive: archive.relabel(request.name, labels, caller.known)
+            request.name, lambda archive: archive.relabel(request.name, labels, caller.known, most)
         )
         return UpdateSceneResponse(stored_scene=record)
 
@@ -137,6 +139,11 @@ class Keeping:
             raise ServerStoppingError("the server is about to stop")
         histograms = [BytesValue.FromString(each).value for each in told[1:]]
         return GetSceneResponse.FromString(told[0]), histograms
+
+    @property
+    def _most(self) -> int | None:
+        """Bytes that a caller may keep."""
+        return self._app.setup.limits.max_stored_bytes
 
     def _kept(self, field: str) -> SceneArchive:
         if self._archive is None:

@@ -23,7 +23,14 @@ import numpy as np
 import sketchmatch
 from sketchmatch.api import Histogram, Segmentation, Segmenter
 from sketchmatch.app.store import Database, Reading, Store
-from sketchmatch.errors import InvalidInputError, NotFoundError, Reason, StoreError, quoted
+from sketchmatch.errors import (
+    InvalidInputError,
+    NotFoundError,
+    QuotaError,
+    Reason,
+    StoreError,
+    quoted,
+)
 from sketchmatch.model import FloatArray, Scene, SceneObject, pair_count
 from sketchmatch.model.arrays import frozen_floats, sealed
 from sketchmatch.model.labels import cleaned_label
@@ -49,7 +56,8 @@ __all__ = [
 ]
 
 _FILE, _VERSION = "scenes", 1
-SCENES_BYTES = 1024 * 1024 * 1024
+_MIB = 1024 * 1024
+SCENES_BYTES = 1024 * _MIB
 """Bytes of all scenes together, where nobody says another number."""
 
 _SCHEMA = """
@@ -184,8 +192,21 @@ class SceneArchive:
         """
         self._file.work(lambda _: None)
 
-    def put(self, found: GetSceneResponse, caller: str) -> bool:
-        """Keep what a segmenter found in a source; return whether the caller had not put it."""
+    def put(self, found: GetSceneResponse, caller: str, most: int | None = None) -> bool:
+        """Keep what a segmenter found in a source; return whether the caller had not put it.
+
+        Parameters
+        ----------
+        found, caller
+            What it found, and for whom.
+        most
+            Bytes that the caller may keep, or None for no limit.
+
+        Raises
+        ------
+        QuotaError
+            If these would be more; then nothing is kept.
+        """
         record = found.stored_scene
         source = zlib.compress(found.source.SerializeToString(deterministic=True), 1)
         labels = _labels_of(record)
@@ -195,12 +216,19 @@ class SceneArchive:
                 "INSERT OR IGNORE INTO contents VALUES (?, ?, ?)",
                 (record.name, source, json.dumps(labels)),
             )
-            return _put(connection, record, record.name, caller)
+            return _put(connection, record, record.name, caller, most)
 
         return self._file.work(job)
 
-    def claim(self, name: str, caller: str) -> tuple[StoredScene, bool] | None:
+    def claim(
+        self, name: str, caller: str, most: int | None = None
+    ) -> tuple[StoredScene, bool] | None:
         """Let a caller have a scene that it could put; None where nobody has put it.
+
+        Raises
+        ------
+        QuotaError
+            As :meth:`put` does.
 
         Returns
         -------
@@ -212,7 +240,7 @@ class SceneArchive:
             found = connection.execute(
                 "SELECT record FROM scenes WHERE name = ?", (name,)
             ).fetchone()
-            return None if found is None else (found[0], _own(connection, name, caller))
+            return None if found is None else (found[0], _own(connection, name, caller, most))
 
         found = self._file.work(job)
         return None if found is None else (StoredScene.FromString(found[0]), found[1])
@@ -237,7 +265,13 @@ class SceneArchive:
 
         return self._file.work(job)
 
-    def relabel(self, name: str, labels: Sequence[tuple[int, str]], caller: str) -> StoredScene:
+    def relabel(
+        self,
+        name: str,
+        labels: Sequence[tuple[int, str]],
+        caller: str,
+        most: int | None = None,
+    ) -> StoredScene:
         """Keep a scene with other labels, beside the one of this name.
 
         Raises
@@ -246,6 +280,8 @@ class SceneArchive:
             If it has no such object.
         NotFoundError
             If the caller has put none of this name.
+        QuotaError
+            As :meth:`put` does.
         """
 
         def job(connection: sqlite3.Connection) -> StoredScene:
@@ -263,7 +299,7 @@ class SceneArchive:
                 record.scene.objects[place].label = cleaned_label(label)
             wanted = _labels_of(record)
             record.name = content if wanted == json.loads(found) else _relabelled(content, wanted)
-            _put(connection, record, content, caller)
+            _put(connection, record, content, caller, most)
             return record
 
         return self._file.work(job)
@@ -441,7 +477,13 @@ def described_by(identity: str) -> str:
     return f"{sketchmatch.__version__} {identity}"
 
 
-def _put(connection: sqlite3.Connection, record: StoredScene, content: str, caller: str) -> bool:
+def _put(
+    connection: sqlite3.Connection,
+    record: StoredScene,
+    content: str,
+    caller: str,
+    most: int | None,
+) -> bool:
     """Write a scene and who has it; return whether that is new."""
     labels = _labels_of(record)
     connection.execute(
@@ -455,14 +497,34 @@ def _put(connection: sqlite3.Connection, record: StoredScene, content: str, call
             json.dumps(labels),
         ),
     )
-    return _own(connection, record.name, caller)
+    return _own(connection, record.name, caller, most)
 
 
-def _own(connection: sqlite3.Connection, name: str, caller: str) -> bool:
+def _own(connection: sqlite3.Connection, name: str, caller: str, most: int | None) -> bool:
     made = connection.execute(
         "INSERT OR IGNORE INTO owners VALUES (?, ?, ?)", (caller, time.time_ns(), name)
     )
-    return made.rowcount > 0
+    new = made.rowcount > 0
+    if new and most is not None and (kept := _kept_bytes(connection, caller)) > most:
+        raise QuotaError(
+            f"with this scene you would keep {kept / _MIB:.3g} MiB here, and {most / _MIB:.3g} MiB "
+            "are the limit for each caller; delete scenes that you do not need"
+        )
+    return new
+
+
+def _kept_bytes(connection: sqlite3.Connection, caller: str) -> int:
+    """Return the bytes of a caller's scenes and of their sources, each counted once."""
+    (scenes,) = connection.execute(
+        "SELECT total(length(record)) FROM scenes JOIN owners USING (name) WHERE caller = ?",
+        (caller,),
+    ).fetchone()
+    (sources,) = connection.execute(
+        "SELECT total(length(source)) FROM contents WHERE content IN "
+        "(SELECT content FROM scenes JOIN owners USING (name) WHERE caller = ?)",
+        (caller,),
+    ).fetchone()
+    return int(scenes + sources)
 
 
 def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) -> bytes:

@@ -59,6 +59,8 @@ class RequestLimits:
         Requests of one caller that run at the same time, or None for all that may.
     max_per_minute
         Requests that one caller may begin in a minute, or None for no limit.
+    max_stored_bytes
+        Bytes of the scenes that one caller keeps, with their sources, or None for no limit.
     max_comparisons
         Numbers that the relations of one match may be compared by, or None for no limit: pairs of
         sketched objects × pairs of mapped objects × directions.
@@ -83,6 +85,7 @@ class RequestLimits:
     default_time_budget: float | None = None
     max_per_caller: int | None = None
     max_per_minute: int | None = None
+    max_stored_bytes: int | None = None
     max_comparisons: int | None = None
     max_candidates: int | None = None
     sketches: SketchLimits = SketchLimits()

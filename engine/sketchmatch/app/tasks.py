@@ -271,12 +271,12 @@ class Task:
         Its responses, as bytes.
     stopping
         Set once nobody wants more of them.
-    asked
-        When it came.
+    asked, begun
+        When it came, and when it had its turn; None for not yet.
     again
         Whether it was begun before, by a worker that was lost.
     long
-        Whether it has turned out to take long, so that it gives way to others.
+        Whether it has turned out to take long, or is expected to, so that it gives way to others.
     readers
         How many read it.
     noted
@@ -306,6 +306,7 @@ class Task:
         self.log = Log[bytes](self._run << _RUN_BITS)
         self.stopping = threading.Event()
         self.asked = time.monotonic()
+        self.begun: float | None = None
         self.again = False
         self.long = False
         self.readers = 0
@@ -329,6 +330,7 @@ class Task:
 
     def begin(self) -> None:
         """Have its turn."""
+        self.begun = time.monotonic()
         self._move(State.RUNNING)
 
     def stop(self, why: BaseException) -> None:

@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, cast
 from sketchmatch.app.forking import forking, renew
 from sketchmatch.app.frames import Flag, Frames, Says, failure_of, frame
 from sketchmatch.app.jobs import time_budget
+from sketchmatch.app.lengths import Lengths
 from sketchmatch.app.setup import Setup
 from sketchmatch.app.tasks import Task
 from sketchmatch.app.worker import SECONDS, WorkerSetup, live
@@ -49,10 +50,12 @@ _OVERTIME = 2.0
 _STARTING = 60.0
 _WARMING = 120.0
 _IDLE_SECONDS = 30.0
-_LONG_PROCESSOR, _LONG = 0.1, 0.5
-"""Seconds of processor time, or of any, after which a request gives way to those that may be short.
+_LONG_PROCESSOR, _LONG, _STUCK = 0.2, 0.5, 5.0
+"""Seconds of processor time after which a request gives way to those that may be short.
 
-Those that may be short are done one a processor: more would only hold each other up.
+Those that may be short are done one a processor: more would only hold each other up. On a busy
+machine a short one takes long, too; so other time counts only where the system does not tell that
+of the processor, and for what waits for something else than a processor.
 """
 _GIVES_WAY = 10
 _NAMED = 5
@@ -88,6 +91,8 @@ class Workers:
         self.scenes: Path | None = None
         """The file of the scenes that are kept."""
         self.gave_way = gave_way
+        self.lengths = Lengths()
+        """How long requests take that need no stranger's plugin."""
         self._kept = kept
         self._ended = ended
         self._all: set[_Worker] = set()
@@ -192,6 +197,11 @@ class Workers:
         """Hear of the end of a task."""
         self._doing.pop(task, None)
         self._ended(task, error)
+
+    def learn(self, task: Task, *, long: bool) -> None:
+        """Hear whether a task took long."""
+        if not task.strangers:
+            self.lengths.learn(task.order, long=long)
 
     def _new(self, key: _Key, strangers: _Strangers) -> _Worker:
         worker = _Worker(self, key, strangers)
@@ -313,6 +323,8 @@ class _Worker(asyncio.Protocol):
         self._budget = self._seconds(task)
         self._spent = self._processor_seconds()
         self._task, self._strangers = task, task.strangers
+        if task.long:
+            self._give_way()
         self.send(Says.ORDER, pickle.dumps(task.order))
 
     def stop(self) -> None:
@@ -334,6 +346,7 @@ class _Worker(asyncio.Protocol):
         elif not self._task.long and self._is_long(now):
             self._task.long = True
             self._give_way()
+            self._workers.learn(self._task, long=True)
             self._workers.gave_way()
 
     def kill(self) -> None:
@@ -416,6 +429,8 @@ class _Worker(asyncio.Protocol):
         if task is None:
             self._answer(error)
             return
+        if error is None and not task.stopping.is_set():
+            self._workers.learn(task, long=self._took_long(time.monotonic()))
         self.since = time.monotonic()
         if task.long:
             self._step_forward()
@@ -468,8 +483,11 @@ class _Worker(asyncio.Protocol):
         return WorkerLostError(f"the worker {what}")
 
     def _is_long(self, now: float) -> bool:
-        long = self._processor_seconds() - self._spent > _LONG_PROCESSOR
-        return long or now - self.since > _LONG
+        return self._took_long(now) or now - self.since > _STUCK
+
+    def _took_long(self, now: float) -> bool:
+        spent = self._processor_seconds()
+        return spent - self._spent > _LONG_PROCESSOR if spent else now - self.since > _LONG
 
     def _processor_seconds(self) -> float:
         """Return what the process has taken of processors; 0 where the system does not tell."""

@@ -71,6 +71,10 @@ def serve(
     max_requests_per_minute: Annotated[
         int | None, typer.Option(help="Requests that one caller may begin in a minute.")
     ] = None,
+    max_stored_mib_per_caller: Annotated[
+        int | None,
+        typer.Option(metavar="MIB", help="Scenes that one caller keeps, with their sources."),
+    ] = None,
     max_comparisons: Annotated[
         int | None,
         typer.Option(
@@ -176,6 +180,12 @@ def serve(
             help="Tell metrics, as Prometheus reads them, and probes over HTTP here.",
         ),
     ] = None,
+    traces_endpoint: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL", help="Send OpenTelemetry traces to the collector here, OTLP over gRPC."
+        ),
+    ] = None,
     web: Annotated[
         bool,
         typer.Option(
@@ -224,6 +234,7 @@ def serve(
         "server.default_time_budget_seconds": default_time_budget,
         "server.max_matches_per_caller": max_matches_per_caller,
         "server.max_requests_per_minute": max_requests_per_minute,
+        "server.max_stored_mib_per_caller": max_stored_mib_per_caller,
         "server.max_comparisons": max_comparisons,
         "server.max_candidates": max_candidates,
         "server.tls_certificate": tls_certificate,
@@ -240,6 +251,7 @@ def serve(
         "server.max_sketches_per_caller": max_sketches_per_caller,
         "server.sketch_idle_seconds": sketch_idle,
         "server.metrics_address": metrics_address,
+        "server.traces_endpoint": traces_endpoint,
         "server.web_address": web_address,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
@@ -306,6 +318,7 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
         server.keep_matches_days,
         server.keep_matches_mib * _MIB,
         server.keep_scenes_mib * _MIB,
+        server.traces_endpoint,
     )
 
 
@@ -330,6 +343,7 @@ def _setup(configuration: Configuration) -> Setup:
         registry.refuse_problems()
     refuse_faults(configuration, registry)
     server = configuration.settings.server
+    stored = server.max_stored_mib_per_caller
     return Setup(
         Engine(registry, configuration.defaults, configuration.limits),
         RequestLimits(
@@ -341,6 +355,7 @@ def _setup(configuration: Configuration) -> Setup:
             default_time_budget=server.default_time_budget_seconds,
             max_per_caller=server.max_matches_per_caller,
             max_per_minute=server.max_requests_per_minute,
+            max_stored_bytes=stored and stored * _MIB,
             max_comparisons=server.max_comparisons,
             max_candidates=server.max_candidates,
             sketches=SketchLimits(

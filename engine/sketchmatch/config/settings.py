@@ -186,6 +186,14 @@ class _Server(_Section):
         description="Requests that one caller may begin in a minute; no limit, when left out.",
         examples=[600],
     )
+    max_stored_mib_per_caller: int | None = Field(
+        None,
+        ge=1,
+        le=1_000_000,
+        description="MiB of the scenes that one caller keeps, with their sources; no limit beside "
+        "that of the store, when left out.",
+        examples=[100],
+    )
     max_comparisons: int | None = Field(
         None,
         ge=1,
@@ -261,6 +269,13 @@ class _Server(_Section):
         description="Host and port for Prometheus' /metrics and the probes /livez and /readyz over "
         "HTTP; none, when left out.",
         examples=["127.0.0.1:9464"],
+    )
+    traces_endpoint: str | None = Field(
+        None,
+        pattern=r"^https?://[^/\s]+$",
+        description="URL of an OpenTelemetry collector that takes OTLP over gRPC; no traces, when "
+        "left out.",
+        examples=["http://127.0.0.1:4317"],
     )
     web_address: Annotated[str | None, AfterValidator(_watched)] = Field(
         None,

@@ -14,7 +14,7 @@ import grpc
 
 from sketchmatch.server.wrapping import WrappingInterceptor, kind_of
 
-__all__ = ["CallLogInterceptor", "note", "noted"]
+__all__ = ["CallLogInterceptor", "facts", "note", "noted"]
 
 _OURS = "/sketchmatch."
 _log = logging.getLogger(__name__)
@@ -27,9 +27,14 @@ def note(**facts: object) -> None:
     _facts.get({}).update(facts)
 
 
+def facts() -> dict[str, object]:
+    """Return what is known of the call under way so far."""
+    return dict(_facts.get({}))
+
+
 def noted() -> str:
-    """Return what is known of the call under way so far, as a log tells it."""
-    return " ".join(f"{name}={value}" for name, value in _facts.get({}).items())
+    """Return the same as a log tells it."""
+    return " ".join(f"{name}={value}" for name, value in facts().items())
 
 
 class CallLogInterceptor(WrappingInterceptor):

@@ -9,9 +9,10 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import grpc
+from google.protobuf.descriptor_pool import DescriptorPool
 from grpc_health.v1 import health, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
@@ -31,10 +32,12 @@ from sketchmatch.server.metrics import Metric, Metrics, MetricsInterceptor
 from sketchmatch.server.monitor import Monitor
 from sketchmatch.server.notify import notify
 from sketchmatch.server.readiness import Readiness
+from sketchmatch.server.reflected import Reflected
 from sketchmatch.server.services import CatalogService, MatchService, SceneService, TransferService
 from sketchmatch.server.sketching import SketchService
 from sketchmatch.server.tls import TlsFiles, server_credentials, watched_pems
 from sketchmatch.server.tokens import read_tokens
+from sketchmatch.server.traces import Traces
 from sketchmatch.server.watchdog import watch
 from sketchmatch.server.watched import Watched
 from sketchmatch_proto.v1 import (
@@ -116,6 +119,8 @@ class ServerSettings:
         For how long matches are kept there, and how large their file may grow.
     scenes_bytes
         How large the file of kept scenes may grow.
+    traces_endpoint
+        URL of a collector of OpenTelemetry traces; None for none.
     """
 
     address: str = "127.0.0.1:50051"
@@ -133,6 +138,7 @@ class ServerSettings:
     matches_days: float = 30.0
     matches_bytes: int = 1 << 30
     scenes_bytes: int = 1 << 30
+    traces_endpoint: str | None = None
 
 
 async def serve(
@@ -172,7 +178,9 @@ async def serve(
     app = Application(
         setup, settings.workers, store, archive, metrics.matched, settings.scenes_bytes
     )
+    traces = Traces.sent_to(settings.traces_endpoint)
     interceptors = [
+        *traces.interceptors,
         MetricsInterceptor(metrics),
         CallLogInterceptor(),
         *files.interceptors,
@@ -211,7 +219,9 @@ async def serve(
     _add_services(server, services, readiness)
     _watch(metrics, app, files, readiness)
     port = _listen(server, settings.address, files.credentials)
-    beside = _Beside(settings, app, files, Handlers(services, interceptors), metrics, readiness)
+    beside = _Beside(
+        settings, app, files, Handlers(services, interceptors), metrics, readiness, traces
+    )
     await readiness.know(app.setup.engine.registry.algorithms)
     await server.start()
     beside.start()
@@ -281,7 +291,7 @@ class _Files:
 
 
 class _Beside:
-    """What answers over HTTP beside the gRPC server: monitors, and browsers.
+    """What is beside the gRPC server: monitors, browsers, and a collector of traces.
 
     Attributes
     ----------
@@ -297,8 +307,10 @@ class _Beside:
         handlers: Handlers,
         metrics: Metrics,
         readiness: Readiness,
+        traces: Traces,
     ) -> None:
         self.sentences: list[str] = []
+        self._traces = traces
         self._monitor: Monitor | None = None
         self._gateway: Gateway | None = None
         if settings.metrics_address:
@@ -322,9 +334,10 @@ class _Beside:
             await self._gateway.stop(grace)
 
     async def close(self) -> None:
-        """Tell monitors nothing more."""
+        """Tell monitors nothing more, and the collector of traces the last."""
         if self._monitor:
             await asyncio.to_thread(self._monitor.close)
+        await asyncio.to_thread(self._traces.close)
 
 
 class _Warming:
@@ -332,6 +345,7 @@ class _Warming:
 
     def __init__(self, app: Application, readiness: Readiness, stopping: asyncio.Event) -> None:
         self._app, self._readiness, self._stopping = app, readiness, stopping
+        self._latest = 0
 
     async def begin(self, say: Callable[[str], None]) -> None:
         """Compile what the default pipeline needs."""
@@ -343,8 +357,14 @@ class _Warming:
         await self.go_on()
 
     async def go_on(self) -> None:
-        """Compile the rest, while no request is under way."""
-        unwanted = _unless_quiet(self._app, self._stopping)
+        """Compile the rest, while no request is under way; a later call takes the place of it.
+
+        Those that wait for quiet would else take all threads of a server that is reloaded while it
+        is busy, and nothing else would have its turn in them.
+        """
+        self._latest += 1
+        own = self._latest
+        unwanted = _unless_quiet(self._app, lambda: self._stopping.is_set() or self._latest != own)
         await self._app.warm_up_others(unwanted, self._readiness.ready)
 
 
@@ -454,7 +474,9 @@ def _add_services(
     server.add_generic_rpc_handlers(services)
     health_pb2_grpc.add_HealthServicer_to_server(readiness.servicer, server)
     reflection.enable_server_reflection(
-        (*_SERVICES, health.SERVICE_NAME, reflection.SERVICE_NAME), server
+        (*_SERVICES, health.SERVICE_NAME, reflection.SERVICE_NAME),
+        server,
+        cast(DescriptorPool, Reflected()),
     )
 
 
@@ -553,8 +575,8 @@ def _on_signals(actions: Mapping[str, Callable[[], None]]) -> None:
             continue
 
 
-def _unless_quiet(app: Application, stopping: asyncio.Event) -> Callable[[], bool]:
-    """Return a function that waits for quiet, and says whether the server was stopped instead.
+def _unless_quiet(app: Application, unwanted: Callable[[], bool]) -> Callable[[], bool]:
+    """Return a function that waits for quiet, and says whether nobody wants it any more instead.
 
     It is quiet when no request has been under way for a second: to compile beside one would slow
     it down.
@@ -563,11 +585,11 @@ def _unless_quiet(app: Application, stopping: asyncio.Event) -> Callable[[], boo
 
     def stopped() -> bool:
         nonlocal busy
-        while not stopping.is_set() and time.monotonic() - busy < _QUIET:
+        while not unwanted() and time.monotonic() - busy < _QUIET:
             time.sleep(_LOOK)
             if not app.idle:
                 busy = time.monotonic()
-        return stopping.is_set()
+        return unwanted()
 
     return stopped
 

@@ -18,6 +18,7 @@ from sketchmatch.app.waiting import Caller
 from sketchmatch.server.callers import caller_of
 from sketchmatch.server.calls import note
 from sketchmatch.server.pacing import Pacing
+from sketchmatch.server.traces import trace
 from sketchmatch_proto.v1 import (
     catalog_service_pb2,
     match_pb2,
@@ -140,6 +141,7 @@ class SceneService:
         with self._app.running("SegmentRequest", request, caller_from(context)) as task:
             async with aclosing(followed(task.log)) as told:
                 found = [response async for _, response in told]
+            trace(task)
         # Nobody waits for an answer to a request that was stopped.
         return found[0] if found else b""
 
@@ -176,6 +178,7 @@ class TransferService:
             async with aclosing(followed(task.log)) as told:
                 async for _, response in told:
                     answer = response
+            trace(task)
         return answer
 
     def handler(self) -> grpc.GenericRpcHandler:
@@ -226,6 +229,7 @@ async def _tell(
                 continue
             await write(_numbered(number, response))
             _note_event(match.event(number, response))
+    trace(match)
 
 
 def _numbered(number: int, response: bytes) -> bytes:

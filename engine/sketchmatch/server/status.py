@@ -16,6 +16,7 @@ from sketchmatch.errors import (
     NotAuthenticatedError,
     NotFoundError,
     PluginError,
+    QuotaError,
     Reason,
     RetryableError,
     ServerStoppingError,
@@ -42,6 +43,7 @@ _CODES: dict[type[SketchmatchError], grpc.StatusCode] = {
     NotAuthenticatedError: grpc.StatusCode.UNAUTHENTICATED,
     NotFoundError: grpc.StatusCode.NOT_FOUND,
     StoreError: grpc.StatusCode.FAILED_PRECONDITION,
+    QuotaError: grpc.StatusCode.RESOURCE_EXHAUSTED,
     PluginError: grpc.StatusCode.INTERNAL,
 }
 
@@ -73,6 +75,7 @@ def refusal(error: BaseException) -> Refusal:
             | NotAuthenticatedError()
             | NotFoundError()
             | StoreError()
+            | QuotaError()
             | PluginError()
             | MatchCancelledError()
         ):

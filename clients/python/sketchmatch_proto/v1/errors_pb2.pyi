@@ -52,7 +52,7 @@ class _ErrorReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._En
     """INVALID_ARGUMENT: the request is larger than `ServerLimits.max_request_bytes`."""
     ERROR_REASON_LIMIT_EXCEEDED: _ErrorReason.ValueType  # 13
     """INVALID_ARGUMENT: the request asks for more work than a limit of the server allows.
-    RESOURCE_EXHAUSTED: the server has no room for it now.
+    RESOURCE_EXHAUSTED: the server has no room for it now, or keeps as much for the caller as it may.
     """
     ERROR_REASON_TIME_BUDGET_EXHAUSTED: _ErrorReason.ValueType  # 14
     """DEADLINE_EXCEEDED: the time budget ended before there was any answer to give."""
@@ -131,7 +131,7 @@ ERROR_REASON_MESSAGE_TOO_LARGE: ErrorReason.ValueType  # 12
 """INVALID_ARGUMENT: the request is larger than `ServerLimits.max_request_bytes`."""
 ERROR_REASON_LIMIT_EXCEEDED: ErrorReason.ValueType  # 13
 """INVALID_ARGUMENT: the request asks for more work than a limit of the server allows.
-RESOURCE_EXHAUSTED: the server has no room for it now.
+RESOURCE_EXHAUSTED: the server has no room for it now, or keeps as much for the caller as it may.
 """
 ERROR_REASON_TIME_BUDGET_EXHAUSTED: ErrorReason.ValueType  # 14
 """DEADLINE_EXCEEDED: the time budget ended before there was any answer to give."""

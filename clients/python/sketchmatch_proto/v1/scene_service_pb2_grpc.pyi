@@ -62,7 +62,8 @@ class SceneServiceStub:
     * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
       is not needed, or tell its operator; requests with sources in them are answered all the same.
     * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
-      `RetryInfo`. Without `RetryInfo` the request is larger than the transport lets through.
+      `RetryInfo`. Without `RetryInfo` the request is larger than the transport lets through,
+      or with `ErrorInfo` the caller would keep more than it may; delete what is not needed.
     * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
     * `INTERNAL`: the segmenter broke its contract; the message names it and the distribution it is
       from. Choose another one and tell the author.
@@ -122,6 +123,7 @@ class SceneServiceStub:
       there are.
     * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
       is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `RESOURCE_EXHAUSTED`: the caller would keep more than it may. Delete what is not needed.
     * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
     * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
     * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
@@ -190,7 +192,8 @@ class SceneServiceAsyncStub:
     * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
       is not needed, or tell its operator; requests with sources in them are answered all the same.
     * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
-      `RetryInfo`. Without `RetryInfo` the request is larger than the transport lets through.
+      `RetryInfo`. Without `RetryInfo` the request is larger than the transport lets through,
+      or with `ErrorInfo` the caller would keep more than it may; delete what is not needed.
     * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
     * `INTERNAL`: the segmenter broke its contract; the message names it and the distribution it is
       from. Choose another one and tell the author.
@@ -250,6 +253,7 @@ class SceneServiceAsyncStub:
       there are.
     * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
       is not needed, or tell its operator; requests with sources in them are answered all the same.
+    * `RESOURCE_EXHAUSTED`: the caller would keep more than it may. Delete what is not needed.
     * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
     * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
     * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
@@ -322,7 +326,8 @@ class SceneServiceServicer(metaclass=abc.ABCMeta):
         * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
           is not needed, or tell its operator; requests with sources in them are answered all the same.
         * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
-          `RetryInfo`. Without `RetryInfo` the request is larger than the transport lets through.
+          `RetryInfo`. Without `RetryInfo` the request is larger than the transport lets through,
+          or with `ErrorInfo` the caller would keep more than it may; delete what is not needed.
         * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
         * `INTERNAL`: the segmenter broke its contract; the message names it and the distribution it is
           from. Choose another one and tell the author.
@@ -388,6 +393,7 @@ class SceneServiceServicer(metaclass=abc.ABCMeta):
           there are.
         * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
           is not needed, or tell its operator; requests with sources in them are answered all the same.
+        * `RESOURCE_EXHAUSTED`: the caller would keep more than it may. Delete what is not needed.
         * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
         * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
         * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
