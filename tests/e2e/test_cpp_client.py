@@ -127,7 +127,7 @@ def servers(tmp_path_factory):
     tls = ("--tls-certificate", str(own.certificate), "--tls-key", str(own.key), "--workers", "0")
     client_ca = ("--tls-client-ca", str(authority.certificate))
     with ExitStack() as stack:
-        plain = stack.enter_context(server())
+        plain = stack.enter_context(server("--store", str(folder / "kept")))
         by_token = stack.enter_context(server(*tls, "--tokens", str(folder / "tokens")))
         mutual = stack.enter_context(server(*tls, *client_ca))
         doomed = Server()
@@ -245,6 +245,7 @@ SAID = (
     "desk is object",
     "8 of 8 sketched objects matched",
     " events\n",
+    "patrol has 3 points, within ",
     "TOO_FEW_OBJECTS in ",
     "",
     "sketchmatch.v1\n",
@@ -308,6 +309,7 @@ def test_clang_format_and_clang_tidy_find_nothing():
 
 def test_doxygen_finds_everything_documented():
     require(shutil.which("doxygen"), "the program doxygen")
+    BUILD.parent.mkdir(exist_ok=True)
     run("doxygen", FOLDER / "Doxyfile")
     assert (ROOT / "build" / "cpp-docs" / "html" / "index.html").exists()
 
