@@ -54,6 +54,9 @@ def test_what_became_of_it_is_returned(call, server):
         ({"y_axis": "left"}, "y_axis"),
         ({"radius": "wide"}, "radius"),
         ({"alternatives": 3}, "alternatives"),
+        ({"request_id": "3f0e"}, "request_id"),
+        ({"keep_running": True}, "keep_running"),
+        ({"priority": "low"}, "priority"),
     ],
 )
 def test_an_option_of_the_wrong_form_is_refused_by_name(options, field):

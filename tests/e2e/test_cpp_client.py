@@ -66,7 +66,11 @@ def built():
         require(shutil.which(program), f"the program {program}")
     for header in ("grpcpp/grpcpp.h", "yaml-cpp/yaml.h", "gtest/gtest.h"):
         require(Path("/usr/include", header).exists(), f"the C++ header {header}")
-    options = ("-DSKETCHMATCH_BUILD_TESTS=ON", "-DSKETCHMATCH_STRICT=ON")
+    options = (
+        *("-DSKETCHMATCH_BUILD_TESTS=ON", "-DSKETCHMATCH_STRICT=ON"),
+        # The compiler's own time is what the tests take most of.
+        *("-DCMAKE_BUILD_TYPE=None", "-DCMAKE_CXX_FLAGS=-O1"),
+    )
     run("cmake", "-S", FOLDER, "-B", BUILD, "-G", "Ninja", *options)
     run("cmake", "--build", BUILD, "--parallel", "2")
     return BUILD
@@ -127,7 +131,7 @@ def servers(tmp_path_factory):
     tls = ("--tls-certificate", str(own.certificate), "--tls-key", str(own.key), "--workers", "0")
     client_ca = ("--tls-client-ca", str(authority.certificate))
     with ExitStack() as stack:
-        plain = stack.enter_context(server())
+        plain = stack.enter_context(server("--store", str(folder / "kept")))
         by_token = stack.enter_context(server(*tls, "--tokens", str(folder / "tokens")))
         mutual = stack.enter_context(server(*tls, *client_ca))
         doomed = Server()
@@ -245,6 +249,7 @@ SAID = (
     "desk is object",
     "8 of 8 sketched objects matched",
     " events\n",
+    "patrol has 3 points, within ",
     "TOO_FEW_OBJECTS in ",
     "",
     "sketchmatch.v1\n",
@@ -294,7 +299,7 @@ def test_ten_thousand_calls_leave_nothing_behind(built):
 @pytest.mark.parametrize("sanitizers", ["address,undefined", "thread"])
 def test_sanitizers_find_nothing(sanitizers):
     said = run(FOLDER / "sanitize.sh", sanitizers)
-    assert "100% tests passed" in said
+    assert re.search(r"^\[  PASSED  \] \d{2,} tests", said, re.M), said[-4000:]
     assert "ERROR: " not in said
     assert "WARNING: ThreadSanitizer" not in said
 
@@ -308,6 +313,7 @@ def test_clang_format_and_clang_tidy_find_nothing():
 
 def test_doxygen_finds_everything_documented():
     require(shutil.which("doxygen"), "the program doxygen")
+    BUILD.parent.mkdir(exist_ok=True)
     run("doxygen", FOLDER / "Doxyfile")
     assert (ROOT / "build" / "cpp-docs" / "html" / "index.html").exists()
 

@@ -1,14 +1,17 @@
 """What ROS's tools read of the packages fits what is in them."""
 
 import ast
+import json
 import re
+import subprocess
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 import yaml
 
 from tests.ros.messages import OURS, store
-from tests.tools import ROOT
+from tests.tools import ROOT, require
 
 ROS = ROOT / "clients" / "ros"
 PACKAGE = ROS / "sketchmatch_ros"
@@ -44,6 +47,59 @@ def test_every_interface_is_generated_and_its_parts_are_depended_on():
     assert set(re.findall(r'"((?:msg|action|srv)/\w+\.\w+)"', text)) == files
     used = {name.partition("/")[0] for name in re.findall(r"\w+/msg/\w+", str(ours()))}
     assert used - {"sketchmatch_msgs", "builtin_interfaces"} <= depends(OURS)
+
+
+@pytest.mark.slow
+def test_ros_own_tools_take_every_interface(tmp_path):
+    python = Path("/usr/bin/python3")  # whose package python3-rosidl is
+    found = (
+        python.exists()
+        and not subprocess.run(
+            [python, "-c", "import rosidl_adapter, rosidl_parser"], capture_output=True, check=False
+        ).returncode
+    )
+    require(found, "rosidl, by apt-get install python3-rosidl")
+    done = subprocess.run(
+        [python, "-c", _PARSE, OURS, tmp_path],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout.splitlines()[-1]) == {
+        "MatchSketch": "Action",
+        "MatchedObject": "Message",
+        "ObjectMap": "Message",
+        "Sketch": "Message",
+        "Stroke": "Message",
+        "Carry": "Service",
+    }
+
+
+_PARSE = """
+import json, sys
+from pathlib import Path
+from rosidl_adapter import convert_to_idl
+from rosidl_parser.definition import Action, IdlLocator, Message, Service
+from rosidl_parser.parser import parse_idl_file
+
+ours, out = Path(sys.argv[1]), Path(sys.argv[2])
+kinds = {}
+for kind in ("action", "msg", "srv"):
+    for file in sorted((ours / kind).iterdir()):
+        convert_to_idl(ours, "sketchmatch_msgs", file.relative_to(ours), out)
+        (idl,) = out.rglob(file.stem + ".idl")
+        parsed = parse_idl_file(IdlLocator(out, idl.relative_to(out)))
+        (one,) = [
+            type(each).__name__
+            for each in parsed.content.elements
+            if isinstance(each, (Action, Message, Service))
+        ]
+        kinds[file.stem] = one
+print(json.dumps(kinds))
+"""
+"""Makes IDL of every interface, as a build does, and reads it."""
 
 
 def ours():

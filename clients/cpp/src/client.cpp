@@ -3,6 +3,7 @@
 #include <grpcpp/support/byte_buffer.h>
 #include <sketchmatch/v1/catalog_service.grpc.pb.h>
 #include <sketchmatch/v1/scene_service.grpc.pb.h>
+#include <sketchmatch/v1/transfer_service.grpc.pb.h>
 
 #include <algorithm>
 #include <chrono>
@@ -29,6 +30,17 @@ constexpr const char* kCheckHealth = "/grpc.health.v1.Health/Check";
 constexpr const char* kServing = "\x08\x01";
 constexpr std::size_t kLongestName = 127;
 constexpr Seconds kHealthPoll{0.05};
+
+using Clock = std::chrono::steady_clock;
+
+/// Returns how to make the next of several calls that share a time.
+CallOptions what_is_left(const CallOptions& call, std::optional<Seconds> limit,
+                         Clock::time_point began) {
+  auto next = call;
+  next.timeout = limit ? std::max(Seconds(0.0), *limit - Seconds(Clock::now() - began))
+                       : Seconds(std::numeric_limits<double>::infinity());
+  return next;
+}
 
 [[noreturn]] void refuse_part(const std::string& name) {
   detail::refuse("name", "is " + detail::in_quotes(name) +
@@ -206,6 +218,7 @@ struct Client::Impl {
   std::shared_ptr<const detail::Connection> connection;
   std::unique_ptr<v1::MatchService::Stub> matches;
   std::unique_ptr<v1::SceneService::Stub> scenes;
+  std::unique_ptr<v1::TransferService::Stub> transfers;
   std::unique_ptr<v1::CatalogService::Stub> catalog;
 
   [[nodiscard]] std::unique_ptr<detail::MatchStream> stream(const Source& sketch, const Source& map,
@@ -213,6 +226,18 @@ struct Client::Impl {
                                                             const CallOptions& call) const {
     return std::make_unique<detail::MatchStream>(
         connection, detail::Course(detail::match_request(sketch, map, options)), call);
+  }
+
+  /// Makes a call of a stub, and returns its answer.
+  template <typename Stub, typename Request, typename Answer>
+  [[nodiscard]] Answer asked(const CallOptions& call, const std::unique_ptr<Stub>& stub,
+                             grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                          Answer*),
+                             const Request& request) const {
+    return detail::asked<Answer>(*connection, call,
+                                 [&](grpc::ClientContext* context, Answer* answer) {
+                                   return (stub.get()->*method)(context, request, answer);
+                                 });
   }
 };
 
@@ -230,7 +255,7 @@ Client::Client(const std::string& address, const ClientOptions& options) {
       Impl{std::make_shared<const detail::Connection>(detail::Connection{
                address, access.authorization, timeout, options.retries, channel}),
            v1::MatchService::NewStub(channel), v1::SceneService::NewStub(channel),
-           v1::CatalogService::NewStub(channel)});
+           v1::TransferService::NewStub(channel), v1::CatalogService::NewStub(channel)});
 }
 
 Client::Client(Client&& other) noexcept = default;
@@ -262,45 +287,91 @@ MatchCall Client::watch(const std::string& match_id, std::uint64_t after,
 MatchRecord Client::get_match(const std::string& match_id, const CallOptions& call) const {
   v1::GetMatchRequest request;
   request.set_match_id(detail::checked_text(match_id, "match_id"));
-  return detail::decoded(detail::asked<v1::GetMatchResponse>(
-      *impl_->connection, call, [&](grpc::ClientContext* context, v1::GetMatchResponse* answer) {
-        return impl_->matches->GetMatch(context, request, answer);
-      }));
+  return detail::decoded(
+      impl_->asked(call, impl_->matches, &v1::MatchService::Stub::GetMatch, request));
 }
 
 MatchSummary Client::cancel_match(const std::string& match_id, const CallOptions& call) const {
   v1::CancelMatchRequest request;
   request.set_match_id(detail::checked_text(match_id, "match_id"));
-  const auto answer = detail::asked<v1::CancelMatchResponse>(
-      *impl_->connection, call, [&](grpc::ClientContext* context, v1::CancelMatchResponse* told) {
-        return impl_->matches->CancelMatch(context, request, told);
-      });
+  const auto answer =
+      impl_->asked(call, impl_->matches, &v1::MatchService::Stub::CancelMatch, request);
   return detail::decoded(answer.match());
 }
 
 Segmentation Client::segment(const Source& source, const SegmentOptions& options,
                              const CallOptions& call) const {
   const auto request = detail::segment_request(source, options);
-  return detail::decoded(detail::asked<v1::SegmentResponse>(
-      *impl_->connection, call, [&](grpc::ClientContext* context, v1::SegmentResponse* answer) {
-        return impl_->scenes->Segment(context, request, answer);
-      }));
+  return detail::decoded(
+      impl_->asked(call, impl_->scenes, &v1::SceneService::Stub::Segment, request));
+}
+
+PutScene Client::put_scene(const Source& source, const SegmentOptions& options,
+                           const CallOptions& call) const {
+  const auto request = detail::put_scene_request(source, options);
+  return detail::decoded(
+      impl_->asked(call, impl_->scenes, &v1::SceneService::Stub::PutScene, request));
+}
+
+GotScene Client::get_scene(const std::string& name, bool include_source,
+                           const CallOptions& call) const {
+  v1::GetSceneRequest request;
+  request.set_name(detail::checked_text(name, "name"));
+  request.set_include_source(include_source);
+  return detail::decoded(
+      impl_->asked(call, impl_->scenes, &v1::SceneService::Stub::GetScene, request));
+}
+
+std::vector<SceneSummary> Client::list_scenes(const CallOptions& call) const {
+  const auto limit = impl_->connection->limit(call);
+  const auto began = Clock::now();
+  v1::ListScenesRequest request;
+  std::vector<SceneSummary> scenes;
+  while (true) {
+    const auto page = impl_->asked(what_is_left(call, limit, began), impl_->scenes,
+                                   &v1::SceneService::Stub::ListScenes, request);
+    for (const auto& scene : page.scenes()) {
+      scenes.push_back(detail::decoded(scene));
+    }
+    if (page.next_page_token().empty()) {
+      return scenes;
+    }
+    request.set_page_token(page.next_page_token());
+  }
+}
+
+StoredScene Client::update_scene(const std::string& name, const ObjectLabels& labels,
+                                 const CallOptions& call) const {
+  const auto request = detail::update_scene_request(name, labels);
+  const auto answer =
+      impl_->asked(call, impl_->scenes, &v1::SceneService::Stub::UpdateScene, request);
+  return detail::decoded(answer.stored_scene());
+}
+
+void Client::delete_scene(const std::string& name, const CallOptions& call) const {
+  v1::DeleteSceneRequest request;
+  request.set_name(detail::checked_text(name, "name"));
+  static_cast<void>(
+      impl_->asked(call, impl_->scenes, &v1::SceneService::Stub::DeleteScene, request));
+}
+
+Transfer Client::transfer(const Source& sketch, const Source& map,
+                          const std::vector<Feature>& features, const TransferOptions& options,
+                          const CallOptions& call) const {
+  const auto request = detail::transfer_request(sketch, map, features, options);
+  return detail::decoded(
+      impl_->asked(call, impl_->transfers, &v1::TransferService::Stub::Transfer, request));
 }
 
 Catalogue Client::algorithms(const CallOptions& call) const {
-  return detail::decoded(detail::asked<v1::ListAlgorithmsResponse>(
-      *impl_->connection, call,
-      [&](grpc::ClientContext* context, v1::ListAlgorithmsResponse* answer) {
-        return impl_->catalog->ListAlgorithms(context, {}, answer);
-      }));
+  return detail::decoded(impl_->asked(call, impl_->catalog,
+                                      &v1::CatalogService::Stub::ListAlgorithms,
+                                      v1::ListAlgorithmsRequest()));
 }
 
 ServerInfo Client::server_info(const CallOptions& call) const {
-  return detail::decoded(detail::asked<v1::GetServerInfoResponse>(
-      *impl_->connection, call,
-      [&](grpc::ClientContext* context, v1::GetServerInfoResponse* answer) {
-        return impl_->catalog->GetServerInfo(context, {}, answer);
-      }));
+  return detail::decoded(impl_->asked(
+      call, impl_->catalog, &v1::CatalogService::Stub::GetServerInfo, v1::GetServerInfoRequest()));
 }
 
 bool Client::is_serving(const std::string& name, const CallOptions& call) const {
@@ -319,16 +390,13 @@ bool Client::is_serving(const std::string& name, const CallOptions& call) const 
 }
 
 void Client::wait_until_serving(Seconds timeout, const Cancellation& cancellation) const {
-  using Clock = std::chrono::steady_clock;
   const auto limit = detail::limit_of(timeout);
   const auto began = Clock::now();
+  CallOptions call;
+  call.cancellation = cancellation;
   while (true) {
-    CallOptions call;
-    call.cancellation = cancellation;
-    call.timeout = limit ? std::max(Seconds(0.0), *limit - Seconds(Clock::now() - began))
-                         : Seconds(std::numeric_limits<double>::infinity());
     try {
-      if (is_serving({}, call)) {
+      if (is_serving({}, what_is_left(call, limit, began))) {
         return;
       }
     } catch (const ServerUnavailableError&) {  // yet

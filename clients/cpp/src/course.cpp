@@ -12,11 +12,11 @@ namespace {
 /// Returns a name that no other request has.
 std::string new_name() {
   constexpr int kBytes = 16;
-  constexpr const char* kDigits = "0123456789abcdef";
+  constexpr const char* kHex = "0123456789abcdef";
   std::random_device random;
   std::string name;
   for (int k = 0; k < 2 * kBytes; ++k) {
-    name += kDigits[random() % 16U];  // NOLINT: it has sixteen
+    name += kHex[random() % 16U];  // NOLINT: it has sixteen
   }
   return name;
 }

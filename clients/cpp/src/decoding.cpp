@@ -8,7 +8,8 @@ namespace sketchmatch {
 
 namespace {
 
-ObjectMap map_of(const std::vector<ObjectMatch>& lines) {
+template <typename Line>
+ObjectMap map_of(const std::vector<Line>& lines) {
   ObjectMap map;
   for (const auto& line : lines) {
     map.emplace(line.sketch_object, line.map_object);
@@ -21,6 +22,8 @@ ObjectMap map_of(const std::vector<ObjectMatch>& lines) {
 ObjectMap Progress::object_map() const { return map_of(object_matches); }
 
 ObjectMap Match::object_map() const { return map_of(result.object_matches); }
+
+ObjectMap Transfer::object_map() const { return map_of(partners); }
 
 namespace detail {
 
@@ -36,8 +39,9 @@ Seconds decoded(const google::protobuf::Duration& message) {
          Seconds(std::chrono::nanoseconds(message.nanos()));
 }
 
-MatchSummary::Time decoded(const google::protobuf::Timestamp& message) {
-  return MatchSummary::Time(std::chrono::duration_cast<MatchSummary::Time::duration>(
+std::chrono::system_clock::time_point decoded(const google::protobuf::Timestamp& message) {
+  using Time = std::chrono::system_clock::time_point;
+  return Time(std::chrono::duration_cast<Time::duration>(
       std::chrono::seconds(message.seconds()) + std::chrono::nanoseconds(message.nanos())));
 }
 
@@ -110,6 +114,10 @@ Algorithm decoded(const v1::Algorithm& message);
 Plugin decoded(const v1::Plugin& message);
 Profile decoded(const v1::Profile& message);
 FileReader decoded(const v1::FileReader& message);
+Partners decoded(const v1::Partners& message);
+CarriedPoints decoded(const v1::CarriedPoints& message);
+FeatureChange decoded(const v1::FeatureChange& message);
+CarriedFeature decoded(const v1::CarriedFeature& message);
 
 /// Returns the values of a repeated field.
 template <typename Field>
@@ -132,16 +140,23 @@ std::vector<std::uint32_t> numbers(const Field& field) {
   return {field.begin(), field.end()};
 }
 
-SceneObject decoded(const v1::SceneObject& message) {
-  SceneObject object{{},
-                     message.label(),
-                     message.area(),
-                     decoded(message.centroid()),
-                     SKETCHMATCH_KNOWN(message, certainty)};
-  for (const auto& ring : message.rings()) {
-    object.rings.push_back(all(ring.points()));
+template <typename Field>
+std::vector<double> reals(const Field& field) {
+  return {field.begin(), field.end()};
+}
+
+template <typename Field>
+std::vector<Ring> rings(const Field& field) {
+  std::vector<Ring> values;
+  for (const auto& ring : field) {
+    values.push_back(all(ring.points()));
   }
-  return object;
+  return values;
+}
+
+SceneObject decoded(const v1::SceneObject& message) {
+  return {rings(message.rings()), message.label(), message.area(), decoded(message.centroid()),
+          SKETCHMATCH_KNOWN(message, certainty)};
 }
 
 Scene decoded(const v1::Scene& message) { return {all(message.objects())}; }
@@ -230,8 +245,7 @@ MatchResult decoded(const v1::MatchResult& message) {
   result.outcome = static_cast<Outcome>(message.outcome());
   result.object_matches = all(message.object_matches());
   result.unmatched_sketch_objects = numbers(message.unmatched_sketch_objects());
-  result.unmatched_sketch_probabilities = {message.unmatched_sketch_probabilities().begin(),
-                                           message.unmatched_sketch_probabilities().end()};
+  result.unmatched_sketch_probabilities = reals(message.unmatched_sketch_probabilities());
   result.unmatched_map_objects = numbers(message.unmatched_map_objects());
   result.omap_confidence = message.omap_confidence();
   result.fmap_confidence = decoded(message.fmap_confidence());
@@ -319,6 +333,43 @@ ServerLimits decoded(const v1::ServerLimits& message) {
   return limits;
 }
 
+Partners decoded(const v1::Partners& message) {
+  return {message.sketch_object(), message.map_object()};
+}
+
+Feature decoded(const v1::Feature& message) {
+  switch (message.kind_case()) {
+    case v1::Feature::kPoint:
+      return {message.name(), decoded(message.point())};
+    case v1::Feature::kRoute:
+      return {message.name(), Route{all(message.route().points()),
+                                    reals(message.route().speeds_meters_per_second())}};
+    case v1::Feature::kZone:
+      return {message.name(), Zone{rings(message.zone().rings())}};
+    default:
+      return {message.name(), {}};
+  }
+}
+
+CarriedPoints decoded(const v1::CarriedPoints& message) {
+  return {reals(message.deviations()), reals(message.sources())};
+}
+
+FeatureChange decoded(const v1::FeatureChange& message) {
+  return {static_cast<ChangeReason>(message.reason()), message.first_point(), message.last_point(),
+          message.sentence()};
+}
+
+CarriedFeature decoded(const v1::CarriedFeature& message) {
+  return {decoded(message.feature()), all(message.lines()), all(message.changes()),
+          message.drawn()};
+}
+
+Warp decoded(const v1::Warp& message) {
+  return {static_cast<WarpKind>(message.kind()), message.rotation_radians(), message.scale(),
+          message.residual(), reals(message.weights())};
+}
+
 }  // namespace
 
 std::optional<MatchEvent> decoded(const v1::MatchResponse& message) {
@@ -361,6 +412,31 @@ MatchRecord decoded(const v1::GetMatchResponse& message) {
 Segmentation decoded(const v1::SegmentResponse& message) {
   return {decoded(message.scene()), texts(message.warnings()), decoded(message.segmenter()),
           all(message.route())};
+}
+
+StoredScene decoded(const v1::StoredScene& message) {
+  return {message.name(), decoded(message.scene()), texts(message.warnings()),
+          decoded(message.segmenter()), all(message.route())};
+}
+
+PutScene decoded(const v1::PutSceneResponse& message) {
+  return {decoded(message.stored_scene()), message.created()};
+}
+
+GotScene decoded(const v1::GetSceneResponse& message) {
+  return {decoded(message.stored_scene()),
+          message.has_source() ? std::optional<Source>(message.source()) : std::nullopt};
+}
+
+SceneSummary decoded(const v1::SceneSummary& message) {
+  return {message.name(), message.object_count(), texts(message.labels()),
+          decoded(message.put_time())};
+}
+
+Transfer decoded(const v1::TransferResponse& message) {
+  return {all(message.features()), decoded(message.warp()), all(message.object_map()),
+          decoded(message.scenes()),
+          message.has_match() ? std::optional(decoded(message.match())) : std::nullopt};
 }
 
 Catalogue decoded(const v1::ListAlgorithmsResponse& message) {

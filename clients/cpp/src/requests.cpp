@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "points.hpp"
 #include "text.hpp"
 
 namespace sketchmatch::detail {
@@ -151,11 +152,10 @@ std::string numbered(const char* field, int number) {
   return std::string(field) + "[" + std::to_string(number) + "]";
 }
 
-}  // namespace
-
-v1::MatchRequest match_request(const Source& sketch, const Source& map,
-                               const MatchOptions& options) {
-  v1::MatchRequest request;
+/// Writes what a match and a transfer have in common.
+template <typename Request>
+void write_common(const Source& sketch, const Source& map, const MatchOptions& options,
+                  Request& request) {
   *request.mutable_sketch() = sketch.message();
   *request.mutable_map() = map.message();
   write(options, *request.mutable_pipeline());
@@ -174,9 +174,6 @@ v1::MatchRequest match_request(const Source& sketch, const Source& map,
   if (options.unmatched_price) {
     request.set_unmatched_price(*options.unmatched_price);
   }
-  if (options.alternatives) {
-    request.set_alternatives(*options.alternatives);
-  }
   for (const auto& pin : options.pins) {
     const auto field = numbered("pins", request.pins_size());
     write(pin, *request.add_pins(), field);
@@ -188,6 +185,54 @@ v1::MatchRequest match_request(const Source& sketch, const Source& map,
       synonyms->add_labels(checked_text(label, field));
     }
   }
+}
+
+/// Writes a source and how to find its objects.
+template <typename Request>
+void write_segmenting(const Source& source, const SegmentOptions& options, Request& request) {
+  *request.mutable_source() = source.message();
+  request.set_profile(checked_text(options.profile, "profile"));
+  if (!options.segmenter.empty() || !options.params.empty()) {
+    select(options.segmenter, options.params, *request.mutable_segmenter(), "segmenter");
+  }
+}
+
+/// Refuses an option that a match alone has a use for.
+void refuse_for_transfer(bool given, const char* option) {
+  if (given) {
+    refuse(option, "is for matches; a transfer has one answer, and no name: leave it out");
+  }
+}
+
+void write(const Feature& feature, v1::Feature& message, const std::string& field) {
+  message.set_name(checked_text(feature.name, field + ".name"));
+  if (const auto* point = std::get_if<Point>(&feature.kind)) {
+    write_point(*point, *message.mutable_point());
+  } else if (const auto* route = std::get_if<Route>(&feature.kind)) {
+    auto* written = message.mutable_route();
+    write_points(route->points, *written);
+    for (const double speed : route->speeds_meters_per_second) {
+      written->add_speeds_meters_per_second(speed);
+    }
+  } else if (const auto* zone = std::get_if<Zone>(&feature.kind)) {
+    auto* written = message.mutable_zone();
+    for (const auto& ring : zone->rings) {
+      write_points(ring, *written->add_rings());
+    }
+  } else {
+    refuse(field, "is nothing; give a Point, a Route or a Zone");
+  }
+}
+
+}  // namespace
+
+v1::MatchRequest match_request(const Source& sketch, const Source& map,
+                               const MatchOptions& options) {
+  v1::MatchRequest request;
+  write_common(sketch, map, options, request);
+  if (options.alternatives) {
+    request.set_alternatives(*options.alternatives);
+  }
   request.set_request_id(checked_text(options.request_id, "request_id"));
   request.set_keep_running(options.keep_running);
   request.set_priority(static_cast<v1::Priority>(options.priority));
@@ -196,11 +241,54 @@ v1::MatchRequest match_request(const Source& sketch, const Source& map,
 
 v1::SegmentRequest segment_request(const Source& source, const SegmentOptions& options) {
   v1::SegmentRequest request;
-  *request.mutable_source() = source.message();
-  request.set_profile(checked_text(options.profile, "profile"));
-  if (!options.segmenter.empty() || !options.params.empty()) {
-    select(options.segmenter, options.params, *request.mutable_segmenter(), "segmenter");
+  write_segmenting(source, options, request);
+  return request;
+}
+
+v1::PutSceneRequest put_scene_request(const Source& source, const SegmentOptions& options) {
+  v1::PutSceneRequest request;
+  write_segmenting(source, options, request);
+  return request;
+}
+
+v1::UpdateSceneRequest update_scene_request(const std::string& name, const ObjectLabels& labels) {
+  v1::UpdateSceneRequest request;
+  request.set_name(checked_text(name, "name"));
+  for (const auto& [object, label] : labels) {
+    const auto field = numbered("labels", request.labels_size());
+    auto* message = request.add_labels();
+    message->set_object(object);
+    message->set_label(checked_text(label, field));
   }
+  return request;
+}
+
+v1::TransferRequest transfer_request(const Source& sketch, const Source& map,
+                                     const std::vector<Feature>& features,
+                                     const TransferOptions& options) {
+  refuse_for_transfer(options.alternatives.has_value(), "alternatives");
+  refuse_for_transfer(!options.request_id.empty(), "request_id");
+  refuse_for_transfer(options.keep_running, "keep_running");
+  refuse_for_transfer(options.priority != Priority::unspecified, "priority");
+  v1::TransferRequest request;
+  write_common(sketch, map, options, request);
+  for (const auto& [sketched, mapped] : options.object_map) {
+    auto* pair = request.add_object_map();
+    pair->set_sketch_object(sketched);
+    pair->set_map_object(mapped);
+  }
+  request.set_direction(static_cast<v1::TransferDirection>(options.direction));
+  for (const auto& feature : features) {
+    const auto field = numbered("features", request.features_size());
+    write(feature, *request.add_features(), field);
+  }
+  if (options.y_axis == YAxis::down) {
+    request.set_y_axis(v1::Y_AXIS_DOWN);
+  }
+  if (options.radius) {
+    request.set_radius(*options.radius);
+  }
+  request.set_allow_unknown(options.allow_unknown);
   return request;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "map_files.hpp"
+#include "points.hpp"
 #include "text.hpp"
 
 namespace sketchmatch {
@@ -17,8 +18,7 @@ Source::Source(const v1::Source& message, std::vector<std::string> notes)
 namespace {
 
 using detail::refuse;
-
-v1::YAxis written(YAxis axis) { return axis == YAxis::down ? v1::Y_AXIS_DOWN : v1::Y_AXIS_UP; }
+using detail::written;
 
 /// Returns the label of the thing with a number; empty where there are none.
 std::string label_of(const std::vector<std::string>& labels, std::size_t number) {
@@ -41,14 +41,6 @@ void check_count(const std::string& field, std::size_t given, const char* of, st
 
 void check_labels(const std::vector<std::string>& labels, std::size_t count, const char* what) {
   check_count("labels", labels.size(), "names", count, what);
-}
-
-void write(const Ring& ring, v1::Ring& message) {
-  for (const auto& corner : ring) {
-    auto* point = message.add_points();
-    point->set_x(corner.x);
-    point->set_y(corner.y);
-  }
 }
 
 std::string bytes_of(const std::filesystem::path& path, const std::string& field,
@@ -112,7 +104,7 @@ Source polygons_with_holes(const std::vector<std::vector<Ring>>& polygons,
       polygon->set_certainty(*certainties.at(k));
     }
     for (const auto& ring : polygons.at(k)) {
-      write(ring, *polygon->add_rings());
+      detail::write_points(ring, *polygon->add_rings());
     }
   }
   return Source(source);

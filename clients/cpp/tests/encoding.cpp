@@ -1,33 +1,443 @@
 #include "encoding.hpp"
 
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/duration.pb.h>
+#include <google/protobuf/struct.pb.h>
+#include <google/protobuf/timestamp.pb.h>
+
 #include <cmath>
+#include <map>
+#include <sketchmatch/raw.hpp>
+#include <sstream>
+#include <stdexcept>
+#include <type_traits>
 
 namespace sketchmatch::test {
 
 namespace {
 
-#define SET_IF_KNOWN(value, message, field) \
-  if ((value).field) (message).set_##field(*(value).field)
+using google::protobuf::Descriptor;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
 
-google::protobuf::Duration encoded(Seconds value) {
-  google::protobuf::Duration message;
-  message.set_seconds(static_cast<std::int64_t>(std::floor(value.count())));
-  message.set_nanos(
-      static_cast<std::int32_t>((value.count() - std::floor(value.count())) * 1e9 + 0.5));
-  return message;
+/// The fields that the client writes into requests, by message; those of answers are below.
+const std::map<std::string, std::string> kWritten{
+    {"MatchRequest",
+     "sketch map pipeline seed time_budget weights alternatives allow_unmatched unmatched_price "
+     "pins "
+     "synonyms request_id keep_running priority"},
+    {"TransferRequest",
+     "sketch map pipeline seed time_budget weights allow_unmatched unmatched_price pins synonyms "
+     "object_map direction features y_axis radius allow_unknown"},
+    {"Pin", "sketch_object map_object excluded"},
+    {"ObjectReference", "index label"},
+    {"Synonyms", "labels"},
+    {"WatchMatchRequest", "match_id after"},
+    {"GetMatchRequest", "match_id"},
+    {"CancelMatchRequest", "match_id"},
+    {"SegmentRequest", "source segmenter profile"},
+    {"PutSceneRequest", "source segmenter profile"},
+    {"GetSceneRequest", "name include_source"},
+    {"ListScenesRequest", "page_token"},
+    {"UpdateSceneRequest", "name labels"},
+    {"ObjectLabel", "object label"},
+    {"DeleteSceneRequest", "name"},
+    {"Source", "stroke_set polygon_set occupancy_grid image map_server_map file stored_scene"},
+    {"StrokeSet", "strokes y_axis"},
+    {"Stroke", "points label"},
+    {"StrokePoint", "x y time_seconds"},
+    {"PolygonSet", "polygons y_axis"},
+    {"LabelledPolygon", "rings label certainty"},
+    {"OccupancyGrid", "rows columns resolution_meters origin cells"},
+    {"Pose", "x_meters y_meters yaw_radians"},
+    {"EncodedImage", "data"},
+    {"MapServerMap", "yaml image objects"},
+    {"EncodedFile", "name data part"},
+};
+
+template <typename Kind, typename Variant>
+std::optional<Kind> if_it_is(const Variant& variant) {
+  const auto* found = std::get_if<Kind>(&variant);
+  return found == nullptr ? std::nullopt : std::optional(*found);
 }
 
-google::protobuf::Timestamp encoded(MatchSummary::Time value) {
-  constexpr std::int64_t kNanos = 1'000'000'000;
-  const auto count =
-      std::chrono::duration_cast<std::chrono::nanoseconds>(value.time_since_epoch()).count();
-  google::protobuf::Timestamp message;
-  message.set_seconds(count / kNanos);
-  message.set_nanos(static_cast<std::int32_t>(count % kNanos));
-  return message;
-}
+#define FIELD(name) visit(#name, value.name)
 
-google::protobuf::Value encoded(const Value& value) {
+/// The fields that the client reads, by value: `of` names each of them to a visitor.
+struct Fields {
+  template <typename Visit>
+  static void of(const AlgorithmSelection& value, const Visit& visit) {
+    FIELD(name);
+    FIELD(parameters);
+  }
+
+  template <typename Visit>
+  static void of(const Pipeline& value, const Visit& visit) {
+    FIELD(sketch_segmenter);
+    FIELD(map_segmenter);
+    FIELD(histogram);
+    FIELD(similarity);
+    FIELD(searcher);
+    FIELD(judge);
+    FIELD(profile);
+  }
+
+  template <typename Visit>
+  static void of(const Weights& value, const Visit& visit) {
+    FIELD(similarity);
+    FIELD(rotation);
+    FIELD(dilation);
+    FIELD(shape);
+    FIELD(size);
+    FIELD(distance);
+  }
+
+  template <typename Visit>
+  static void of(const Point& value, const Visit& visit) {
+    FIELD(x);
+    FIELD(y);
+  }
+
+  template <typename Visit>
+  static void of(const Ring& value, const Visit& visit) {
+    visit("points", value);
+  }
+
+  template <typename Visit>
+  static void of(const SceneObject& value, const Visit& visit) {
+    FIELD(rings);
+    FIELD(label);
+    FIELD(area);
+    FIELD(centroid);
+    FIELD(certainty);
+  }
+
+  template <typename Visit>
+  static void of(const Scene& value, const Visit& visit) {
+    FIELD(objects);
+  }
+
+  template <typename Visit>
+  static void of(const MatchAccepted& value, const Visit& visit) {
+    FIELD(match_id);
+    FIELD(seed);
+    FIELD(pipeline);
+    FIELD(weights);
+    FIELD(time_budget);
+    FIELD(unmatched_price);
+  }
+
+  template <typename Visit>
+  static void of(const MatchScenes& value, const Visit& visit) {
+    FIELD(sketch);
+    FIELD(map);
+    FIELD(sketch_warnings);
+    FIELD(map_warnings);
+    FIELD(sketch_route);
+  }
+
+  template <typename Visit>
+  static void of(const ObjectRelation& value, const Visit& visit) {
+    FIELD(reference_object);
+    FIELD(phrase);
+    FIELD(degree);
+  }
+
+  template <typename Visit>
+  static void of(const ObjectMatch& value, const Visit& visit) {
+    FIELD(sketch_object);
+    FIELD(map_object);
+    FIELD(sketch_label);
+    FIELD(map_label);
+    FIELD(confidence);
+    FIELD(margin);
+    FIELD(relation);
+    FIELD(probability);
+  }
+
+  template <typename Visit>
+  static void of(const Progress& value, const Visit& visit) {
+    FIELD(phase);
+    FIELD(fraction);
+    FIELD(iteration);
+    FIELD(evaluations);
+    FIELD(confidence);
+    FIELD(upper_bound);
+    FIELD(object_matches);
+    FIELD(elapsed);
+  }
+
+  template <typename Visit>
+  static void of(const FmapConfidence& value, const Visit& visit) {
+    FIELD(total);
+    FIELD(similarity);
+    FIELD(rotation);
+    FIELD(dilation);
+    FIELD(shape);
+    FIELD(size);
+  }
+
+  template <typename Visit>
+  static void of(const ObjectPair& value, const Visit& visit) {
+    FIELD(first);
+    FIELD(second);
+  }
+
+  template <typename Visit>
+  static void of(const FmapEntry& value, const Visit& visit) {
+    FIELD(sketch_pair);
+    FIELD(map_pair);
+    FIELD(similarity);
+    FIELD(rotation_radians);
+    FIELD(dilation);
+  }
+
+  template <typename Visit>
+  static void of(const AlternativeMap& value, const Visit& visit) {
+    FIELD(object_matches);
+    FIELD(fmap_confidence);
+    FIELD(omap_confidence);
+    FIELD(probability);
+  }
+
+  template <typename Visit>
+  static void of(const Ambiguity& value, const Visit& visit) {
+    FIELD(maps);
+    FIELD(alternatives);
+    FIELD(deciding_sketch_objects);
+  }
+
+  template <typename Visit>
+  static void of(const MatchStatistics& value, const Visit& visit) {
+    FIELD(iterations);
+    FIELD(evaluations);
+    FIELD(segment_elapsed);
+    FIELD(describe_elapsed);
+    FIELD(relate_elapsed);
+    FIELD(search_elapsed);
+    FIELD(total_elapsed);
+  }
+
+  template <typename Visit>
+  static void of(const MatchResult& value, const Visit& visit) {
+    FIELD(match_id);
+    FIELD(seed);
+    FIELD(outcome);
+    FIELD(object_matches);
+    FIELD(unmatched_sketch_objects);
+    FIELD(unmatched_sketch_probabilities);
+    FIELD(unmatched_map_objects);
+    FIELD(omap_confidence);
+    FIELD(fmap_confidence);
+    FIELD(upper_bound);
+    FIELD(fmap_entries);
+    FIELD(rotation_radians);
+    FIELD(scale);
+    FIELD(statistics);
+    FIELD(alternatives);
+    FIELD(search_note);
+    FIELD(probability);
+    FIELD(place_probability);
+    FIELD(ambiguity);
+    FIELD(provisional);
+  }
+
+  template <typename Visit>
+  static void of(const MatchSummary& value, const Visit& visit) {
+    FIELD(match_id);
+    FIELD(request_id);
+    FIELD(state);
+    FIELD(created_at);
+    FIELD(ended_at);
+    FIELD(outcome);
+    FIELD(last_event);
+    FIELD(error_message);
+    FIELD(error_reason);
+  }
+
+  template <typename Visit>
+  static void of(const Segmentation& value, const Visit& visit) {
+    FIELD(scene);
+    FIELD(warnings);
+    FIELD(segmenter);
+    FIELD(route);
+  }
+
+  template <typename Visit>
+  static void of(const StoredScene& value, const Visit& visit) {
+    FIELD(name);
+    FIELD(scene);
+    FIELD(warnings);
+    FIELD(segmenter);
+    FIELD(route);
+  }
+
+  template <typename Visit>
+  static void of(const PutScene& value, const Visit& visit) {
+    FIELD(stored_scene);
+    FIELD(created);
+  }
+
+  template <typename Visit>
+  static void of(const GotScene& value, const Visit& visit) {
+    FIELD(stored_scene);
+    FIELD(source);
+  }
+
+  template <typename Visit>
+  static void of(const SceneSummary& value, const Visit& visit) {
+    FIELD(name);
+    FIELD(object_count);
+    FIELD(labels);
+    FIELD(put_time);
+  }
+
+  template <typename Visit>
+  static void of(const Route& value, const Visit& visit) {
+    FIELD(points);
+    FIELD(speeds_meters_per_second);
+  }
+
+  template <typename Visit>
+  static void of(const Zone& value, const Visit& visit) {
+    FIELD(rings);
+  }
+
+  template <typename Visit>
+  static void of(const Feature& value, const Visit& visit) {
+    FIELD(name);
+    visit("point", if_it_is<Point>(value.kind));
+    visit("route", if_it_is<Route>(value.kind));
+    visit("zone", if_it_is<Zone>(value.kind));
+  }
+
+  template <typename Visit>
+  static void of(const FeatureChange& value, const Visit& visit) {
+    FIELD(reason);
+    FIELD(first_point);
+    FIELD(last_point);
+    FIELD(sentence);
+  }
+
+  template <typename Visit>
+  static void of(const CarriedPoints& value, const Visit& visit) {
+    FIELD(deviations);
+    FIELD(sources);
+  }
+
+  template <typename Visit>
+  static void of(const CarriedFeature& value, const Visit& visit) {
+    FIELD(feature);
+    FIELD(lines);
+    FIELD(changes);
+    FIELD(drawn);
+  }
+
+  template <typename Visit>
+  static void of(const Warp& value, const Visit& visit) {
+    FIELD(kind);
+    FIELD(rotation_radians);
+    FIELD(scale);
+    FIELD(residual);
+    FIELD(weights);
+  }
+
+  template <typename Visit>
+  static void of(const Partners& value, const Visit& visit) {
+    FIELD(sketch_object);
+    FIELD(map_object);
+  }
+
+  template <typename Visit>
+  static void of(const Transfer& value, const Visit& visit) {
+    FIELD(features);
+    FIELD(warp);
+    visit("object_map", value.partners);
+    FIELD(scenes);
+    FIELD(match);
+  }
+
+  template <typename Visit>
+  static void of(const Algorithm& value, const Visit& visit) {
+    FIELD(kind);
+    FIELD(name);
+    FIELD(summary);
+    FIELD(description);
+    FIELD(distribution);
+    FIELD(distribution_version);
+    FIELD(parameters_schema);
+    FIELD(is_default);
+    FIELD(source_kinds);
+    FIELD(source);
+  }
+
+  template <typename Visit>
+  static void of(const Plugin& value, const Visit& visit) {
+    FIELD(distribution);
+    FIELD(version);
+    FIELD(state);
+    FIELD(reason);
+  }
+
+  template <typename Visit>
+  static void of(const Profile& value, const Visit& visit) {
+    FIELD(name);
+    FIELD(summary);
+    FIELD(pipeline);
+    FIELD(is_default);
+    FIELD(weights);
+    FIELD(allow_unmatched);
+  }
+
+  template <typename Visit>
+  static void of(const FileReader& value, const Visit& visit) {
+    FIELD(name);
+    FIELD(summary);
+    FIELD(suffixes);
+    FIELD(json_keys);
+    FIELD(source_kind);
+    FIELD(distribution);
+    FIELD(distribution_version);
+  }
+
+  template <typename Visit>
+  static void of(const Catalogue& value, const Visit& visit) {
+    FIELD(algorithms);
+    FIELD(plugins);
+    FIELD(profiles);
+    FIELD(readers);
+  }
+
+  template <typename Visit>
+  static void of(const ServerLimits& value, const Visit& visit) {
+    FIELD(max_request_bytes);
+    FIELD(max_objects);
+    FIELD(max_concurrent_matches);
+    FIELD(max_time_budget);
+    FIELD(max_waiting);
+    FIELD(max_wait);
+    FIELD(default_time_budget);
+    FIELD(max_matches_per_caller);
+    FIELD(max_requests_per_minute);
+    FIELD(max_comparisons);
+    FIELD(max_candidates);
+  }
+
+  template <typename Visit>
+  static void of(const ServerInfo& value, const Visit& visit) {
+    FIELD(version);
+    FIELD(api_version);
+    FIELD(plugin_api_version);
+    FIELD(limits);
+    FIELD(uptime);
+  }
+};
+
+template <typename Value>
+constexpr bool kIsPlain =
+    std::is_arithmetic_v<Value> || std::is_enum_v<Value> || std::is_same_v<Value, std::string>;
+
+google::protobuf::Value as_json_value(const Value& value) {
   google::protobuf::Value message;
   const auto& kind = value.kind();
   if (std::holds_alternative<bool>(kind)) {
@@ -39,12 +449,12 @@ google::protobuf::Value encoded(const Value& value) {
   } else if (std::holds_alternative<Value::List>(kind)) {
     message.mutable_list_value();
     for (const auto& each : std::get<Value::List>(kind)) {
-      *message.mutable_list_value()->add_values() = encoded(each);
+      *message.mutable_list_value()->add_values() = as_json_value(each);
     }
   } else if (std::holds_alternative<Value::Object>(kind)) {
     message.mutable_struct_value();
     for (const auto& [name, each] : std::get<Value::Object>(kind)) {
-      (*message.mutable_struct_value()->mutable_fields())[name] = encoded(each);
+      (*message.mutable_struct_value()->mutable_fields())[name] = as_json_value(each);
     }
   } else {
     message.set_null_value(google::protobuf::NULL_VALUE);
@@ -52,304 +462,244 @@ google::protobuf::Value encoded(const Value& value) {
   return message;
 }
 
-v1::AlgorithmSelection encoded(const AlgorithmSelection& value) {
-  v1::AlgorithmSelection message;
-  message.set_name(value.name);
-  if (!value.parameters.empty()) {
-    *message.mutable_parameters() = encoded(Value(value.parameters)).struct_value();
+/// Writes fields into a message, by name.
+class Writer {
+ public:
+  explicit Writer(Message& message) : message_(message) {}
+
+  template <typename Value>
+  void operator()(const char* name, const Value& value) const {
+    put(*message_.GetDescriptor()->FindFieldByName(name), value);
   }
-  return message;
-}
 
-v1::Pipeline encoded(const Pipeline& value) {
-  v1::Pipeline message;
-  const auto put = [](const AlgorithmSelection& from, v1::AlgorithmSelection* (v1::Pipeline::*to)(),
-                      v1::Pipeline& pipeline) {
-    if (!from.name.empty()) {
-      *(pipeline.*to)() = encoded(from);
-    }
-  };
-  put(value.sketch_segmenter, &v1::Pipeline::mutable_sketch_segmenter, message);
-  put(value.map_segmenter, &v1::Pipeline::mutable_map_segmenter, message);
-  put(value.histogram, &v1::Pipeline::mutable_histogram, message);
-  put(value.similarity, &v1::Pipeline::mutable_similarity, message);
-  put(value.searcher, &v1::Pipeline::mutable_searcher, message);
-  put(value.judge, &v1::Pipeline::mutable_judge, message);
-  message.set_profile(value.profile);
-  return message;
-}
-
-v1::ConfidenceWeights encoded(const Weights& value) {
-  v1::ConfidenceWeights message;
-  message.set_similarity(value.similarity);
-  message.set_rotation(value.rotation);
-  message.set_dilation(value.dilation);
-  SET_IF_KNOWN(value, message, shape);
-  SET_IF_KNOWN(value, message, size);
-  SET_IF_KNOWN(value, message, distance);
-  return message;
-}
-
-v1::Point encoded(const Point& value) {
-  v1::Point message;
-  message.set_x(value.x);
-  message.set_y(value.y);
-  return message;
-}
-
-v1::Scene encoded(const Scene& value) {
-  v1::Scene message;
-  for (const auto& each : value.objects) {
-    auto* object = message.add_objects();
-    object->set_label(each.label);
-    object->set_area(each.area);
-    *object->mutable_centroid() = encoded(each.centroid);
-    SET_IF_KNOWN(each, *object, certainty);
-    for (const auto& ring : each.rings) {
-      auto* points = object->add_rings();
-      for (const auto& corner : ring) {
-        *points->add_points() = encoded(corner);
+ private:
+  template <typename Value>
+  void put(const FieldDescriptor& field, const std::optional<Value>& value) const {
+    if (value) {
+      put(field, *value);
+      if constexpr (!kIsPlain<Value>) {
+        message_.GetReflection()->MutableMessage(&message_, &field);  // an empty one, too
       }
     }
   }
-  return message;
-}
 
-v1::ObjectMatch encoded(const ObjectMatch& value) {
-  v1::ObjectMatch message;
-  message.set_sketch_object(value.sketch_object);
-  message.set_map_object(value.map_object);
-  message.set_sketch_label(value.sketch_label);
-  message.set_map_label(value.map_label);
-  message.set_confidence(value.confidence);
-  SET_IF_KNOWN(value, message, margin);
-  SET_IF_KNOWN(value, message, probability);
-  if (value.relation) {
-    auto* relation = message.mutable_relation();
-    relation->set_reference_object(value.relation->reference_object);
-    relation->set_phrase(value.relation->phrase);
-    relation->set_degree(value.relation->degree);
-  }
-  return message;
-}
-
-v1::FmapConfidence encoded(const FmapConfidence& value) {
-  v1::FmapConfidence message;
-  message.set_total(value.total);
-  message.set_similarity(value.similarity);
-  message.set_rotation(value.rotation);
-  message.set_dilation(value.dilation);
-  SET_IF_KNOWN(value, message, shape);
-  SET_IF_KNOWN(value, message, size);
-  return message;
-}
-
-v1::ObjectPair encoded(const ObjectPair& value) {
-  v1::ObjectPair message;
-  message.set_first(value.first);
-  message.set_second(value.second);
-  return message;
-}
-
-template <typename Value, typename Field>
-void put_all(const std::vector<Value>& values, Field* field) {
-  for (const auto& each : values) {
-    if constexpr (std::is_arithmetic_v<Value>) {
-      field->Add(each);
-    } else if constexpr (std::is_same_v<Value, std::string>) {
-      *field->Add() = each;
-    } else {
-      *field->Add() = encoded(each);
+  template <typename Value>
+  void put(const FieldDescriptor& field, const std::vector<Value>& values) const {
+    for (const auto& value : values) {
+      if constexpr (kIsPlain<Value>) {
+        add(field, value);
+      } else {
+        write(value, *message_.GetReflection()->AddMessage(&message_, &field));
+      }
     }
   }
+
+  template <typename Value>
+  void put(const FieldDescriptor& field, const Value& value) const {
+    const auto* reflection = message_.GetReflection();
+    if constexpr (std::is_enum_v<Value>) {
+      reflection->SetEnumValue(&message_, &field, static_cast<int>(value));
+    } else if constexpr (std::is_same_v<Value, bool>) {
+      reflection->SetBool(&message_, &field, value);
+    } else if constexpr (std::is_same_v<Value, double>) {
+      reflection->SetDouble(&message_, &field, value);
+    } else if constexpr (std::is_same_v<Value, std::uint32_t>) {
+      reflection->SetUInt32(&message_, &field, value);
+    } else if constexpr (std::is_same_v<Value, std::uint64_t>) {
+      reflection->SetUInt64(&message_, &field, value);
+    } else if constexpr (std::is_same_v<Value, std::string>) {
+      reflection->SetString(&message_, &field, value);
+    } else {
+      auto* part = reflection->MutableMessage(&message_, &field);
+      write(value, *part);
+      if (part->ByteSizeLong() == 0) {
+        reflection->ClearField(&message_, &field);
+      }
+    }
+  }
+
+  template <typename Value>
+  void add(const FieldDescriptor& field, const Value& value) const {
+    const auto* reflection = message_.GetReflection();
+    if constexpr (std::is_enum_v<Value>) {
+      reflection->AddEnumValue(&message_, &field, static_cast<int>(value));
+    } else if constexpr (std::is_same_v<Value, double>) {
+      reflection->AddDouble(&message_, &field, value);
+    } else if constexpr (std::is_same_v<Value, std::uint32_t>) {
+      reflection->AddUInt32(&message_, &field, value);
+    } else {
+      reflection->AddString(&message_, &field, value);
+    }
+  }
+
+  static void write(Seconds value, Message& message) {
+    google::protobuf::Duration duration;
+    duration.set_seconds(static_cast<std::int64_t>(std::floor(value.count())));
+    duration.set_nanos(
+        static_cast<std::int32_t>((value.count() - std::floor(value.count())) * 1e9 + 0.5));
+    message.CopyFrom(duration);
+  }
+
+  static void write(std::chrono::system_clock::time_point value, Message& message) {
+    constexpr std::int64_t kNanos = 1'000'000'000;
+    const auto count =
+        std::chrono::duration_cast<std::chrono::nanoseconds>(value.time_since_epoch()).count();
+    google::protobuf::Timestamp timestamp;
+    timestamp.set_seconds(count / kNanos);
+    timestamp.set_nanos(static_cast<std::int32_t>(count % kNanos));
+    message.CopyFrom(timestamp);
+  }
+
+  static void write(const Parameters& value, Message& message) {
+    message.CopyFrom(as_json_value(Value(value)).struct_value());
+  }
+
+  static void write(const Source& value, Message& message) { message.CopyFrom(value.message()); }
+
+  template <typename Value>
+  static void write(const Value& value, Message& message) {
+    Fields::of(value, Writer(message));
+  }
+
+  Message& message_;
+};
+
+/// Collects the full names of fields, those of the messages within too.
+class Collector {
+ public:
+  Collector(const Descriptor& described, std::set<std::string>& names)
+      : described_(described), names_(names) {}
+
+  template <typename Value>
+  void operator()(const char* name, const Value& value) const {
+    const auto* field = described_.FindFieldByName(name);
+    if (field == nullptr) {
+      throw std::logic_error(described_.full_name() + " has no field " + name);
+    }
+    if (names_.insert(field->full_name()).second) {
+      within(field->message_type(), value);
+    }
+  }
+
+ private:
+  template <typename Value>
+  void within(const Descriptor* described, const std::optional<Value>& value) const {
+    if constexpr (!std::is_same_v<Value, Source>) {
+      within(described, value.value_or(Value{}));
+    }
+  }
+
+  template <typename Value>
+  void within(const Descriptor* described, const std::vector<Value>& /*values*/) const {
+    within(described, Value{});
+  }
+
+  void within(const Descriptor* described, const Ring& value) const {
+    const bool is_ring = described->name() == "Ring";
+    if (is_ring) {
+      Fields::of(value, Collector(*described, names_));
+    } else {
+      within(described, Point{});
+    }
+  }
+
+  template <typename Value>
+  void within(const Descriptor* described, const Value& value) const {
+    if constexpr (!kIsPlain<Value> && !std::is_same_v<Value, Seconds> &&
+                  !std::is_same_v<Value, std::chrono::system_clock::time_point> &&
+                  !std::is_same_v<Value, Parameters>) {
+      Fields::of(value, Collector(*described, names_));
+    }
+  }
+
+  const Descriptor& described_;
+  std::set<std::string>& names_;
+};
+
+template <typename Type, typename Value>
+void collect(std::set<std::string>& names, const Value& value = {}) {
+  Fields::of(value, Collector(*Type::descriptor(), names));
+}
+
+/// The full names of all fields that the client knows.
+const std::set<std::string>& known_fields() {
+  static const std::set<std::string> known = [] {
+    std::set<std::string> names;
+    for (const auto& [type, fields] : kWritten) {
+      std::istringstream words(fields);
+      for (std::string word; words >> word;) {
+        const auto name = "sketchmatch.v1." + type + "." + word;
+        if (google::protobuf::DescriptorPool::generated_pool()->FindFieldByName(name) == nullptr) {
+          throw std::logic_error("the contract has no field " + name);
+        }
+        names.insert(name);
+      }
+    }
+    collect<v1::MatchAccepted, MatchAccepted>(names);
+    collect<v1::MatchScenes, MatchScenes>(names);
+    collect<v1::MatchProgress, Progress>(names);
+    collect<v1::MatchResult, MatchResult>(names);
+    collect<v1::MatchSummary, MatchSummary>(names);
+    collect<v1::SegmentResponse, Segmentation>(names);
+    collect<v1::PutSceneResponse, PutScene>(names);
+    collect<v1::GetSceneResponse, GotScene>(names);
+    collect<v1::SceneSummary, SceneSummary>(names);
+    collect<v1::TransferResponse, Transfer>(names);
+    collect<v1::ListAlgorithmsResponse, Catalogue>(names);
+    collect<v1::GetServerInfoResponse, ServerInfo>(names);
+    return names;
+  }();
+  return known;
+}
+
+void forget_unknown(Message& message, std::set<std::string>& forgotten) {
+  if (message.GetDescriptor()->file()->package() != "sketchmatch.v1") {
+    return;  // a Struct or a Duration
+  }
+  const auto* reflection = message.GetReflection();
+  std::vector<const FieldDescriptor*> fields;
+  reflection->ListFields(message, &fields);
+  for (const auto* field : fields) {
+    if (known_fields().count(field->full_name()) == 0) {
+      forgotten.insert(field->full_name());
+      reflection->ClearField(&message, field);
+    } else if (field->message_type() == nullptr) {
+      continue;
+    } else if (field->is_repeated()) {
+      for (int k = 0; k < reflection->FieldSize(message, field); ++k) {
+        forget_unknown(*reflection->MutableRepeatedMessage(&message, field, k), forgotten);
+      }
+    } else {
+      forget_unknown(*reflection->MutableMessage(&message, field), forgotten);
+    }
+  }
+}
+
+template <typename Value>
+void written(const Value& value, Message& message) {
+  Fields::of(value, Writer(message));
 }
 
 }  // namespace
 
-v1::MatchAccepted encoded(const MatchAccepted& value) {
-  v1::MatchAccepted message;
-  message.set_match_id(value.match_id);
-  message.set_seed(value.seed);
-  *message.mutable_pipeline() = encoded(value.pipeline);
-  *message.mutable_weights() = encoded(value.weights);
-  if (value.time_budget) {
-    *message.mutable_time_budget() = encoded(*value.time_budget);
-  }
-  SET_IF_KNOWN(value, message, unmatched_price);
-  return message;
-}
+void encode(const MatchAccepted& value, Message& message) { written(value, message); }
+void encode(const MatchScenes& value, Message& message) { written(value, message); }
+void encode(const Progress& value, Message& message) { written(value, message); }
+void encode(const MatchResult& value, Message& message) { written(value, message); }
+void encode(const MatchSummary& value, Message& message) { written(value, message); }
+void encode(const Segmentation& value, Message& message) { written(value, message); }
+void encode(const StoredScene& value, Message& message) { written(value, message); }
+void encode(const PutScene& value, Message& message) { written(value, message); }
+void encode(const GotScene& value, Message& message) { written(value, message); }
+void encode(const SceneSummary& value, Message& message) { written(value, message); }
+void encode(const Transfer& value, Message& message) { written(value, message); }
+void encode(const Catalogue& value, Message& message) { written(value, message); }
+void encode(const ServerInfo& value, Message& message) { written(value, message); }
 
-v1::MatchScenes encoded(const MatchScenes& value) {
-  v1::MatchScenes message;
-  *message.mutable_sketch() = encoded(value.sketch);
-  *message.mutable_map() = encoded(value.map);
-  put_all(value.sketch_warnings, message.mutable_sketch_warnings());
-  put_all(value.map_warnings, message.mutable_map_warnings());
-  put_all(value.sketch_route, message.mutable_sketch_route());
-  return message;
-}
-
-v1::MatchProgress encoded(const Progress& value) {
-  v1::MatchProgress message;
-  message.set_phase(static_cast<v1::Phase>(value.phase));
-  SET_IF_KNOWN(value, message, fraction);
-  message.set_iteration(value.iteration);
-  message.set_evaluations(value.evaluations);
-  SET_IF_KNOWN(value, message, confidence);
-  SET_IF_KNOWN(value, message, upper_bound);
-  put_all(value.object_matches, message.mutable_object_matches());
-  *message.mutable_elapsed() = encoded(value.elapsed);
-  return message;
-}
-
-v1::MatchResult encoded(const MatchResult& value) {
-  v1::MatchResult message;
-  message.set_match_id(value.match_id);
-  message.set_seed(value.seed);
-  message.set_outcome(static_cast<v1::Outcome>(value.outcome));
-  put_all(value.object_matches, message.mutable_object_matches());
-  put_all(value.unmatched_sketch_objects, message.mutable_unmatched_sketch_objects());
-  put_all(value.unmatched_sketch_probabilities, message.mutable_unmatched_sketch_probabilities());
-  put_all(value.unmatched_map_objects, message.mutable_unmatched_map_objects());
-  message.set_omap_confidence(value.omap_confidence);
-  *message.mutable_fmap_confidence() = encoded(value.fmap_confidence);
-  SET_IF_KNOWN(value, message, upper_bound);
-  for (const auto& each : value.fmap_entries) {
-    auto* entry = message.add_fmap_entries();
-    *entry->mutable_sketch_pair() = encoded(each.sketch_pair);
-    *entry->mutable_map_pair() = encoded(each.map_pair);
-    entry->set_similarity(each.similarity);
-    entry->set_rotation_radians(each.rotation_radians);
-    entry->set_dilation(each.dilation);
-  }
-  message.set_rotation_radians(value.rotation_radians);
-  message.set_scale(value.scale);
-  auto* statistics = message.mutable_statistics();
-  statistics->set_iterations(value.statistics.iterations);
-  statistics->set_evaluations(value.statistics.evaluations);
-  *statistics->mutable_segment_elapsed() = encoded(value.statistics.segment_elapsed);
-  *statistics->mutable_describe_elapsed() = encoded(value.statistics.describe_elapsed);
-  *statistics->mutable_relate_elapsed() = encoded(value.statistics.relate_elapsed);
-  *statistics->mutable_search_elapsed() = encoded(value.statistics.search_elapsed);
-  *statistics->mutable_total_elapsed() = encoded(value.statistics.total_elapsed);
-  for (const auto& each : value.alternatives) {
-    auto* alternative = message.add_alternatives();
-    put_all(each.object_matches, alternative->mutable_object_matches());
-    *alternative->mutable_fmap_confidence() = encoded(each.fmap_confidence);
-    alternative->set_omap_confidence(each.omap_confidence);
-    SET_IF_KNOWN(each, *alternative, probability);
-  }
-  message.set_search_note(value.search_note);
-  SET_IF_KNOWN(value, message, probability);
-  SET_IF_KNOWN(value, message, place_probability);
-  if (value.ambiguity) {
-    auto* ambiguity = message.mutable_ambiguity();
-    ambiguity->set_maps(value.ambiguity->maps);
-    put_all(value.ambiguity->alternatives, ambiguity->mutable_alternatives());
-    put_all(value.ambiguity->deciding_sketch_objects, ambiguity->mutable_deciding_sketch_objects());
-  }
-  message.set_provisional(value.provisional);
-  return message;
-}
-
-v1::MatchSummary encoded(const MatchSummary& value) {
-  v1::MatchSummary message;
-  message.set_match_id(value.match_id);
-  message.set_request_id(value.request_id);
-  message.set_state(static_cast<v1::MatchState>(value.state));
-  *message.mutable_created_at() = encoded(value.created_at);
-  if (value.ended_at) {
-    *message.mutable_ended_at() = encoded(*value.ended_at);
-  }
-  message.set_outcome(static_cast<v1::Outcome>(value.outcome));
-  message.set_last_event(value.last_event);
-  message.set_error_message(value.error_message);
-  message.set_error_reason(value.error_reason);
-  return message;
-}
-
-v1::SegmentResponse encoded(const Segmentation& value) {
-  v1::SegmentResponse message;
-  *message.mutable_scene() = encoded(value.scene);
-  put_all(value.warnings, message.mutable_warnings());
-  *message.mutable_segmenter() = encoded(value.segmenter);
-  put_all(value.route, message.mutable_route());
-  return message;
-}
-
-v1::ListAlgorithmsResponse encoded(const Catalogue& value) {
-  v1::ListAlgorithmsResponse message;
-  for (const auto& each : value.algorithms) {
-    auto* algorithm = message.add_algorithms();
-    algorithm->set_kind(static_cast<v1::AlgorithmKind>(each.kind));
-    algorithm->set_name(each.name);
-    algorithm->set_summary(each.summary);
-    algorithm->set_description(each.description);
-    algorithm->set_distribution(each.distribution);
-    algorithm->set_distribution_version(each.distribution_version);
-    *algorithm->mutable_parameters_schema() = encoded(Value(each.parameters_schema)).struct_value();
-    algorithm->set_is_default(each.is_default);
-    for (const auto kind : each.source_kinds) {
-      algorithm->add_source_kinds(static_cast<v1::SourceKind>(kind));
-    }
-    algorithm->set_source(each.source);
-  }
-  for (const auto& each : value.plugins) {
-    auto* plugin = message.add_plugins();
-    plugin->set_distribution(each.distribution);
-    plugin->set_version(each.version);
-    plugin->set_state(static_cast<v1::PluginState>(each.state));
-    plugin->set_reason(each.reason);
-  }
-  for (const auto& each : value.profiles) {
-    auto* profile = message.add_profiles();
-    profile->set_name(each.name);
-    profile->set_summary(each.summary);
-    *profile->mutable_pipeline() = encoded(each.pipeline);
-    profile->set_is_default(each.is_default);
-    if (each.weights) {
-      *profile->mutable_weights() = encoded(*each.weights);
-    }
-    profile->set_allow_unmatched(each.allow_unmatched);
-  }
-  for (const auto& each : value.readers) {
-    auto* reader = message.add_readers();
-    reader->set_name(each.name);
-    reader->set_summary(each.summary);
-    put_all(each.suffixes, reader->mutable_suffixes());
-    put_all(each.json_keys, reader->mutable_json_keys());
-    reader->set_source_kind(static_cast<v1::SourceKind>(each.source_kind));
-    reader->set_distribution(each.distribution);
-    reader->set_distribution_version(each.distribution_version);
-  }
-  return message;
-}
-
-v1::GetServerInfoResponse encoded(const ServerInfo& value) {
-  v1::GetServerInfoResponse message;
-  message.set_version(value.version);
-  message.set_api_version(value.api_version);
-  message.set_plugin_api_version(value.plugin_api_version);
-  auto* limits = message.mutable_limits();
-  SET_IF_KNOWN(value.limits, *limits, max_request_bytes);
-  SET_IF_KNOWN(value.limits, *limits, max_objects);
-  SET_IF_KNOWN(value.limits, *limits, max_concurrent_matches);
-  SET_IF_KNOWN(value.limits, *limits, max_waiting);
-  if (value.limits.max_time_budget) {
-    *limits->mutable_max_time_budget() = encoded(*value.limits.max_time_budget);
-  }
-  if (value.limits.max_wait) {
-    *limits->mutable_max_wait() = encoded(*value.limits.max_wait);
-  }
-  if (value.limits.default_time_budget) {
-    *limits->mutable_default_time_budget() = encoded(*value.limits.default_time_budget);
-  }
-  SET_IF_KNOWN(value.limits, *limits, max_matches_per_caller);
-  SET_IF_KNOWN(value.limits, *limits, max_requests_per_minute);
-  SET_IF_KNOWN(value.limits, *limits, max_comparisons);
-  SET_IF_KNOWN(value.limits, *limits, max_candidates);
-  *message.mutable_uptime() = encoded(value.uptime);
-  return message;
+std::set<std::string> forget_unknown(Message& message) {
+  std::set<std::string> forgotten;
+  forget_unknown(message, forgotten);
+  return forgotten;
 }
 
 }  // namespace sketchmatch::test

@@ -83,6 +83,52 @@ class FakeServer::Scenes final : public v1::SceneService::Service {
     return fake_.take(*request, *context);
   }
 
+  grpc::Status PutScene(grpc::ServerContext* context, const v1::PutSceneRequest* request,
+                        v1::PutSceneResponse* answer) override {
+    *answer = fake_.put;
+    return fake_.take(*request, *context);
+  }
+
+  grpc::Status GetScene(grpc::ServerContext* context, const v1::GetSceneRequest* request,
+                        v1::GetSceneResponse* answer) override {
+    *answer = fake_.got;
+    return fake_.take(*request, *context);
+  }
+
+  grpc::Status ListScenes(grpc::ServerContext* context, const v1::ListScenesRequest* request,
+                          v1::ListScenesResponse* answer) override {
+    if (!fake_.pages.empty()) {
+      *answer = fake_.pages.front();
+      fake_.pages.erase(fake_.pages.begin());
+    }
+    return fake_.take(*request, *context);
+  }
+
+  grpc::Status UpdateScene(grpc::ServerContext* context, const v1::UpdateSceneRequest* request,
+                           v1::UpdateSceneResponse* answer) override {
+    *answer = fake_.updated;
+    return fake_.take(*request, *context);
+  }
+
+  grpc::Status DeleteScene(grpc::ServerContext* context, const v1::DeleteSceneRequest* request,
+                           v1::DeleteSceneResponse* /*answer*/) override {
+    return fake_.take(*request, *context);
+  }
+
+ private:
+  FakeServer& fake_;
+};
+
+class FakeServer::Transfers final : public v1::TransferService::Service {
+ public:
+  explicit Transfers(FakeServer& fake) : fake_(fake) {}
+
+  grpc::Status Transfer(grpc::ServerContext* context, const v1::TransferRequest* request,
+                        v1::TransferResponse* answer) override {
+    *answer = fake_.carried;
+    return fake_.take(*request, *context);
+  }
+
  private:
   FakeServer& fake_;
 };
@@ -112,6 +158,7 @@ FakeServer::FakeServer(int port)
     : events(small_match()),
       matches_(std::make_unique<Matches>(*this)),
       scenes_(std::make_unique<Scenes>(*this)),
+      transfers_(std::make_unique<Transfers>(*this)),
       catalog_(std::make_unique<Catalog>(*this)) {
   info.set_api_version("sketchmatch.v1");
   grpc::EnableDefaultHealthCheckService(true);
@@ -120,6 +167,7 @@ FakeServer::FakeServer(int port)
                            &port_);
   builder.RegisterService(matches_.get());
   builder.RegisterService(scenes_.get());
+  builder.RegisterService(transfers_.get());
   builder.RegisterService(catalog_.get());
   server_ = builder.BuildAndStart();
   server_->GetHealthCheckService()->SetServingStatus("sketchmatch.v1.MatchService", true);

@@ -31,6 +31,11 @@ class FakeServer {
   /// What it answers.
   std::vector<v1::MatchResponse> events;
   v1::SegmentResponse segments;
+  v1::PutSceneResponse put;
+  v1::GetSceneResponse got;
+  std::vector<v1::ListScenesResponse> pages;
+  v1::UpdateSceneResponse updated;
+  v1::TransferResponse carried;
   v1::ListAlgorithmsResponse catalogue;
   v1::GetServerInfoResponse info;
   /// Whether a match goes on with its first progress until somebody stops it.
@@ -56,6 +61,7 @@ class FakeServer {
  private:
   class Matches;
   class Scenes;
+  class Transfers;
   class Catalog;
 
   std::optional<std::size_t> take_break();
@@ -72,6 +78,7 @@ class FakeServer {
   int port_ = 0;
   std::unique_ptr<Matches> matches_;
   std::unique_ptr<Scenes> scenes_;
+  std::unique_ptr<Transfers> transfers_;
   std::unique_ptr<Catalog> catalog_;
   std::unique_ptr<grpc::Server> server_;
 };

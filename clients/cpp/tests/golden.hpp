@@ -4,6 +4,8 @@
 
 #include <google/protobuf/message.h>
 
+#include <memory>
+#include <set>
 #include <string>
 
 namespace sketchmatch::test {
@@ -20,6 +22,13 @@ Message golden(const std::string& name) {
   read_golden(name, message);
   return message;
 }
+
+/// Returns the names of all golden messages.
+std::set<std::string> golden_names();
+
+/// Returns a golden message, whatever its type.
+/// @throws std::runtime_error If the headers of the raw stubs have no such type.
+std::unique_ptr<google::protobuf::Message> any_golden(const std::string& name);
 
 /// Returns a message in protobuf's text format, in which equal messages are equal.
 std::string as_text(const google::protobuf::Message& message);

@@ -80,6 +80,84 @@ TEST_F(Real, ASketchIsSegmented) {
   EXPECT_EQ(found.scene.objects.at(2).label, "plant");
 }
 
+TEST_F(Real, ASceneIsKeptRelabelledAndForgotten) {
+  const auto known = client();
+  const auto put = known.put_scene(sketch());
+  EXPECT_TRUE(put.created);
+  EXPECT_FALSE(known.put_scene(sketch()).created);
+  const auto& name = put.stored_scene.name;
+  EXPECT_EQ(known.match(sources::stored_scene(name), map()).object_map().at(0), 6U);
+
+  const auto other = known.update_scene(name, {{2, "cactus"}, {3, ""}});
+  EXPECT_NE(other.name, name);
+  EXPECT_EQ(other.scene.objects.at(2).label, "cactus");
+  EXPECT_EQ(other.scene.objects.at(3).label, "");
+  const auto got = known.get_scene(name, true);
+  EXPECT_EQ(got.stored_scene.scene.objects.at(2).label, "plant");
+  ASSERT_TRUE(got.source);
+  EXPECT_EQ(known.put_scene(*got.source).stored_scene.name, name);
+
+  const auto listed = known.list_scenes();
+  ASSERT_EQ(listed.size(), 2U);
+  EXPECT_EQ(listed.at(0).name, other.name);
+  EXPECT_EQ(listed.at(0).object_count, 8U);
+  known.delete_scene(name);
+  known.delete_scene(other.name);
+  EXPECT_TRUE(known.list_scenes().empty());
+  EXPECT_THROW(static_cast<void>(known.get_scene(name)), NotFoundError);
+  EXPECT_THROW(known.delete_scene(name), NotFoundError);
+  EXPECT_THROW(static_cast<void>(known.match(sources::stored_scene(name), map())), NotFoundError);
+}
+
+TEST_F(Real, AServerWithoutAStoreSaysSo) {
+  ClientOptions options;
+  options.root_certificates = variable("CA");
+  options.token_file = variable("TOKEN_FILE");
+  EXPECT_THROW(static_cast<void>(Client(variable("TLS_ADDRESS"), options).list_scenes()),
+               StoreError);
+}
+
+TEST_F(Real, FeaturesAreCarriedThroughTheObjectsThatAreKnown) {
+  const auto square = [](double left, double low, double side) -> Ring {
+    return {{left, low}, {left + side, low}, {left + side, low + side}, {left, low + side}};
+  };
+  TransferOptions options;
+  options.object_map = {{0, 1}, {1, 0}, {2, 2}};
+  const auto carried = client().transfer(
+      sources::polygons({square(0, 0, 1), square(6, 0, 1), square(0, 4, 1)}),
+      sources::polygons({square(22, 10, 2), square(10, 10, 2), square(10, 18, 2)}),
+      {{"dock", Point{3, 2}}, {"way", Route{{{1, 2}, {5, 2}}, {0.5, 0.25}}}}, options);
+  EXPECT_FALSE(carried.match);
+  EXPECT_EQ(carried.object_map(), options.object_map);
+  ASSERT_EQ(carried.features.size(), 2U);
+  EXPECT_EQ(carried.features.at(0).feature.name, "dock");
+  const auto dock = std::get<Point>(carried.features.at(0).feature.kind);
+  EXPECT_NEAR(dock.x, 16.0, 1e-6);
+  EXPECT_NEAR(dock.y, 14.0, 1e-6);
+  EXPECT_NEAR(std::get<Route>(carried.features.at(1).feature.kind).points.back().x, 20.0, 1e-6);
+  EXPECT_EQ(std::get<Route>(carried.features.at(1).feature.kind).speeds_meters_per_second.front(),
+            0.5);
+  EXPECT_NEAR(carried.warp.scale, 2.0, 1e-6);
+
+  options.object_map[3] = 0;
+  try {
+    static_cast<void>(client().transfer(sketch(), map(), {{"dock", Point{3, 2}}}, options));
+    FAIL();
+  } catch (const InvalidRequestError& error) {
+    EXPECT_EQ(error.field().find("object_map"), 0U);
+  }
+}
+
+TEST_F(Real, FeaturesAreCarriedThroughAMatch) {
+  const auto carried = client().transfer(sketch(), map(), {{"dock", Point{300, -200}}});
+  ASSERT_TRUE(carried.match);
+  EXPECT_EQ(carried.object_map(),
+            (ObjectMap{{0, 6}, {1, 4}, {2, 7}, {3, 5}, {4, 1}, {5, 0}, {6, 2}, {7, 3}}));
+  EXPECT_EQ(carried.warp.weights.size(), 8U);
+  EXPECT_EQ(carried.features.back().feature.name, "dock");
+  EXPECT_EQ(carried.features.back().lines.at(0).deviations.size(), 1U);
+}
+
 TEST_F(Real, TheCatalogueAndTheInfoAreRead) {
   const auto catalogue = client().algorithms();
   EXPECT_GT(catalogue.algorithms.size(), 10U);

@@ -420,7 +420,8 @@ class Client:
             Seconds after which the call fails.
         **options
             The object map where it is known, direction, radius …, and all that a match takes but
-            ``alternatives``: :class:`TransferOptions`.
+            ``alternatives``, ``request_id``, ``keep_running`` and ``priority``:
+            :class:`TransferOptions`.
 
         Returns
         -------

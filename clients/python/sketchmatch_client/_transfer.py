@@ -21,6 +21,7 @@ _DIRECTIONS = {
     "sketch-to-map": transfer_service_pb2.TRANSFER_DIRECTION_SKETCH_TO_MAP,
     "map-to-sketch": transfer_service_pb2.TRANSFER_DIRECTION_MAP_TO_SKETCH,
 }
+_FOR_MATCHES = ("alternatives", "request_id", "keep_running", "priority")
 _Y_AXES = {"up": source_pb2.Y_AXIS_UP, "down": source_pb2.Y_AXIS_DOWN}
 
 
@@ -67,12 +68,13 @@ def transfer_request(
     """
     given: dict[str, Any] = dict(options)
     own = {name: given.pop(name) for name in _FIELDS if name in given}
-    if given.pop("alternatives", None) is not None:
-        raise InvalidRequestError(
-            "alternatives is for a match; a transfer has one answer",
-            "INVALID_FIELD",
-            "alternatives",
-        )
+    for name in _FOR_MATCHES:
+        if given.pop(name, None) is not None:
+            raise InvalidRequestError(
+                f"{name} is for matches; a transfer has one answer, and no name: leave it out",
+                "INVALID_FIELD",
+                name,
+            )
     matching = match_request(sketch, map, **given)
     # What both requests have has the same numbers in both.
     request = TransferRequest.FromString(matching.SerializeToString())

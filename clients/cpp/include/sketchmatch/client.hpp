@@ -13,8 +13,11 @@
 #include <sketchmatch/options.hpp>
 #include <sketchmatch/scene.hpp>
 #include <sketchmatch/sources.hpp>
+#include <sketchmatch/stored.hpp>
 #include <sketchmatch/summary.hpp>
+#include <sketchmatch/transfer.hpp>
 #include <string>
+#include <vector>
 
 namespace grpc {
 class Channel;
@@ -173,6 +176,52 @@ class Client {
   /// Finds the objects of one source, without a match.
   [[nodiscard]] Segmentation segment(const Source& source, const SegmentOptions& options = {},
                                      const CallOptions& call = {}) const;
+
+  /// Finds the objects of a source, and has the server keep them for later matches:
+  /// `sources::stored_scene` makes their name a sketch or map.
+  /// @throws StoreError If the server keeps no scenes, or cannot.
+  // Whoever knows the name already need not look.
+  // NOLINTNEXTLINE(modernize-use-nodiscard)
+  PutScene put_scene(const Source& source, const SegmentOptions& options = {},
+                     const CallOptions& call = {}) const;
+
+  /// Returns a scene that one has put.
+  /// @param name Its name.
+  /// @param include_source Whether the source is wanted, too; it may be large.
+  /// @param call Timeout and cancellation.
+  /// @throws NotFoundError If the server keeps no such scene for this caller.
+  [[nodiscard]] GotScene get_scene(const std::string& name, bool include_source = false,
+                                   const CallOptions& call = {}) const;
+
+  /// Returns what there is to say of all scenes that one has put, the latest first. The timeout is
+  /// for all of it.
+  [[nodiscard]] std::vector<SceneSummary> list_scenes(const CallOptions& call = {}) const;
+
+  /// Gives objects of a kept scene other labels.
+  /// @param name Of the scene, which stays as it is.
+  /// @param labels By index, from 0; an empty one takes the label away.
+  /// @param call Timeout and cancellation.
+  /// @return The scene with these labels, under a name of its own.
+  /// @throws NotFoundError As `get_scene`.
+  [[nodiscard]] StoredScene update_scene(const std::string& name, const ObjectLabels& labels,
+                                         const CallOptions& call = {}) const;
+
+  /// Forgets a scene; it stays for others who have put it.
+  /// @throws NotFoundError As `get_scene`.
+  void delete_scene(const std::string& name, const CallOptions& call = {}) const;
+
+  /// Carries points, routes and zones from a sketch to a map, back, or from an old map to a new
+  /// one, which is then given as the map.
+  /// @param sketch What the person drew, or the old map.
+  /// @param map What the robot knows.
+  /// @param features What is carried; a route that is drawn in the sketch is, without being asked.
+  /// @param options Which object is which, where that is known, direction, radius, and all that a
+  ///   match takes but what is about its name.
+  /// @param call Timeout and cancellation.
+  [[nodiscard]] Transfer transfer(const Source& sketch, const Source& map,
+                                  const std::vector<Feature>& features = {},
+                                  const TransferOptions& options = {},
+                                  const CallOptions& call = {}) const;
 
   /// Returns the algorithms that the server offers, its profiles, readers and plugins.
   [[nodiscard]] Catalogue algorithms(const CallOptions& call = {}) const;

@@ -10,6 +10,8 @@
 #include <sketchmatch/options.hpp>
 #include <sketchmatch/scene.hpp>
 #include <sketchmatch/sources.hpp>
+#include <sketchmatch/stored.hpp>
 #include <sketchmatch/summary.hpp>
+#include <sketchmatch/transfer.hpp>
 #include <sketchmatch/value.hpp>
 #include <sketchmatch/version.hpp>
