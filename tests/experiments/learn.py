@@ -60,7 +60,7 @@ SKETCHES = {
 _FEWEST = 4
 """How many objects a sketch has at least that is gone on with."""
 
-CHECKED = 800
+CHECKED = 1000
 """Sketches beyond those for ``posterior`` that its probabilities are checked with."""
 
 THESIS = (1.0, 1.0, 1.0)
