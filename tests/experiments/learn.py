@@ -8,7 +8,8 @@ and ``posterior.json`` beside that module:
 - ``odds``: price, and what makes probabilities of the thesis's ζ, which the judge ``confidence``
   has;
 - ``posterior``: what evidence counts for with the judge ``posterior``, by
-  :mod:`tests.experiments.posterior`;
+  :mod:`tests.experiments.posterior`: first of places and maps, from few numbers of each line, then
+  of maps alone, from more of them and from more sketches of other kinds;
 - and how well the probabilities of both hold on yet other sketches.
 """
 
@@ -23,15 +24,18 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from sketchmatch_builtin.judges import calibration
+from tests.experiments.drawings import Drawing
 from tests.experiments.odds import considered_by, errors, learned_odds
 from tests.experiments.posterior import (
     Known,
+    gone_on,
     judged_errors,
     known_of,
     learned_posterior,
     posterior_text,
 )
 from tests.experiments.runs import each_of
+from tests.experiments.training import hall_drawing, inventive_drawing, training_drawing
 
 __all__ = ["LEARNED", "SKETCHES", "THESIS"]
 
@@ -41,7 +45,20 @@ LEARNED = Path(__file__).with_name("learned.json")
 JUDGE = Path(calibration.__file__).with_name("posterior.json")
 """What the judge goes by."""
 
-SKETCHES = {"odds": 600, "check": 600, "posterior": 13000, "many": 300}
+SKETCHES = {
+    "odds": 600,
+    "check": 600,
+    "posterior": 13000,
+    "many": 300,
+    "again": 1200,
+    "halls": 2300,
+    "inventive": 1500,
+    "anything": 1500,
+}
+"""How many there are; from ``again``, the first ones of ``posterior``, on it goes on with maps."""
+
+_FEWEST = 4
+"""How many objects a sketch has at least that is gone on with."""
 
 CHECKED = 1000
 """Sketches beyond those for ``posterior`` that its probabilities are checked with."""
@@ -75,16 +92,30 @@ def _odds() -> dict[str, Any]:
 
 def _posterior() -> dict[str, Any]:
     few, many = SKETCHES["posterior"], SKETCHES["many"]
-    learned = learned_posterior(_known(range(few)) + _known(range(many), many=True))
+    lavish = partial(training_drawing, many=True)
+    first = learned_posterior(_known(range(few)) + _known(range(many), lavish))
+    learned = gone_on(first, further())
     JUDGE.write_text(posterior_text(learned), encoding="utf-8")
     found = judged_errors(_known(range(few, few + CHECKED)), learned)
     print(found)
     return {"errors": found}
 
 
-def _known(numbers: range, many: bool = False) -> list[Known]:
+def further() -> list[Known]:
+    """Return the sketches that are gone on with: of this place, and of enough to tell something."""
+    kinds: dict[str, Callable[[int], Drawing]] = {
+        "again": training_drawing,
+        "halls": hall_drawing,
+        "inventive": inventive_drawing,
+        "anything": partial(inventive_drawing, anything=True),
+    }
+    every = [each for kind, draw in kinds.items() for each in _known(range(SKETCHES[kind]), draw)]
+    return [each for each in every if not each.elsewhere and len(each.truth) >= _FEWEST]
+
+
+def _known(numbers: range, draw: Callable[[int], Drawing] = training_drawing) -> list[Known]:
     """Return sketches in numbers, showing progress."""
-    every = each_of(partial(known_of, many=many), numbers, "sketches for posterior")
+    every = each_of(partial(known_of, draw=draw), numbers, "sketches for posterior")
     return list(itertools.chain.from_iterable(every))
 
 

@@ -6,6 +6,7 @@ places, and nothing else here needs a library for such.
 References
 ----------
 D. Kingma, J. Ba, "Adam: a method for stochastic optimization", 2015.
+M. Wortsman et al., "Robust fine-tuning of zero-shot models", CVPR 2022.
 """
 
 from __future__ import annotations
@@ -30,6 +31,10 @@ _RATE = 2e-3
 _WARMING = 0.05
 _DECAY = 0.1
 _MOMENTS = 0.9, 0.995
+_KEPT = 0.3
+"""The share of what was begun with in who went on from there: as much as costs nothing on other
+sketches of the same kinds."""
+
 _SCALED_BY = 4000
 """Cases of which the scales of numbers are taken."""
 
@@ -62,13 +67,27 @@ class Case(NamedTuple):
     right: int
 
 
-def fitted_maps(cases: Sequence[Case], seed: int = 0) -> Layers:
-    """Return the layers under which the right maps are likeliest."""
+def fitted_maps(cases: Sequence[Case], seed: int = 0, start: Layers | None = None) -> Layers:
+    """Return the layers under which the right maps are likeliest.
+
+    Parameters
+    ----------
+    cases
+        What to learn from.
+    seed
+        Of what is random.
+    start
+        Layers to go on from, which may know fewer numbers of a line: the first ones of them. What
+        comes of it is a mean of both, which forgets less of what is not among the cases.
+    """
     rng = np.random.default_rng(seed)
     some = [cases[k] for k in rng.permutation(len(cases))[:_SCALED_BY]]
     of_lines = _scaling(np.concatenate([each.lines[each.matched] for each in some]))
     of_maps = _scaling(np.concatenate([each.whole for each in some]))
     of_scenes = _scaling(np.stack([each.scene for each in some]))
+    if start is not None:
+        of_lines[:, : start.of_lines.shape[1]] = start.of_lines
+        of_maps, of_scenes = start.of_maps, start.of_scenes
     known = [_small(each, of_lines, of_maps, of_scenes) for each in cases]
     k, w, s = (one.shape[1] for one in (of_lines, of_maps, of_scenes))
     parameters = {
@@ -80,14 +99,39 @@ def fitted_maps(cases: Sequence[Case], seed: int = 0) -> Layers:
         "direct": np.zeros(w),
         "score": np.ones(1),
     }
+    if start is not None:
+        parameters = _grown(parameters, start)
+    begun = {name: each.copy() for name, each in parameters.items()}
 
     def slopes(at: _Parameters, chosen: IntArray) -> _Parameters:
         small = {name: each.astype(np.float32) for name, each in at.items()}
         return _map_slopes(small, [known[c] for c in chosen])
 
     _descend(parameters, slopes, len(cases), rng, keep=("score",))
+    if start is not None:
+        parameters = {
+            name: each + _KEPT * (begun[name] - each) for name, each in parameters.items()
+        }
     score = float(parameters.pop("score")[0])
     return Layers(of_lines, of_maps, of_scenes, score=score, **parameters)
+
+
+def _grown(fresh: _Parameters, start: Layers) -> _Parameters:
+    """Return what layers know, with as many hidden ones again of lines that know nothing yet."""
+    more = fresh["first"].shape[1]
+    known, scenes = start.of_lines.shape[1], start.of_scenes.shape[1]
+    old = np.zeros((len(fresh["first"]), start.first.shape[1]))
+    old[:known], old[-scenes:] = start.first[:known], start.first[known:]
+    nothing = np.zeros((more, start.second.shape[1]))
+    return {
+        "first": np.hstack([old, fresh["first"]]),
+        "first_bias": np.append(start.first_bias, fresh["first_bias"]),
+        "second": np.vstack([start.second, nothing]),
+        "second_bias": start.second_bias.copy(),
+        "last": start.last.copy(),
+        "direct": start.direct.copy(),
+        "score": np.array([start.score]),
+    }
 
 
 def fitted_place(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from sketchmatch_builtin.histograms.constant import ConstantForce
 from sketchmatch_builtin.judges._described import described
 from sketchmatch_builtin.judges._evidence import (
     JUDGED,
+    OF_PLACES,
     Described,
     line_numbers,
     lost_numbers,
@@ -35,12 +36,13 @@ from sketchmatch_builtin.judges._evidence import (
 )
 from sketchmatch_builtin.judges.calibration import Layers, PlaceLayers, Posterior
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+from tests.experiments.drawings import Drawing
 from tests.experiments.logits import significant
 from tests.experiments.networks import Case, fitted_maps, fitted_place
 from tests.experiments.reliability import reliability
 from tests.experiments.training import training_drawing
 
-__all__ = ["Known", "judged_errors", "known_of", "learned_posterior", "posterior_text"]
+__all__ = ["Known", "gone_on", "judged_errors", "known_of", "learned_posterior", "posterior_text"]
 
 _ENGINE = Engine(default_registry())
 
@@ -78,9 +80,9 @@ class Known:
     truth: IntArray
 
 
-def known_of(number: int, many: bool = False) -> list[Known]:
-    """Return a sketch in numbers; arguments as of :func:`training_drawing`."""
-    drawn = training_drawing(number, many)
+def known_of(number: int, draw: Callable[[int], Drawing] = training_drawing) -> list[Known]:
+    """Return a sketch in numbers: the one of that number, of a kind that somebody draws."""
+    drawn = draw(number)
     scenes = drawn.scene, drawn.map
     compared = finish(_ENGINE.compare(scenes, ConstantForce(), CrossCorrelation()))
     swapped = compared.swapped
@@ -112,7 +114,7 @@ def learned_posterior(cases: Sequence[Known]) -> Posterior:
     found = [each for each in here if each.right >= 0]
     # Each is learned from without relations too, since places are told by such worths.
     maps, bare = (
-        _rounded_layers(fitted_maps([_case(each, related) for each in found]))
+        _rounded_layers(fitted_maps([_case(each, related, OF_PLACES) for each in found]))
         for related in (True, False)
     )
     layers = {True: maps, False: bare}
@@ -143,6 +145,18 @@ def learned_posterior(cases: Sequence[Known]) -> Posterior:
     return Posterior(
         maps, bare, place, _rounded(labels), _rounded(lost), round(float(np.mean(luck)), 2)
     )
+
+
+def gone_on(first: Posterior, cases: Sequence[Known]) -> Posterior:
+    """Return what was learned first, and of maps also from more sketches of this place.
+
+    These tell of each line what the others beside it are like as well. How often the right map is
+    not known, and of places, nothing more is learned: these sketches are of harder kinds.
+    """
+    found = [each for each in cases if each.right >= 0]
+    maps = _rounded_layers(fitted_maps([_case(each, True) for each in found], start=first.maps))
+    labels = _labels(found, {True: maps, False: first.bare})
+    return first._replace(maps=maps, labels=_rounded(labels))
 
 
 def judged_errors(cases: Sequence[Known], learned: Posterior) -> dict[str, float]:
@@ -178,11 +192,11 @@ def _counts(case: Known) -> bool:
     return case.elsewhere and case.described.drawn > 5
 
 
-def _case(known: Known, related: bool) -> Case:
-    """Return a sketch as the fit of maps wants it."""
+def _case(known: Known, related: bool, numbers: int | None = None) -> Case:
+    """Return a sketch as the fit of maps wants it, with so many numbers of each line."""
     found = known.described
     return Case(
-        line_numbers(found.measured, related).astype(np.float32),
+        line_numbers(found.measured, related)[:, :, :numbers].astype(np.float32),
         found.measured.matched,
         map_numbers(found.measured, found.drawn),
         scene_numbers(found),

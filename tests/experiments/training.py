@@ -1,9 +1,9 @@
 """Sketches to learn from: of many kinds of maps, by people of many kinds.
 
 How people draw is not known well enough to learn from one model of it, so each sketch has
-deviations of its own, and each map things, sizes and an order of its own; a quarter of all are of
-:mod:`tests.experiments.people`. The study measures with :mod:`tests.experiments.generators`,
-which are others.
+deviations of its own, and each map things, sizes and an order of its own; some are of
+:mod:`tests.experiments.people`, and others of :mod:`tests.experiments.halls`. The study measures
+with :mod:`tests.experiments.generators`, which are others.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ from sketchmatch.errors import InvalidInputError
 from sketchmatch.model import FloatArray, IntArray, Scene, SceneObject
 from sketchmatch.testing import random_scene
 from tests.experiments.drawings import Drawing
+from tests.experiments.halls import hall, recalled
 from tests.experiments.people import Person, Shapes, remembered, with_extras
 
-__all__ = ["training_drawing"]
+__all__ = ["hall_drawing", "inventive_drawing", "training_drawing"]
 
 _BY_PEOPLE = 0.25
 _ELSEWHERE = 0.35
@@ -29,6 +30,7 @@ _DRAWN = (2, 3, 4, 5, 6, 7, 8, 8, 9, 10, 12)
 _MANY_OBJECTS = (20, 28, 36, 48, 60)
 _MANY_DRAWN = (14, 18, 24, 32, 45)
 _EXTRAS = (0.65, 0.28, 0.07)
+_INVENTED = (0.4, 0.4, 0.2)
 _NEIGHBOURS = 0.8
 _STRENGTHS = (0.5, 0.7, 0.95, 1.05, 1.2)
 _TRIES = 200
@@ -57,12 +59,51 @@ def training_drawing(number: int, many: bool = False) -> Drawing:
     count = min(len(place), int(rng.choice(_MANY_DRAWN if many else _DRAWN)))
     kept = _seen(place, count, rng)
     extra = int(rng.choice(3, p=_EXTRAS)) if count > 2 else 0
-    if by_people:
-        sketch, truth = _by_people(place, kept, extra, rng)
-    else:
-        sketch, truth = _by_anybody(place, kept, extra, rng)
+    sketch, truth = (_by_people if by_people else _by_anybody)(place, kept, extra, rng)
     order = rng.permutation(len(sketch))
     scene = Scene(tuple(sketch.objects[k] for k in order))
+    return Drawing(scene, map_, np.full(len(order), -1) if elsewhere else truth[order])
+
+
+def inventive_drawing(number: int, anything: bool = False) -> Drawing:
+    """Return a sketch of this place, as :func:`training_drawing` does, by who invents more.
+
+    Parameters
+    ----------
+    number
+        Which one.
+    anything
+        Whether what is invented may be like nothing that is there.
+    """
+    rng = np.random.default_rng((161803, number, int(anything)) if anything else (161803, number))
+    by_people = rng.random() < _BY_PEOPLE
+    objects = int(rng.choice(_OBJECTS[3:10] if by_people else _OBJECTS[3:]))
+    map_ = (random_scene if by_people else _strewn)(rng, objects)
+    kept = _seen(map_, min(objects, int(rng.choice(_DRAWN[3:]))), rng)
+    extra = int(rng.choice(3, p=_INVENTED))
+    if by_people:
+        sketch, truth = _by_people(map_, kept, extra, rng)
+    else:
+        sketch, truth = _by_anybody(map_, kept, extra, rng, anything)
+    order = rng.permutation(len(sketch))
+    return Drawing(Scene(tuple(sketch.objects[k] for k in order)), map_, truth[order])
+
+
+def hall_drawing(number: int) -> Drawing:
+    """Return a sketch of a hall by somebody who recalls it, as :func:`training_drawing` does."""
+    rng = np.random.default_rng((141421, number))
+    objects = int(rng.choice(_OBJECTS[2:]))
+    map_ = hall(rng, objects)
+    elsewhere = rng.random() < _ELSEWHERE
+    place = hall(rng, max(4, round(objects * rng.uniform(0.7, 1.4)))) if elsewhere else map_
+    count = min(len(place), int(rng.choice(_DRAWN[2:])))
+    kept = _seen(place, count, rng)
+    things = [place.objects[k].rings[0] for k in kept]
+    added = _extras(place, things, int(rng.choice(3, p=_INVENTED)), rng)
+    truth = np.array([*kept, *[-1] * len(added)])
+    order = rng.permutation(len(truth))
+    every = [*things, *added]
+    scene = Scene.from_polygons(recalled([every[k] for k in order], place, rng))
     return Drawing(scene, map_, np.full(len(order), -1) if elsewhere else truth[order])
 
 
@@ -148,11 +189,15 @@ def _outline(rng: np.random.Generator, shape: int, size: float, aspect: float) -
 
 
 def _by_anybody(
-    place: Scene, kept: IntArray, extra: int, rng: np.random.Generator
+    place: Scene,
+    kept: IntArray,
+    extra: int,
+    rng: np.random.Generator,
+    anything: bool = False,
 ) -> tuple[Scene, IntArray]:
     """Draw with deviations of this sketch's own."""
     things = [place.objects[k].rings[0] for k in kept]
-    added = _extras(place, things, extra, rng)
+    added = _extras(place, things, extra, rng, anything)
     truth = np.array([*kept, *[-1] * len(added)])
     strength = rng.uniform(0.3, 1.05)
     while True:
@@ -163,9 +208,13 @@ def _by_anybody(
 
 
 def _extras(
-    place: Scene, things: Sequence[FloatArray], count: int, rng: np.random.Generator
+    place: Scene,
+    things: Sequence[FloatArray],
+    count: int,
+    rng: np.random.Generator,
+    anything: bool = False,
 ) -> list[FloatArray]:
-    """Return things like those of the place, where nothing is."""
+    """Return things like those of the place, or of any kind about as large, where nothing is."""
     corners = np.concatenate(things)
     low, high = corners.min(axis=0), corners.max(axis=0)
     there = [item.polygon for item in place.objects]
@@ -174,6 +223,9 @@ def _extras(
         if len(found) == count:
             break
         like = place.objects[rng.integers(len(place))].rings[0]
+        if anything:
+            size = math.sqrt(shapely.Polygon(like).area)
+            like = _outline(rng, *_kind(rng, 0.3, 0.4)) * size
         ring = (like - like.mean(axis=0)) @ _turning(rng.uniform(0.0, 7.0))
         ring = ring * math.exp(rng.normal(0.0, 0.2)) + rng.uniform(low, high)
         outline = shapely.Polygon(ring)

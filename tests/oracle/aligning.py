@@ -145,14 +145,20 @@ def lines(partners, drawn, mapped, tolerances):
     """Return what places, sizes and shapes say of each object with a partner, by name."""
     u, t, growth = best_pose(partners, drawn, mapped, tolerances)
     pairs = [(i, j) for i, j in enumerate(partners) if j >= 0]
+    z = np.array([drawn.places[i] for i, _ in pairs])
+    off = np.array([(mapped.places[j] - u * drawn.places[i] - t) / u for i, j in pairs])
+    straightened = _bend(z, off / drawn.spacing, drawn.spacing)[1]
+    spread = (abs(z - z.mean()) ** 2).sum()
     found = {}
-    for i, j in pairs:
+    for k, (i, j) in enumerate(pairs):
+        free = 1.0 - 1.0 / len(pairs) - abs(z[k] - z.mean()) ** 2 / spread
+        nearest = min(abs(mapped.places[j] - each) for each in np.delete(mapped.places, j))
         left = (mapped.places[j] - u * drawn.places[i] - t) / u / drawn.spacing
-        others = [(k, g) for k, g in pairs if k != i]
+        others = [line for line in pairs if line != (i, j)]
         others.sort(key=lambda line: abs(drawn.places[line[0]] - drawn.places[i]))
         ways = []
-        for k, g in others:
-            way = drawn.places[k] - drawn.places[i]
+        for h, g in others:
+            way = drawn.places[h] - drawn.places[i]
             ways.append(min(abs((mapped.places[g] - mapped.places[j]) / u / way - 1.0) ** 2, 1e4))
         found[i] = {
             "place": abs(left) ** 2,
@@ -161,6 +167,9 @@ def lines(partners, drawn, mapped, tolerances):
             "round": abs(mapped.shapes[j]),
             "way": np.mean(ways),
             "near": np.mean(ways[:2]),
+            "alone": abs(left) ** 2 / max(free, 0.2) ** 2,
+            "bent": abs(straightened[k]) ** 2,
+            "room": (nearest / abs(u) / drawn.spacing) ** 2,
         }
     return found
 
@@ -177,7 +186,7 @@ def whole(partners, drawn, mapped, tolerances):
         "matched": len(pairs),
         **_surrounded(partners, mapped, abs(u) * drawn.spacing),
         "offset": min((growth - 2.0 * math.log(abs(u))) ** 2, 6.0),
-        "bend": _bend(z, left / drawn.spacing, drawn.spacing),
+        "bend": _bend(z, left / drawn.spacing, drawn.spacing)[0],
     }
 
 
@@ -198,7 +207,7 @@ def object_pair(a, b, objects):
 
 
 def _bend(z, left, unit):
-    """Return how far a stretch and a growth to one side lead, by ridge regression."""
+    """Return how far a stretch and a growth to one side lead, by ridge regression, and the rest."""
     z = z - z.mean()
     extent = math.sqrt((abs(z) ** 2).mean())
     z, ratio = z / extent, extent / unit
@@ -210,7 +219,8 @@ def _bend(z, left, unit):
     ridge = np.diag([1e-3] * 2 + [math.hypot(1e-3, 0.2 / (0.12 * ratio))] * 4)
     sought = np.concatenate([(left * weights).real, (left * weights).imag, np.zeros(6)])
     found = np.linalg.lstsq(np.concatenate([stacked, ridge]), sought, rcond=None)[0]
-    return min((found[2:] ** 2).sum() / (0.12 * ratio) ** 2, 9.0)
+    rest = left - np.array(effects).T @ found
+    return min((found[2:] ** 2).sum() / (0.12 * ratio) ** 2, 9.0), rest
 
 
 def _surrounded(partners, mapped, unit):

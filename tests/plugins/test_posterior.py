@@ -39,7 +39,7 @@ from tests.plugins.test_align import seen_as, sloppy, strewn
 from tests.searching import relations_of
 from tests.strategies import random_table
 
-OF_LINE, OF_BARE, OF_MAP, OF_SCENE, PLACE, LOST = 11, 9, 8, 3, 38, 5
+OF_LINE, OF_BARE, OF_MAP, OF_SCENE, PLACE, LOST = 22, 9, 8, 3, 38, 5
 
 
 def learned(rng=None, scale=0.3, width=3, score=1.0, constant=2.0, lost=-2.0, luck=0.4):
@@ -295,18 +295,42 @@ def test_the_same_is_judged_the_same():
 
 def test_lines_are_described_by_what_is_measured_of_them():
     row = np.zeros((1, 2, len(Line)))
-    row[0, 0] = 0.04, -0.5, 0.09, 0.7, 0.01, 0.2, 0.3, 0.4
-    found = line_numbers(Measured(row, np.zeros((1, 8)), np.array([[True, False]])), related=True)
+    row[0, 0] = 0.04, -0.5, 0.09, 0.7, 0.01, 0.2, 0.3, 0.4, 0.05, 0.02, 1.5
+    one = np.array([[True, False]])
+    found = line_numbers(Measured(row, np.zeros((1, 8)), one), related=True)
     ln = math.log
     shape = ln(0.093), 0.7, ln(0.31), ln(0.41), ln(0.013), 0.2
-    np.testing.assert_allclose(found[0, 0], [1.0, ln(0.043), 0.2, ln(0.253), -0.5, *shape])
+    # Beside none the others deviate by nothing.
+    beside = [ln(1.0 + 100.0 * each) for each in (0.05, 0.02, 0.25, 0.09, 0.3, 0.4, 0.01, 0.2)]
+    alone = ln(0.053), ln(0.023), ln(1.51)
+    np.testing.assert_allclose(
+        found[0, 0], [1.0, ln(0.043), 0.2, ln(0.253), -0.5, *shape, *beside, *alone]
+    )
     np.testing.assert_array_equal(found[0, 1], np.zeros(OF_LINE))
     bare = line_numbers(Measured(row, np.zeros((1, 8)), np.array([[True, True]])), related=False)
     np.testing.assert_array_equal(bare[0, 0], found[0, 0, :OF_BARE])
     far = row.copy()
     far[0, 0, [Line.PLACE, Line.SIZE]] = 100.0, 7.0
-    bounded = line_numbers(Measured(far, np.zeros((1, 8)), np.array([[True, False]])), True)
+    bounded = line_numbers(Measured(far, np.zeros((1, 8)), one), True)
     np.testing.assert_allclose(bounded[0, 0, [2, 4]], [3.0, 3.0])
+
+
+def test_a_deviation_is_set_beside_those_of_the_other_lines():
+    rows = np.zeros((2, 4, len(Line)))
+    rows[:, :, Line.ALONE] = 0.99, 0.05, 0.13, 500.0
+    rows[:, :, Line.SIZE] = -1.0, 0.3, -0.5, 0.0
+    matched = np.array([[True, True, True, False], [True, True, True, True]])
+    found = line_numbers(Measured(rows, np.zeros((2, 8)), matched), related=True)
+    ln = math.log
+    np.testing.assert_allclose(
+        found[0, :, 11], [ln(1.0 / 0.1), ln(0.06 / 0.57), ln(0.14 / 0.53), 0.0]
+    )
+    np.testing.assert_allclose(
+        found[0, :, 13], [ln(1.01 / 0.18), ln(0.1 / 0.635), ln(0.26 / 0.555), 0.0]
+    )
+    # One that is far out counts no more than nine among the others.
+    assert found[1, 1, 11] == pytest.approx(ln(0.06 / (0.01 + (0.99 + 0.13 + 9.0) / 3.0)))
+    assert found[1, 3, 11] == pytest.approx(ln(500.01 / (0.01 + (0.99 + 0.05 + 0.13) / 3.0)))
 
 
 def test_maps_are_described_by_what_is_measured_of_them_and_by_shares():
@@ -405,7 +429,7 @@ def test_a_place_is_described_by_how_far_its_best_map_exceeds_chance_and_rivals(
     by_object = np.array([most, mean, lead, ahead]) / 4.0
     np.testing.assert_allclose(found[4:12], np.column_stack([by_object, 4.0 * by_object]).ravel())
     np.testing.assert_allclose(found[12:18], [-0.25, 1.0, 0.25, 0.5, 0.3, 0.7])
-    lines = line_numbers(measured_, True)[0, :, 1:]
+    lines = line_numbers(measured_, True)[0, :, 1:11]
     np.testing.assert_allclose(found[18:], [*lines.mean(axis=0), *lines.max(axis=0)])
 
 

@@ -7,12 +7,18 @@ import pytest
 import shapely
 
 from sketchmatch_builtin.alignment import Line, Measured, Whole
-from sketchmatch_builtin.judges._evidence import JUDGED, Described, weighed
+from sketchmatch_builtin.judges._evidence import JUDGED, Described, weighed, worths
 from sketchmatch_builtin.judges.calibration import posterior_of
-from tests.experiments import networks, posterior, training
+from tests.experiments import halls, networks, posterior, training
 from tests.experiments.networks import Case, fitted_place
-from tests.experiments.posterior import Known, known_of, learned_posterior, posterior_text
-from tests.experiments.training import training_drawing
+from tests.experiments.posterior import (
+    Known,
+    gone_on,
+    known_of,
+    learned_posterior,
+    posterior_text,
+)
+from tests.experiments.training import hall_drawing, inventive_drawing, training_drawing
 from tests.tools import ROOT
 
 NUMBERS_OF_DRAWINGS = range(60)
@@ -104,6 +110,72 @@ def test_things_of_a_floor_lie_apart():
         assert len(outlines) == 12
 
 
+def test_things_of_a_hall_lie_apart_and_are_as_many_as_wanted():
+    alike = []
+    for seed in range(12):
+        objects = (4, 8, 20)[seed % 3]
+        scene = halls.hall(np.random.default_rng(seed), objects)
+        outlines = [item.polygon for item in scene.objects]
+        assert len(outlines) == objects
+        for k, each in enumerate(outlines[:-1]):
+            assert shapely.distance(each, outlines[k + 1 :]).min() > 0.05
+        areas = np.sort([item.area for item in scene.objects])
+        alike.append(np.isclose(areas[1:], areas[:-1], rtol=1e-9).any())
+    assert np.mean(alike) > 0.5  # much in them is alike
+
+
+def test_halls_are_recalled_about_as_they_are_and_in_their_order():
+    agreeing = []
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        place = halls.hall(rng, 12)
+        things = [item.rings[0] for item in place.objects]
+        drawn = halls.recalled(things, place, rng)
+        outlines = [shapely.Polygon(ring) for ring in drawn]
+        assert not any(a.intersects(b) for k, a in enumerate(outlines) for b in outlines[:k])
+        z, w = (
+            np.array([complex(*shapely.Polygon(ring).centroid.coords[0]) for ring in rings])
+            for rings in (things, drawn)
+        )
+        z, w = z - z.mean(), w - w.mean()
+        agreeing.append(abs(np.vdot(z, w)) / np.linalg.norm(z) / np.linalg.norm(w))
+    assert min(agreeing) > 0.8
+    assert 0.93 < np.mean(agreeing) < 0.998  # and not as they are
+
+
+def test_of_halls_and_of_the_inventive_the_truth_is_a_partial_map():
+    for draw, most in ((hall_drawing, 0.45), (inventive_drawing, 0.0)):
+        drawings = [draw(number) for number in range(30)]
+        again = draw(7)
+        for one, two in zip(again.scene.objects, drawings[7].scene.objects, strict=True):
+            np.testing.assert_array_equal(one.rings[0], two.rings[0])
+        extras = []
+        for each in drawings:
+            assert each.truth.shape == (len(each.scene),)
+            assert each.truth.max() < len(each.map)
+            known = each.truth[each.truth >= 0]
+            assert len(set(known.tolist())) == len(known)
+            if len(known):
+                extras.append(len(each.truth) - len(known))
+        assert 1.0 - len(extras) / len(drawings) <= most
+        assert set(extras) == {0, 1, 2}
+
+
+def test_of_what_is_like_anything_few_are_like_what_is_there():
+    def corners(anything):
+        rng = np.random.default_rng(0)
+        box = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+        place = training.Scene.from_polygons(
+            [9.0 * np.array([k % 3, k // 3]) + box for k in range(6)]
+        )
+        things = [item.rings[0] for item in place.objects]
+        found = training._extras(place, things, 40, rng, anything)
+        return np.array([len(ring) for ring in found])
+
+    assert (corners(False) == 4).all()
+    assert 0.2 < (corners(True) == 4).mean() < 0.8
+
+
 @pytest.mark.parametrize("simple", [0, 1, 2])
 def test_a_simplified_outline_is_as_large(simple):
     ring = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]])
@@ -113,7 +185,7 @@ def test_a_simplified_outline_is_as_large(simple):
 
 
 def test_no_code_of_the_generators_that_measure_is_learned_from():
-    for module in (training, posterior):
+    for module in (training, halls, posterior):
         text = (ROOT / "tests" / "experiments" / f"{module.__name__.split('.')[-1]}.py").read_text()
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.ImportFrom):
@@ -201,6 +273,51 @@ def networks_case(rng):
         rng.normal(size=maps),
         int(rng.integers(maps)),
     )
+
+
+def test_who_goes_on_begins_with_what_is_known(monkeypatch):
+    rng = np.random.default_rng(0)
+    first = learned_posterior(made_up(rng, 60))
+    assert first.maps.of_lines.shape == (2, 11)
+    cases = [each for each in made_up(rng, 50) if not each.elsewhere]
+    monkeypatch.setattr(networks, "_EPOCHS", 0)
+    found = gone_on(first, cases)
+    assert found.maps.of_lines.shape == (2, 22)
+    for case in cases:
+        known = case.described
+        np.testing.assert_allclose(
+            worths(known, known.measured, found.maps, True),
+            worths(known, known.measured, first.maps, True),
+            rtol=1e-9,
+            atol=1e-9,
+        )
+    for kept, before in ((found.bare, first.bare), (found.place, first.place)):
+        for one, other in zip(kept, before, strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.slow
+def test_who_goes_on_learns_what_lines_are_beside_others():
+    def beside(rng, count):
+        """Return cases in which the one right line is that which deviates as the others do."""
+        cases = []
+        for case in made_up(rng, count, elsewhere=0.0):
+            known = case.described
+            known.measured.lines[:, :, Line.ALONE] = np.exp(rng.normal(-2.0, 1.0, (8, 1)))
+            wrong = np.arange(8) != case.right
+            known.measured.lines[wrong, 0, Line.ALONE] *= 20.0
+            cases.append(case)
+        return cases
+
+    first = learned_posterior(made_up(np.random.default_rng(0), 300))
+    found = gone_on(first, beside(np.random.default_rng(1), 1500))
+    checked = [case for case in beside(np.random.default_rng(2), 300) if case.right >= 0]
+    told = {
+        name: np.mean([weighed(c.described, each).shares.argmax() == c.right for c in checked])
+        for name, each in (("first", first), ("found", found))
+    }
+    assert told["first"] < 0.7
+    assert told["found"] > 0.95
 
 
 def test_slopes_of_maps_are_those_of_small_steps():

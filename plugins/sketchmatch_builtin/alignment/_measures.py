@@ -35,7 +35,10 @@ class Line(IntEnum):
     is 0 where the mapped object is round. ``SELF`` is what the histograms of the forces within both
     objects lack of being alike, ``RELATION`` what σ lacks of 1, in the mean over the other lines.
     ``WAY`` is the square of how far the ways to the others deviate, each in units of its length,
-    in the mean over all of them, ``NEAR`` over the two nearest.
+    in the mean over all of them, ``NEAR`` over the two nearest. ``ALONE`` is ``PLACE`` under the
+    pose that the other lines alone lead to, or about that, and ``BENT`` on a page that is stretched
+    and grows to one side as fits best. ``ROOM`` is the square of how far the mapped object is from
+    the nearest other one, in units of the spacing.
     """
 
     PLACE = 0
@@ -46,6 +49,9 @@ class Line(IntEnum):
     RELATION = 5
     WAY = 6
     NEAR = 7
+    ALONE = 8
+    BENT = 9
+    ROOM = 10
 
 
 class Whole(IntEnum):
@@ -93,6 +99,8 @@ _FEWEST_AROUND = 3
 _BENDS = 6
 _PAGE = 0.12
 _FARTHEST = 1e4
+_LEAST_ALONE = 0.2
+"""What is left at least of a line's own share in where it lies."""
 
 
 class Relations(NamedTuple):
@@ -141,7 +149,7 @@ def measure(
         As of :class:`Measured`, written.
     """
     n, m = drawn.places.size, mapped.places.size
-    used = np.empty(m, dtype=np.bool_)
+    used, room = np.empty(m, dtype=np.bool_), _rooms(mapped)
     lines[:], wholes[:] = 0.0, 0.0
     for x in range(maps.shape[0]):
         partners, row = maps[x], wholes[x]
@@ -158,9 +166,13 @@ def measure(
                 used[j] = True
                 row[Whole.SCORE] += pair_score(u, t, growth, drawn, i, mapped, j, tolerances)
         row[Whole.OFFSET] = min((growth - 2.0 * np.log(abs(u))) ** 2, 6.0)
-        row[Whole.BEND] = _bend(partners, drawn, mapped, u, t, count)
+        row[Whole.BEND] = _bend(partners, drawn, mapped, u, t, count, lines[x])
         _surround(partners, used, drawn, mapped, u, row)
         _compare(partners, drawn, mapped, u, t, growth, lines[x])
+        _stand_alone(partners, drawn, count, lines[x])
+        for i in range(n):
+            if partners[i] >= 0:
+                lines[x, i, Line.ROOM] = room[partners[i]] / (square(u) * drawn.spacing**2)
         if relations.selves.size > 0:
             _relate(partners, n, m, relations, u, lines[x], row)
 
@@ -241,6 +253,35 @@ def _compare(
 
 
 @kernel
+def _stand_alone(partners: IntArray, drawn: Things, count: int, lines: FloatArray) -> None:
+    """Measure how far lines deviate under the pose of all others, as least squares have it."""
+    middle, extent = 0.0j, 0.0
+    for i in range(partners.size):
+        if partners[i] >= 0:
+            middle += drawn.places[i] / count
+    for i in range(partners.size):
+        if partners[i] >= 0:
+            extent += square(drawn.places[i] - middle)
+    for i in range(partners.size):
+        if partners[i] >= 0:
+            own = 1.0 / count
+            if extent > 0.0:
+                own += square(drawn.places[i] - middle) / extent
+            lines[i, Line.ALONE] = lines[i, Line.PLACE] / max(1.0 - own, _LEAST_ALONE) ** 2
+
+
+@kernel
+def _rooms(mapped: Things) -> FloatArray:
+    """Return how far each mapped object is from the nearest other one, squared."""
+    room = np.full(mapped.places.size, np.inf)
+    for i in range(room.size):
+        for j in range(i):
+            apart = square(mapped.places[i] - mapped.places[j])
+            room[i], room[j] = min(room[i], apart), min(room[j], apart)
+    return room
+
+
+@kernel
 def _bin_of(u: complex, bins: int) -> tuple[int, int, float]:
     """Return the bins between which the turn of a pose lies, and how far between."""
     turn = np.angle(u) % np.pi * bins / np.pi
@@ -258,8 +299,9 @@ def _bend(
     u: complex,
     t: complex,
     count: int,
+    lines: FloatArray,
 ) -> float:
-    """Return how far the page is stretched and grows to one side, squared.
+    """Return how far the page is stretched and grows to one side, squared; write what is left.
 
     What a pose leaves, in units of the spacing, is fitted by a shift, by a stretch, conj(z) times
     a complex number, and by z times a scale that grows along x and y; z is from the middle in
@@ -293,7 +335,33 @@ def _bend(
     for p in range(_BENDS):
         normal[p, p] += 1e-6 if p < 2 else 1e-6 + (0.2 / (_PAGE * ratio)) ** 2
     found = _solve(normal, right)
+    _straighten(partners, drawn, mapped, u, t, middle, extent, found, lines)
     return float(min((found[2:] ** 2).sum() / (_PAGE * ratio) ** 2, 9.0))
+
+
+@kernel
+def _straighten(
+    partners: IntArray,
+    drawn: Things,
+    mapped: Things,
+    u: complex,
+    t: complex,
+    middle: complex,
+    extent: float,
+    found: FloatArray,
+    lines: FloatArray,
+) -> None:
+    """Write what a bend leaves of how far each line deviates."""
+    effects = np.zeros((2, _BENDS))
+    for i in range(partners.size):
+        if partners[i] >= 0:
+            left = (mapped.places[partners[i]] - u * drawn.places[i] - t) / (u * drawn.spacing)
+            _write_effects((drawn.places[i] - middle) / extent, effects)
+            x, y = left.real, left.imag
+            for p in range(_BENDS):
+                x -= effects[0, p] * found[p]
+                y -= effects[1, p] * found[p]
+            lines[i, Line.BENT] = min(x * x + y * y, _FARTHEST)
 
 
 @kernel

@@ -22,6 +22,7 @@ __all__ = [
     "FARTHEST",
     "JUDGED",
     "LINES",
+    "OF_PLACES",
     "Described",
     "Weighed",
     "best_first",
@@ -49,7 +50,13 @@ FARTHEST = 5.0
 say anything."""
 
 LINES = 0.25
+OF_PLACES = 11
+"""How many numbers of lines tell places, and were learned from first; the others came later."""
+
 _RELATIONS = 2
+_MOST_BESIDE = 9.0
+"""What others deviate at most, where deviations are compared with theirs."""
+
 _NONE = -30.0
 
 
@@ -109,12 +116,17 @@ def best_first(measured: Measured) -> IntArray:
 def line_numbers(measured: Measured, related: bool) -> FloatArray:
     """Return what describes lines; 0 for objects without partner.
 
+    Each deviation counts for itself, and beside those of the other lines of its map: people who
+    draw all else with care have drawn this with care too.
+
     Returns
     -------
     ndarray
-        Shape (c, n, 11), or 9 where relations do not count.
+        Shape (c, n, 22), or 9 where relations do not count.
     """
-    place, size, shape, round_, own, relation, way, near = np.moveaxis(measured.lines, 2, 0)
+    place, size, shape, round_, own, relation, way, near, alone, bent, room = np.moveaxis(
+        measured.lines, 2, 0
+    )
     numbers = [
         np.ones_like(place),
         np.log(0.003 + place),
@@ -127,8 +139,25 @@ def line_numbers(measured: Measured, related: bool) -> FloatArray:
         np.log(0.01 + near),
     ]
     if related:
-        numbers += [np.log(0.003 + own), relation]
+        deviations = (alone, bent, size**2, shape, way, near, own, relation)
+        numbers += [
+            np.log(0.003 + own),
+            relation,
+            *(_beside(each, measured.matched) for each in deviations),
+            np.log(0.003 + alone),
+            np.log(0.003 + bent),
+            np.log(0.01 + room),
+        ]
     return np.stack(numbers, axis=2) * measured.matched[:, :, None]
+
+
+def _beside(deviations: FloatArray, matched: BoolArray) -> FloatArray:
+    """Return ln of deviations, less that of the mean over the other lines of each map."""
+    others = np.maximum(matched.sum(axis=1, keepdims=True) - 1, 1)
+    bounded = np.minimum(deviations, _MOST_BESIDE) * matched
+    mean = (bounded.sum(axis=1, keepdims=True) - bounded) / others
+    beside: FloatArray = np.log(0.01 + deviations) - np.log(0.01 + mean)
+    return beside
 
 
 def map_numbers(measured: Measured, drawn: int) -> FloatArray:
@@ -158,7 +187,8 @@ def worths(known: Described, measured: Measured, layers: Layers, related: bool) 
     related
         Whether relations count, or places, sizes and shapes alone.
     """
-    lines = scaled_lines(line_numbers(measured, related), measured.matched, layers.of_lines)
+    known_lines = line_numbers(measured, related)[:, :, : layers.of_lines.shape[1]]
+    lines = scaled_lines(known_lines, measured.matched, layers.of_lines)
     scene = within(scene_numbers(known), layers.of_scenes)
     whole = within(map_numbers(measured, known.drawn), layers.of_maps)
     width = lines.shape[2]
@@ -202,7 +232,7 @@ def place_numbers(known: Described, layers: Layers) -> FloatArray:
     first = float(at_first.max())
     by_chance = [float(each.wholes[:, Whole.SCORE].max(initial=_NONE)) for each in known.decoys]
     ahead = first - max(by_chance, default=first + _NONE)
-    lines = line_numbers(measured, True)[best, measured.matched[best], 1:]
+    lines = line_numbers(measured, True)[best, measured.matched[best], 1:OF_PLACES]
     if not len(lines):
         lines = np.zeros((1, lines.shape[1]))
     if not known.related:
