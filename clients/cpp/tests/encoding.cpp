@@ -349,6 +349,7 @@ v1::GetServerInfoResponse encoded(const ServerInfo& value) {
   SET_IF_KNOWN(value.limits, *limits, max_comparisons);
   SET_IF_KNOWN(value.limits, *limits, max_candidates);
   *message.mutable_uptime() = encoded(value.uptime);
+  message.set_keeps_scenes(value.keeps_scenes);
   return message;
 }
 

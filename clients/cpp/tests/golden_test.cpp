@@ -392,6 +392,7 @@ TEST(GoldenMessages, EachIsOneOfTheClientsOrReachedByTheRawStubs) {
       raw<v1::DeleteSketchResponse>("DeleteSketchResponse"),
       raw<v1::GetSceneRequest>("GetSceneRequest"),
       raw<v1::GetSceneResponse>("GetSceneResponse"),
+      raw<v1::GetSceneResponse>("GetSceneResponse.mended"),
       raw<v1::ListMatchesRequest>("ListMatchesRequest"),
       raw<v1::ListMatchesResponse>("ListMatchesResponse"),
       raw<v1::ListScenesRequest>("ListScenesRequest"),

@@ -47,7 +47,7 @@ __all__ = [
     "without_store",
 ]
 
-_FILE, _VERSION = "scenes", 1
+_FILE, _VERSION = "scenes", 2
 _MAX_BYTES = 1024 * 1024 * 1024
 _SCHEMA = """
 CREATE TABLE contents (
@@ -60,7 +60,7 @@ CREATE TABLE scenes (
 CREATE INDEX scenes_by_content ON scenes (content);
 CREATE INDEX scenes_by_outlines ON scenes (outlines);
 CREATE TABLE owners (
-    caller TEXT NOT NULL, put_time INTEGER NOT NULL, name TEXT NOT NULL,
+    caller TEXT NOT NULL, put_time INTEGER NOT NULL, name TEXT NOT NULL, title TEXT NOT NULL,
     PRIMARY KEY (caller, name)
 ) WITHOUT ROWID;
 CREATE INDEX owners_by_name ON owners (name);
@@ -181,22 +181,31 @@ class SceneArchive:
         """
         self._file.work(lambda _: None)
 
-    def put(self, found: GetSceneResponse, caller: str) -> bool:
-        """Keep what a segmenter found in a source; return whether the caller had not put it."""
+    def put(
+        self, found: GetSceneResponse, caller: str, title: str = ""
+    ) -> tuple[StoredScene, bool]:
+        """Keep what a segmenter found in a source, and what the caller calls it.
+
+        Returns
+        -------
+        tuple
+            The scene, and whether the caller had not put it.
+        """
         record = found.stored_scene
         source = zlib.compress(found.source.SerializeToString(deterministic=True), 1)
         labels = _labels_of(record)
 
-        def job(connection: sqlite3.Connection) -> bool:
+        def job(connection: sqlite3.Connection) -> tuple[StoredScene, bool]:
             connection.execute(
                 "INSERT OR IGNORE INTO contents VALUES (?, ?, ?)",
                 (record.name, source, json.dumps(labels)),
             )
-            return _put(connection, record, record.name, caller)
+            created = _put(connection, record, record.name, caller)
+            return _titled(connection, record, caller, title or None), created
 
         return self._file.work(job)
 
-    def claim(self, name: str, caller: str) -> tuple[StoredScene, bool] | None:
+    def claim(self, name: str, caller: str, title: str = "") -> tuple[StoredScene, bool] | None:
         """Let a caller have a scene that it could put; None where nobody has put it.
 
         Returns
@@ -205,14 +214,17 @@ class SceneArchive:
             The scene, and whether the caller had not put it.
         """
 
-        def job(connection: sqlite3.Connection) -> tuple[bytes, bool] | None:
+        def job(connection: sqlite3.Connection) -> tuple[StoredScene, bool] | None:
             found = connection.execute(
                 "SELECT record FROM scenes WHERE name = ?", (name,)
             ).fetchone()
-            return None if found is None else (found[0], _own(connection, name, caller))
+            if found is None:
+                return None
+            created = _own(connection, name, caller)
+            record = StoredScene.FromString(found[0])
+            return _titled(connection, record, caller, title or None), created
 
-        found = self._file.work(job)
-        return None if found is None else (StoredScene.FromString(found[0]), found[1])
+        return self._file.work(job)
 
     def get(
         self, name: str, caller: str, include_source: bool = False, field: str = "name"
@@ -230,12 +242,25 @@ class SceneArchive:
             source = None
             if include_source:
                 source = _source(connection.execute(_SOURCE_OF, (name,)).fetchone())
-            return GetSceneResponse(stored_scene=StoredScene.FromString(record), source=source)
+            return GetSceneResponse(stored_scene=record, source=source)
 
         return self._file.work(job)
 
-    def relabel(self, name: str, labels: Sequence[tuple[int, str]], caller: str) -> StoredScene:
-        """Keep a scene with other labels, beside the one of this name.
+    def relabel(
+        self,
+        name: str,
+        labels: Sequence[tuple[int, str]],
+        caller: str,
+        title: str | None = None,
+    ) -> StoredScene:
+        """Keep a scene with other labels, beside the one of this name, and under another title.
+
+        Parameters
+        ----------
+        name, labels, caller
+            Of the scene; by object; whose it is.
+        title
+            What the caller calls it from now on; None: as before.
 
         Raises
         ------
@@ -246,7 +271,7 @@ class SceneArchive:
         """
 
         def job(connection: sqlite3.Connection) -> StoredScene:
-            record = StoredScene.FromString(_record(connection, name, caller, "name"))
+            record = _record(connection, name, caller, "name")
             content, found = connection.execute(
                 "SELECT content, contents.labels FROM contents JOIN scenes USING (content) "
                 "WHERE name = ?",
@@ -260,8 +285,10 @@ class SceneArchive:
                 record.scene.objects[place].label = cleaned_label(label)
             wanted = _labels_of(record)
             record.name = content if wanted == json.loads(found) else _relabelled(content, wanted)
+            called = record.title if title is None else title
+            record.ClearField("title")
             _put(connection, record, content, caller)
-            return record
+            return _titled(connection, record, caller, called)
 
         return self._file.work(job)
 
@@ -280,7 +307,8 @@ class SceneArchive:
 
         def job(connection: sqlite3.Connection) -> list[Any]:
             return connection.execute(
-                "SELECT name, put_time, objects, labels FROM owners JOIN scenes USING (name) "
+                "SELECT name, put_time, objects, labels, title "
+                "FROM owners JOIN scenes USING (name) "
                 "WHERE caller = ? AND (put_time, name) < (?, ?) "
                 "ORDER BY put_time DESC, name DESC LIMIT ?",
                 (caller, before, last, size + 1),
@@ -288,9 +316,9 @@ class SceneArchive:
 
         rows = self._file.work(job)
         response = ListScenesResponse()
-        for name, put_time, objects, labels in rows[:size]:
+        for name, put_time, objects, labels, title in rows[:size]:
             named = [label for label in json.loads(labels) if label]
-            summary = SceneSummary(name=name, object_count=objects, labels=named)
+            summary = SceneSummary(name=name, object_count=objects, labels=named, title=title)
             summary.put_time.FromNanoseconds(put_time)
             response.scenes.append(summary)
         if len(rows) > size:
@@ -372,7 +400,7 @@ class Shelf:
         if self._file is None:
             raise without_store(field)
         record = self._file.work(lambda connection: _record(connection, name, caller, field))
-        return self.decoded(name, record)
+        return self.decoded(name, record.SerializeToString())
 
     def decoded(self, name: str, record: bytes) -> Segmentation:
         """Return the scene of a record, decoded once."""
@@ -452,15 +480,33 @@ def _put(connection: sqlite3.Connection, record: StoredScene, content: str, call
 
 def _own(connection: sqlite3.Connection, name: str, caller: str) -> bool:
     made = connection.execute(
-        "INSERT OR IGNORE INTO owners VALUES (?, ?, ?)", (caller, time.time_ns(), name)
+        "INSERT OR IGNORE INTO owners VALUES (?, ?, ?, '')", (caller, time.time_ns(), name)
     )
     return made.rowcount > 0
 
 
-def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) -> bytes:
-    """Return the record of a scene of a caller."""
+def _titled(
+    connection: sqlite3.Connection, record: StoredScene, caller: str, title: str | None
+) -> StoredScene:
+    """Return a record with what its caller calls it, from now on or as before."""
+    whose = (caller, record.name)
+    if title is not None:
+        connection.execute(
+            "UPDATE owners SET title = ? WHERE caller = ? AND name = ?", (title, *whose)
+        )
+    (called,) = connection.execute(
+        "SELECT title FROM owners WHERE caller = ? AND name = ?", whose
+    ).fetchone()
+    with_title = StoredScene()
+    with_title.CopyFrom(record)
+    with_title.title = called
+    return with_title
+
+
+def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) -> StoredScene:
+    """Return the record of a scene of a caller, with its title."""
     found = connection.execute(
-        "SELECT record FROM scenes JOIN owners USING (name) WHERE name = ? AND caller = ?",
+        "SELECT record, title FROM scenes JOIN owners USING (name) WHERE name = ? AND caller = ?",
         (name, caller),
     ).fetchone()
     if found is None:
@@ -469,7 +515,9 @@ def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) 
             f"{field} is {shown[:_NAMED]}, and you keep no scene of this name here; put it, or "
             "list those there are"
         )
-    return bytes(found[0])
+    record = StoredScene.FromString(found[0])
+    record.title = found[1]
+    return record
 
 
 def _labels_of(record: StoredScene) -> list[str]:
