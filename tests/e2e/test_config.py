@@ -102,7 +102,7 @@ def test_check_says_every_fault_in_a_line(command_line, mine):
         "max_time_budget_seconds, default_time_budget_seconds, max_matches_per_caller, "
         "max_requests_per_minute, max_comparisons, max_candidates, tls_certificate, tls_key, "
         "tls_client_ca, tokens, store, keep, keep_matches_days, keep_matches_mib, "
-        "metrics_address, web_address, web_origins, insecure",
+        "metrics_address, web_address, web_origins, web_robots, insecure",
     ]
 
 

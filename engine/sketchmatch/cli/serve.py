@@ -172,6 +172,13 @@ def serve(
             help="Show the sketch pad, and answer Connect, gRPC-Web and JSON, here.",
         ),
     ] = None,
+    web_robots: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL,…",
+            help="Let the sketch pad send routes to these ROS bridges, as in ws://robot.local:9090.",
+        ),
+    ] = None,
     strict_plugins: Annotated[
         bool,
         typer.Option(
@@ -219,6 +226,7 @@ def serve(
         "server.keep_matches_mib": keep_matches_mib,
         "server.metrics_address": metrics_address,
         "server.web_address": web_address,
+        "server.web_robots": web_robots,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
         "limits.max_side": max_side,
@@ -283,6 +291,7 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
         bool(server.store),
         server.keep_matches_days,
         server.keep_matches_mib * _MIB,
+        server.web_robots,
     )
 
 

@@ -110,6 +110,8 @@ class ServerSettings:
         Host and port for browsers; None for none.
     web_origins
         Of pages from elsewhere that may call there.
+    web_robots
+        Addresses of ROS bridges that the sketch pad may send routes to.
     store_named
         Whether somebody named that folder, so that the server is not to start without it.
     matches_days, matches_bytes
@@ -130,6 +132,7 @@ class ServerSettings:
     store_named: bool = True
     matches_days: float = 30.0
     matches_bytes: int = 1 << 30
+    web_robots: tuple[str, ...] = ()
 
 
 async def serve(
@@ -302,7 +305,13 @@ class _Beside:
         if settings.web_address:
             tls = (settings.tls, files.pems) if settings.tls and files.pems else None
             self._gateway = Gateway(
-                settings.web_address, settings.web_origins, app, handlers, _SERVICES, tls
+                settings.web_address,
+                settings.web_origins,
+                app,
+                handlers,
+                _SERVICES,
+                settings.web_robots,
+                tls,
             )
             self.sentences += [f"the sketch pad is at {self._gateway.url}", *self._gateway.lacking]
 
