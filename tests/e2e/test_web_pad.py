@@ -851,6 +851,9 @@ def test_axe_finds_nothing_that_keeps_anybody_out(pad, visit, scheme, size):
         page.get_by_test_id(f"open-{menu}").click()
         assert page.evaluate(look) == [], menu
         page.keyboard.press("Escape")
+    page.get_by_test_id("mend").click()
+    page.get_by_test_id("mend-0").click()
+    assert page.evaluate(look) == [], "mending"
 
 
 def test_it_speaks_german_to_who_asks_for_it(pad, visit):

@@ -95,11 +95,11 @@ export function MapPane() {
             class={map.underlay.grid ? "grid" : "photo"}
           />
         )}
-        {map?.things.map((thing, k) => (
-          <MapThing key={thing.id} index={k} view={view.value} />
-        ))}
         {carried.value.map((way) => (
           <Way key={way.id} way={way} view={view.value} />
+        ))}
+        {map?.things.map((thing, k) => (
+          <MapThing key={thing.id} index={k} view={view.value} />
         ))}
       </svg>
     </div>

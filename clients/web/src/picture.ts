@@ -116,7 +116,7 @@ async function mapParts(): Promise<string[]> {
     ].join("");
   });
   const ways = carried.peek().map((way) => wayPart(way, view));
-  return [map.underlay ? await underlayPart(map.underlay, view) : "", ...things, ...ways];
+  return [map.underlay ? await underlayPart(map.underlay, view) : "", ...ways, ...things];
 }
 
 function wayPart({ kind, lines }: Carried, view: View): string {
