@@ -19,7 +19,7 @@ says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 .PHONY: demo test test-slow test-all test-units test-interpreted mutation lint proto bench \
   bench-histograms bench-match bench-searchers bench-server bench-sketches bench-startup experiments \
   fuzz look \
-  reference api serve clean web pad lint-web bench-web
+  reference api serve clean web pad lint-web bench-web look-web
 
 demo: $(VENV)/runtime
 	@$(BIN)/sketchmatch demo
@@ -87,6 +87,10 @@ lint-web: $(WEB)
 
 bench-web: $(VENV)/dev $(WEB)
 	@$(BIN)/python -m tests.benchmarks.web $(ARGS)
+
+# The pictures of the sketch pad in its documentation: look at them.
+look-web: $(VENV)/dev $(WEB)
+	@$(BIN)/python -m tests.look_web $(ARGS)
 
 # One picture of every map, floor and drawing as it is segmented by default: look at it.
 look: $(VENV)/dev

@@ -65,7 +65,8 @@ def shelf(archive):
 @pytest.fixture
 def name(archive):
     """A scene that anna has put."""
-    assert archive.put(found(), "anna")
+    _, created = archive.put(found(), "anna")
+    assert created
     return found().stored_scene.name
 
 
@@ -111,7 +112,7 @@ class TestOwners:
         assert created
         assert record == archive.get(name, "bert").stored_scene == found().stored_scene
         assert archive.claim(name, "bert") == (record, False)
-        assert not archive.put(found(), "anna")
+        assert not archive.put(found(), "anna")[1]
 
     def test_what_one_forgets_stays_with_the_other_until_nobody_has_it(self, archive, name):
         archive.claim(name, "bert")
@@ -240,24 +241,24 @@ class TestQuotas:
 
     def test_a_caller_keeps_what_it_may_and_others_theirs(self, archive, large):
         for each in large[:2]:
-            assert archive.put(each, "anna", 2 * self.MIB + 20_000)
+            assert archive.put(each, "anna", most=2 * self.MIB + 20_000)[1]
         said = (
             r"with this scene you would keep 3 MiB here, and 2\.02 MiB are the limit for each "
             "caller; delete scenes that you do not need"
         )
         with pytest.raises(QuotaError, match=said):
-            archive.put(large[2], "anna", 2 * self.MIB + 20_000)
+            archive.put(large[2], "anna", most=2 * self.MIB + 20_000)
         with pytest.raises(NotFoundError):
             archive.get(large[2].stored_scene.name, "anna")
-        assert archive.put(large[2], "bert", 2 * self.MIB + 20_000)
+        assert archive.put(large[2], "bert", most=2 * self.MIB + 20_000)[1]
         with pytest.raises(QuotaError):
-            archive.claim(large[2].stored_scene.name, "anna", 2 * self.MIB + 20_000)
+            archive.claim(large[2].stored_scene.name, "anna", most=2 * self.MIB + 20_000)
         archive.delete(large[0].stored_scene.name, "anna")
-        assert archive.claim(large[2].stored_scene.name, "anna", 2 * self.MIB + 20_000)
+        assert archive.claim(large[2].stored_scene.name, "anna", most=2 * self.MIB + 20_000)
 
     def test_what_is_refused_leaves_nothing_behind(self, archive, large):
         with pytest.raises(QuotaError):
-            archive.put(large[0], "anna", self.MIB)
+            archive.put(large[0], "anna", most=self.MIB)
         with sqlite3.connect(archive.path) as file:
             for table in ("scenes", "contents", "owners"):
                 assert file.execute(f"SELECT count(*) FROM {table}").fetchone() == (0,)
@@ -265,17 +266,17 @@ class TestQuotas:
     def test_what_is_put_again_takes_nothing_and_a_lower_limit_takes_nothing_away(
         self, archive, large
     ):
-        assert archive.put(large[0], "anna")
-        assert not archive.put(large[0], "anna", 1)
+        assert archive.put(large[0], "anna")[1]
+        assert not archive.put(large[0], "anna", most=1)[1]
         assert archive.get(large[0].stored_scene.name, "anna")
 
     def test_a_source_counts_once_however_many_labels_it_is_given(self, archive, large):
         archive.put(large[0], "anna")
         name = large[0].stored_scene.name
         for label in ("chair", "table"):
-            archive.relabel(name, [(0, label)], "anna", self.MIB + 20_000)
+            archive.relabel(name, [(0, label)], "anna", most=self.MIB + 20_000)
         with pytest.raises(QuotaError, match="limit for each caller"):
-            archive.relabel(name, [(0, "lamp")], "anna", self.MIB)
+            archive.relabel(name, [(0, "lamp")], "anna", most=self.MIB)
 
 
 class TestBrokenFiles:

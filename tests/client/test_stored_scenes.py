@@ -68,10 +68,16 @@ def fake():
 def test_scenes_are_asked_for_and_answered(call, fake):
     params = {"closing": 0.125, "mode": "neat"}
     kept = call(
-        fake.address, "put_scene", POLYGONS, segmenter="tracing", params=params, profile="careful"
+        fake.address,
+        "put_scene",
+        POLYGONS,
+        segmenter="tracing",
+        params=params,
+        profile="careful",
+        title="snack bar",
     )
     got = call(fake.address, "get_scene", NAME, include_source=True)
-    labelled = call(fake.address, "update_scene", NAME, {1: "rack", 3: ""})
+    labelled = call(fake.address, "update_scene", NAME, {1: "rack", 3: ""}, title="rack room")
     assert call(fake.address, "delete_scene", OTHER) is None
     assert fake.requests == [
         golden(f"{method}SceneRequest") for method in ("Put", "Get", "Update", "Delete")

@@ -111,7 +111,7 @@ def test_the_server_tells_versions_limits_and_its_age(monkeypatch):
     monkeypatch.setattr(responses, "API_VERSION", 3)
     engine = Engine(REGISTRY, limits=SourceLimits(max_objects=250))
     written = responses.server_info(
-        Setup(engine, RequestLimits(1_048_576, 12, 90.5, 40, 7.5)), 75.5
+        Setup(engine, RequestLimits(1_048_576, 12, 90.5, 40, 7.5)), 75.5, True
     )
     assert as_json(written) == as_written("GetServerInfoResponse")
 
@@ -124,7 +124,7 @@ def test_limits_on_cost_and_on_callers_are_told():
         max_comparisons=81_000_000,
         max_candidates=2**53 + 1,
     )
-    written = responses.server_info(Setup(Engine(REGISTRY), given), 0.0).limits
+    written = responses.server_info(Setup(Engine(REGISTRY), given), 0.0, False).limits
     for field, value in golden("GetServerInfoResponse.limits").limits.ListFields():
         assert getattr(written, field.name) == value
 

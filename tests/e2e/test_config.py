@@ -103,7 +103,8 @@ def test_check_says_every_fault_in_a_line(command_line, mine):
         "max_requests_per_minute, max_stored_mib_per_caller, max_comparisons, max_candidates, "
         "tls_certificate, tls_key, tls_client_ca, tokens, store, keep, keep_matches_days, "
         "keep_matches_mib, keep_scenes_mib, max_sketches, max_sketches_per_caller, "
-        "sketch_idle_seconds, metrics_address, traces_endpoint, web_address, web_origins, insecure",
+        "sketch_idle_seconds, metrics_address, traces_endpoint, web_address, web_origins, "
+        "web_robots, insecure",
     ]
 
 

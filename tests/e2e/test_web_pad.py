@@ -4,17 +4,22 @@ import json
 import math
 import re
 from itertools import pairwise
+from xml.etree import ElementTree
 
 import pytest
 import yaml
+from PIL import Image, ImageColor
 
 from sketchmatch.examples import LIVING_ROOM_MAP
 from tests import processes
 from tests.pace import wait_until
+from tests.rosbridge import rosbridge
 from tests.tools import require
 from tests.web import CLIENTS, KITCHEN, Hand, answer, chromium, draw_kitchen, serving_pad
 
 pytestmark = [pytest.mark.timeout(300), pytest.mark.slow]
+
+SVG = "{http://www.w3.org/2000/svg}"
 
 # Playwright waits by itself for what it is asked for, so long at most.
 _PATIENCE_MS = 60_000
@@ -262,6 +267,134 @@ def test_a_route_through_a_thing_is_led_around_it_and_the_page_says_so(pad, visi
     )
 
 
+def test_a_route_is_sent_to_a_robot_that_was_named_as_a_path_in_metres(visit):
+    with rosbridge() as robot, serving_pad("--web-robots", robot.url) as (_, url):
+        page = visit(url)
+        hand = Hand(page)
+        draw_kitchen(hand)
+        wait_for_answer(page, 6)
+        page.get_by_test_id("tool-route").click()
+        hand.draw([(-100, -20), (-90, 90), (60, 90)], closed=False)
+        page.get_by_test_id("route").wait_for(state="attached")
+        page.get_by_label("Topic").fill("/kitchen_route")
+        page.get_by_test_id("send").click()
+        page.get_by_test_id("notice").get_by_text("sent to /kitchen_route").wait_for()
+        line = json.loads(saved_text(page, "save-carried"))["features"][0]["geometry"]
+        (advertised,) = [each for each in robot.told if each["op"] == "advertise"]
+        assert (advertised["topic"], advertised["type"]) == ("/kitchen_route", "nav_msgs/Path")
+        (published,) = robot.published()
+        assert published["topic"] == "/kitchen_route"
+        path = published["msg"]
+        assert path["header"] == {"frame_id": "map"}
+        poses = [each["pose"] for each in path["poses"]]
+        at = [(each["position"]["x"], each["position"]["y"]) for each in poses]
+        assert at == [pytest.approx(point, abs=1e-5) for point in line["coordinates"]]
+        (ax, ay), (bx, by) = at[:2]
+        turn = poses[0]["orientation"]
+        yaw = 2 * math.atan2(turn["z"], turn["w"])
+        assert math.remainder(yaw - math.atan2(by - ay, bx - ax), 2 * math.pi) == pytest.approx(0)
+
+
+def test_what_a_robot_refuses_and_one_that_is_away_is_said(visit):
+    with rosbridge("no such type") as robot:
+        away = "ws://127.0.0.1:9"
+        with serving_pad("--web-robots", f"{robot.url},{away}") as (_, url):
+            page = visit(url)
+            hand = Hand(page)
+            draw_kitchen(hand)
+            wait_for_answer(page, 6)
+            page.get_by_test_id("tool-route").click()
+            hand.draw([(-100, -20), (-90, 90)], closed=False)
+            page.get_by_test_id("send").click()
+            notice = page.get_by_test_id("notice")
+            notice.get_by_text("refuses the route: no such type").wait_for()
+            page.locator(".sending select").select_option(away)
+            page.get_by_test_id("send").click()
+            notice.get_by_text(f"{away} does not answer").wait_for()
+            assert robot.published() == []
+
+
+def test_the_page_reaches_no_robot_that_nobody_named(pad, browser):
+    page = browser.new_context().new_page()
+    page.goto(pad)
+    with rosbridge() as robot:
+        reach = """(url) => new Promise((done) => {
+          try {
+            const socket = new WebSocket(url);
+            socket.onopen = () => done('open');
+            socket.onerror = () => done('refused');
+          } catch { done('refused'); }
+        })"""
+        assert page.evaluate(reach, robot.url) == "refused"
+    page.context.close()
+
+
+def test_the_picture_of_both_sides_has_the_colours_and_numbers_of_the_page(pad, visit):
+    page = visit(pad)
+    draw_kitchen(Hand(page))
+    wait_for_answer(page, 6)
+    svg = ElementTree.fromstring(saved_text(page, "save-picture-svg"))
+    sides = svg.findall(f"{SVG}svg")
+    shown = []
+    for side, pane in zip(sides, (".paper", ".floor"), strict=True):
+        badges = {
+            badge.find(f"{SVG}text").text: badge.find(f"{SVG}circle").get("fill")
+            for badge in side.iter(f"{SVG}g")
+            if badge.find(f"{SVG}circle") is not None
+        }
+        on_page = {
+            badge.locator("text").text_content(): badge.locator("circle").get_attribute("fill")
+            for badge in page.locator(f"{pane} .badge").all()
+        }
+        assert badges == on_page
+        shown.append(badges)
+    assert shown[0] == shown[1]
+    assert len(shown[0]) == 6
+    labels = {text.text for text in sides[1].iter(f"{SVG}text")}
+    assert set(KITCHEN) <= labels
+    assert sides[1].find(f"{SVG}image").get("href").startswith("data:image/png")
+    page.get_by_test_id("open-file").click()
+    with page.expect_download() as saved:
+        page.get_by_test_id("save-picture-png").click()
+    with Image.open(saved.value.path()) as picture:
+        pixels = picture.convert("RGB")
+    # All six colours of pairs are in both halves.
+    width, height = pixels.size
+    for left in (0, width // 2):
+        half = pixels.crop((left, 0, left + width // 2, height))
+        seen = {colour for _, colour in half.getcolors(1 << 24)}
+        assert {ImageColor.getrgb(each) for each in shown[0].values()} <= seen
+
+
+def test_a_thing_is_made_as_large_as_somebody_types_and_stays_so(pad, visit):
+    page = visit(pad)
+    hand = Hand(page)
+    draw_kitchen(hand)
+    wait_for_answer(page, 6)
+    hand.tap(*KITCHEN["bin"][:2])
+    width, height = page.get_by_test_id("width"), page.get_by_test_id("height")
+    before, high = float(width.input_value()), float(height.input_value())
+    box = page.get_by_test_id("sketch-thing-5").locator("path")
+    drawn = box.bounding_box()
+    width.fill(f"{2 * before}")
+    width.press("Enter")
+    wait_until(
+        lambda: box.bounding_box()["width"] == pytest.approx(2 * drawn["width"], rel=0.05),
+        "the thing is as wide as before",
+    )
+    assert box.bounding_box()["height"] == pytest.approx(drawn["height"], rel=0.05)
+    hand.tap(*KITCHEN["bin"][:2])
+    wait_for_answer(page, 6)
+    assert float(width.input_value()) == pytest.approx(2 * before, rel=0.02)
+    assert float(height.input_value()) == pytest.approx(high, rel=0.02)
+    page.keyboard.press("Escape")
+    page.get_by_test_id("undo").click()
+    wait_until(
+        lambda: box.bounding_box()["width"] == pytest.approx(drawn["width"], rel=0.02),
+        "what was typed is not taken back",
+    )
+
+
 def test_a_zone_is_carried_named_saved_and_opened_again(pad, visit, tmp_path):
     page = visit(pad)
     hand = Hand(page)
@@ -309,6 +442,9 @@ def test_a_map_is_kept_by_the_server_under_a_name_and_chosen_again(visit, tmp_pa
         page.get_by_label("Keep it as").fill("our flat")
         page.get_by_test_id("keep-map").click()
         page.get_by_test_id("notice").get_by_text("our flat").wait_for()
+        other = visit(url)
+        other.get_by_test_id("open-places").click()
+        other.get_by_test_id("stored-map").get_by_text("our flat").wait_for()
         page.get_by_test_id("open-places").click()
         page.get_by_test_id("place-kitchen").click()
         title.get_by_text("Kitchen").wait_for()
@@ -324,6 +460,86 @@ def test_a_map_is_kept_by_the_server_under_a_name_and_chosen_again(visit, tmp_pa
         page.get_by_test_id("tool-zone").click()
         hand.box(-20, 0, 60, 40)
         page.get_by_test_id("zone").wait_for(state="attached")
+
+
+def test_a_server_that_keeps_nothing_is_not_asked_for_what_it_keeps(visit):
+    with serving_pad("--no-store") as (_, url):
+        page = visit(url)
+        asked = []
+        page.on("request", lambda request: asked.append(request.url.rpartition("/")[2]))
+        with page.expect_request("**/GetServerInfo"):
+            page.get_by_test_id("open-places").click()
+        page.get_by_test_id("place-kitchen").click()
+        page.get_by_test_id("place-kitchen").wait_for(state="hidden")
+        assert "ListScenes" not in asked
+
+
+def labels(page):
+    return sorted(page.locator(".floor .thing .label").all_text_contents())
+
+
+def test_things_of_the_map_are_merged_left_out_and_named_by_hand_and_that_is_taken_back(pad, visit):
+    page = visit(pad)
+    things = page.locator(".floor .thing")
+    page.get_by_test_id("mend").click()
+    mending = page.get_by_test_id("mending")
+
+    def choose(*names):
+        for name in names:
+            mending.get_by_role("button", name=name, exact=True).click()
+
+    fridge = things.filter(has_text="fridge").locator("path").bounding_box()
+    stove = things.filter(has_text="stove").locator("path").bounding_box()
+    things.filter(has_text="fridge").click()  # on the map, and by its name
+    choose("stove")
+    page.get_by_test_id("mend-merge").click()
+    wait_until(lambda: things.count() == 5, "two things are not made one")
+    # The stove comes first on the map.
+    whole = things.filter(has_text="stove").locator("path").bounding_box()
+    assert whole["x"] == pytest.approx(fridge["x"], abs=2)
+    assert whole["x"] + whole["width"] == pytest.approx(stove["x"] + stove["width"], abs=2)
+    choose("bin")
+    page.get_by_test_id("mend-leave-out").click()
+    wait_until(lambda: things.count() == 4, "a thing that is left out is still there")
+    choose("bench")
+    page.get_by_label("Name on the map").fill("sofa")
+    page.keyboard.press("Enter")
+    wait_until(lambda: "sofa" in labels(page), "a thing is not named")
+    assert labels(page) == ["dining table", "kitchen island", "sofa", "stove"]
+    for count in (4, 5, 6):
+        page.get_by_test_id("mend-undo").click()
+        wait_until(lambda count=count: things.count() == count, "what was mended stays so")
+    assert labels(page) == sorted(KITCHEN)
+    assert page.get_by_test_id("mend-undo").is_disabled()
+
+
+def test_a_mended_map_keeps_its_walls_and_what_was_said_and_the_page_keeps_it(pad, visit):
+    page = visit(pad)
+    hand = Hand(page)
+    draw_kitchen(hand)
+    wait_for_answer(page, 6)
+    hand.tap(*KITCHEN["bin"][:2])
+    page.locator(".floor .thing", has_text="bench").click()
+    said = page.locator("[data-testid=pairs] .line", has_text="you said so")
+    said.wait_for()
+    page.get_by_test_id("mend").click()
+    mending = page.get_by_test_id("mending")
+    mending.get_by_role("button", name="fridge", exact=True).click()
+    page.get_by_test_id("mend-leave-out").click()
+    wait_until(lambda: "fridge" not in labels(page), "a thing that is left out is still there")
+    mending.get_by_role("button", name="bench", exact=True).click()
+    page.get_by_label("Name on the map").fill("sofa")
+    page.keyboard.press("Enter")
+    wait_until(lambda: answer(page).get(6) == "sofa", "what was said is forgotten")
+    assert said.count() == 1
+    page.get_by_test_id("undo").click()  # what was said, so that there is an answer to carry by
+    page.get_by_test_id("tool-route").click()
+    hand.draw([(0, 60), (420, 60)], closed=False)  # through the wall on the right
+    carried = page.get_by_test_id("carried")
+    carried.get_by_text("A part cannot be reached, and is left out.").wait_for()
+    page.reload()
+    page.get_by_test_id("map-thing-0").wait_for()
+    assert labels(page) == sorted({*KITCHEN, "sofa"} - {"fridge", "bench"})
 
 
 def test_undo_and_redo_go_all_the_way_and_nothing_is_lost_between_fast_strokes(pad, visit):
@@ -635,6 +851,9 @@ def test_axe_finds_nothing_that_keeps_anybody_out(pad, visit, scheme, size):
         page.get_by_test_id(f"open-{menu}").click()
         assert page.evaluate(look) == [], menu
         page.keyboard.press("Escape")
+    page.get_by_test_id("mend").click()
+    page.get_by_test_id("mend-0").click()
+    assert page.evaluate(look) == [], "mending"
 
 
 def test_it_speaks_german_to_who_asks_for_it(pad, visit):

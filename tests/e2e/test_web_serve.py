@@ -3,6 +3,8 @@
 import socket
 from contextlib import suppress
 
+import pytest
+
 from tests.processes import sketchmatch
 
 
@@ -25,3 +27,12 @@ def test_an_address_that_is_none_is_refused_by_its_name():
     assert done.returncode == 2
     assert "--web-address is '8080'" in line
     assert "should have a port" in line
+
+
+@pytest.mark.parametrize("address", ["robot.local:9090", "http://robot", "ws://a; script-src *"])
+def test_a_robot_that_is_no_web_socket_is_refused_before_it_is_part_of_a_header(address):
+    done = sketchmatch("serve", "--web-robots", address)
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 2
+    assert "--web-robots" in line
+    assert "should be a WebSocket each, as in ws://robot.local:9090" in line

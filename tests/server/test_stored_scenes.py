@@ -216,3 +216,39 @@ def test_the_histograms_of_a_scene_are_kept_with_it_and_no_others(tmp_path):
     assert rows
     assert {outlines for outlines, _ in rows} == {Scene.from_polygons(shapes(6, 1)).identity}
     assert min(size for _, size in rows) >= 15 * 180 * 8
+
+
+def test_a_title_is_the_callers_own_and_no_part_of_the_name(client, name):
+    assert client.get_scene(name).stored_scene.title == ""
+    titled = client.put_scene(MAP, title="  our   flat ")
+    assert (titled.stored_scene.name, titled.stored_scene.title) == (name, "our flat")
+    assert not titled.created
+    assert client.put_scene(MAP).stored_scene.title == "our flat", (
+        "putting it again takes none away"
+    )
+    assert client.get_scene(name).stored_scene.title == "our flat"
+    assert {each.name: each.title for each in client.list_scenes()}[name] == "our flat"
+
+
+def test_a_title_is_changed_alone_kept_with_new_labels_and_taken_away(client, name):
+    changed = client.update_scene(name, title="the flat")
+    assert (changed.name, changed.title) == (name, "the flat")
+    labelled = client.update_scene(name, {0: "cupboard"})
+    assert labelled.name != name
+    assert labelled.title == "the flat"
+    other = client.update_scene(name, {0: "dresser"}, title="with a dresser")
+    titles = {each.name: each.title for each in client.list_scenes()}
+    assert (titles[name], titles[other.name]) == ("the flat", "with a dresser")
+    assert client.update_scene(name, title="").title == ""
+
+
+def test_a_title_longer_than_a_line_is_refused(client):
+    with pytest.raises(InvalidRequestError, match=r"title has 201 characters; give up to 200"):
+        client.put_scene(MAP, title="x" * 201)
+    assert client.put_scene(MAP, title="x" * 200).stored_scene.title == "x" * 200
+
+
+def test_a_server_says_whether_it_keeps_scenes(client):
+    assert client.server_info().keeps_scenes
+    with hosting(setup()) as host, Client(host.address) as without:
+        assert not without.server_info().keeps_scenes

@@ -393,6 +393,21 @@ def test_the_root_is_the_page_and_nothing_may_be_inline_or_from_elsewhere():
     assert headers[b"x-content-type-options"] == b"nosniff"
 
 
+def test_the_page_connects_to_the_robots_that_are_named_and_to_nobody_else():
+    def connects(pages):
+        _, headers, _ = page(pages, "/")
+        policy = headers[b"content-security-policy"].decode()
+        (said,) = [part for part in policy.split("; ") if part.startswith("connect-src")]
+        return said
+
+    robots = ("ws://robot.local:9090", "wss://fleet.example/bridge")
+    named = Pages({"/index.html": b"<!doctype html>"}, robots)
+    assert connects(PAGES) == "connect-src 'self'"
+    assert connects(named) == "connect-src 'self' ws://robot.local:9090 wss://fleet.example/bridge"
+    assert json.loads(page(PAGES, "/robots.json")[2]) == []
+    assert json.loads(page(named, "/robots.json")[2]) == list(robots)
+
+
 def test_scripts_are_compressed_and_kept_and_pages_are_asked_for_again():
     _, plain, body = page(PAGES, "/assets/index-1a2b.js")
     _, headers, packed = page(PAGES, "/assets/index-1a2b.js", Accept_Encoding="gzip, br")

@@ -11,6 +11,7 @@ from sketchmatch.cli.sources import source_of
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.io import read_source
 from sketchmatch.io.files import read_map_files
+from sketchmatch.io.ros_map import decode_map_server
 from sketchmatch.io.scene_files import save_scene
 from sketchmatch_map_files import content_of, parse
 
@@ -134,6 +135,18 @@ def test_one_that_says_of_no_map_is_ignored(mended):
     office, _, edit = mended
     edit(lambda features: [each["properties"].pop("map") for each in features])
     assert "is of another content" in notes(office)[0]
+
+
+def test_one_that_a_caller_says_is_of_this_map_need_not_say_so_itself(office):
+    text, picture = office.read_text(), office.with_suffix(".pgm").read_bytes()
+    crate = feature([1, 1], [2, 1], [2, 2], [1, 2], label="crate")
+    objects = json.dumps({"type": "FeatureCollection", "features": [crate]})
+    ignored = decode_map_server(text, picture, objects)
+    assert ignored.objects is None
+    assert "of another content" in ignored.notes[-1]
+    taken = decode_map_server(text, picture, objects, own_objects=True)
+    assert [each.label for each in taken.objects.polygons] == ["crate"]
+    assert not any("content" in note for note in taken.notes)
 
 
 def test_one_feature_that_says_of_which_map_it_is_is_enough(mended):

@@ -430,6 +430,7 @@ struct Fields {
     FIELD(plugin_api_version);
     FIELD(limits);
     FIELD(uptime);
+    FIELD(keeps_scenes);
   }
 };
 

@@ -214,10 +214,11 @@ class AsyncClient:
         segmenter: str | None = None,
         params: Mapping[str, Any] | None = None,
         profile: str | None = None,
+        title: str = "",
         timeout: float | None = None,
     ) -> PutSceneResponse:
         """Have the server keep a scene; see :meth:`Client.put_scene`."""
-        request = _scenes.put_request(source, segmenter, params, profile)
+        request = _scenes.put_request(source, segmenter, params, profile, title)
         return await self._asked(self._keeping.PutScene, request, timeout)
 
     async def get_scene(
@@ -238,10 +239,15 @@ class AsyncClient:
             request.page_token = page.next_page_token
 
     async def update_scene(
-        self, name: str, labels: Mapping[int, str], *, timeout: float | None = None
+        self,
+        name: str,
+        labels: Mapping[int, str] | None = None,
+        *,
+        title: str | None = None,
+        timeout: float | None = None,
     ) -> StoredScene:
         """Give objects of a kept scene other labels; see :meth:`Client.update_scene`."""
-        request = _scenes.update_request(name, labels)
+        request = _scenes.update_request(name, labels, title)
         return (await self._asked(self._keeping.UpdateScene, request, timeout)).stored_scene
 
     async def delete_scene(self, name: str, *, timeout: float | None = None) -> None:

@@ -25,6 +25,7 @@ def put_request(
     segmenter: str | None = None,
     params: Mapping[str, Any] | None = None,
     profile: str | None = None,
+    title: str = "",
 ) -> PutSceneRequest:
     """Return the request to keep a scene; see :meth:`Client.put_scene`."""
     asked = segment_request(source, segmenter, params, profile)
@@ -32,6 +33,7 @@ def put_request(
         source=asked.source,
         segmenter=asked.segmenter if asked.HasField("segmenter") else None,
         profile=asked.profile,
+        title=_title(title),
     )
 
 
@@ -40,19 +42,30 @@ def get_request(name: str, include_source: bool) -> GetSceneRequest:
     return GetSceneRequest(name=_name(name), include_source=include_source)
 
 
-def update_request(name: str, labels: Mapping[int, str]) -> UpdateSceneRequest:
-    """Return the request for other labels; see :meth:`Client.update_scene`."""
+def update_request(
+    name: str, labels: Mapping[int, str] | None, title: str | None = None
+) -> UpdateSceneRequest:
+    """Return the request for other labels or another title; see :meth:`Client.update_scene`."""
+    labels = {} if labels is None else labels
     if not isinstance(labels, Mapping):
         problem = f"labels is {reprlib.repr(labels)}; give a dict from objects to labels"
         raise InvalidRequestError(problem, "INVALID_FIELD", "labels")
     with refused_as("INVALID_FIELD", "labels", "does not lead from indices, from 0, to text"):
         given = [ObjectLabel(object=k, label=label) for k, label in labels.items()]
-    return UpdateSceneRequest(name=_name(name), labels=given)
+    called = None if title is None else _title(title)
+    return UpdateSceneRequest(name=_name(name), labels=given, title=called)
 
 
 def delete_request(name: str) -> DeleteSceneRequest:
     """Return the request to forget a scene; see :meth:`Client.delete_scene`."""
     return DeleteSceneRequest(name=_name(name))
+
+
+def _title(given: Any) -> str:
+    if not isinstance(given, str):
+        problem = f"title is {reprlib.repr(given)}; give text that people know the scene by"
+        raise InvalidRequestError(problem, "INVALID_FIELD", "title")
+    return given
 
 
 def _name(given: Any) -> str:

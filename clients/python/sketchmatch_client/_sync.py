@@ -306,6 +306,7 @@ class Client:
         segmenter: str | None = None,
         params: Mapping[str, Any] | None = None,
         profile: str | None = None,
+        title: str = "",
         timeout: float | None = None,
     ) -> PutSceneResponse:
         """Find the objects of a source, and have the server keep them for later matches.
@@ -316,13 +317,15 @@ class Client:
         ----------
         source, segmenter, params, profile, timeout
             As for :meth:`segment`.
+        title
+            What you call it, for people who choose among scenes; it is no part of the name.
 
         Returns
         -------
         PutSceneResponse
             The scene, under the hash of what it is, and whether you had not put it before.
         """
-        request = _scenes.put_request(source, segmenter, params, profile)
+        request = _scenes.put_request(source, segmenter, params, profile, title)
         return self._asked(self._keeping.PutScene, request, timeout)
 
     def get_scene(
@@ -343,9 +346,14 @@ class Client:
             request.page_token = page.next_page_token
 
     def update_scene(
-        self, name: str, labels: Mapping[int, str], *, timeout: float | None = None
+        self,
+        name: str,
+        labels: Mapping[int, str] | None = None,
+        *,
+        title: str | None = None,
+        timeout: float | None = None,
     ) -> StoredScene:
-        """Give objects of a kept scene other labels.
+        """Give objects of a kept scene other labels, or the scene another title.
 
         Parameters
         ----------
@@ -353,15 +361,17 @@ class Client:
             Of the scene, which stays as it is.
         labels
             By index, from 0; an empty one takes the label away.
+        title
+            What you call it from now on; None: as before.
         timeout
             Seconds after which the call fails.
 
         Returns
         -------
         StoredScene
-            The scene with these labels, under its own name.
+            The scene with these labels, under its own name, which a title does not change.
         """
-        request = _scenes.update_request(name, labels)
+        request = _scenes.update_request(name, labels, title)
         return self._asked(self._keeping.UpdateScene, request, timeout).stored_scene
 
     def delete_scene(self, name: str, *, timeout: float | None = None) -> None:

@@ -55,9 +55,15 @@ export function scene(found: Scene): Source {
   return create(SourceSchema, { kind: { case: "polygonSet", value } });
 }
 
-/** Return a map as ROS map_server saves it: the text of the yaml, the bytes of its picture. */
-export function mapServerMap(yaml: string, image: Uint8Array): Source {
-  return create(SourceSchema, { kind: { case: "mapServerMap", value: { yaml, image } } });
+/**
+ * Return a map as ROS map_server saves it: the text of the yaml, the bytes of its picture.
+ *
+ * `objects` is GeoJSON of what its objects are, in metres, where somebody has put them right; they
+ * stand for the map where no segmenter is chosen.
+ */
+export function mapServerMap(yaml: string, image: Uint8Array, objects = ""): Source {
+  const value = { yaml, image, objects, ownObjects: objects !== "" };
+  return create(SourceSchema, { kind: { case: "mapServerMap", value } });
 }
 
 /** Return a picture: PNG, JPEG, BMP or PGM. */

@@ -1,5 +1,7 @@
 /** The answer in words: what is what, how sure that is, and what to ask. */
 
+import { useEffect } from "preact/hooks";
+
 import type { Carried } from "./carry";
 import { colourOf } from "./colours";
 import { drawing } from "./document";
@@ -8,6 +10,7 @@ import {
   alone,
   answered,
   asking,
+  bridges,
   cancel,
   cancelled,
   carried,
@@ -16,6 +19,7 @@ import {
   isLit,
   leaveOut,
   lit,
+  lookForRobots,
   mapName,
   matchNow,
   nameOfCarried,
@@ -30,10 +34,16 @@ import {
   radius,
   reading,
   readings,
+  resize,
+  robot,
   running,
+  sending,
+  sendRoutes,
   setRadius,
+  sizeOf,
   sketchName,
   trouble,
+  unit,
 } from "./state";
 import { language, type Texts, texts } from "./texts";
 
@@ -238,6 +248,39 @@ function Asking({ index }: { index: number }) {
         </button>
       </div>
       <Chooser index={index} />
+      <Size index={index} />
+    </div>
+  );
+}
+
+/** How large a sketched thing is, for who would rather type it. */
+function Size({ index }: { index: number }) {
+  const t = texts.value;
+  const size = sizeOf(index);
+  if (!size) return null;
+  const side = (k: 0 | 1, name: string) => (
+    <label>
+      <span class="muted">{`${name}${unit.value && ` (${unit.value})`}`}</span>
+      <input
+        type="number"
+        min="0.01"
+        max="100000"
+        step="any"
+        data-testid={k ? "height" : "width"}
+        value={Number(size[k].toPrecision(3))}
+        onChange={({ currentTarget: { valueAsNumber: typed, validity } }) => {
+          const isOther = typed !== Number(size[k].toPrecision(3));
+          if (validity.valid && Number.isFinite(typed) && isOther) {
+            resize(index, k ? [size[0], typed] : [typed, size[1]]);
+          }
+        }}
+      />
+    </label>
+  );
+  return (
+    <div class="row size">
+      {side(0, t.width)}
+      {side(1, t.height)}
     </div>
   );
 }
@@ -352,7 +395,51 @@ function OnTheMap() {
           }}
         />
       </label>
+      <Sending />
     </section>
+  );
+}
+
+/** To which robot a route is sent; only to those that whoever runs the server has named. */
+function Sending() {
+  const t = texts.value;
+  useEffect(() => void lookForRobots(), []);
+  const listed = bridges.value ?? [];
+  const routes = carried.value.filter(({ kind, lines }) => kind === "route" && lines.length);
+  if (!listed.length || !routes.length) return null;
+  const { url, topic, frame } = robot.value;
+  return (
+    <form
+      class="sending"
+      onSubmit={(event) => {
+        event.preventDefault();
+        const said = new FormData(event.currentTarget);
+        const text = (name: string) => String(said.get(name) ?? "").trim();
+        void sendRoutes({ url: text("url"), topic: text("topic"), frame: text("frame") });
+      }}
+    >
+      <label>
+        <span class="muted">{t.robot}</span>
+        <select name="url" value={listed.includes(url) ? url : listed[0]}>
+          {listed.map((each) => (
+            <option key={each}>{each}</option>
+          ))}
+        </select>
+      </label>
+      <div class="row">
+        <label>
+          <span class="muted">{t.topic}</span>
+          <input name="topic" required pattern="/?[A-Za-z][A-Za-z0-9_\/]*" defaultValue={topic} />
+        </label>
+        <label>
+          <span class="muted">{t.frame}</span>
+          <input name="frame" required pattern="\S+" defaultValue={frame} />
+        </label>
+      </div>
+      <button type="submit" class="primary" disabled={sending.value} data-testid="send">
+        {t.send}
+      </button>
+    </form>
   );
 }
 
@@ -360,10 +447,8 @@ function within({ lines }: Carried): string {
   const t = texts.value;
   if (!lines.length) return t.nowhere;
   const most = Math.max(0, ...lines.flatMap(({ deviations }) => deviations));
-  const isGrid = place.value?.underlay?.grid ?? false;
-  return t.within(
-    `${most.toLocaleString(language.value, { maximumFractionDigits: 2 })}${isGrid ? " m" : ""}`,
-  );
+  const metres = most.toLocaleString(language.value, { maximumFractionDigits: 2 });
+  return t.within(`${metres} ${unit.value}`.trim());
 }
 
 function Unmatched() {
@@ -408,7 +493,7 @@ function Unmatched() {
                     type="button"
                     class="cross"
                     aria-label={`${t.leaveOut}: ${mapName(k)}`}
-                    onClick={() => leaveOut(k)}
+                    onClick={() => void leaveOut(new Set([k]))}
                   >
                     <Icon name="close" />
                   </button>

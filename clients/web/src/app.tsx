@@ -5,11 +5,12 @@ import { useEffect, useRef } from "preact/hooks";
 import { AnswerPanel, currentName } from "./answer";
 import { geoJson, waypoints } from "./carry";
 import { canRedo, canUndo, drawing, nameStrokes, redo, undo } from "./document";
-import { download, drawingSvg, inkOutline, pathOf, strokesJson } from "./files";
-import { boxOf } from "./geometry";
+import { download, drawingSvg, strokesJson } from "./files";
 import { Icon, type IconName } from "./icons";
 import { MapPane } from "./map";
+import { Mending } from "./mending";
 import { isPlace, PLACES } from "./maps";
+import { pictureSvg, pngOf } from "./picture";
 import { SketchPane } from "./sketch";
 import { Tuning } from "./tuning";
 import {
@@ -24,6 +25,7 @@ import {
   keepShown,
   link,
   lookForStored,
+  mending,
   naming,
   newSheet,
   notice,
@@ -87,13 +89,27 @@ export function App() {
           <div class="panel-head">
             <h2 id="map-title">{t.map}</h2>
             <span class="muted title">{titleOfMap()}</span>
-            {place.value && !isPlace(place.value.place) && (
+            {place.value && (
+              <button
+                type="button"
+                class="quiet"
+                aria-pressed={mending.value !== null}
+                aria-label={t.mend}
+                title={t.mend}
+                data-testid="mend"
+                onClick={() => (mending.value = mending.value ? null : new Set())}
+              >
+                <Icon name="mend" />
+              </button>
+            )}
+            {place.value?.found.segmenter && !isPlace(place.value.place) && (
               <Menu id="tuning" icon="settings" label={t.tuning}>
                 <Tuning />
               </Menu>
             )}
           </div>
           <MapPane />
+          {mending.value && <Mending chosen={mending.value} />}
         </section>
         <AnswerPanel />
       </main>
@@ -120,7 +136,7 @@ function pressed(event: KeyboardEvent): void {
     event.preventDefault();
     return;
   }
-  if (key === "escape") asking.value = null;
+  if (key === "escape") [asking.value, mending.value] = [null, null];
   const chosen = TOOLS.find(([, letter]) => letter.toLowerCase() === key);
   if (chosen && !event.altKey) tool.value = chosen[0];
 }
@@ -381,7 +397,8 @@ function FileMenu() {
         drawn,
         "save-svg",
       )}
-      {item(t.savePng, () => void savePng(), drawn, "save-png")}
+      {item(t.savePictureSvg, () => void savePicture("svg"), drawn, "save-picture-svg")}
+      {item(t.savePicturePng, () => void savePicture("png"), drawn, "save-picture-png")}
       {item(
         t.saveCarried,
         () => save("routes.geojson", "application/geo+json", geoJson(carried.peek())),
@@ -400,20 +417,10 @@ function FileMenu() {
   );
 }
 
-async function savePng(): Promise<void> {
-  const { strokes } = drawing.peek();
-  const { x0, y0, x1, y1 } = boxOf(strokes.flatMap(({ points }) => points));
-  const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [2 * (x1 - x0 + 60), 2 * (y1 - y0 + 60)];
-  const context = canvas.getContext("2d");
-  if (!context) return;
-  context.fillStyle = "#fffdf8";
-  context.fillRect(0, 0, canvas.width, canvas.height);
-  context.setTransform(2, 0, 0, 2, 2 * (30 - x0), 2 * (30 - y0));
-  context.fillStyle = "#22303c";
-  for (const stroke of strokes) context.fill(new Path2D(pathOf(inkOutline(stroke, true))));
-  const blob = await new Promise<Blob | null>((done) => canvas.toBlob(done));
-  if (blob) download("sketch.png", blob);
+async function savePicture(kind: "svg" | "png"): Promise<void> {
+  const svg = await pictureSvg();
+  const picture = kind === "svg" ? new Blob([svg], { type: "image/svg+xml" }) : await pngOf(svg);
+  if (picture) download(`sketchmatch.${kind}`, picture);
 }
 
 async function copyLink(): Promise<void> {

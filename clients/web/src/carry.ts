@@ -152,7 +152,7 @@ export function waypoints(carried: readonly Carried[]): string {
 }
 
 /** Return where a robot looks at a point of a route: to the next, and at the last as before. */
-function yawAt(points: readonly Xy[], k: number): number {
+export function yawAt(points: readonly Xy[], k: number): number {
   const [from, to] = k + 1 < points.length ? [k, k + 1] : [k - 1, k];
   const [a, b] = [points[from], points[to]];
   return a && b ? Math.atan2(b[1] - a[1], b[0] - a[0]) : 0;

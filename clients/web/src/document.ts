@@ -2,6 +2,8 @@
 
 import { computed, type ReadonlySignal, signal } from "@preact/signals";
 
+import { boxOf } from "./geometry";
+
 /** x and y in units of the paper, y down; seconds; pressure from 0 to 1. */
 export type InkPoint = readonly [number, number, number, number];
 
@@ -26,6 +28,8 @@ export interface Pin {
 export interface Drawing {
   readonly strokes: readonly Stroke[];
   readonly pins: readonly Pin[];
+  /** Units of the map for a unit of the paper, once somebody has typed the size of a thing. */
+  readonly scale?: number | undefined;
 }
 
 export const EMPTY: Drawing = { strokes: [], pins: [] };
@@ -106,6 +110,7 @@ export function addStroke(stroke: Stroke): void {
 
 export function eraseStrokes(ids: ReadonlySet<string>): void {
   change((now) => ({
+    ...now,
     strokes: now.strokes.filter(({ id }) => !ids.has(id)),
     pins: now.pins.filter(({ strokes }) => !strokes.every((id) => ids.has(id))),
   }));
@@ -119,6 +124,32 @@ export function moveStrokes(ids: ReadonlySet<string>, dx: number, dy: number): v
   change((now) => ({
     ...now,
     strokes: now.strokes.map((stroke) => (ids.has(stroke.id) ? moved(stroke) : stroke)),
+  }));
+}
+
+/**
+ * Stretch strokes about their middle.
+ *
+ * The scale by which somebody measured them holds from then on: that of an answer changes with
+ * whatever is drawn, and a size that was typed stays what it is.
+ */
+export function stretchStrokes(
+  ids: ReadonlySet<string>,
+  [fx, fy]: readonly [number, number],
+  scale: number,
+): void {
+  const box = boxOf(current.peek().strokes.flatMap((s) => (ids.has(s.id) ? s.points : [])));
+  const [cx, cy] = [(box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2];
+  const stretched = (stroke: Stroke): Stroke => ({
+    ...stroke,
+    points: stroke.points.map(
+      ([x, y, t, p]) => [cx + fx * (x - cx), cy + fy * (y - cy), t, p] as const,
+    ),
+  });
+  change((now) => ({
+    ...now,
+    scale,
+    strokes: now.strokes.map((stroke) => (ids.has(stroke.id) ? stretched(stroke) : stroke)),
   }));
 }
 

@@ -142,6 +142,7 @@ interface Packed {
   p: string;
   s: { d: number[]; l?: string; k?: StrokeKind; i: string }[];
   n: Pin[];
+  u?: number;
 }
 
 /** Return a drawing packed for a link: differences of whole points, deflated. */
@@ -155,7 +156,12 @@ export async function packed({ place, drawing }: Shared): Promise<string> {
     });
     return { d, i: id, ...(label ? { l: label } : {}), ...(kind === "thing" ? {} : { k: kind }) };
   });
-  const text = JSON.stringify({ p: place, s, n: [...drawing.pins] } satisfies Packed);
+  const text = JSON.stringify({
+    p: place,
+    s,
+    n: [...drawing.pins],
+    ...(drawing.scale ? { u: drawing.scale } : {}),
+  } satisfies Packed);
   const data = await through(new Blob([text]), new CompressionStream("deflate-raw"));
   return btoa(String.fromCharCode(...data))
     .replace(/\+/g, "-")
@@ -170,7 +176,7 @@ export async function unpacked(text: string): Promise<Shared | null> {
       c.charCodeAt(0),
     );
     const plain = await through(new Blob([data]), new DecompressionStream("deflate-raw"));
-    const { p, s, n } = JSON.parse(new TextDecoder().decode(plain)) as Packed;
+    const { p, s, n, u } = JSON.parse(new TextDecoder().decode(plain)) as Packed;
     const strokes = s.map(({ d, l, k: kind, i }): Stroke => {
       let [x, y] = [0, 0];
       const points: InkPoint[] = [];
@@ -180,7 +186,7 @@ export async function unpacked(text: string): Promise<Shared | null> {
       }
       return { ...ink(points), id: i, label: l ?? "", kind: kind ?? "thing" };
     });
-    return { place: p, drawing: { strokes, pins: n } };
+    return { place: p, drawing: { strokes, pins: n, scale: u } };
   } catch {
     return null;
   }
@@ -214,6 +220,6 @@ function round(value: number, digits = 1): number {
   return Number(value.toFixed(digits));
 }
 
-function escaped(text: string): string {
+export function escaped(text: string): string {
   return text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/"/g, "&quot;");
 }

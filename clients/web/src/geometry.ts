@@ -38,6 +38,25 @@ export function areaOf(ring: readonly Xy[]): number {
   return Math.abs(twice) / 2;
 }
 
+/** Return the convex outline around points, counter-clockwise where y grows up. */
+export function outlineAround(points: readonly Xy[]): Xy[] {
+  const sorted = [...points].sort(([ax, ay], [bx, by]) => ax - bx || ay - by);
+  const half = (along: readonly Xy[]): Xy[] => {
+    const kept: Xy[] = [];
+    for (const point of along) {
+      while (kept.length > 1 && !turnsLeft(kept.at(-2), kept.at(-1), point)) kept.pop();
+      kept.push(point);
+    }
+    return kept.slice(0, -1);
+  };
+  return [...half(sorted), ...half([...sorted].reverse())];
+}
+
+function turnsLeft(a: Xy | undefined, b: Xy | undefined, [cx, cy]: Xy): boolean {
+  if (!a || !b) return true;
+  return (b[0] - a[0]) * (cy - a[1]) > (b[1] - a[1]) * (cx - a[0]);
+}
+
 export function lengthOf(points: readonly (readonly number[])[]): number {
   let length = 0;
   for (let k = 1; k < points.length; k++) length += distance(at(points, k - 1), at(points, k));

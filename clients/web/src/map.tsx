@@ -7,6 +7,7 @@ import type { Carried } from "./carry";
 import { colourOf } from "./colours";
 import { badgePlace, boxOf, distance, toScreen, type View, type Xy, zoomed } from "./geometry";
 import { boxOfMap, type Underlay } from "./maps";
+import { toggled } from "./mending";
 import { useSize, useView } from "./pane";
 import { Badge } from "./sketch";
 import {
@@ -18,6 +19,7 @@ import {
   isLit,
   lit,
   mapName,
+  mending,
   nameOfCarried,
   pairOf,
   pin,
@@ -27,16 +29,18 @@ import {
 } from "./state";
 import { texts } from "./texts";
 
+export const ARROW = "M-9,-7L3,0L-9,7";
+
 const over = signal(false);
 
 /** A picture as it is shown, painted anew for light and dark. */
-interface Painted {
-  readonly url: string;
+interface Painting {
+  readonly picture: Blob | null;
   readonly width: number;
   readonly height: number;
 }
 
-const painted = signal<Painted | null>(null);
+const painted = signal<(Painting & { readonly url: string }) | null>(null);
 
 export function MapPane() {
   const { element, size } = useSize<HTMLDivElement>();
@@ -49,8 +53,10 @@ export function MapPane() {
     const underlay = map?.underlay;
     if (!underlay) painted.value = null;
     else
-      void paint(underlay, dark.value).then((picture) => {
-        if (wanted) painted.value = picture;
+      void paint(underlay, dark.value).then((done) => {
+        const url = done.picture ? URL.createObjectURL(done.picture) : "";
+        if (wanted) painted.value = { ...done, url };
+        else URL.revokeObjectURL(url);
       });
     return () => {
       wanted = false;
@@ -70,7 +76,7 @@ export function MapPane() {
   return (
     <div
       ref={element}
-      class={`floor${over.value ? " over" : ""}${asking.value !== null ? " asking" : ""}`}
+      class={`floor${over.value ? " over" : ""}${asking.value !== null || mending.value ? " asking" : ""}`}
       data-testid="map"
       onDragOver={(event) => {
         event.preventDefault();
@@ -89,11 +95,11 @@ export function MapPane() {
             class={map.underlay.grid ? "grid" : "photo"}
           />
         )}
-        {map?.things.map((thing, k) => (
-          <MapThing key={thing.id} index={k} view={view.value} />
-        ))}
         {carried.value.map((way) => (
           <Way key={way.id} way={way} view={view.value} />
+        ))}
+        {map?.things.map((thing, k) => (
+          <MapThing key={thing.id} index={k} view={view.value} />
         ))}
       </svg>
     </div>
@@ -111,8 +117,12 @@ function MapThing({ index, view }: { index: number; view: View }) {
   const [x, y] = badgePlace(outline, [cx, cy]);
   const below = x === cx && pair ? cy + 27 : x === cx ? cy + 4 : boxOf(outline).y1 + 16;
   const colour = pair ? colourOf(pair.sketch) : null;
-  const state = `${isLit("map", index) ? " lit" : ""}${pair ? "" : " alone"}${candidate ? " candidate" : ""}`;
+  const state = `${isLit("map", index) ? " lit" : ""}${pair ? "" : " alone"}${candidate ? " candidate" : ""}${mending.value?.has(index) ? " chosen" : ""}`;
   const tapped = () => {
+    if (mending.value) {
+      mending.value = toggled(mending.value, index);
+      return;
+    }
     const asked = asking.value ?? (candidate ? (question.value?.sketch ?? null) : null);
     if (asked !== null) pin(asked, index);
     else lit.value = { side: "map", index };
@@ -177,41 +187,37 @@ function Band({ way, view }: { way: Carried; view: View }) {
 }
 
 function Arrow({ points }: { points: readonly Xy[] }) {
-  const end = points.at(-1);
-  // Ink has points so close together that the last two point anywhere.
-  const before = end && ([...points].reverse().find((one) => distance(one, end) > 12) ?? points[0]);
-  if (!end || !before) return null;
-  const turn = (Math.atan2(end[1] - before[1], end[0] - before[0]) * 180) / Math.PI;
-  return <path d="M-9,-7L3,0L-9,7" transform={`translate(${end[0]} ${end[1]}) rotate(${turn})`} />;
+  const at = arrowOf(points);
+  return at && <path d={ARROW} transform={at} />;
 }
 
-function listed(points: readonly Xy[]): string {
+export function listed(points: readonly Xy[]): string {
   return points.map((point) => point.map((n) => n.toFixed(1)).join(",")).join(" ");
 }
 
 /** The map's y grows up, the screen's down: views are of the map turned over. */
-function flippedBox() {
+export function flippedBox() {
   const map = place.peek();
   if (!map?.things.length) return null;
   const { x0, y0, x1, y1 } = boxOfMap(map);
   return { x0, y0: -y1, x1, y1: -y0 };
 }
 
-function shown(view: View, [x, y]: Xy): Xy {
+export function shown(view: View, [x, y]: Xy): Xy {
   return toScreen(view, [x, -y]);
 }
 
-function matrix({ scale, x, y }: View): string {
+export function matrix({ scale, x, y }: View): string {
   return `matrix(${scale} 0 0 ${-scale} ${x} ${y})`;
 }
 
 /** Return what takes pixels of a picture to units of the map. */
-function placing({ origin: [x, y, yaw], resolution }: Underlay, height: number): string {
+export function placing({ origin: [x, y, yaw], resolution }: Underlay, height: number): string {
   const turn = (yaw * 180) / Math.PI;
   return `translate(${x} ${y}) rotate(${turn}) scale(${resolution} ${-resolution}) translate(0 ${-height})`;
 }
 
-function pathThrough(ring: readonly Xy[], view: View): string {
+export function pathThrough(ring: readonly Xy[], view: View): string {
   const points = ring.map((point) =>
     shown(view, point)
       .map((n) => n.toFixed(1))
@@ -220,15 +226,25 @@ function pathThrough(ring: readonly Xy[], view: View): string {
   return `M${points.join("L")}Z`;
 }
 
+/** Return where the arrow at the end of a route is, and how it is turned. */
+export function arrowOf(points: readonly Xy[]): string | null {
+  const end = points.at(-1);
+  // Ink has points so close together that the last two point anywhere.
+  const before = end && ([...points].reverse().find((one) => distance(one, end) > 12) ?? points[0]);
+  if (!end || !before) return null;
+  const turn = (Math.atan2(end[1] - before[1], end[0] - before[0]) * 180) / Math.PI;
+  return `translate(${end[0]} ${end[1]}) rotate(${turn})`;
+}
+
 /** Return an occupancy grid in the page's colours, unknown left blank; other pictures as they are. */
-async function paint(underlay: Underlay, night: boolean): Promise<Painted> {
+export async function paint(underlay: Underlay, night: boolean): Promise<Painting> {
   const bitmap = await createImageBitmap(underlay.pixels);
   const { width, height } = bitmap;
-  if (!underlay.grid) return { url: URL.createObjectURL(underlay.pixels), width, height };
+  if (!underlay.grid) return { picture: underlay.pixels, width, height };
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [width, height];
   const context = canvas.getContext("2d", { willReadFrequently: true });
-  if (!context) return { url: "", width, height };
+  if (!context) return { picture: null, width, height };
   context.drawImage(bitmap, 0, 0);
   const pixels = context.getImageData(0, 0, width, height);
   const { data } = pixels;
@@ -246,8 +262,8 @@ async function paint(underlay: Underlay, night: boolean): Promise<Painted> {
     data.set(shade < 100 ? wall : shade > 230 ? floor : [0, 0, 0, 0], k);
   }
   context.putImageData(pixels, 0, 0);
-  const blob = await new Promise<Blob | null>((done) => canvas.toBlob(done));
-  return { url: blob ? URL.createObjectURL(blob) : "", width, height };
+  const picture = await new Promise<Blob | null>((done) => canvas.toBlob(done));
+  return { picture, width, height };
 }
 
 /** Let fingers, the wheel and the mouse move the map. */

@@ -113,10 +113,63 @@ export async function openMap(
   };
 }
 
+/**
+ * Have these be the things of a map, whatever was found on it.
+ *
+ * A robot's map keeps its walls: what somebody mended goes beside it, as the command line has it.
+ * Labels alone of a map that the server keeps are changed there.
+ */
+export async function mended(
+  client: SketchmatchClient,
+  map: PlaceMap,
+  things: readonly Thing[],
+): Promise<PlaceMap> {
+  const { source, stored } = map.found;
+  if (stored && isNamedAlone(map.things, things)) return named(client, map, things);
+  const { kind } = source;
+  const whole: Source =
+    kind.case === "mapServerMap"
+      ? sources.mapServerMap(kind.value.yaml, kind.value.image, objectsOf(things))
+      : sources.polygons(things);
+  const seen = await found(client, whole, map.title);
+  // Whoever chooses a segmenter begins anew; these stand where none is chosen.
+  return { ...map, ...seen, found: { ...seen.found, segmenter: "", parameters: {} } };
+}
+
+function isNamedAlone(had: readonly Thing[], has: readonly Thing[]): boolean {
+  return had.length === has.length && had.every(({ rings }, k) => rings === has[k]?.rings);
+}
+
+async function named(
+  client: SketchmatchClient,
+  map: PlaceMap,
+  things: readonly Thing[],
+): Promise<PlaceMap> {
+  const labels = things.flatMap(({ id, label }, k) =>
+    label === map.things[k]?.label ? [] : [{ object: Number(id), label }],
+  );
+  const { storedScene } = await client.scenes.updateScene({ name: map.found.stored, labels });
+  const stored = storedScene?.name ?? map.found.stored;
+  return { ...map, things: thingsOf(storedScene?.scene), found: { ...map.found, stored } };
+}
+
+/** Return things as the file beside a robot's map has them. */
+function objectsOf(things: readonly Thing[]): string {
+  const features = things.map(({ rings, label }) => ({
+    type: "Feature",
+    properties: label ? { label } : {},
+    geometry: {
+      type: "Polygon",
+      coordinates: rings.map((ring) => [...ring, ...ring.slice(0, 1)]),
+    },
+  }));
+  return JSON.stringify({ type: "FeatureCollection", features });
+}
+
 /** A map that the server keeps. */
 export interface StoredMap {
   readonly name: string;
-  /** What it was called in this browser, or else what is on it. */
+  /** What it is called, or else what is on it. */
   readonly title: string;
   readonly things: number;
 }
@@ -124,15 +177,15 @@ export interface StoredMap {
 /** Return the maps that the server keeps, the latest first; null where it keeps none. */
 export async function listStored(client: SketchmatchClient): Promise<StoredMap[] | null> {
   try {
+    if (!(await client.info()).keepsScenes) return null;
     const { scenes } = await client.scenes.listScenes({});
-    const titles = titlesOfStored();
-    return scenes.map(({ name, labels, objectCount }) => ({
+    return scenes.map(({ name, title, labels, objectCount }) => ({
       name,
-      title: titles[name] ?? (labels.slice(0, 3).join(", ") || name.slice(0, 8)),
+      title: title || labels.slice(0, 3).join(", ") || name.slice(0, 8),
       things: objectCount,
     }));
   } catch {
-    return null; // a server without a store says so
+    return null; // the pane tells what is wrong with the server
   }
 }
 
@@ -159,7 +212,7 @@ export async function openStored(
   };
 }
 
-/** Have the server keep a map as it was found, and remember here what it is called. */
+/** Have the server keep a map as it was found, under a title. */
 export async function keepOnServer(
   client: SketchmatchClient,
   map: PlaceMap,
@@ -169,16 +222,10 @@ export async function keepOnServer(
   const { storedScene } = await client.scenes.putScene({
     source,
     segmenter: { name: segmenter, parameters: parametersOf(map.found) },
+    title,
   });
   const stored = storedScene?.name ?? "";
-  localStorage.setItem(TITLES, JSON.stringify({ ...titlesOfStored(), [stored]: title }));
   return { ...map, title, found: { ...map.found, stored } };
-}
-
-const TITLES = "stored-maps";
-
-function titlesOfStored(): Readonly<Record<string, string>> {
-  return JSON.parse(localStorage.getItem(TITLES) ?? "{}") as Record<string, string>;
 }
 
 async function underlayOf(kind: Source["kind"]): Promise<Underlay | null> {

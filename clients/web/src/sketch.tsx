@@ -136,7 +136,7 @@ function Things({ view }: { view: View }) {
       {found.sketched.map(({ rings, centroid }, k) => {
         if (found.strokesOf[k]?.some((id) => moved?.ids.has(id))) return null;
         const pair = pairOf({ side: "sketch", index: k });
-        const d = rings.map((ring) => pathThrough(ring, view)).join("");
+        const d = rings.map((ring) => paperPath(ring, view)).join("");
         const outline = (rings[0] ?? []).map(([x, y]) => toScreen(view, [x, -y]));
         const [x, y] = badgePlace(outline, toScreen(view, [centroid[0], -centroid[1]]));
         const state = `${isLit("sketch", k) || asking.value === k ? " lit" : ""}${pair ? "" : " alone"}`;
@@ -167,7 +167,7 @@ export function Badge(props: { x: number; y: number; number: number; colour: str
   );
 }
 
-function pathThrough(ring: readonly Xy[], view: View): string {
+export function paperPath(ring: readonly Xy[], view: View): string {
   const points = ring.map(([x, y]) =>
     toScreen(view, [x, -y])
       .map((n) => n.toFixed(1))
@@ -176,7 +176,7 @@ function pathThrough(ring: readonly Xy[], view: View): string {
   return `M${points.join("L")}Z`;
 }
 
-function paperBox() {
+export function paperBox() {
   const points = drawing.peek().strokes.flatMap((stroke) => stroke.points);
   return points.length ? boxOf(points) : null;
 }

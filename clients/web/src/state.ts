@@ -13,11 +13,12 @@ import {
   pins,
   pinStrokes,
   replace,
+  stretchStrokes,
   type Stroke,
   thingStrokes,
 } from "./document";
 import { ink, inkOf, packed, parseStrokes, unpacked } from "./files";
-import { isInside, type Xy } from "./geometry";
+import { boxOf, isInside, outlineAround, type Xy } from "./geometry";
 import { keepDrawing, keepMap, restored } from "./keep";
 import {
   foundOtherwise,
@@ -26,14 +27,17 @@ import {
   openOutlines,
   keepOnServer,
   listStored,
+  mended,
   openPlace,
   openStored,
   type Place,
   type PlaceMap,
   sampleSketch,
   type StoredMap,
+  type Thing,
   type Tuned,
 } from "./maps";
+import { NotSent, type Robot, robots, send } from "./robot";
 import { type Answered, type Progress, Session } from "./session";
 import { texts } from "./texts";
 
@@ -210,6 +214,39 @@ async function carryOver(wanted: ToCarry, signal: AbortSignal): Promise<void> {
   }
 }
 
+/** The ROS bridges that routes may be sent to; null until somebody has asked. */
+export const bridges = signal<readonly string[] | null>(null);
+export const robot = signal<Robot>({
+  url: "",
+  topic: "/sketched_route",
+  frame: "map",
+  ...(JSON.parse(localStorage.getItem("robot") ?? "{}") as Partial<Robot>),
+});
+export const sending = signal(false);
+
+export async function lookForRobots(): Promise<void> {
+  bridges.value ??= await robots();
+}
+
+/** Send the routes on the map to a robot, and say whether they are there. */
+export async function sendRoutes(to: Robot): Promise<void> {
+  const t = texts.peek();
+  robot.value = to;
+  localStorage.setItem("robot", JSON.stringify(to));
+  sending.value = true;
+  try {
+    for (const way of carried.peek()) {
+      if (way.kind === "route" && way.lines.length) await send(way, to);
+    }
+    notice.value = t.sent(to.topic);
+  } catch (thrown) {
+    const said = thrown instanceof NotSent ? thrown.said : String(thrown);
+    notice.value = said ? t.refused(to.url, said) : t.noRobot(to.url);
+  } finally {
+    sending.value = false;
+  }
+}
+
 /** Return the pair of a thing, if it has one. */
 export function pairOf(thing: Lit | null): Pair | undefined {
   if (!thing) return undefined;
@@ -281,14 +318,55 @@ export function matchNow(): void {
   }
 }
 
+/** The maps before somebody mended the one that is shown, the latest last. */
+const mendedFrom = signal<readonly PlaceMap[]>([]);
+export const canUnmend = computed(() => mendedFrom.value.length > 0);
+/** The things of the map that are about to be mended; null while nobody mends. */
+export const mending = signal<ReadonlySet<number> | null>(null);
+
 /** Show another map; what was said of the former one holds no longer. */
-function show(map: PlaceMap): void {
+function show(map: PlaceMap, from: readonly PlaceMap[] = []): void {
   batch(() => {
+    mendedFrom.value = from;
+    if (mending.peek()) mending.value = new Set();
     answered.value = null;
     lit.value = null;
     place.value = map;
   });
 }
+
+function forgetPins(): void {
+  change((now) => (now.pins.length ? { ...now, pins: [] } : now));
+}
+
+/** Forget what was said about the map that was shown before. */
+function forget(): void {
+  change((now) => (now.pins.length || now.scale ? { ...now, pins: [], scale: undefined } : now));
+}
+
+/** Return width and height of a sketched thing as drawn, in units of the map; null if unknown. */
+export function sizeOf(sketch: number): readonly [number, number] | null {
+  const found = answered.value;
+  const ids = new Set(found?.strokesOf[sketch]);
+  const scale = drawing.value.scale ?? found?.result.scale ?? 0;
+  const { strokes } = drawing.value;
+  const { x0, y0, x1, y1 } = boxOf(strokes.flatMap((s) => (ids.has(s.id) ? s.points : [])));
+  return scale > 0 && x1 > x0 && y1 > y0 ? [scale * (x1 - x0), scale * (y1 - y0)] : null;
+}
+
+/** Make a sketched thing as wide and as high as somebody says, in units of the map. */
+export function resize(sketch: number, [width, height]: readonly [number, number]): void {
+  const [size, found] = [sizeOf(sketch), answered.peek()];
+  const scale = drawing.peek().scale ?? found?.result.scale;
+  if (!size || !scale) return;
+  const ids = new Set(found?.strokesOf[sketch]);
+  const about = asking.peek();
+  stretchStrokes(ids, [width / size[0], height / size[1]], scale);
+  asking.value = about; // it is the same thing, and its other side may be typed next
+}
+
+/** Return what the map's units are called; empty where nobody knows. */
+export const unit = computed(() => (place.value?.underlay?.grid ? "m" : ""));
 
 export function newSheet(): void {
   change((now) => (now.strokes.length ? EMPTY : now));
@@ -297,7 +375,7 @@ export function newSheet(): void {
 export async function choosePlace(name: Place): Promise<void> {
   await telling(async () => {
     show(await openPlace(client, name));
-    change((now) => (now.pins.length ? { ...now, pins: [] } : now));
+    forget();
     refit.value++;
   });
 }
@@ -306,7 +384,7 @@ export async function bringMap(files: readonly File[]): Promise<void> {
   await telling(async () => {
     const map = await openMap(client, files, texts.peek().pictureLacking);
     show(map);
-    change((now) => (now.pins.length ? { ...now, pins: [] } : now));
+    forget();
     notice.value = map.warnings.join(" ");
     refit.value++;
   });
@@ -322,7 +400,7 @@ export async function lookForStored(): Promise<void> {
 export async function chooseStored(map: StoredMap): Promise<void> {
   await telling(async () => {
     show(await openStored(client, map));
-    change((now) => (now.pins.length ? { ...now, pins: [] } : now));
+    forget();
     refit.value++;
   });
 }
@@ -360,14 +438,69 @@ export async function findOtherwise(parameters: Tuned): Promise<void> {
     const other = await foundOtherwise(client, map, parameters);
     if (place.peek() !== map) return; // another one was chosen meanwhile
     show(other);
-    change((now) => (now.pins.length ? { ...now, pins: [] } : now));
+    forget();
   });
 }
 
-/** Take a thing off the map, as if the robot had not seen it. */
-export function leaveOut(index: number): void {
-  const map = place.value;
-  if (map) show({ ...map, things: map.things.filter((_, k) => k !== index) });
+/** Take things off the map, as if the robot had not seen them. */
+export function leaveOut(indices: ReadonlySet<number>): Promise<void> {
+  return mend((things) => things.filter((_, k) => !indices.has(k)).map((thing) => [thing]));
+}
+
+/** Make one thing of several, with the outline around all and the first name that one has. */
+export function mergeThings(indices: ReadonlySet<number>): Promise<void> {
+  const first = Math.min(...indices);
+  return mend((things) => {
+    const parts = things.filter((_, k) => indices.has(k));
+    const rings = [outlineAround(parts.flatMap((part) => part.rings[0] ?? []))];
+    const label = parts.find((part) => part.label)?.label ?? "";
+    return things.flatMap((thing, k) => {
+      if (k === first) return [[{ ...thing, rings, label }, ...parts]];
+      return indices.has(k) ? [] : [[thing]];
+    });
+  });
+}
+
+export function nameThing(index: number, label: string): Promise<void> {
+  return mend((things) => things.map((thing, k) => [k === index ? { ...thing, label } : thing]));
+}
+
+/** Take back the last thing that was mended. */
+export function unmend(): void {
+  const [before, ...earlier] = [...mendedFrom.peek()].reverse();
+  if (!before) return;
+  show(before, earlier.reverse());
+  forgetPins();
+}
+
+/** Mend the map: each thing that it then has, followed by those it was made of. */
+async function mend(next: (things: readonly Thing[]) => Thing[][]): Promise<void> {
+  const map = place.peek();
+  if (!map) return;
+  const made = next(map.things);
+  const title = isPlace(map.place) ? texts.peek().place[map.place] : map.title;
+  await telling(async () => {
+    const things = made.flatMap(([thing]) => (thing ? [thing] : []));
+    const other = await mended(client, { ...map, place: "", title }, things);
+    if (place.peek() !== map) return; // another one was chosen meanwhile
+    const from = [...mendedFrom.peek(), map];
+    // What was said of a thing holds for what became of it.
+    const thingOf = (id: string | null) =>
+      id === null
+        ? null
+        : other.things[made.findIndex((all) => all.some((one) => one.id === id))]?.id;
+    batch(() => {
+      show(other, from);
+      change((now) => {
+        if (!now.pins.length) return now;
+        const pins = now.pins.flatMap(({ strokes, thing }) => {
+          const there = thingOf(thing);
+          return there === undefined ? [] : [{ strokes, thing: there }];
+        });
+        return { ...now, pins };
+      });
+    });
+  });
 }
 
 /** Draw the place as somebody drew it, stroke by stroke. */

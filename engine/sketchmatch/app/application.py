@@ -319,7 +319,8 @@ class Application:
 
     def info(self) -> GetServerInfoResponse:
         """Return versions and limits."""
-        return responses.server_info(self._setup, time.monotonic() - self._began)
+        uptime = time.monotonic() - self._began
+        return responses.server_info(self._setup, uptime, self.scenes.path is not None)
 
     async def start(
         self,

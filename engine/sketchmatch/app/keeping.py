@@ -21,6 +21,7 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
     GetSceneResponse,
     ListScenesRequest,
     ListScenesResponse,
+    PutSceneRequest,
     PutSceneResponse,
     StoredScene,
     UpdateSceneRequest,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["Keeping"]
 
 _Result = TypeVar("_Result")
+_LONGEST_TITLE = 200
 
 
 class Keeping:
@@ -63,16 +65,18 @@ class Keeping:
     async def put(self, data: bytes, caller: Caller) -> PutSceneResponse:
         """Find the objects of a source, and keep them; ``data`` is a ``PutSceneRequest``."""
         archive = self._kept("the request")
+        title = _title(await asyncio.to_thread(_title_in, data))
         await asyncio.to_thread(archive.open)
         while True:
             found, histograms = await self._found(data, caller)
             if found.HasField("source"):
-                created = await asyncio.to_thread(archive.put, found, caller.known, self._most)
+                put = await asyncio.to_thread(archive.put, found, caller.known, title, self._most)
                 for packed in histograms:
                     self.keep(packed)
-                return PutSceneResponse(stored_scene=found.stored_scene, created=created)
+                record, created = put
+                return PutSceneResponse(stored_scene=record, created=created)
             name = found.stored_scene.name
-            claimed = await asyncio.to_thread(archive.claim, name, caller.known, self._most)
+            claimed = await asyncio.to_thread(archive.claim, name, caller.known, title, self._most)
             if claimed is not None:
                 record, created = claimed
                 return PutSceneResponse(stored_scene=record, created=created)
@@ -99,11 +103,13 @@ class Keeping:
         )
 
     async def update(self, request: UpdateSceneRequest, caller: Caller) -> UpdateSceneResponse:
-        """Keep a scene of a caller with other labels."""
+        """Keep a scene of a caller with other labels, or under another title."""
         labels = [(each.object, each.label) for each in request.labels]
+        title = _title(request.title) if request.HasField("title") else None
         most = self._most
         record = await self._asked(
-            request.name, lambda archive: archive.relabel(request.name, labels, caller.known, most)
+            request.name,
+            lambda archive: archive.relabel(request.name, labels, caller.known, title, most),
         )
         return UpdateSceneResponse(stored_scene=record)
 
@@ -157,3 +163,16 @@ class Keeping:
             problem = "is not set; give the name of a scene"
             raise InvalidInputError(Reason.MISSING_FIELD, "name", problem)
         return await asyncio.to_thread(job, archive)
+
+
+def _title_in(data: bytes) -> str:
+    return PutSceneRequest.FromString(data).title
+
+
+def _title(given: str) -> str:
+    """Return a title as it is kept."""
+    title = " ".join(given.split())
+    if len(title) > _LONGEST_TITLE:
+        problem = f"has {len(title)} characters; give up to {_LONGEST_TITLE}"
+        raise InvalidInputError(Reason.INVALID_FIELD, "title", problem)
+    return title

@@ -224,7 +224,9 @@ def source(
                 return _occupancy_grid(message.occupancy_grid)
             case "map_server_map":
                 packed = message.map_server_map
-                return decode_map_server(packed.yaml, packed.image, packed.objects)
+                return decode_map_server(
+                    packed.yaml, packed.image, packed.objects, packed.own_objects
+                )
             case "image":
                 return decode_image(message.image.data)
             case "file":

@@ -255,8 +255,10 @@ def catalogue(
     )
 
 
-def server_info(setup: Setup, uptime: float) -> catalog_service_pb2.GetServerInfoResponse:
-    """Return versions and limits as a message; ``uptime`` in seconds."""
+def server_info(
+    setup: Setup, uptime: float, keeps_scenes: bool
+) -> catalog_service_pb2.GetServerInfoResponse:
+    """Return versions, limits and what the server keeps as a message; ``uptime`` in seconds."""
     given = setup.limits
     limits = catalog_service_pb2.ServerLimits(
         max_request_bytes=given.max_request_bytes,
@@ -284,6 +286,7 @@ def server_info(setup: Setup, uptime: float) -> catalog_service_pb2.GetServerInf
         plugin_api_version=API_VERSION,
         limits=limits,
         uptime=Duration(seconds=int(uptime)),
+        keeps_scenes=keeps_scenes,
     )
 
 

@@ -55,7 +55,7 @@ __all__ = [
     "without_store",
 ]
 
-_FILE, _VERSION = "scenes", 1
+_FILE, _VERSION = "scenes", 2
 _MIB = 1024 * 1024
 SCENES_BYTES = 1024 * _MIB
 """Bytes of all scenes together, where nobody says another number."""
@@ -71,7 +71,7 @@ CREATE TABLE scenes (
 CREATE INDEX scenes_by_content ON scenes (content);
 CREATE INDEX scenes_by_outlines ON scenes (outlines);
 CREATE TABLE owners (
-    caller TEXT NOT NULL, put_time INTEGER NOT NULL, name TEXT NOT NULL,
+    caller TEXT NOT NULL, put_time INTEGER NOT NULL, name TEXT NOT NULL, title TEXT NOT NULL,
     PRIMARY KEY (caller, name)
 ) WITHOUT ROWID;
 CREATE INDEX owners_by_name ON owners (name);
@@ -192,13 +192,15 @@ class SceneArchive:
         """
         self._file.work(lambda _: None)
 
-    def put(self, found: GetSceneResponse, caller: str, most: int | None = None) -> bool:
-        """Keep what a segmenter found in a source; return whether the caller had not put it.
+    def put(
+        self, found: GetSceneResponse, caller: str, title: str = "", most: int | None = None
+    ) -> tuple[StoredScene, bool]:
+        """Keep what a segmenter found in a source, and what the caller calls it.
 
         Parameters
         ----------
-        found, caller
-            What it found, and for whom.
+        found, caller, title
+            What it found, for whom, and what that caller calls it.
         most
             Bytes that the caller may keep, or None for no limit.
 
@@ -206,22 +208,28 @@ class SceneArchive:
         ------
         QuotaError
             If these would be more; then nothing is kept.
+
+        Returns
+        -------
+        tuple
+            The scene, and whether the caller had not put it.
         """
         record = found.stored_scene
         source = zlib.compress(found.source.SerializeToString(deterministic=True), 1)
         labels = _labels_of(record)
 
-        def job(connection: sqlite3.Connection) -> bool:
+        def job(connection: sqlite3.Connection) -> tuple[StoredScene, bool]:
             connection.execute(
                 "INSERT OR IGNORE INTO contents VALUES (?, ?, ?)",
                 (record.name, source, json.dumps(labels)),
             )
-            return _put(connection, record, record.name, caller, most)
+            created = _put(connection, record, record.name, caller, most)
+            return _titled(connection, record, caller, title or None), created
 
         return self._file.work(job)
 
     def claim(
-        self, name: str, caller: str, most: int | None = None
+        self, name: str, caller: str, title: str = "", most: int | None = None
     ) -> tuple[StoredScene, bool] | None:
         """Let a caller have a scene that it could put; None where nobody has put it.
 
@@ -236,14 +244,17 @@ class SceneArchive:
             The scene, and whether the caller had not put it.
         """
 
-        def job(connection: sqlite3.Connection) -> tuple[bytes, bool] | None:
+        def job(connection: sqlite3.Connection) -> tuple[StoredScene, bool] | None:
             found = connection.execute(
                 "SELECT record FROM scenes WHERE name = ?", (name,)
             ).fetchone()
-            return None if found is None else (found[0], _own(connection, name, caller, most))
+            if found is None:
+                return None
+            created = _own(connection, name, caller, most)
+            record = StoredScene.FromString(found[0])
+            return _titled(connection, record, caller, title or None), created
 
-        found = self._file.work(job)
-        return None if found is None else (StoredScene.FromString(found[0]), found[1])
+        return self._file.work(job)
 
     def get(
         self, name: str, caller: str, include_source: bool = False, field: str = "name"
@@ -261,7 +272,7 @@ class SceneArchive:
             source = None
             if include_source:
                 source = _source(connection.execute(_SOURCE_OF, (name,)).fetchone())
-            return GetSceneResponse(stored_scene=StoredScene.FromString(record), source=source)
+            return GetSceneResponse(stored_scene=record, source=source)
 
         return self._file.work(job)
 
@@ -270,9 +281,19 @@ class SceneArchive:
         name: str,
         labels: Sequence[tuple[int, str]],
         caller: str,
+        title: str | None = None,
         most: int | None = None,
     ) -> StoredScene:
-        """Keep a scene with other labels, beside the one of this name.
+        """Keep a scene with other labels, beside the one of this name, and under another title.
+
+        Parameters
+        ----------
+        name, labels, caller
+            Of the scene; by object; whose it is.
+        title
+            What the caller calls it from now on; None: as before.
+        most
+            Bytes that the caller may keep, or None for no limit.
 
         Raises
         ------
@@ -285,7 +306,7 @@ class SceneArchive:
         """
 
         def job(connection: sqlite3.Connection) -> StoredScene:
-            record = StoredScene.FromString(_record(connection, name, caller, "name"))
+            record = _record(connection, name, caller, "name")
             content, found = connection.execute(
                 "SELECT content, contents.labels FROM contents JOIN scenes USING (content) "
                 "WHERE name = ?",
@@ -299,8 +320,10 @@ class SceneArchive:
                 record.scene.objects[place].label = cleaned_label(label)
             wanted = _labels_of(record)
             record.name = content if wanted == json.loads(found) else _relabelled(content, wanted)
+            called = record.title if title is None else title
+            record.ClearField("title")
             _put(connection, record, content, caller, most)
-            return record
+            return _titled(connection, record, caller, called)
 
         return self._file.work(job)
 
@@ -319,7 +342,8 @@ class SceneArchive:
 
         def job(connection: sqlite3.Connection) -> list[Any]:
             return connection.execute(
-                "SELECT name, put_time, objects, labels FROM owners JOIN scenes USING (name) "
+                "SELECT name, put_time, objects, labels, title "
+                "FROM owners JOIN scenes USING (name) "
                 "WHERE caller = ? AND (put_time, name) < (?, ?) "
                 "ORDER BY put_time DESC, name DESC LIMIT ?",
                 (caller, before, last, size + 1),
@@ -327,9 +351,9 @@ class SceneArchive:
 
         rows = self._file.work(job)
         response = ListScenesResponse()
-        for name, put_time, objects, labels in rows[:size]:
+        for name, put_time, objects, labels, title in rows[:size]:
             named = [label for label in json.loads(labels) if label]
-            summary = SceneSummary(name=name, object_count=objects, labels=named)
+            summary = SceneSummary(name=name, object_count=objects, labels=named, title=title)
             summary.put_time.FromNanoseconds(put_time)
             response.scenes.append(summary)
         if len(rows) > size:
@@ -416,7 +440,7 @@ class Shelf:
         if self._file is None:
             raise without_store(field)
         record = self._file.work(lambda connection: _record(connection, name, caller, field))
-        return self.decoded(name, record)
+        return self.decoded(name, record.SerializeToString())
 
     def decoded(self, name: str, record: bytes) -> Segmentation:
         """Return the scene of a record, decoded once."""
@@ -502,7 +526,7 @@ def _put(
 
 def _own(connection: sqlite3.Connection, name: str, caller: str, most: int | None) -> bool:
     made = connection.execute(
-        "INSERT OR IGNORE INTO owners VALUES (?, ?, ?)", (caller, time.time_ns(), name)
+        "INSERT OR IGNORE INTO owners VALUES (?, ?, ?, '')", (caller, time.time_ns(), name)
     )
     new = made.rowcount > 0
     if new and most is not None and (kept := _kept_bytes(connection, caller)) > most:
@@ -527,10 +551,28 @@ def _kept_bytes(connection: sqlite3.Connection, caller: str) -> int:
     return int(scenes + sources)
 
 
-def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) -> bytes:
-    """Return the record of a scene of a caller."""
+def _titled(
+    connection: sqlite3.Connection, record: StoredScene, caller: str, title: str | None
+) -> StoredScene:
+    """Return a record with what its caller calls it, from now on or as before."""
+    whose = (caller, record.name)
+    if title is not None:
+        connection.execute(
+            "UPDATE owners SET title = ? WHERE caller = ? AND name = ?", (title, *whose)
+        )
+    (called,) = connection.execute(
+        "SELECT title FROM owners WHERE caller = ? AND name = ?", whose
+    ).fetchone()
+    with_title = StoredScene()
+    with_title.CopyFrom(record)
+    with_title.title = called
+    return with_title
+
+
+def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) -> StoredScene:
+    """Return the record of a scene of a caller, with its title."""
     found = connection.execute(
-        "SELECT record FROM scenes JOIN owners USING (name) WHERE name = ? AND caller = ?",
+        "SELECT record, title FROM scenes JOIN owners USING (name) WHERE name = ? AND caller = ?",
         (name, caller),
     ).fetchone()
     if found is None:
@@ -539,7 +581,9 @@ def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) 
             f"{field} is {shown[:_NAMED]}, and you keep no scene of this name here; put it, or "
             "list those there are"
         )
-    return bytes(found[0])
+    record = StoredScene.FromString(found[0])
+    record.title = found[1]
+    return record
 
 
 def _labels_of(record: StoredScene) -> list[str]:

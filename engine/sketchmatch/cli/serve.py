@@ -200,6 +200,13 @@ def serve(
             help="Show the sketch pad, and answer Connect, gRPC-Web and JSON, here.",
         ),
     ] = None,
+    web_robots: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL,…",
+            help="Let the sketch pad send routes to these ROS bridges, as in ws://robot.local:9090.",
+        ),
+    ] = None,
     strict_plugins: Annotated[
         bool,
         typer.Option(
@@ -253,6 +260,7 @@ def serve(
         "server.metrics_address": metrics_address,
         "server.traces_endpoint": traces_endpoint,
         "server.web_address": web_address,
+        "server.web_robots": web_robots,
         "limits.max_bytes": max_bytes,
         "limits.max_pixels": max_pixels,
         "limits.max_side": max_side,
@@ -319,6 +327,7 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
         server.keep_matches_mib * _MIB,
         server.keep_scenes_mib * _MIB,
         server.traces_endpoint,
+        server.web_robots,
     )
 
 

@@ -1,14 +1,15 @@
-"""Where servers listen: what an address must have, before gRPC guesses the rest."""
+"""Where servers listen, and robots: what an address must have, before anybody guesses the rest."""
 
 from __future__ import annotations
 
 import re
 from ipaddress import ip_address
 
-__all__ = ["address_fault", "is_of_this_machine", "network_fault"]
+__all__ = ["address_fault", "bridge_fault", "is_of_this_machine", "network_fault"]
 
 _LOCAL = re.compile(r"unix(?:-abstract)?:(.*)", re.S)
 _URL = re.compile(r"[a-z][a-z0-9+.-]*://", re.I)
+_BRIDGE = re.compile(r"wss?://(?:[\w.-]+|\[[0-9a-f:]+\])(?::\d{1,5})?(?:/[\w./-]*)?", re.I | re.A)
 _PORTS = 65_535
 _DIGITS = 5
 _LONGEST_PATH = 107
@@ -80,3 +81,19 @@ def network_fault(address: str) -> str:
         (not numbered, f"end with a port from 0 to {_PORTS}, as in {host}:50051"),
     )
     return next((f"should {fault}" for wrong, fault in faults if wrong), "")
+
+
+def bridge_fault(address: str) -> str:
+    """Return what is wrong with the address of a ROS bridge; empty if nothing is.
+
+    Examples
+    --------
+    >>> bridge_fault("ws://robot.local:9090")
+    ''
+    >>> bridge_fault("robot.local:9090")
+    'should be a WebSocket each, as in ws://robot.local:9090'
+    """
+    # It becomes part of a header, in which spaces, commas and semicolons have a meaning.
+    if _BRIDGE.fullmatch(address):
+        return ""
+    return "should be a WebSocket each, as in ws://robot.local:9090"

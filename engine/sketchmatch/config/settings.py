@@ -13,7 +13,7 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 
-from sketchmatch.config.addresses import address_fault, network_fault
+from sketchmatch.config.addresses import address_fault, bridge_fault, network_fault
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
 from sketchmatch.pipeline.selection import STAGES
@@ -49,6 +49,13 @@ def _watched(address: str | None) -> str | None:
     if address and (fault := network_fault(address)):
         raise ValueError(fault)
     return address
+
+
+def _bridges(addresses: tuple[str, ...]) -> tuple[str, ...]:
+    for address in addresses:
+        if fault := bridge_fault(address):
+            raise ValueError(fault)
+    return addresses
 
 
 _Weight = Annotated[float, Field(ge=0.0, le=MAX_WEIGHT)]
@@ -287,6 +294,12 @@ class _Server(_Section):
         (),
         description="Origins of pages from elsewhere that may call at the address for browsers.",
         examples=[["https://pad.example.org"]],
+    )
+    web_robots: Annotated[_Names, AfterValidator(_bridges)] = Field(
+        (),
+        description="ROS bridges (rosbridge) that the sketch pad may send routes to; it reaches "
+        "nobody else.",
+        examples=[["ws://robot.local:9090"]],
     )
     insecure: bool = Field(
         False,

@@ -17,7 +17,7 @@ from sketchmatch_map_files import is_of
 __all__ = ["with_objects"]
 
 
-def with_objects(grid: OccupancyGrid, objects: str, content: str) -> OccupancyGrid:
+def with_objects(grid: OccupancyGrid, objects: str, content: str | None) -> OccupancyGrid:
     """Return a grid with the objects that a file says it has, if it is one of this content.
 
     Coordinates are metres in the map's frame, whatever a tool says that they are. A feature of
@@ -31,7 +31,7 @@ def with_objects(grid: OccupancyGrid, objects: str, content: str) -> OccupancyGr
     objects
         The text of the file, GeoJSON; empty if there is none.
     content
-        What it has to say that it is of.
+        What it has to say that it is of; None: it is of this map, whatever it says.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def with_objects(grid: OccupancyGrid, objects: str, content: str) -> OccupancyGr
         return grid
     try:
         features = load_json(objects)
-        if not is_of(features, content):
+        if content is not None and not is_of(features, content):
             note = "the file with objects is of another content of the map and was ignored"
             return replace(grid, notes=(*grid.notes, note))
         return replace(grid, objects=_objects_of({**features, "crs": None}))

@@ -183,7 +183,9 @@ class MapServerHeader:
         ).astype(np.int8)
 
 
-def decode_map_server(yaml_text: str, image: bytes, objects: str = "") -> OccupancyGrid:
+def decode_map_server(
+    yaml_text: str, image: bytes, objects: str = "", own_objects: bool = False
+) -> OccupancyGrid:
     """Decode a map from the contents of its files.
 
     Parameters
@@ -194,6 +196,8 @@ def decode_map_server(yaml_text: str, image: bytes, objects: str = "") -> Occupa
         The picture's file.
     objects
         The file that says what its objects are, if there is one.
+    own_objects
+        Whether these are of this map though they do not say so.
 
     Raises
     ------
@@ -205,7 +209,9 @@ def decode_map_server(yaml_text: str, image: bytes, objects: str = "") -> Occupa
     except InvalidInputError as error:
         raise error.within("yaml") from None
     grid = header.grid(image)
-    return with_objects(grid, objects, content_of(parse(yaml_text), image)) if objects else grid
+    if not objects:
+        return grid
+    return with_objects(grid, objects, None if own_objects else content_of(parse(yaml_text), image))
 
 
 def parse_header(yaml_text: str) -> MapServerHeader:

@@ -45,6 +45,8 @@ class Gateway:
         The same with the services and interceptors of the gRPC server.
     services
         Full names of the services.
+    robots
+        Addresses of ROS bridges that the sketch pad may send routes to.
     tls
         Files of certificates, and what is in them; None: no encryption.
 
@@ -61,6 +63,7 @@ class Gateway:
         app: Application,
         handlers: Handlers,
         services: Iterable[str],
+        robots: Sequence[str] = (),
         tls: tuple[TlsFiles, Watched[Pems]] | None = None,
     ) -> None:
         try:
@@ -78,7 +81,7 @@ class Gateway:
             app.setup.limits.transport_bytes,
             lambda: app.setup.limits.max_request_bytes,
         )
-        pages = bundled_pages()
+        pages = bundled_pages(robots)
         self._socket, self.address = _listening(address)
         self.url = f"{'https' if tls else 'http'}://{self.address}/"
         self.lacking = () if pages else ("the sketch pad is not built; make web does",)

@@ -4,39 +4,49 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+import json
 import mimetypes
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
 from importlib import resources
 from pathlib import PurePosixPath
 from typing import Any
 
-__all__ = ["HEADERS", "Pages", "answer_plainly", "bundled_pages"]
+__all__ = ["Pages", "answer_plainly", "bundled_pages"]
 
-_POLICY = "; ".join(
-    (
+ROBOTS = "/robots.json"
+"""Where the page reads to which ROS bridges it may send routes."""
+
+
+def _headers(robots: Sequence[str] = ()) -> tuple[tuple[bytes, bytes], ...]:
+    """Return what goes with every page.
+
+    Nothing is loaded from elsewhere, nothing runs within a page, and it connects to nobody but this
+    server and the robots that whoever runs it has named.
+    """
+    policy = (
         "default-src 'none'",
         "script-src 'self'",
         "style-src 'self'",
         "img-src 'self' blob: data:",
         "font-src 'self'",
-        "connect-src 'self'",
+        " ".join(("connect-src 'self'", *robots)),
         "manifest-src 'self'",
         "base-uri 'none'",
         "form-action 'none'",
         "frame-ancestors 'none'",
     )
-)
+    return (
+        (b"content-security-policy", "; ".join(policy).encode()),
+        (b"cross-origin-opener-policy", b"same-origin"),
+        (b"cross-origin-resource-policy", b"same-origin"),
+        (b"referrer-policy", b"no-referrer"),
+        (b"x-content-type-options", b"nosniff"),
+    )
 
-HEADERS = (
-    (b"content-security-policy", _POLICY.encode()),
-    (b"cross-origin-opener-policy", b"same-origin"),
-    (b"cross-origin-resource-policy", b"same-origin"),
-    (b"referrer-policy", b"no-referrer"),
-    (b"x-content-type-options", b"nosniff"),
-)
-"""What goes with every page: nothing from elsewhere, and no script or style within a page."""
+
+_HEADERS = _headers()
 
 _TYPES = {".js": "text/javascript", ".webmanifest": "application/manifest+json"}
 _WORTH_GZIP = ("text/", "image/svg", "application/json", "application/manifest")
@@ -58,10 +68,14 @@ class Pages:
     ----------
     files
         What is in each, by the path that browsers ask for.
+    robots
+        Addresses of ROS bridges that the page may send routes to.
     """
 
-    def __init__(self, files: Mapping[str, bytes]) -> None:
-        self._pages = {path: _page(path, data) for path, data in files.items()}
+    def __init__(self, files: Mapping[str, bytes], robots: Sequence[str] = ()) -> None:
+        listed = {ROBOTS: json.dumps(list(robots)).encode()} if files else {}
+        self._pages = {path: _page(path, data) for path, data in {**files, **listed}.items()}
+        self._headers = _headers(robots)
 
     def __bool__(self) -> bool:
         return "/index.html" in self._pages
@@ -77,10 +91,10 @@ class Pages:
             text = "there is no such page" if self else "the sketch pad is not built; make web does"
             await answer_plainly(send, HTTPStatus.NOT_FOUND, text)
         else:
-            await _answer(page, scope, send)
+            await _answer(page, self._headers, scope, send)
 
 
-def bundled_pages() -> Pages:
+def bundled_pages(robots: Sequence[str] = ()) -> Pages:
     """Return the sketch pad that came with the engine; no pages where it was not built."""
     folder = resources.files("sketchmatch.server") / "pad"
     found: dict[str, bytes] = {}
@@ -95,20 +109,22 @@ def bundled_pages() -> Pages:
 
     if folder.is_dir():
         gather(folder, "")
-    return Pages(found)
+    return Pages(found, robots)
 
 
 async def answer_plainly(send: Any, status: HTTPStatus, text: str) -> None:
     """Answer with a sentence."""
     body = f"{text}\n".encode()
-    headers = [(b"content-type", b"text/plain; charset=utf-8"), *HEADERS]
+    headers = [(b"content-type", b"text/plain; charset=utf-8"), *_HEADERS]
     await _send(send, status, headers, body)
 
 
-async def _answer(page: _Page, scope: Any, send: Any) -> None:
+async def _answer(
+    page: _Page, always: Sequence[tuple[bytes, bytes]], scope: Any, send: Any
+) -> None:
     asked = dict(scope["headers"])
     kept = b"public, max-age=31536000, immutable" if page.lasting else b"no-cache"
-    headers = [(b"etag", page.tag), (b"cache-control", kept), *HEADERS]
+    headers = [(b"etag", page.tag), (b"cache-control", kept), *always]
     if asked.get(b"if-none-match") == page.tag:
         await _send(send, HTTPStatus.NOT_MODIFIED, headers, b"")
         return

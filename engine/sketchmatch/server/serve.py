@@ -113,6 +113,8 @@ class ServerSettings:
         Host and port for browsers; None for none.
     web_origins
         Of pages from elsewhere that may call there.
+    web_robots
+        Addresses of ROS bridges that the sketch pad may send routes to.
     store_named
         Whether somebody named that folder, so that the server is not to start without it.
     matches_days, matches_bytes
@@ -139,6 +141,7 @@ class ServerSettings:
     matches_bytes: int = 1 << 30
     scenes_bytes: int = 1 << 30
     traces_endpoint: str | None = None
+    web_robots: tuple[str, ...] = ()
 
 
 async def serve(
@@ -319,7 +322,13 @@ class _Beside:
         if settings.web_address:
             tls = (settings.tls, files.pems) if settings.tls and files.pems else None
             self._gateway = Gateway(
-                settings.web_address, settings.web_origins, app, handlers, _SERVICES, tls
+                settings.web_address,
+                settings.web_origins,
+                app,
+                handlers,
+                _SERVICES,
+                settings.web_robots,
+                tls,
             )
             self.sentences += [f"the sketch pad is at {self._gateway.url}", *self._gateway.lacking]
 

@@ -100,6 +100,7 @@ struct ServerInfo {
   std::uint32_t plugin_api_version = 0;  ///< Version of the plugin API.
   ServerLimits limits;                   ///< What requests must keep to.
   Seconds uptime{0.0};                   ///< Time since it started.
+  bool keeps_scenes = false;             ///< Whether it keeps scenes.
 };
 
 }  // namespace sketchmatch

@@ -384,12 +384,15 @@ class GetServerInfoResponse(google.protobuf.message.Message):
     PLUGIN_API_VERSION_FIELD_NUMBER: builtins.int
     LIMITS_FIELD_NUMBER: builtins.int
     UPTIME_FIELD_NUMBER: builtins.int
+    KEEPS_SCENES_FIELD_NUMBER: builtins.int
     version: builtins.str
     """Version of the sketchmatch engine, e.g. "0.1.0"."""
     api_version: builtins.str
     """Protobuf package of the newest API that it serves, e.g. "sketchmatch.v1"."""
     plugin_api_version: builtins.int
     """Version of the plugin API."""
+    keeps_scenes: builtins.bool
+    """Whether it keeps scenes, for `PutScene` and what else `SceneService` does with them."""
     @property
     def limits(self) -> global___ServerLimits:
         """What requests must keep to."""
@@ -406,9 +409,10 @@ class GetServerInfoResponse(google.protobuf.message.Message):
         plugin_api_version: builtins.int = ...,
         limits: global___ServerLimits | None = ...,
         uptime: google.protobuf.duration_pb2.Duration | None = ...,
+        keeps_scenes: builtins.bool = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["limits", b"limits", "uptime", b"uptime"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["api_version", b"api_version", "limits", b"limits", "plugin_api_version", b"plugin_api_version", "uptime", b"uptime", "version", b"version"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["api_version", b"api_version", "keeps_scenes", b"keeps_scenes", "limits", b"limits", "plugin_api_version", b"plugin_api_version", "uptime", b"uptime", "version", b"version"]) -> None: ...
 
 global___GetServerInfoResponse = GetServerInfoResponse
 

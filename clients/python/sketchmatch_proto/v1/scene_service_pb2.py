@@ -18,7 +18,7 @@ from sketchmatch_proto.v1 import scene_pb2 as sketchmatch_dot_v1_dot_scene__pb2
 from sketchmatch_proto.v1 import source_pb2 as sketchmatch_dot_v1_dot_source__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"sketchmatch/v1/scene_service.proto\x12\x0esketchmatch.v1\x1a\x1fgoogle/protobuf/timestamp.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1asketchmatch/v1/scene.proto\x1a\x1bsketchmatch/v1/source.proto\"\x80\x01\n\x0eSegmentRequest\x12&\n\x06source\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12\x35\n\tsegmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x0f\n\x07profile\x18\x03 \x01(\t\"\xa6\x01\n\x0fSegmentResponse\x12$\n\x05scene\x18\x01 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x10\n\x08warnings\x18\x02 \x03(\t\x12\x35\n\tsegmenter\x18\x03 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12$\n\x05route\x18\x04 \x03(\x0b\x32\x15.sketchmatch.v1.Point\"\x81\x01\n\x0fPutSceneRequest\x12&\n\x06source\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12\x35\n\tsegmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x0f\n\x07profile\x18\x03 \x01(\t\"V\n\x10PutSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\x12\x0f\n\x07\x63reated\x18\x02 \x01(\x08\"\xb0\x01\n\x0bStoredScene\x12\x0c\n\x04name\x18\x01 \x01(\t\x12$\n\x05scene\x18\x02 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x10\n\x08warnings\x18\x03 \x03(\t\x12\x35\n\tsegmenter\x18\x04 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12$\n\x05route\x18\x05 \x03(\x0b\x32\x15.sketchmatch.v1.Point\"7\n\x0fGetSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x16\n\x0einclude_source\x18\x02 \x01(\x08\"m\n\x10GetSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\x12&\n\x06source\x18\x02 \x01(\x0b\x32\x16.sketchmatch.v1.Source\":\n\x11ListScenesRequest\x12\x11\n\tpage_size\x18\x01 \x01(\x05\x12\x12\n\npage_token\x18\x02 \x01(\t\"[\n\x12ListScenesResponse\x12,\n\x06scenes\x18\x01 \x03(\x0b\x32\x1c.sketchmatch.v1.SceneSummary\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"p\n\x0cSceneSummary\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x14\n\x0cobject_count\x18\x02 \x01(\r\x12\x0e\n\x06labels\x18\x03 \x03(\t\x12,\n\x08put_time\x18\x04 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\"O\n\x12UpdateSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12+\n\x06labels\x18\x02 \x03(\x0b\x32\x1b.sketchmatch.v1.ObjectLabel\",\n\x0bObjectLabel\x12\x0e\n\x06object\x18\x01 \x01(\r\x12\r\n\x05label\x18\x02 \x01(\t\"H\n\x13UpdateSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\"\"\n\x12\x44\x65leteSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"\x15\n\x13\x44\x65leteSceneResponse2\xfd\x03\n\x0cSceneService\x12J\n\x07Segment\x12\x1e.sketchmatch.v1.SegmentRequest\x1a\x1f.sketchmatch.v1.SegmentResponse\x12M\n\x08PutScene\x12\x1f.sketchmatch.v1.PutSceneRequest\x1a .sketchmatch.v1.PutSceneResponse\x12M\n\x08GetScene\x12\x1f.sketchmatch.v1.GetSceneRequest\x1a .sketchmatch.v1.GetSceneResponse\x12S\n\nListScenes\x12!.sketchmatch.v1.ListScenesRequest\x1a\".sketchmatch.v1.ListScenesResponse\x12V\n\x0bUpdateScene\x12\".sketchmatch.v1.UpdateSceneRequest\x1a#.sketchmatch.v1.UpdateSceneResponse\x12V\n\x0b\x44\x65leteScene\x12\".sketchmatch.v1.DeleteSceneRequest\x1a#.sketchmatch.v1.DeleteSceneResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"sketchmatch/v1/scene_service.proto\x12\x0esketchmatch.v1\x1a\x1fgoogle/protobuf/timestamp.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1asketchmatch/v1/scene.proto\x1a\x1bsketchmatch/v1/source.proto\"\x80\x01\n\x0eSegmentRequest\x12&\n\x06source\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12\x35\n\tsegmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x0f\n\x07profile\x18\x03 \x01(\t\"\xa6\x01\n\x0fSegmentResponse\x12$\n\x05scene\x18\x01 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x10\n\x08warnings\x18\x02 \x03(\t\x12\x35\n\tsegmenter\x18\x03 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12$\n\x05route\x18\x04 \x03(\x0b\x32\x15.sketchmatch.v1.Point\"\x90\x01\n\x0fPutSceneRequest\x12&\n\x06source\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12\x35\n\tsegmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x0f\n\x07profile\x18\x03 \x01(\t\x12\r\n\x05title\x18\x04 \x01(\t\"V\n\x10PutSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\x12\x0f\n\x07\x63reated\x18\x02 \x01(\x08\"\xbf\x01\n\x0bStoredScene\x12\x0c\n\x04name\x18\x01 \x01(\t\x12$\n\x05scene\x18\x02 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x10\n\x08warnings\x18\x03 \x03(\t\x12\x35\n\tsegmenter\x18\x04 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12$\n\x05route\x18\x05 \x03(\x0b\x32\x15.sketchmatch.v1.Point\x12\r\n\x05title\x18\x06 \x01(\t\"7\n\x0fGetSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x16\n\x0einclude_source\x18\x02 \x01(\x08\"m\n\x10GetSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\x12&\n\x06source\x18\x02 \x01(\x0b\x32\x16.sketchmatch.v1.Source\":\n\x11ListScenesRequest\x12\x11\n\tpage_size\x18\x01 \x01(\x05\x12\x12\n\npage_token\x18\x02 \x01(\t\"[\n\x12ListScenesResponse\x12,\n\x06scenes\x18\x01 \x03(\x0b\x32\x1c.sketchmatch.v1.SceneSummary\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"\x7f\n\x0cSceneSummary\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x14\n\x0cobject_count\x18\x02 \x01(\r\x12\x0e\n\x06labels\x18\x03 \x03(\t\x12,\n\x08put_time\x18\x04 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05title\x18\x05 \x01(\t\"m\n\x12UpdateSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12+\n\x06labels\x18\x02 \x03(\x0b\x32\x1b.sketchmatch.v1.ObjectLabel\x12\x12\n\x05title\x18\x03 \x01(\tH\x00\x88\x01\x01\x42\x08\n\x06_title\",\n\x0bObjectLabel\x12\x0e\n\x06object\x18\x01 \x01(\r\x12\r\n\x05label\x18\x02 \x01(\t\"H\n\x13UpdateSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\"\"\n\x12\x44\x65leteSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"\x15\n\x13\x44\x65leteSceneResponse2\xfd\x03\n\x0cSceneService\x12J\n\x07Segment\x12\x1e.sketchmatch.v1.SegmentRequest\x1a\x1f.sketchmatch.v1.SegmentResponse\x12M\n\x08PutScene\x12\x1f.sketchmatch.v1.PutSceneRequest\x1a .sketchmatch.v1.PutSceneResponse\x12M\n\x08GetScene\x12\x1f.sketchmatch.v1.GetSceneRequest\x1a .sketchmatch.v1.GetSceneResponse\x12S\n\nListScenes\x12!.sketchmatch.v1.ListScenesRequest\x1a\".sketchmatch.v1.ListScenesResponse\x12V\n\x0bUpdateScene\x12\".sketchmatch.v1.UpdateSceneRequest\x1a#.sketchmatch.v1.UpdateSceneResponse\x12V\n\x0b\x44\x65leteScene\x12\".sketchmatch.v1.DeleteSceneRequest\x1a#.sketchmatch.v1.DeleteSceneResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -30,31 +30,31 @@ if _descriptor._USE_C_DESCRIPTORS == False:
   _globals['_SEGMENTRESPONSE']._serialized_start=307
   _globals['_SEGMENTRESPONSE']._serialized_end=473
   _globals['_PUTSCENEREQUEST']._serialized_start=476
-  _globals['_PUTSCENEREQUEST']._serialized_end=605
-  _globals['_PUTSCENERESPONSE']._serialized_start=607
-  _globals['_PUTSCENERESPONSE']._serialized_end=693
-  _globals['_STOREDSCENE']._serialized_start=696
-  _globals['_STOREDSCENE']._serialized_end=872
-  _globals['_GETSCENEREQUEST']._serialized_start=874
-  _globals['_GETSCENEREQUEST']._serialized_end=929
-  _globals['_GETSCENERESPONSE']._serialized_start=931
-  _globals['_GETSCENERESPONSE']._serialized_end=1040
-  _globals['_LISTSCENESREQUEST']._serialized_start=1042
-  _globals['_LISTSCENESREQUEST']._serialized_end=1100
-  _globals['_LISTSCENESRESPONSE']._serialized_start=1102
-  _globals['_LISTSCENESRESPONSE']._serialized_end=1193
-  _globals['_SCENESUMMARY']._serialized_start=1195
-  _globals['_SCENESUMMARY']._serialized_end=1307
-  _globals['_UPDATESCENEREQUEST']._serialized_start=1309
-  _globals['_UPDATESCENEREQUEST']._serialized_end=1388
-  _globals['_OBJECTLABEL']._serialized_start=1390
-  _globals['_OBJECTLABEL']._serialized_end=1434
-  _globals['_UPDATESCENERESPONSE']._serialized_start=1436
-  _globals['_UPDATESCENERESPONSE']._serialized_end=1508
-  _globals['_DELETESCENEREQUEST']._serialized_start=1510
-  _globals['_DELETESCENEREQUEST']._serialized_end=1544
-  _globals['_DELETESCENERESPONSE']._serialized_start=1546
-  _globals['_DELETESCENERESPONSE']._serialized_end=1567
-  _globals['_SCENESERVICE']._serialized_start=1570
-  _globals['_SCENESERVICE']._serialized_end=2079
+  _globals['_PUTSCENEREQUEST']._serialized_end=620
+  _globals['_PUTSCENERESPONSE']._serialized_start=622
+  _globals['_PUTSCENERESPONSE']._serialized_end=708
+  _globals['_STOREDSCENE']._serialized_start=711
+  _globals['_STOREDSCENE']._serialized_end=902
+  _globals['_GETSCENEREQUEST']._serialized_start=904
+  _globals['_GETSCENEREQUEST']._serialized_end=959
+  _globals['_GETSCENERESPONSE']._serialized_start=961
+  _globals['_GETSCENERESPONSE']._serialized_end=1070
+  _globals['_LISTSCENESREQUEST']._serialized_start=1072
+  _globals['_LISTSCENESREQUEST']._serialized_end=1130
+  _globals['_LISTSCENESRESPONSE']._serialized_start=1132
+  _globals['_LISTSCENESRESPONSE']._serialized_end=1223
+  _globals['_SCENESUMMARY']._serialized_start=1225
+  _globals['_SCENESUMMARY']._serialized_end=1352
+  _globals['_UPDATESCENEREQUEST']._serialized_start=1354
+  _globals['_UPDATESCENEREQUEST']._serialized_end=1463
+  _globals['_OBJECTLABEL']._serialized_start=1465
+  _globals['_OBJECTLABEL']._serialized_end=1509
+  _globals['_UPDATESCENERESPONSE']._serialized_start=1511
+  _globals['_UPDATESCENERESPONSE']._serialized_end=1583
+  _globals['_DELETESCENEREQUEST']._serialized_start=1585
+  _globals['_DELETESCENEREQUEST']._serialized_end=1619
+  _globals['_DELETESCENERESPONSE']._serialized_start=1621
+  _globals['_DELETESCENERESPONSE']._serialized_end=1642
+  _globals['_SCENESERVICE']._serialized_start=1645
+  _globals['_SCENESERVICE']._serialized_end=2154
 # @@protoc_insertion_point(module_scope)

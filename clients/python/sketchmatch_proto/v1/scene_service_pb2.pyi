@@ -99,8 +99,13 @@ class PutSceneRequest(google.protobuf.message.Message):
     SOURCE_FIELD_NUMBER: builtins.int
     SEGMENTER_FIELD_NUMBER: builtins.int
     PROFILE_FIELD_NUMBER: builtins.int
+    TITLE_FIELD_NUMBER: builtins.int
     profile: builtins.str
     """As in `SegmentRequest`."""
+    title: builtins.str
+    """What you call it, for people who choose among scenes: up to 200 characters. It is yours alone, and
+    no part of the scene's name. Empty: a scene that you have put already keeps its title.
+    """
     @property
     def source(self) -> sketchmatch_proto.v1.source_pb2.Source:
         """The sketch or map. Required, and no stored scene."""
@@ -115,9 +120,10 @@ class PutSceneRequest(google.protobuf.message.Message):
         source: sketchmatch_proto.v1.source_pb2.Source | None = ...,
         segmenter: sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection | None = ...,
         profile: builtins.str = ...,
+        title: builtins.str = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["segmenter", b"segmenter", "source", b"source"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["profile", b"profile", "segmenter", b"segmenter", "source", b"source"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["profile", b"profile", "segmenter", b"segmenter", "source", b"source", "title", b"title"]) -> None: ...
 
 global___PutSceneRequest = PutSceneRequest
 
@@ -157,8 +163,11 @@ class StoredScene(google.protobuf.message.Message):
     WARNINGS_FIELD_NUMBER: builtins.int
     SEGMENTER_FIELD_NUMBER: builtins.int
     ROUTE_FIELD_NUMBER: builtins.int
+    TITLE_FIELD_NUMBER: builtins.int
     name: builtins.str
     """The hash of what it is, in hexadecimal: 64 digits. `Source.stored_scene` takes it."""
+    title: builtins.str
+    """What you call it; empty if nothing."""
     @property
     def scene(self) -> sketchmatch_proto.v1.scene_pb2.Scene:
         """The objects."""
@@ -183,9 +192,10 @@ class StoredScene(google.protobuf.message.Message):
         warnings: collections.abc.Iterable[builtins.str] | None = ...,
         segmenter: sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection | None = ...,
         route: collections.abc.Iterable[sketchmatch_proto.v1.source_pb2.Point] | None = ...,
+        title: builtins.str = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["scene", b"scene", "segmenter", b"segmenter"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["name", b"name", "route", b"route", "scene", b"scene", "segmenter", b"segmenter", "warnings", b"warnings"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["name", b"name", "route", b"route", "scene", b"scene", "segmenter", b"segmenter", "title", b"title", "warnings", b"warnings"]) -> None: ...
 
 global___StoredScene = StoredScene
 
@@ -294,10 +304,13 @@ class SceneSummary(google.protobuf.message.Message):
     OBJECT_COUNT_FIELD_NUMBER: builtins.int
     LABELS_FIELD_NUMBER: builtins.int
     PUT_TIME_FIELD_NUMBER: builtins.int
+    TITLE_FIELD_NUMBER: builtins.int
     name: builtins.str
     """Its name."""
     object_count: builtins.int
     """How many objects it has."""
+    title: builtins.str
+    """What you call it; empty if nothing."""
     @property
     def labels(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.str]:
         """The labels of those that have one, in the order of the objects."""
@@ -313,22 +326,28 @@ class SceneSummary(google.protobuf.message.Message):
         object_count: builtins.int = ...,
         labels: collections.abc.Iterable[builtins.str] | None = ...,
         put_time: google.protobuf.timestamp_pb2.Timestamp | None = ...,
+        title: builtins.str = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["put_time", b"put_time"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["labels", b"labels", "name", b"name", "object_count", b"object_count", "put_time", b"put_time"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["labels", b"labels", "name", b"name", "object_count", b"object_count", "put_time", b"put_time", "title", b"title"]) -> None: ...
 
 global___SceneSummary = SceneSummary
 
 @typing.final
 class UpdateSceneRequest(google.protobuf.message.Message):
-    """Labels for objects of a scene."""
+    """A title for a scene, and labels for its objects."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
     NAME_FIELD_NUMBER: builtins.int
     LABELS_FIELD_NUMBER: builtins.int
+    TITLE_FIELD_NUMBER: builtins.int
     name: builtins.str
     """Name of the scene. Required."""
+    title: builtins.str
+    """What you call it from now on, as in `PutSceneRequest`; an empty one takes the title away. Absent: the
+    scene in the answer is called as the one that `name` names.
+    """
     @property
     def labels(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectLabel]:
         """The labels; the other objects keep theirs."""
@@ -338,8 +357,11 @@ class UpdateSceneRequest(google.protobuf.message.Message):
         *,
         name: builtins.str = ...,
         labels: collections.abc.Iterable[global___ObjectLabel] | None = ...,
+        title: builtins.str | None = ...,
     ) -> None: ...
-    def ClearField(self, field_name: typing.Literal["labels", b"labels", "name", b"name"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_title", b"_title", "title", b"title"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_title", b"_title", "labels", b"labels", "name", b"name", "title", b"title"]) -> None: ...
+    def WhichOneof(self, oneof_group: typing.Literal["_title", b"_title"]) -> typing.Literal["title"] | None: ...
 
 global___UpdateSceneRequest = UpdateSceneRequest
 

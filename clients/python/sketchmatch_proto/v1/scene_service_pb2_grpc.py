@@ -143,8 +143,9 @@ class SceneServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def UpdateScene(self, request, context):
-        """Gives objects of a scene other labels. Labels are part of what a match sees, and so of the scene's
-        name: the scene with the new labels has ANOTHER name, which the answer has. The scene under the
+        """Gives a scene another title, and its objects other labels. Labels are part of what a match sees,
+        and so of the scene's name: the scene with the new labels has ANOTHER name, which the answer has. A
+        title alone leaves the name as it is. The scene under the
         old name stays as it is until it is deleted.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):

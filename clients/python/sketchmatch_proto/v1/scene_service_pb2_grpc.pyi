@@ -111,8 +111,9 @@ class SceneServiceStub:
         sketchmatch_proto.v1.scene_service_pb2.UpdateSceneRequest,
         sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse,
     ]
-    """Gives objects of a scene other labels. Labels are part of what a match sees, and so of the scene's
-    name: the scene with the new labels has ANOTHER name, which the answer has. The scene under the
+    """Gives a scene another title, and its objects other labels. Labels are part of what a match sees,
+    and so of the scene's name: the scene with the new labels has ANOTHER name, which the answer has. A
+    title alone leaves the name as it is. The scene under the
     old name stays as it is until it is deleted.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
@@ -241,8 +242,9 @@ class SceneServiceAsyncStub:
         sketchmatch_proto.v1.scene_service_pb2.UpdateSceneRequest,
         sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse,
     ]
-    """Gives objects of a scene other labels. Labels are part of what a match sees, and so of the scene's
-    name: the scene with the new labels has ANOTHER name, which the answer has. The scene under the
+    """Gives a scene another title, and its objects other labels. Labels are part of what a match sees,
+    and so of the scene's name: the scene with the new labels has ANOTHER name, which the answer has. A
+    title alone leaves the name as it is. The scene under the
     old name stays as it is until it is deleted.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
@@ -381,8 +383,9 @@ class SceneServiceServicer(metaclass=abc.ABCMeta):
         request: sketchmatch_proto.v1.scene_service_pb2.UpdateSceneRequest,
         context: _ServicerContext,
     ) -> typing.Union[sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse, collections.abc.Awaitable[sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse]]:
-        """Gives objects of a scene other labels. Labels are part of what a match sees, and so of the scene's
-        name: the scene with the new labels has ANOTHER name, which the answer has. The scene under the
+        """Gives a scene another title, and its objects other labels. Labels are part of what a match sees,
+        and so of the scene's name: the scene with the new labels has ANOTHER name, which the answer has. A
+        title alone leaves the name as it is. The scene under the
         old name stays as it is until it is deleted.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):

@@ -362,6 +362,7 @@ class MapServerMap(google.protobuf.message.Message):
     YAML_FIELD_NUMBER: builtins.int
     IMAGE_FIELD_NUMBER: builtins.int
     OBJECTS_FIELD_NUMBER: builtins.int
+    OWN_OBJECTS_FIELD_NUMBER: builtins.int
     yaml: builtins.str
     """Text of the .yaml file. Its keys are read as map_server reads them (`resolution`, `origin`,
     `negate`, `occupied_thresh`, `free_thresh`, `mode`), except `image`, a path that only the
@@ -374,14 +375,19 @@ class MapServerMap(google.protobuf.message.Message):
     --out` saves it). They stand for the map where no segmenter is chosen. If none of its features
     says that it is of a map with this content, it is ignored, with a warning.
     """
+    own_objects: builtins.bool
+    """Whether `objects` are of this map though none of its features says so, as where somebody has put
+    them right just now.
+    """
     def __init__(
         self,
         *,
         yaml: builtins.str = ...,
         image: builtins.bytes = ...,
         objects: builtins.str = ...,
+        own_objects: builtins.bool = ...,
     ) -> None: ...
-    def ClearField(self, field_name: typing.Literal["image", b"image", "objects", b"objects", "yaml", b"yaml"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["image", b"image", "objects", b"objects", "own_objects", b"own_objects", "yaml", b"yaml"]) -> None: ...
 
 global___MapServerMap = MapServerMap
 
