@@ -36,6 +36,7 @@ def come_back_in(seconds):
     return error_details_pb2.RetryInfo(retry_delay=delay)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_a_server_that_was_away_for_a_moment_is_asked_again(call, server, method):
     server.fail(grpc.StatusCode.UNAVAILABLE, "away")
@@ -46,6 +47,7 @@ def test_a_server_that_was_away_for_a_moment_is_asked_again(call, server, method
     assert all(request == first for request in again)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_a_busy_server_is_asked_again_no_sooner_than_it_says(call, server, method):
     server.fail(grpc.StatusCode.RESOURCE_EXHAUSTED, "full", come_back_in(0.4))

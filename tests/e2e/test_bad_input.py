@@ -602,6 +602,7 @@ def details(error: grpc.RpcError) -> tuple[error_details_pb2.ErrorInfo, list]:
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name.replace(" ", "-"))
 
 
+@pytest.mark.slow
 @every_case
 def test_over_grpc_it_is_an_invalid_argument_with_the_fields_path_and_the_remedy(
     stub, case, tmp_path

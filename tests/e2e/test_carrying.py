@@ -174,6 +174,7 @@ def test_in_python_it_is_the_same(zones):
     assert known.object_map == ((2, 7), (0, 6), (4, 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

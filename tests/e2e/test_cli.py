@@ -109,6 +109,7 @@ def test_json_writes_out_index_0_and_empty_lists(command_line):
     assert answer["unmatchedMapObjects"] == []
 
 
+@pytest.mark.slow
 def test_a_pipe_gets_tab_separated_lines_and_nothing_else(where):
     done = run("match", *ROOM, *where)
     assert done.returncode == 0
@@ -214,6 +215,7 @@ def test_segmenters_are_chosen_by_the_names_of_their_stages(command_line, where)
     assert "sketch_segmenter.name is 'image', which cannot read" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["match", "relate"])
 @pytest.mark.parametrize("side", ["sketch", "map"])
 def test_former_names_of_options_hold_and_are_deprecated(command_line, command, side):
@@ -597,6 +599,7 @@ def test_what_is_typed_wrong_gets_exit_code_2_and_one_line_with_the_remedy(
     assert_one_line(command_line(*arguments), ExitCode.INVALID_INPUT, *words)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments", [["match", *ROOM], ["segment", LIVING_ROOM_MAP], ["plugins", "list"]]
 )
@@ -644,6 +647,7 @@ def test_the_end_of_a_file_does_not_look_like_ctrl_c(command_line, monkeypatch):
     assert "interrupted" not in done.stderr
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_long_match_soon_and_quietly(where):
     terminal = Terminal("match", *ROOM, *where, *LONG)
     terminal.wait_for("searching")

@@ -75,6 +75,7 @@ def test_the_variables_of_the_image_are_settings(monkeypatch):
     assert settings.metrics_address == variables["SKETCHMATCH_SERVER__METRICS_ADDRESS"]
 
 
+@pytest.mark.slow
 def test_the_image_does_not_start_for_strangers(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     for name, value in re.findall(r"(SKETCHMATCH_\w+)=(\S+)", DOCKERFILE):

@@ -225,6 +225,7 @@ def test_relate_takes_algorithms_and_their_parameters(command_line):
 # What is typed wrong ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -39,6 +39,7 @@ def said_by(code, **environment):
     return done.stdout.split()
 
 
+@pytest.mark.slow
 @compiled_only
 def test_what_is_no_dependency_is_not_needed():
     # Some functions of NumPy work in kernels only where SciPy is installed, and abort elsewhere.

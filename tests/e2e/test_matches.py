@@ -45,6 +45,7 @@ def test_ones_matches_are_listed_shown_watched_and_cancelled(served):
     assert stopped.stderr == "sketchmatch: the match was cancelled\n"
 
 
+@pytest.mark.slow
 def test_a_match_that_is_not_there_and_a_server_that_is_not_asked_are_one_line_each(served):
     address, *_ = served
     missing = sketchmatch("matches", "show", address, "nobody")

@@ -39,6 +39,7 @@ def test_the_command_line_obeys_and_counts_from_one(command_line, files, where):
     assert found.get(2) != 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [

@@ -62,6 +62,7 @@ def test_the_search_ends_at_least_as_high_as_the_truth(runs, setting):
     assert sum(reached) >= 0.9 * RUNS
 
 
+@pytest.mark.slow
 def test_what_is_not_ambiguous_is_matched_right(runs):
     right = [r["cropped"]["right"] for r in runs if r["rival"] < AMBIGUOUS]
     assert len(right) >= RUNS / 2, "most runs can tell"

@@ -32,6 +32,7 @@ def object_map(done):
     return {line.get("sketchObject", 0): line.get("mapObject", 0) for line in lines}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [
@@ -56,6 +57,7 @@ def test_a_sketch_set_by_hand_is_matched_wholly_right_with_its_map(name, command
     assert object_map(done) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["00", "01", "02", "03"])
 def test_a_sketch_that_a_person_drew_is_matched_wholly_right_with_its_map(name, command_line):
     truth = truth_of(BY_PEOPLE, name)

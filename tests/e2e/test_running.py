@@ -58,6 +58,7 @@ def test_each_line_does_what_the_page_says(operator):
     follow(operator, text)
 
 
+@pytest.mark.slow
 def test_metrics_are_told_as_the_page_says(operator):
     require(importlib.util.find_spec("prometheus_client"), "the package prometheus-client")
     follow(operator, commands_of("Metrics"))

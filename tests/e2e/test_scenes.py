@@ -24,6 +24,7 @@ def scenes(tmp_path_factory):
         yield run
 
 
+@pytest.mark.slow
 def test_a_map_is_put_labelled_and_matched_with_by_its_name(scenes):
     name = scenes("scenes put", LIVING_ROOM_MAP).stdout.strip()
     assert len(name) == 64
@@ -41,6 +42,7 @@ def test_a_map_is_put_labelled_and_matched_with_by_its_name(scenes):
     assert labelled not in scenes("scenes list").stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "arguments", "said"),
     [
@@ -59,6 +61,7 @@ def test_what_is_of_no_use_is_said_in_one_line(scenes, command, arguments, said)
     assert said in line
 
 
+@pytest.mark.slow
 def test_a_stored_scene_without_a_server_is_refused():
     done = sketchmatch("match", LIVING_ROOM_SKETCH, "scene:ab")
     assert done.returncode == 2

@@ -23,6 +23,7 @@ def where(request, address):
     return ["--server", address] if request.param == "server" else []
 
 
+@pytest.mark.slow
 def test_what_was_found_is_saved_to_the_last_digit(command_line, where, tmp_path):
     saved, again = tmp_path / "scene.geojson", tmp_path / "again.geojson"
     done = command_line("segment", LIVING_ROOM_MAP, "--json", "--out", saved, *where)

@@ -97,6 +97,7 @@ def test_what_cannot_be_done_is_said_in_a_line(command_line, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_commands_show_tokens_and_certificates(command_line, monkeypatch, tmp_path):
     ours = Authority(tmp_path, "ours")
     pair, client = ours.issue("localhost"), ours.issue("robot-7")

@@ -30,12 +30,14 @@ def node(code):
     )
 
 
+@pytest.mark.slow
 def test_the_first_answer_of_the_readme_is_what_it_says(url):
     ((code, printed),) = re.findall(r"^```js\n(.*?)^```\n\n^```\n(.*?)^```", README, re.S | re.M)
     done = node(code.replace("http://127.0.0.1:8080", url.rstrip("/")))
     assert (done.stdout, done.stderr) == (printed, "")
 
 
+@pytest.mark.slow
 def test_errors_say_what_to_do_and_where(url):
     done = node(f"""
         import {{ SketchmatchClient, sources }} from "@sketchmatch/client";

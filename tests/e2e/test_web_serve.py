@@ -8,6 +8,7 @@ import pytest
 from tests.processes import sketchmatch
 
 
+@pytest.mark.slow
 def test_web_alone_means_port_8080_of_this_machine_and_says_when_that_is_taken():
     with socket.socket() as taken:
         with suppress(OSError):  # somebody else has it, which does as well
@@ -29,6 +30,7 @@ def test_an_address_that_is_none_is_refused_by_its_name():
     assert "should have a port" in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("address", ["robot.local:9090", "http://robot", "ws://a; script-src *"])
 def test_a_robot_that_is_no_web_socket_is_refused_before_it_is_part_of_a_header(address):
     done = sketchmatch("serve", "--web-robots", address)

@@ -135,6 +135,7 @@ def test_geojson_of_any_structure_is_read_or_refused(document):
     read_or_refused(decode_geojson, json.dumps(document), PolygonSet)
 
 
+@pytest.mark.slow
 @given(STROKES | VALUES)
 @settings(max_examples=200)
 def test_stroke_json_of_any_structure_is_read_or_refused(document):

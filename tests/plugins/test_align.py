@@ -371,6 +371,7 @@ def test_it_is_the_default_and_finds_partial_maps():
     assert Align().object_consistent
 
 
+@pytest.mark.slow
 @compiled_only
 @pytest.mark.parametrize("partial", [False, True])
 def test_work_between_pauses_is_bounded_for_many_objects(monkeypatch, partial):

@@ -70,6 +70,7 @@ LAYOUTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
 @given(st.integers(0, 2**32), st.integers(2, 30), st.integers(2, 6))
 @examples(40)

@@ -21,7 +21,7 @@ def _warm():
         algorithm.warm_up()
 
 
-@parametrize_plugins(
+CONTRACTS = parametrize_plugins(
     BUILT_IN,
     expected_failures={
         RasterForce: {
@@ -29,5 +29,28 @@ def _warm():
         }
     },
 )
+# What takes seconds: whole plans are cut into rooms dozens of times, and swarms fly.
+SLOW = {
+    "ImageSegmenter-threads-agree",
+    "FsnnPso-threads-agree",
+    "NnPso-threads-agree",
+    "RoomSegmenter-answers-repeat",
+    "RoomSegmenter-blank-sources-are-refused",
+    "RoomSegmenter-inputs-stay-untouched",
+    "RoomSegmenter-threads-agree",
+}
+
+
+def marked(case):
+    if case.id not in SLOW:
+        return case
+    return pytest.param(*case.values, id=case.id, marks=(*case.marks, pytest.mark.slow))
+
+
+def test_what_is_slow_is_among_the_contracts():
+    assert {case.id for case in CONTRACTS.args[1]} >= SLOW
+
+
+@pytest.mark.parametrize(CONTRACTS.args[0], [marked(case) for case in CONTRACTS.args[1]])
 def test_it_keeps_the_contract(check):
     check()

@@ -125,6 +125,7 @@ def test_relations_with_evidence_and_rotation_weights(seed):
     assert_proved(table, weights, seed)
 
 
+@pytest.mark.slow
 @given(tables(most=5, more=3), st.tuples(*3 * [st.floats(0.0, 10.0)]).filter(any))
 @example(random_table(np.random.default_rng(0), 2, 2), (5e-324, 0.0, 0.0))
 @example(random_table(np.random.default_rng(0), 4, 5), (0.0, 0.0, 5e-324))
@@ -141,6 +142,7 @@ def test_any_weights_agree_with_the_slow_oracle(table, weights):
         assert seen[-1].confidence == pytest.approx(best, abs=TRUE)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("seed", range(60))
 def test_sketches(seed):
@@ -221,6 +223,7 @@ def test_two_objects(argument, weights):
         assert seen[-1].confidence == pytest.approx(expected, abs=TRUE)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("seed", range(8))
 def test_the_bound_is_true_whenever_one_looks(seed, monkeypatch):
@@ -274,6 +277,7 @@ def test_stopped_early_it_has_a_map_and_a_true_bound(larger, steps, monkeypatch)
     assert_sound(seen, table, best)
 
 
+@pytest.mark.slow
 def test_a_node_limit_ends_the_search_with_a_gap(larger):
     table, best = larger
     seen, outcome = run(table, starts=1, node_limit=3)
@@ -301,6 +305,7 @@ def test_without_memory_for_a_cell_it_does_not_claim_a_proof(larger, monkeypatch
     assert run(table)[1] is Outcome.ITERATION_LIMIT
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("quality", ["best", "worst"])
 def test_given_maps_are_where_it_begins(quality):
@@ -316,6 +321,7 @@ def test_given_maps_are_where_it_begins(quality):
     assert seen[-1].confidence == pytest.approx(max(every.values()), abs=TRUE)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("k", [1, 3, 10])
 def test_alternatives_are_good_and_different(k):
@@ -378,6 +384,7 @@ def test_what_was_yielded_does_not_change_later(monkeypatch):
         assert (progress.fmap.entries == entries).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objects", [15, 40])
 def test_it_yields_often_and_stops_when_it_is_closed(objects):
     # Random relations are far beyond a proof at these sizes.
@@ -395,6 +402,7 @@ def test_twelve_objects_are_proved():
     assert run(table)[1] is Outcome.OPTIMAL
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("weights", WEIGHTS)
 @pytest.mark.parametrize("seed", range(3))

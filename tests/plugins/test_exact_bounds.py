@@ -126,6 +126,7 @@ def test_a_half_is_half_as_wide_and_no_wider_elsewhere(turned):
     assert cells.boxes[1:].tolist() == pytest.approx(np.array(expected))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weights", WEIGHTS)
 def test_a_candidate_dropped_from_a_cell_is_on_no_better_map(weights):
     tried = 0
@@ -329,6 +330,7 @@ def test_what_fixed_objects_lose_is_never_more_than_any_direction_of_the_cell_co
         assert lost == pytest.approx(true, abs=2e-6)
 
 
+@pytest.mark.slow
 @given(SEEDS, st.integers(3, 4), st.booleans())
 @settings(max_examples=100)
 def test_where_rotation_is_all_costs_and_losses_of_a_whole_map_are_its_loss(seed, objects, heavy):

@@ -266,6 +266,7 @@ def test_it_agrees_with_its_definition_between_objects_apart(name, shapes):
     assert_as_defined(name, *shapes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXACT)
 @given(shapes=slivers())
 @examples(20)
@@ -273,6 +274,7 @@ def test_it_agrees_with_its_definition_between_slivers(name, shapes):
     assert_as_defined(name, *shapes, tolerance=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in EXACT if name not in INFINITE_IN_TOUCH])
 @given(shapes=pairs_in_touch())
 @examples(20)

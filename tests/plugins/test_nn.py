@@ -284,6 +284,7 @@ def test_what_was_yielded_does_not_change_later(searcher):
     assert (first.fmap.entries == entries).all()
 
 
+@pytest.mark.slow
 @ALL
 @pytest.mark.parametrize("objects", [8, 30])
 def test_it_yields_often_and_stops_when_it_is_closed(searcher, objects):

@@ -102,6 +102,7 @@ def lamps(shape):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("light", lamps((2, 2)))
 @pytest.mark.parametrize("margin", [0.0, 0.1])
 @pytest.mark.parametrize("kind", ["thin", "thick", "filled"])
@@ -185,6 +186,7 @@ def same_as_negative(pixels):
     return answers[0] == answers[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*(f"sketches/{k:02}" for k in range(12)), "model_simple"])
 def test_a_floor_plan_gives_objects_or_a_sentence_and_its_negative_the_same(name):
     assert same_as_negative(picture(f"rooms-rsi/{name}.png"))

@@ -297,6 +297,7 @@ def test_a_speck_where_the_map_ends_is_left_out():
     assert speck.certainty == 0.2
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1))
 @example(0)
 @settings(max_examples=30)

@@ -297,6 +297,7 @@ def test_a_border_is_valid_and_encloses_its_cells_exactly(cells):
     assert outline.bounds == (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1))
 def test_any_grid_gives_valid_objects_or_one_sentence(seed):
     rng = np.random.default_rng(seed)

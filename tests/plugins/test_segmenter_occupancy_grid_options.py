@@ -149,6 +149,7 @@ def furnished(seed):
     return cells
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), st.sampled_from(OPTIONS), st.integers(1, 30))
 @settings(max_examples=40)
 def test_padding_with_unknown_cells_changes_nothing(seed, params, pad):
@@ -160,6 +161,7 @@ def test_padding_with_unknown_cells_changes_nothing(seed, params, pad):
         assert np.allclose(before.rings[0], after.rings[0])
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), st.sampled_from(OPTIONS), st.integers(1, 3))
 @settings(max_examples=40)
 def test_turning_the_map_turns_the_objects(seed, params, turns):

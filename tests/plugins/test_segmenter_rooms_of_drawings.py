@@ -58,6 +58,7 @@ def picture(paper=255, ink=0, scale=40):
     return pixels
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, 0.001, 300.0])
 def test_strokes_that_are_walls_with_gaps_enclose_rooms_at_any_scale(factor):
     found = areas(strokes(WALLS, factor), factor)
@@ -177,6 +178,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_has_no_two_rooms_is_refused_in_one_sentence(case):
     source, path = REFUSED[case]
@@ -195,6 +197,7 @@ DRAWN = {
 RSI = ROOT.parent / "shared" / "data" / "sketches" / "rooms-rsi"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DRAWN)
 def test_masks_that_people_drew_are_cut_into_regions(name):
     path = RSI / "sketches" / f"{name}.png"

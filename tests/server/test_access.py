@@ -178,6 +178,7 @@ def test_with_mutual_tls_a_caller_is_who_the_certificate_names(
     assert callers == [caller]
 
 
+@pytest.mark.slow
 def test_with_both_a_caller_needs_both_and_is_who_the_token_names(
     monkeypatch, ask, tls, ours, others, robot, tmp_path
 ):
@@ -349,6 +350,7 @@ def test_tls_on_a_port_without_is_told_that_it_does_not_encrypt(ask, address, ou
         ask(address, "server_info", root_certificates=ours.certificate)
 
 
+@pytest.mark.slow
 def test_a_client_without_a_certificate_of_the_right_authority_gets_nowhere(ask, tls, ours, others):
     mutual = TlsFiles(tls.certificate, tls.key, others.certificate)
     stranger = ours.issue("stranger")
@@ -439,6 +441,7 @@ def test_tokens_change_while_the_server_runs(ours, tls, robot, tmp_path):
     assert not any(other in line for line in host.said)
 
 
+@pytest.mark.slow
 def test_a_reload_says_what_it_read_again(ours, robot, tmp_path):
     (tmp_path / "tokens").write_text(robot[1].line)
     pair = ours.issue("localhost")

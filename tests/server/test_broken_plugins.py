@@ -14,6 +14,7 @@ def client():
         yield client
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plugin", BROKEN, ids=lambda plugin: plugin.__name__)
 def test_a_broken_plugin_is_named_with_its_distribution_and_the_server_goes_on(
     client, plugin, caplog

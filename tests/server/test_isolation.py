@@ -245,6 +245,7 @@ def test_a_search_that_ignores_its_time_budget_is_stopped(host):
         connected.match(scene(4), scene(4), searcher="sleepingsearcher", time_budget=0.5)
 
 
+@pytest.mark.slow
 def test_stuck_requests_of_strangers_leave_places_to_all_others(host):
     """Half of four places are theirs: six of eight requests wait for one."""
     del host
@@ -309,6 +310,7 @@ def test_no_process_outlives_a_server_that_is_killed(site, tmp_path, monkeypatch
         assert_all_end(children)
 
 
+@pytest.mark.slow
 def test_a_signal_to_the_whole_group_lets_strangers_matches_end_within_the_grace(site, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.fspath(site), prepend=os.pathsep)
     monkeypatch.setenv("PYTHONPATH", os.fspath(Path.cwd()), prepend=os.pathsep)

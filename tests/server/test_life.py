@@ -200,6 +200,7 @@ def test_sigterm_lets_a_running_match_end_within_the_grace():
             assert running.end() == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", ["2", "0"])
 def test_sigterm_ends_matches_with_their_best_so_far_before_the_grace_ends(workers):
     said = ("--grace", "4", "--workers", workers)
@@ -233,6 +234,7 @@ def test_sigterm_with_no_grace_at_all_ends_matches_at_once():
     assert not any("Traceback" in line for line in running.said)
 
 
+@pytest.mark.slow
 def test_a_second_server_on_the_same_port_is_refused_in_one_line(address):
     second = run("serve", "--address", address)
     assert second.returncode == 2

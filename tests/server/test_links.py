@@ -28,6 +28,7 @@ with Client(sys.argv[1]) as client:
 """
 
 
+@pytest.mark.slow
 def test_a_caller_that_is_frozen_gives_its_place_back(monkeypatch):
     monkeypatch.setattr(serve, "_PING_MS", 400)
     with serving(max_concurrent_matches=1, max_waiting=0, max_time_budget=600.0) as host:
@@ -46,6 +47,7 @@ def test_a_caller_that_is_frozen_gives_its_place_back(monkeypatch):
             frozen.communicate()
 
 
+@pytest.mark.slow
 def test_of_thousands_of_calls_at_once_none_is_dropped():
     with serving(warm=False) as host, ExitStack() as connected:
         stubs = [

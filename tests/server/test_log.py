@@ -31,6 +31,7 @@ TIME = r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z"
 CALLER = r"caller=ipv4:127\.0\.0\.1:\d+"
 
 
+@pytest.mark.slow
 def test_each_call_has_a_line_with_time_caller_match_and_how_it_ended():
     with server() as running, Client(running.address) as client:
         found = client.match(scene(4), scene(5, 1))
@@ -58,6 +59,7 @@ def test_each_call_has_a_line_with_time_caller_match_and_how_it_ended():
         assert not any("Health" in line for line in running.said)
 
 
+@pytest.mark.slow
 def test_callers_who_leave_at_any_moment_leave_no_error_in_the_log():
     async def leaves(client, rng):
         for _ in range(25):
@@ -112,6 +114,7 @@ def raise_here():
     raise ZeroDivisionError
 
 
+@pytest.mark.slow
 def test_a_server_whose_log_nobody_reads_goes_on():
     with subprocess.Popen(
         [*COMMAND, "serve", "--address", "127.0.0.1:0"], stderr=subprocess.PIPE, text=True
@@ -128,6 +131,7 @@ def test_a_server_whose_log_nobody_reads_goes_on():
             process.send_signal(signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_an_address_that_a_reload_cannot_change_is_said_to_stay(tmp_path):
     file = tmp_path / "sketchmatch.toml"
     file.write_text("[server]\nmax_matches = 3\n", encoding="utf-8")

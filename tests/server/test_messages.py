@@ -137,6 +137,7 @@ def test_a_compressed_request_that_is_cut_off_or_goes_on_is_not_taken_for_a_shor
         assert code is grpc.StatusCode.INVALID_ARGUMENT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compression", COMPRESSED)
 @pytest.mark.parametrize("path", [*OURS, HEALTH, REFLECTION])
 def test_what_explodes_is_refused_at_the_limit(path, compression):
@@ -162,6 +163,7 @@ def peak_mib(pid):
     return int(re.search(r"VmHWM:\s+(\d+)", status)[1]) / 1024
 
 
+@pytest.mark.slow
 def test_nothing_is_inflated_for_which_there_is_no_place():
     explosive = zlib.compress(b"\x0a" + varint(60 * MIB) + bytes(60 * MIB))
     assert len(explosive) < MIB

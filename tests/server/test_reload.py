@@ -51,6 +51,7 @@ def searcher_of(match) -> str:
     return match.accepted.pipeline.searcher.name
 
 
+@pytest.mark.slow
 def test_new_requests_get_the_new_configuration_and_a_running_search_its_own(running):
     client, reload = running
     events = client.events(scene(8), scene(8, 1), params=ENDLESS["params"], time_budget=5.0)

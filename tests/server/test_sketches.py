@@ -283,6 +283,7 @@ def test_an_update_of_no_use_is_refused_by_field_and_changes_nothing(client, cha
         assert (made.revision, made.stroke_count) == (2, 2)
 
 
+@pytest.mark.slow
 def test_revisions_of_long_ago_are_forgotten(client):
     with client.sketch(MAP) as sketch:
         for k in range(258):

@@ -124,6 +124,7 @@ def test_a_client_that_vanishes_stops_its_search(recorded):
         list(events)
 
 
+@pytest.mark.slow
 def test_cancel_stops_the_description_of_many_objects_within_100_ms(recorded):
     def latency(client):
         probes.described.clear()
@@ -146,6 +147,7 @@ def test_cancel_stops_the_description_of_many_objects_within_100_ms(recorded):
         assert_prompt([latency(client) for _ in range(5)])
 
 
+@pytest.mark.slow
 def test_a_search_that_is_stopped_frees_its_place_and_leaves_no_error_in_the_log(caplog):
     full = {"max_concurrent_matches": 1, "max_waiting": 0}
     with serving(**full) as host, Client(host.address) as client:

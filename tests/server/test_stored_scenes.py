@@ -189,6 +189,7 @@ def test_a_full_store_is_said_then_a_lost_one_and_inline_sources_are_matched(tmp
         assert answer(client.match(SKETCH, MAP)) == expected
 
 
+@pytest.mark.slow
 def test_scenes_outlive_the_server_and_workers_match_with_them(tmp_path):
     store = tmp_path / "store"
     with hosting(setup(), store=store) as host, Client(host.address, timeout=60) as client:

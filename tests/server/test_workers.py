@@ -91,6 +91,7 @@ def test_bytes_that_are_no_request_are_an_invalid_argument(address):
     assert no.value.code().name == "INVALID_ARGUMENT"
 
 
+@pytest.mark.slow
 def test_a_match_whose_worker_is_killed_may_be_sent_again_and_no_other_notices():
     with server("--workers", "2") as running, Client(running.address, retries=0) as client:
         pid = running.process.pid
@@ -109,6 +110,7 @@ def test_a_match_whose_worker_is_killed_may_be_sent_again_and_no_other_notices()
         wait_until(lambda: any("ended by itself (signal 9)" in line for line in running.said), "")
 
 
+@pytest.mark.slow
 def test_workers_that_are_killed_while_they_wait_are_replaced_without_a_word():
     with server("--workers", "2") as running, Client(running.address) as client:
         pid = running.process.pid
@@ -138,6 +140,7 @@ def test_a_task_that_its_worker_had_not_begun_to_tell_of_is_done_by_another():
     assert lost is not other
 
 
+@pytest.mark.slow
 def test_what_is_stopped_and_does_not_heed_it_loses_its_process_and_frees_its_place():
     full = {"max_concurrent_matches": 1, "max_waiting": 0}
     with working(1, **full) as address, Client(address) as client:
@@ -173,6 +176,7 @@ def nice_of(pid):
     return -20
 
 
+@pytest.mark.slow
 def test_a_polite_client_gets_its_turn_beside_a_flood():
     full = {"max_concurrent_matches": 2, "max_waiting": 100}
     counts, stop = {"flood": 0, "polite": 0}, threading.Event()
@@ -235,6 +239,7 @@ def refused(client):
     return False
 
 
+@pytest.mark.slow
 def test_nothing_is_lost_or_mixed_up_among_hundreds_of_requests(address):
     """Each request has an answer of its own, and many callers ask at once."""
 
@@ -266,6 +271,7 @@ def test_nothing_is_lost_or_mixed_up_among_hundreds_of_requests(address):
     assert len(set(in_loop(asked()).result(300))) == 300
 
 
+@pytest.mark.slow
 def test_a_process_group_that_is_told_to_end_comes_to_an_end_as_its_server_does():
     said = ("--grace", "4", "--workers", "2")
     with server(*said) as running, Client(running.address, retries=0) as client:

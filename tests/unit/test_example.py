@@ -67,6 +67,7 @@ def test_made_again_the_texts_are_the_same(fresh, path):
     assert (fresh / path.name).read_bytes() == path.read_bytes()
 
 
+@pytest.mark.slow
 def test_made_again_the_map_is_the_same(fresh):
     # Another machine's sine may differ in the last bit and move a beam into the next cell.
     bundled = shades(LIVING_ROOM_MAP.with_suffix(".pgm"))
@@ -75,6 +76,7 @@ def test_made_again_the_map_is_the_same(fresh):
     assert np.count_nonzero(again != bundled) <= 10
 
 
+@pytest.mark.slow
 def test_making_it_twice_gives_the_same_bytes(fresh, tmp_path):
     make(tmp_path)
     for path in fresh.iterdir():

@@ -79,12 +79,14 @@ def test_it_agrees_with_the_definition_between_objects_apart(r, shapes):
     assert_same(computed(*shapes, r), by_definition(*shapes, r), *shapes, r)
 
 
+@pytest.mark.slow
 @given(pairs_apart(), floats(-8.0, 10.0))
 @examples(40)
 def test_it_agrees_with_the_definition_at_any_exponent(shapes, r):
     assert_same(computed(*shapes, r), by_definition(*shapes, r), *shapes, r)
 
 
+@pytest.mark.slow
 @given(slivers(), st.one_of(exponents, floats(-4.0, 10.0)))
 @examples(60)
 def test_slivers_keep_eight_digits(shapes, r):
@@ -100,6 +102,7 @@ def test_slivers_along_each_other_keep_eight_digits(r):
     assert_same(computed(first, second, r), expected, first, second, r, tolerance=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("r", BELOW_TWO)
 @given(shapes=pairs_in_touch())
 @examples(15)
@@ -300,6 +303,7 @@ def test_the_definition_is_the_second_difference_of_psi(r):
     assert by_definition([first], [second], r, 4)[0] == pytest.approx(expected, rel=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("r", [-3.0, -1.0, 0.5, 1.0, 2.0, 3.5])
 def test_the_definition_adds_up_to_the_force_between_all_points(r):
     shear = np.array([[1.0, 0.3], [-0.2, 0.8]])

@@ -260,6 +260,7 @@ def as_text(value):
     return value if value is None else yaml.load(yaml.safe_dump(value), yaml.BaseLoader)
 
 
+@pytest.mark.slow
 @given(
     values=st.dictionaries(TEXTS, VALUES, max_size=5),
     flow=st.sampled_from([True, False, None]),

@@ -134,6 +134,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("drawn", "mapped"), CASES.values(), ids=CASES)
 @pytest.mark.parametrize("degrees", [0, 90, 136, 180, -30])
 @pytest.mark.parametrize("scale", [0.2, 1.0, 12.0])

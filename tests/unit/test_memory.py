@@ -38,6 +38,7 @@ THINGS = st.lists(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["constant", "force", "hybrid", "raster"])
 @given(steps=st.lists(THINGS, min_size=2, max_size=4))
 def test_a_scene_that_changes_is_described_as_if_it_were_new(name, steps):

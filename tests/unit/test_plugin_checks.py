@@ -182,6 +182,7 @@ def groups(cells):
 GOOD = [RandomMaps, Centres, Cosine, ProductCosine, Boxes, Blocks, Ranks]
 
 
+@pytest.mark.slow
 @parametrize_plugins(GOOD)
 def test_plain_python_keeps_every_contract(check):
     check()

@@ -398,6 +398,7 @@ def test_a_broken_distribution_can_be_denied(tmp_path, monkeypatch):
     assert not any("acme-lucky" in problem for problem in registry.problems)
 
 
+@pytest.mark.slow
 def test_a_broken_distribution_harms_no_library_that_reads_them_all(tmp_path):
     info = tmp_path / "acme_lucky-1.0.dist-info"
     info.mkdir()

@@ -163,6 +163,7 @@ def test_products_of_matrices_give_what_comparing_row_by_row_gives(quick, slow, 
         assert one.similarity.max() <= 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("directions", [4, 12, 24])
 def test_the_peak_is_the_best_of_all_rotations(directions):
     rng = np.random.default_rng(directions)

@@ -28,6 +28,7 @@ def pixels(image):
     return np.asarray(image).astype(int)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [0, 45, 90, 170, -60])
 def test_the_histogram_and_its_arrow_point_where_the_object_lies(degrees):
     turn = math.radians(degrees)

@@ -39,6 +39,7 @@ def test_the_package_loads_nothing_but_itself():
     assert not loaded & {*HEAVY, "pydantic", "rich", "typer", "google.protobuf"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -67,6 +68,7 @@ def test_a_scene_needs_no_compiler_no_pictures_and_no_transport():
     assert not loaded & {*NUMERICAL, "PIL", "grpc", "google.protobuf", "pydantic", "rich"}
 
 
+@pytest.mark.slow
 def test_what_asks_a_server_does_not_compute():
     loaded = loaded_by("import sketchmatch.cli.answering, sketchmatch.cli.sources")
     assert not loaded & {*NUMERICAL, "sketchmatch_builtin"}
