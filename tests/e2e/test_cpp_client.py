@@ -132,7 +132,9 @@ def servers(tmp_path_factory):
     client_ca = ("--tls-client-ca", str(authority.certificate))
     with ExitStack() as stack:
         plain = stack.enter_context(server("--store", str(folder / "kept")))
-        by_token = stack.enter_context(server(*tls, "--tokens", str(folder / "tokens")))
+        by_token = stack.enter_context(
+            server(*tls, "--no-store", "--tokens", str(folder / "tokens"))
+        )
         mutual = stack.enter_context(server(*tls, *client_ca))
         doomed = Server()
         stack.callback(doomed.end)
