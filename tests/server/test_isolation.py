@@ -8,7 +8,7 @@ import statistics
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -55,14 +55,27 @@ def site(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
-def host(site):
-    """Yield a server that finds the distributions."""
+@contextmanager
+def finding(site, patience):
+    """Run a server that finds the distributions."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(site)
-        setup = Setup(Engine(discover()), isolation=Isolation(patience=PATIENCE))
+        setup = Setup(Engine(discover()), isolation=Isolation(patience=patience))
         with hosting(setup) as running:
             yield running
+
+
+@pytest.fixture(scope="module")
+def host(site):
+    with finding(site, PATIENCE) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def patient_host(site):
+    """Yield one on which a new process may take its time, as it does on a busy machine."""
+    with finding(site, 60.0) as running:
+        yield running
 
 
 @pytest.fixture(scope="module")
@@ -206,7 +219,7 @@ def fails(client, plugin) -> None:
     # `auto` leaves no objects out, so that the judge is asked whether it does.
     chosen = {"searcher": "auto", stage: plugin.name}
     with pytest.raises(ServerFailedError, match=words) as raised:
-        client.match(scene(4), scene(4), **chosen, time_budget=4.0)
+        client.match(scene(4), scene(4), **chosen, time_budget=20.0)
     kind = stage.removeprefix("map_")
     assert raised.value.reason == "PLUGIN_FAILED"
     assert str(raised.value).startswith(f"{kind} {plugin.name} of acme-misbehaving 1.2 ")
@@ -219,13 +232,16 @@ def fails(client, plugin) -> None:
     [tuple(BROKEN), *((plugin,) for plugin in UNSTOPPABLE)],
     ids=lambda plugins: "+".join(plugin.__name__ for plugin in plugins)[:40],
 )
-def test_plugins_that_misbehave_harm_no_other_request(host, client, plugins):
+def test_plugins_that_misbehave_harm_no_other_request(request, plugins):
+    silent = "no sign of life" in (BROKEN | UNSTOPPABLE)[plugins[0]][1]
+    host = request.getfixturevalue("host" if silent else "patient_host")
     blamed = []
 
     def misbehave():
-        for plugin in plugins:
-            fails(client, plugin)
-            blamed.append(plugin)
+        with Client(host.address) as client:
+            for plugin in plugins:
+                fails(client, plugin)
+                blamed.append(plugin)
 
     # The machine may be busy with something else: that is no fault of the plugins.
     assert any(slowdown(host, misbehave) < 2.0 for _ in range(3))

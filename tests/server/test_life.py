@@ -203,13 +203,13 @@ def test_sigterm_lets_a_running_match_end_within_the_grace():
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", ["2", "0"])
 def test_sigterm_ends_matches_with_their_best_so_far_before_the_grace_ends(workers):
-    said = ("--grace", "4", "--workers", workers)
+    said = ("--grace", "8", "--workers", workers)
     with server(*said) as running, Client(running.address, retries=0) as client:
         searches = [client.events(scene(20), scene(20, 1), **ENDLESS) for _ in range(2)]
         for events in searches:
             while not next(events).progress.HasField("confidence"):
                 pass
-        with within(7.0) as watch:
+        with within(11.0) as watch:
             running.process.send_signal(signal.SIGTERM)
             for events in searches:
                 result = list(events)[-1].result

@@ -445,7 +445,7 @@ Catalogue decoded(const v1::ListAlgorithmsResponse& message) {
 }
 
 ServerInfo decoded(const v1::GetServerInfoResponse& message) {
-  return {message.version(), message.api_version(), message.plugin_api_version(),
+  return {message.version(),         message.api_version(),     message.plugin_api_version(),
           decoded(message.limits()), decoded(message.uptime()), message.keeps_scenes()};
 }
 
