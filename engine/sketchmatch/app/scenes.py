@@ -439,8 +439,8 @@ class Shelf:
         """
         if self._file is None:
             raise without_store(field)
-        record = self._file.work(lambda connection: _record(connection, name, caller, field))
-        return self.decoded(name, record.SerializeToString())
+        record, _ = self._file.work(lambda connection: _kept(connection, name, caller, field))
+        return self.decoded(name, record)
 
     def decoded(self, name: str, record: bytes) -> Segmentation:
         """Return the scene of a record, decoded once."""
@@ -569,8 +569,8 @@ def _titled(
     return with_title
 
 
-def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) -> StoredScene:
-    """Return the record of a scene of a caller, with its title."""
+def _kept(connection: sqlite3.Connection, name: str, caller: str, field: str) -> tuple[bytes, str]:
+    """Return the record of a scene of a caller, and its title."""
     found = connection.execute(
         "SELECT record, title FROM scenes JOIN owners USING (name) WHERE name = ? AND caller = ?",
         (name, caller),
@@ -581,8 +581,15 @@ def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) 
             f"{field} is {shown[:_NAMED]}, and you keep no scene of this name here; put it, or "
             "list those there are"
         )
-    record = StoredScene.FromString(found[0])
-    record.title = found[1]
+    record, title = found
+    return bytes(record), title
+
+
+def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) -> StoredScene:
+    """Return a scene of a caller, with its title."""
+    kept, title = _kept(connection, name, caller, field)
+    record = StoredScene.FromString(kept)
+    record.title = title
     return record
 
 
