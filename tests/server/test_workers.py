@@ -3,6 +3,8 @@
 import asyncio
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +18,7 @@ from grpc_health.v1 import health_pb2, health_pb2_grpc
 
 from sketchmatch.app import workers
 from sketchmatch.app.setup import RequestLimits, Setup
+from sketchmatch.errors import WorkerLostError
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import default_registry
 from sketchmatch_client import (
@@ -293,3 +296,39 @@ def test_no_worker_outlives_a_server_that_is_killed():
         wait_until(lambda: not any(map(is_alive, processes)), "a process outlives its server")
         with pytest.raises(ServerUnavailableError):
             list(events)
+
+
+CRASHING = """
+import asyncio
+from sketchmatch.app.application import Application
+from sketchmatch.app.setup import Setup
+from sketchmatch.pipeline.engine import Engine
+from sketchmatch.registry import default_registry
+
+async def main():
+    await Application(Setup(Engine(default_registry())), workers=2).start(print)
+    raise SystemExit("somebody else's fault")
+
+asyncio.run(main())
+"""
+
+
+@pytest.mark.slow
+def test_a_process_that_never_comes_to_close_its_workers_ends_all_the_same():
+    ended = subprocess.run(
+        [sys.executable, "-c", CRASHING], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (1, "somebody else's fault\n")
+
+
+def test_workers_that_are_asked_for_while_others_are_closed_are_none():
+    setup = Setup(Engine(default_registry()), limits())
+
+    async def closed():
+        those = workers.Workers(1, lambda *_: None, lambda: None)
+        await those.close()
+        with pytest.raises(WorkerLostError):
+            await those.start(setup)
+        await asyncio.wait_for(those.close(), 60)
+
+    in_loop(closed()).result(120)

@@ -15,6 +15,7 @@ the names of plugin and distribution.
 from __future__ import annotations
 
 import asyncio
+import atexit
 import logging
 import math
 import os
@@ -25,6 +26,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
+from weakref import WeakSet
 
 from sketchmatch.app.forking import forking, renew
 from sketchmatch.app.frames import Flag, Frames, Says, failure_of, frame
@@ -99,6 +101,7 @@ class Workers:
         self._doing: dict[Task, _Worker] = {}
         self._own: _Key = frozenset()
         self._background: set[asyncio.Task[None]] = set()
+        self._closing = False
 
     async def start(self, setup: Setup) -> None:
         """Start the workers that are kept: one first, since it may have to compile kernels.
@@ -177,7 +180,8 @@ class Workers:
             worker.kill()
 
     async def close(self) -> None:
-        """Kill all workers and wait until they have ended."""
+        """Kill all workers, those too that are asked for from now on, and wait until they end."""
+        self._closing = True
         for worker in tuple(self._all):
             worker.kill()
         while self._all or self._background:
@@ -206,6 +210,9 @@ class Workers:
     def _new(self, key: _Key, strangers: _Strangers) -> _Worker:
         worker = _Worker(self, key, strangers)
         self._all.add(worker)
+        _living.add(worker)
+        if self._closing:
+            worker.kill()
         return worker
 
     def _begin(self, task: Task, worker: _Worker) -> None:
@@ -350,15 +357,19 @@ class _Worker(asyncio.Protocol):
             self._workers.gave_way()
 
     def kill(self) -> None:
-        """End the process."""
+        """End the process, and the connection to it."""
         self._killed = True
-        if self._process is not None and self._process.pid is not None:
-            with suppress(OSError, ValueError):
-                self._process.kill()
+        self.end_process()
         if self._transport is not None:
             self._transport.abort()
         elif self._process is None:
             self._workers.lost(self)
+
+    def end_process(self) -> None:
+        """End the process, in any thread, if there is one."""
+        if self._process is not None and self._process.pid is not None:
+            with suppress(OSError, ValueError):
+                self._process.kill()
 
     def send(self, kind: int, content: bytes = b"") -> None:
         """Tell it something."""
@@ -381,8 +392,7 @@ class _Worker(asyncio.Protocol):
         process = self._process
         if process is not None and process.pid is not None:
             await asyncio.to_thread(process.join, _STOPPING)
-            with suppress(OSError, ValueError):
-                process.kill()
+            self.end_process()
             await asyncio.to_thread(process.join)
             ending = _ending(process.exitcode)
         else:
@@ -519,6 +529,19 @@ class _Worker(asyncio.Protocol):
         threads = [int(thread.name) for thread in folder.iterdir()] if folder.is_dir() else []
         for thread in threads or [self._process.pid or 0]:
             os.setpriority(os.PRIO_PROCESS, thread, value)
+
+
+_living: WeakSet[_Worker] = WeakSet()
+
+
+@atexit.register
+def _kill_all() -> None:
+    """End what a server has left that did not come to close its workers.
+
+    They heed no signals, and after this Python waits for the end of processes that it has started.
+    """
+    for worker in tuple(_living):
+        worker.end_process()
 
 
 def _own(setup: Setup) -> _Key:

@@ -249,15 +249,17 @@ async def serve(
         notify("STOPPING=1")
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
-        await readiness.drain()
-        ending = asyncio.gather(server.stop(settings.grace), beside.stop(settings.grace))
-        await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
-        await ending
-        await app.close()
-        await beside.close()
-        if store is not None:
-            store.close()
-        unwatch()
+        try:
+            await readiness.drain()
+            ending = asyncio.gather(server.stop(settings.grace), beside.stop(settings.grace))
+            await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
+            await ending
+        finally:
+            await app.close()
+            await beside.close()
+            if store is not None:
+                store.close()
+            unwatch()
     say("stopped")
 
 
