@@ -21,7 +21,7 @@ from sketchmatch.errors import (
     ServerStoppingError,
     StoreError,
 )
-from sketchmatch_client import match_request, sources
+from sketchmatch_client import features, match_request, sources, transfer_request
 from sketchmatch_proto.v1.match_pb2 import OUTCOME_UNSPECIFIED
 from tests.app.test_application import SCENE, Held, ended, held, setup, until  # noqa: F401
 
@@ -213,6 +213,52 @@ class TestOneLife:
                     with pytest.raises(MatchCancelledError):
                         again.log.check()
                 await until(lambda: app.idle, "a place is never given back")
+
+        asyncio.run(run())
+
+    @pytest.mark.usefixtures("held")
+    def test_one_that_is_cancelled_after_it_was_interrupted_is_not_done_again(self, kept):
+        async def run():
+            async with serving(kept.archive) as app:
+                async with app.matching(endless("n1"), ALICE) as match:
+                    await until(Held.began.is_set, "it does not begin")
+                await state(match, State.INTERRUPTED)
+                interrupted = await app.matches.get("alice", match.id)
+                cancelled = app.cancel(interrupted)
+                assert cancelled.state is State.CANCELLED
+                assert cancelled.events == interrupted.events
+                async with app.matching(endless("n1"), ALICE) as again:
+                    with pytest.raises(MatchCancelledError):
+                        again.log.check()
+                kept.archive.flush()
+                assert kept.archive.find("alice", match.id).state is State.CANCELLED
+                assert app.cancel(again).state is State.CANCELLED
+
+        asyncio.run(run())
+
+    @pytest.mark.usefixtures("held")
+    def test_one_that_is_cancelled_while_it_stops_for_want_of_readers_is_cancelled(self):
+        async def run():
+            async with serving() as app:
+                async with app.matching(endless("n1"), ALICE) as match:
+                    await until(Held.began.is_set, "it does not begin")
+                assert match.state is State.CANCELLING
+                app.cancel(match)
+                await state(match, State.CANCELLED)
+
+        asyncio.run(run())
+
+    @pytest.mark.usefixtures("held")
+    def test_what_is_no_match_is_not_kept_when_it_is_stopped(self, kept):
+        request = transfer_request(SCENE, SCENE, [features.point(0, 0)], searcher="held")
+
+        async def run():
+            async with serving(kept.archive) as app:
+                with app.running("TransferRequest", request.SerializeToString(), ALICE):
+                    await until(Held.began.is_set, "it does not begin")
+                await until(lambda: app.idle, "it does not end")
+                kept.archive.flush()
+                assert await app.matches.page("alice", 0, "") == ([], "")
 
         asyncio.run(run())
 

@@ -110,6 +110,10 @@ class FakeServer(
             return self.segments
         return scene_service_pb2.SegmentResponse(segmenter=request.segmenter, warnings=["w"])
 
+    def DeleteScene(self, request, context):
+        self._take(request, context)
+        context.abort(grpc.StatusCode.NOT_FOUND, "no such scene")
+
     def Transfer(self, request, context):
         self._take(request, context)
         return self.transferred

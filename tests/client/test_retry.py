@@ -14,6 +14,7 @@ from sketchmatch_client.errors import (
     CallCancelledError,
     DeadlineExceededError,
     InvalidRequestError,
+    NotFoundError,
     ServerBusyError,
     ServerFailedError,
     ServerUnavailableError,
@@ -86,6 +87,16 @@ def test_a_match_that_has_begun_is_not_sent_again(call, server):
     with pytest.raises(ServerUnavailableError):
         call(server.address, "match", SKETCH, SKETCH, retries=3)
     assert len(server.requests) == 1
+
+
+def test_a_scene_that_is_gone_when_its_deletion_is_sent_again_is_deleted(call, server):
+    with pytest.raises(NotFoundError):
+        call(server.address, "delete_scene", "ab" * 32, retries=1)
+    server.requests.clear()
+    server.fail(grpc.StatusCode.UNAVAILABLE, "away")
+    server.fails = 1
+    assert call(server.address, "delete_scene", "ab" * 32, retries=1) is None
+    assert len(server.requests) == 2
 
 
 def test_a_pause_beyond_the_timeout_is_not_waited_for(call, server):

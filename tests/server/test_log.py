@@ -1,6 +1,7 @@
 """What a server tells its operator: a line a call, and of a plugin's fault the plugin's lines."""
 
 import asyncio
+import logging
 import random
 import re
 import signal
@@ -12,6 +13,7 @@ import pytest
 from sketchmatch.app.faults import told
 from sketchmatch.errors import PluginError
 from sketchmatch.pipeline.guard import blaming
+from sketchmatch.server.log import logging_to_standard_error
 from sketchmatch_client import (
     AsyncClient,
     Client,
@@ -29,6 +31,15 @@ from tests.server.misbehaving import RaisingSegmenter
 
 TIME = r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z"
 CALLER = r"caller=ipv4:127\.0\.0\.1:\d+"
+
+
+def test_a_caller_who_is_gone_before_the_answer_is_no_fault_of_the_server(capfd):
+    with logging_to_standard_error():
+        grpcs = logging.getLogger("grpc._cython.cygrpc")
+        for what in ("ExecuteBatchError raised in core by", "Unexpected [KeyError] raised by"):
+            grpcs.error("%s servicer method [/sketchmatch.v1.SceneService/PutScene]", what)
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "Unexpected [KeyError]" in line
 
 
 @pytest.mark.slow

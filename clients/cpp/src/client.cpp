@@ -351,8 +351,20 @@ StoredScene Client::update_scene(const std::string& name, const ObjectLabels& la
 void Client::delete_scene(const std::string& name, const CallOptions& call) const {
   v1::DeleteSceneRequest request;
   request.set_name(detail::checked_text(name, "name"));
-  static_cast<void>(
-      impl_->asked(call, impl_->scenes, &v1::SceneService::Stub::DeleteScene, request));
+  int sent = 0;
+  try {
+    static_cast<void>(detail::asked<v1::DeleteSceneResponse>(
+        *impl_->connection, call,
+        [&](grpc::ClientContext* context, v1::DeleteSceneResponse* answer) {
+          ++sent;
+          return impl_->scenes->DeleteScene(context, request, answer);
+        }));
+  } catch (const NotFoundError&) {
+    if (sent == 1) {
+      throw;
+    }
+    // It is gone by a request whose answer was lost.
+  }
 }
 
 Transfer Client::transfer(const Source& sketch, const Source& map,

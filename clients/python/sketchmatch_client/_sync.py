@@ -34,6 +34,7 @@ from sketchmatch_client._sketch import Sketch, create_request
 from sketchmatch_client._transfer import TransferOptions, transfer_request
 from sketchmatch_client.errors import (
     DeadlineExceededError,
+    NotFoundError,
     ServerUnavailableError,
     SketchmatchError,
     translated_errors,
@@ -376,7 +377,19 @@ class Client:
 
     def delete_scene(self, name: str, *, timeout: float | None = None) -> None:
         """Forget a scene; it stays for others who have put it."""
-        self._asked(self._keeping.DeleteScene, _scenes.delete_request(name), timeout)
+        sent = 0
+
+        def delete(*request: Any, **options: Any) -> Any:
+            nonlocal sent
+            sent += 1
+            return self._keeping.DeleteScene(*request, **options)
+
+        try:
+            self._asked(delete, _scenes.delete_request(name), timeout)
+        except NotFoundError:
+            if sent == 1:
+                raise
+            # It is gone by a request whose answer was lost.
 
     def sketch(
         self,

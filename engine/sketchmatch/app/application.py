@@ -305,9 +305,13 @@ class Application:
             if not (match.readers or match.wish.keep_running):
                 self._stop(match, MatchInterruptedError("nobody read the match any more"))
 
-    def cancel(self, task: Task) -> None:
-        """Stop a match, whoever reads it."""
-        self._stop(task, MatchCancelledError("the match was cancelled"))
+    def cancel(self, match: Task | Record) -> Record:
+        """Stop a match, whoever reads it, and return how it is."""
+        error = MatchCancelledError("the match was cancelled")
+        if isinstance(match, Record):
+            return self.matches.cancelled(match, error)
+        self._stop(match, error)
+        return match.record()
 
     def algorithms(self) -> ListAlgorithmsResponse:
         """Return what there is to choose from, put together once for each setup."""
@@ -561,17 +565,23 @@ class Application:
         """See to what nobody else would notice: silence, and too long a wait."""
         while True:
             await asyncio.sleep(_LOOK)
-            self._workers.look()
-            self.sketches.look()
-            for task in self._running:
-                if task.order.is_match and task.log.kept > task.noted:
-                    task.noted = task.log.kept
-                    self.matches.changed(task)
-            now, longest = time.monotonic(), self._setup.limits.max_wait
-            for task in [task for task in self._waiting if now - task.asked > longest]:
-                self._waiting.remove(task, task.caller)
-                problem = f"the request waited {longest:g} s for its turn, which is the limit"
-                self._finish(task, TooBusyError(problem, self._retry_seconds()))
+            try:
+                self._workers.look()
+                self.sketches.look()
+                self._look_at_tasks()
+            except Exception:  # nobody else would look from then on
+                _log.exception("silence, or too long a wait, was not seen to")
+
+    def _look_at_tasks(self) -> None:
+        for task in self._running:
+            if task.log.kept > task.noted:
+                task.noted = task.log.kept
+                self.matches.changed(task)
+        now, longest = time.monotonic(), self._setup.limits.max_wait
+        for task in [task for task in self._waiting if now - task.asked > longest]:
+            self._waiting.remove(task, task.caller)
+            problem = f"the request waited {longest:g} s for its turn, which is the limit"
+            self._finish(task, TooBusyError(problem, self._retry_seconds()))
 
 
 def _name_of(caller: str, request_id: str) -> str:

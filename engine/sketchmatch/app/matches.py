@@ -7,12 +7,20 @@ import base64
 import binascii
 import struct
 from collections import OrderedDict
+from dataclasses import replace
 from typing import TypeVar
 
 from sketchmatch.app.archive import Archive
 from sketchmatch.app.orders import Wish
-from sketchmatch.app.tasks import Record, Task
-from sketchmatch.errors import InvalidInputError, NotFoundError, Reason, StoreError, quoted
+from sketchmatch.app.tasks import Record, State, Task
+from sketchmatch.errors import (
+    InvalidInputError,
+    MatchCancelledError,
+    NotFoundError,
+    Reason,
+    StoreError,
+    quoted,
+)
 
 __all__ = ["Matches"]
 
@@ -51,19 +59,36 @@ class Matches:
         self.changed(task)
 
     def changed(self, task: Task) -> None:
-        """Have a match kept as it is now."""
-        if self._archive is not None:
+        """Have a match kept as it is now; other tasks are not kept."""
+        if self._archive is not None and task.id in self._live:
             self._archive.keep(task, task.id)
 
     def end(self, task: Task) -> None:
         """Hear that a match has ended."""
         if self._live.pop(task.id, None) is None:
             return
-        record = task.record()
-        self._recent[task.id] = record
+        self._remember(task.record())
+
+    def cancelled(self, record: Record, error: MatchCancelledError) -> Record:
+        """Return what becomes of a match that has ended when it is cancelled.
+
+        One that was interrupted is not done again then.
+        """
+        if record.state is not State.INTERRUPTED:
+            return record
+        cancelled = replace(record, state=State.CANCELLED, error=error)
+        self._forget(record.id)
+        self._remember(cancelled)
+        return cancelled
+
+    def _remember(self, record: Record) -> None:
+        """Keep a match that has ended."""
+        self._recent[record.id] = record
         self._recent_bytes += record.size
+        if record.wish.request_id:
+            self._named[record.caller, record.wish.request_id] = record.id
         if self._archive is not None:
-            self._archive.keep(record, task.id)
+            self._archive.keep(record, record.id)
         while len(self._recent) > _MOST_RECENT or self._recent_bytes > _MOST_RECENT_BYTES:
             self._forget(next(iter(self._recent)))
 

@@ -334,10 +334,11 @@ class Task:
         self._move(State.RUNNING)
 
     def stop(self, why: BaseException) -> None:
-        """Be told to come to an end without a result, and why."""
+        """Be told to come to an end without a result, and why; that it is cancelled counts most."""
         if self._state is State.RUNNING:
             self._move(State.CANCELLING)
-        self._stopped_by = self._stopped_by or why
+        if self._stopped_by is None or isinstance(why, MatchCancelledError):
+            self._stopped_by = why
 
     def end(self, error: BaseException | None = None) -> None:
         """Come to the one end, with an error or without."""

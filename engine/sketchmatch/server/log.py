@@ -35,6 +35,14 @@ def logging_to_standard_error() -> Iterator[None]:
         handler.close()
 
 
+def _is_news(record: logging.LogRecord) -> bool:
+    """Whether a record tells more than that a caller was gone before the answer, which gRPC tells.
+
+    The line of the call tells it too, and no operator needs a traceback for it.
+    """
+    return not (record.name.startswith("grpc") and "ExecuteBatchError" in record.getMessage())
+
+
 class _Formatter(logging.Formatter):
     converter = staticmethod(time.gmtime)
     default_time_format = "%Y-%m-%dT%H:%M:%S"
@@ -45,6 +53,7 @@ class _Handler(logging.Handler):
     def __init__(self) -> None:
         super().__init__()
         self.setFormatter(_Formatter("%(asctime)s %(levelname)s %(message)s"))
+        self.addFilter(_is_news)
         self._lines: queue.Queue[str | None] = queue.Queue(_MOST_WAITING)
         self._writer = threading.Thread(target=self._write, name="sketchmatch-log", daemon=True)
         self._writer.start()

@@ -115,9 +115,9 @@ class MatchService:
         self, request: match_service_pb2.CancelMatchRequest, caller: Caller
     ) -> match_service_pb2.CancelMatchResponse:
         match = await self._app.matches.get(caller.name, request.match_id)
-        if isinstance(match, Task):
-            self._app.cancel(match)
-        return match_service_pb2.CancelMatchResponse(match=responses.summary(match.record()))
+        return match_service_pb2.CancelMatchResponse(
+            match=responses.summary(self._app.cancel(match))
+        )
 
     async def _list(
         self, request: match_service_pb2.ListMatchesRequest, caller: Caller

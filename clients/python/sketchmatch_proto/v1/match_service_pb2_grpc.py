@@ -129,7 +129,7 @@ class MatchServiceServicer(object):
 
     def CancelMatch(self, request, context):
         """Stops a match, and returns at once; its readers are told `CANCELLED`. One that has ended stays as
-        it is, which is no error.
+        it is, which is no error; but one that was interrupted is cancelled, and so not done again.
 
         Errors (with `ErrorInfo`, see `ErrorReason`):
 

@@ -103,7 +103,7 @@ class MatchServiceStub:
         sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse,
     ]
     """Stops a match, and returns at once; its readers are told `CANCELLED`. One that has ended stays as
-    it is, which is no error.
+    it is, which is no error; but one that was interrupted is cancelled, and so not done again.
 
     Errors (with `ErrorInfo`, see `ErrorReason`):
 
@@ -215,7 +215,7 @@ class MatchServiceAsyncStub:
         sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse,
     ]
     """Stops a match, and returns at once; its readers are told `CANCELLED`. One that has ended stays as
-    it is, which is no error.
+    it is, which is no error; but one that was interrupted is cancelled, and so not done again.
 
     Errors (with `ErrorInfo`, see `ErrorReason`):
 
@@ -335,7 +335,7 @@ class MatchServiceServicer(metaclass=abc.ABCMeta):
         context: _ServicerContext,
     ) -> typing.Union[sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse, collections.abc.Awaitable[sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse]]:
         """Stops a match, and returns at once; its readers are told `CANCELLED`. One that has ended stays as
-        it is, which is no error.
+        it is, which is no error; but one that was interrupted is cancelled, and so not done again.
 
         Errors (with `ErrorInfo`, see `ErrorReason`):
 
