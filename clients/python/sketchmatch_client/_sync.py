@@ -241,7 +241,10 @@ class Client:
         return self._asked(stub.GetMatch, request, timeout)
 
     def cancel_match(self, match_id: str, *, timeout: float | None = None) -> MatchSummary:
-        """Stop a match of one's own, and return how it is; one that has ended stays as it is.
+        """Stop a match of one's own, and return how it is.
+
+        One that has ended stays as it is, but one that was interrupted is cancelled, and so not
+        done again.
 
         Raises
         ------

@@ -6,7 +6,7 @@ import asyncio
 import signal
 import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -190,33 +190,7 @@ async def serve(
         OpeningInterceptor(),
         ErrorInterceptor(),
     ]
-    server = grpc.aio.server(
-        interceptors=interceptors,
-        options=[
-            ("grpc.max_receive_message_length", app.setup.limits.transport_bytes),
-            ("grpc.max_send_message_length", -1),
-            # A few bytes may become very many: they are inflated once there is a place for them.
-            ("grpc.per_message_decompression", 0),
-            # Of many calls at once gRPC would cancel some without a word; we say when to come back.
-            ("grpc.server.max_pending_requests", _ALL),
-            ("grpc.server.max_pending_requests_hard_limit", _ALL),
-            ("grpc.server_max_unrequested_time_in_server", _ALL),
-            # What waits costs memory: of one connection the rest waits with the caller.
-            ("grpc.max_concurrent_streams", _MOST_AT_ONCE),
-            # A caller who is frozen or cut off keeps its place for 20 s and no longer.
-            ("grpc.keepalive_time_ms", _PING_MS),
-            ("grpc.keepalive_timeout_ms", _PING_MS),
-            ("grpc.http2.ping_timeout_ms", _PING_MS),
-            ("grpc.keepalive_permit_without_calls", 1),
-            ("grpc.http2.max_pings_without_data", 0),
-            # Who has not called for long connects anew when it does.
-            ("grpc.max_connection_idle_ms", _IDLE_MS),
-            # Clients ping every 30 s; by default the server would hang up on them.
-            ("grpc.http2.min_ping_interval_without_data_ms", 20_000),
-            # Otherwise a second server on the same port would silently take half of the calls.
-            ("grpc.so_reuseport", 0),
-        ],
-    )
+    server = _grpc_server(interceptors, app.setup.limits.transport_bytes)
     readiness = Readiness(_SERVICES)
     services = _services(app)
     _add_services(server, services, readiness)
@@ -250,10 +224,7 @@ async def serve(
         say(f"stopping; running matches have {settings.grace:g} s to end")
     finally:
         try:
-            await readiness.drain()
-            ending = asyncio.gather(server.stop(settings.grace), beside.stop(settings.grace))
-            await app.drain(settings.grace - min(_COMING_TO_AN_END, settings.grace / 2))
-            await ending
+            await _drain(server, beside, app, readiness, settings.grace)
         finally:
             await app.close()
             await beside.close()
@@ -261,6 +232,16 @@ async def serve(
                 store.close()
             unwatch()
     say("stopped")
+
+
+async def _drain(
+    server: grpc.aio.Server, beside: _Beside, app: Application, readiness: Readiness, grace: float
+) -> None:
+    """Take nothing new, and let what is under way come to an end in so many seconds."""
+    await readiness.drain()
+    ending = asyncio.gather(server.stop(grace), beside.stop(grace))
+    await app.drain(grace - min(_COMING_TO_AN_END, grace / 2))
+    await ending
 
 
 class _Files:
@@ -470,6 +451,39 @@ def _archive(store: Store, settings: ServerSettings, metrics: Metrics) -> Archiv
         settings.matches_days * _DAY,
         settings.matches_bytes,
         lambda count: metrics.unkept.add(count=count),
+    )
+
+
+def _grpc_server(
+    interceptors: Sequence[grpc.aio.ServerInterceptor], largest: int
+) -> grpc.aio.Server:
+    """Return a server of messages of so many bytes at most."""
+    return grpc.aio.server(
+        interceptors=interceptors,
+        options=[
+            ("grpc.max_receive_message_length", largest),
+            ("grpc.max_send_message_length", -1),
+            # A few bytes may become very many: they are inflated once there is a place for them.
+            ("grpc.per_message_decompression", 0),
+            # Of many calls at once gRPC would cancel some without a word; we say when to come back.
+            ("grpc.server.max_pending_requests", _ALL),
+            ("grpc.server.max_pending_requests_hard_limit", _ALL),
+            ("grpc.server_max_unrequested_time_in_server", _ALL),
+            # What waits costs memory: of one connection the rest waits with the caller.
+            ("grpc.max_concurrent_streams", _MOST_AT_ONCE),
+            # A caller who is frozen or cut off keeps its place for 20 s and no longer.
+            ("grpc.keepalive_time_ms", _PING_MS),
+            ("grpc.keepalive_timeout_ms", _PING_MS),
+            ("grpc.http2.ping_timeout_ms", _PING_MS),
+            ("grpc.keepalive_permit_without_calls", 1),
+            ("grpc.http2.max_pings_without_data", 0),
+            # Who has not called for long connects anew when it does.
+            ("grpc.max_connection_idle_ms", _IDLE_MS),
+            # Clients ping every 30 s; by default the server would hang up on them.
+            ("grpc.http2.min_ping_interval_without_data_ms", 20_000),
+            # Otherwise a second server on the same port would silently take half of the calls.
+            ("grpc.so_reuseport", 0),
+        ],
     )
 
 
