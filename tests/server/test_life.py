@@ -205,7 +205,7 @@ def test_sigterm_lets_a_running_match_end_within_the_grace():
 def test_sigterm_ends_matches_with_their_best_so_far_before_the_grace_ends(workers):
     said = ("--grace", "8", "--workers", workers)
     with server(*said) as running, Client(running.address, retries=0) as client:
-        searches = [client.events(scene(20), scene(20, 1), **ENDLESS) for _ in range(2)]
+        searches = [client.events(scene(8), scene(8, 1), **ENDLESS) for _ in range(2)]
         for events in searches:
             while not next(events).progress.HasField("confidence"):
                 pass
