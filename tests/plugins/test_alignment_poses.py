@@ -366,3 +366,11 @@ def test_changes_end_where_there_is_no_more_room():
     assert vary(worths, 1.0, partners, 99.0, maps, losses) == 7
     assert (maps[7] == -9).all()
     assert np.isfinite(losses).all()
+
+
+@given(st.lists(st.sampled_from([-1.0, 0.0, 0.5, 0.5000001, 3.0]), max_size=70))
+@examples(200)
+def test_guesses_are_ranked_as_a_stable_sort_does(scores):
+    values = np.array(scores, dtype=float)
+    expected = np.argsort(-values, kind="stable")
+    np.testing.assert_array_equal(_poses._ranked(values), expected)

@@ -64,6 +64,8 @@ class WorkerSetup:
         end it; None where it does nothing that could keep it from noticing.
     scenes
         The file of the scenes that are kept; None where none are.
+    backwards
+        Whether to compile the kernels that come last first, as another begins at the beginning.
     """
 
     defaults: Defaults
@@ -71,6 +73,7 @@ class WorkerSetup:
     limits: RequestLimits
     patience: float | None
     scenes: Path | None = None
+    backwards: bool = False
 
 
 def live(connection: socket, distributions: tuple[str, ...], stranger: bool) -> None:
@@ -134,8 +137,8 @@ class _Worker:
         """Do what the server says, one after the other."""
         _, content = self._told.get()
         registry = registry_of(self._distributions)
-        self._set_up(content, registry)
-        warm_up(registry, self._setup.engine.defaults)
+        given = self._set_up(content, registry)
+        warm_up(registry, given.defaults, backwards=given.backwards)
         self.say(Says.READY)
         while True:
             if self._patience is not None:
@@ -167,7 +170,7 @@ class _Worker:
             case _:
                 self._told.put((kind, content))
 
-    def _set_up(self, content: bytes, registry: Registry) -> None:
+    def _set_up(self, content: bytes, registry: Registry) -> WorkerSetup:
         given: WorkerSetup = pickle.loads(content)
         if given.scenes != self._remembered.path:
             self._remembered.close()
@@ -177,6 +180,7 @@ class _Worker:
             lambda described: self.say(Says.DESCRIBED, described.packed()),
         )
         self._patience = given.patience
+        return given
 
     def _do(self, kind: int, content: bytes) -> None:
         if self._patience is not None:

@@ -59,6 +59,8 @@ Those that may be short are done one a processor: more would only hold each othe
 machine a short one takes long, too; so other time counts only where the system does not tell that
 of the processor, and for what waits for something else than a processor.
 """
+_COMPILING = 2
+"""Workers that compile at the same time: one begins at the beginning, and one at the end."""
 _GIVES_WAY = 10
 _NAMED = 5
 _REMEDY = "tell its author or choose another"
@@ -104,7 +106,7 @@ class Workers:
         self._closing = False
 
     async def start(self, setup: Setup) -> None:
-        """Start the workers that are kept: one first, since it may have to compile kernels.
+        """Start the workers that are kept: two first, since they may have to compile kernels.
 
         Raises
         ------
@@ -112,11 +114,13 @@ class Workers:
             If that cannot be done.
         """
         self._own = _own(setup)
-        first = self._new(self._own, ())
-        await first.start(setup)
-        if first.compiled:
+        first = [self._new(self._own, ()) for _ in range(min(self._kept, _COMPILING))]
+        await asyncio.gather(
+            *(each.start(setup, backwards=bool(k)) for k, each in enumerate(first))
+        )
+        if any(each.compiled for each in first):
             renew()
-        others = [self._new(self._own, ()) for _ in range(self._kept - 1)]
+        others = [self._new(self._own, ()) for _ in range(self._kept - len(first))]
         await asyncio.gather(*(each.start(setup) for each in others))
 
     def change(self, setup: Setup) -> None:
@@ -268,8 +272,8 @@ class _Worker(asyncio.Protocol):
         """Whether it waits for something to do."""
         return self.since < math.inf and self._task is None and not self._killed
 
-    async def start(self, setup: Setup) -> None:
-        """Start the process and wait until it is ready.
+    async def start(self, setup: Setup, *, backwards: bool = False) -> None:
+        """Start the process and wait until it is ready, with the last kernels first or not.
 
         Raises
         ------
@@ -290,7 +294,7 @@ class _Worker(asyncio.Protocol):
         if self._killed:
             self._transport.abort()
             raise self._blame("was not wanted any more")
-        self._set_up(setup)
+        self._set_up(setup, backwards)
         self._heard = time.monotonic()
         patience = _STARTING + (setup.isolation.patience if self._strangers else 0.0)
         await self._answered(patience, "did not load in its own process")
@@ -467,11 +471,13 @@ class _Worker(asyncio.Protocol):
         finally:
             self._next = None
 
-    def _set_up(self, setup: Setup) -> None:
+    def _set_up(self, setup: Setup, backwards: bool = False) -> None:
         self._setup, engine = setup, setup.engine
         patience = setup.isolation.patience if self._strangers else None
         scenes = self._workers.scenes
-        told = WorkerSetup(engine.defaults, engine.limits, setup.limits, patience, scenes)
+        told = WorkerSetup(
+            engine.defaults, engine.limits, setup.limits, patience, scenes, backwards
+        )
         self.send(Says.SETUP, pickle.dumps(told))
 
     def _seconds(self, task: Task) -> float | None:

@@ -71,6 +71,8 @@ def warm_up(
     defaults: Defaults = UNCONFIGURED,
     unwanted: Callable[[], bool] = lambda: False,
     warm: Callable[[Registered], None] = lambda _: None,
+    *,
+    backwards: bool = False,
 ) -> None:
     """Load the kernels of what requests use that choose nothing, or compile them.
 
@@ -84,9 +86,17 @@ def warm_up(
         Asked before each algorithm; once it says so, the rest is left out.
     warm
         Called with each algorithm whose kernels are there.
+    backwards
+        Whether to begin at the end, where another process begins at the beginning: each finds what
+        the other has compiled.
     """
-    _load(None)
-    _warm_up(default_algorithms(registry, defaults), unwanted, warm)
+    algorithms = default_algorithms(registry, defaults)
+    if backwards:
+        _warm_up(reversed(algorithms), unwanted, warm)
+        _load(None)
+    else:
+        _load(None)
+        _warm_up(algorithms, unwanted, warm)
 
 
 def warm_up_others(

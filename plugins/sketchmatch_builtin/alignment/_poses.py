@@ -376,11 +376,41 @@ def _keep(guesses: Guesses, score: float, i: int, j: int, k: int, g: int) -> Non
     count += 1
     if count == guesses.scores.size:
         count //= 2
-        best = np.argsort(-guesses.scores, kind="mergesort")[:count]
-        guesses.scores[:count] = guesses.scores[best]
-        guesses.pairings[:count] = guesses.pairings[best]
+        best = _ranked(guesses.scores)
+        scores, pairings = guesses.scores.copy(), guesses.pairings.copy()
+        for place in range(count):
+            guesses.scores[place] = scores[best[place]]
+            for column in range(pairings.shape[1]):
+                guesses.pairings[place, column] = pairings[best[place], column]
         guesses.floor[0] = guesses.scores[count - 1]
     guesses.state[0] = count
+
+
+@kernel
+def _ranked(scores: FloatArray) -> IntArray:
+    """Return places by falling score, those with the same in their order.
+
+    A merge sort: numba's, and its indexing by arrays, would take six seconds to compile.
+    """
+    places, merged = np.arange(scores.size), np.empty(scores.size, dtype=np.int64)
+    width = 1
+    while width < scores.size:
+        for first in range(0, scores.size, 2 * width):
+            left, right = first, min(first + width, scores.size)
+            middle, end = right, min(first + 2 * width, scores.size)
+            for place in range(first, end):
+                from_left = right == end
+                if left < middle and right < end:
+                    from_left = scores[places[left]] >= scores[places[right]]
+                if from_left:
+                    merged[place] = places[left]
+                    left += 1
+                else:
+                    merged[place] = places[right]
+                    right += 1
+        places, merged = merged, places
+        width *= 2
+    return places
 
 
 @kernel
