@@ -2,6 +2,7 @@
 
 from datetime import timedelta
 
+import grpc
 import pytest
 
 from sketchmatch_client import (
@@ -18,7 +19,7 @@ from sketchmatch_client import (
     sources,
 )
 from sketchmatch_proto.v1.match_service_pb2 import ListMatchesResponse
-from tests.contract.golden import NAMES, golden
+from tests.contract.golden import KINDS, NAMES, golden
 
 BAR = [[(2, 12), (8, 12), (8, 20), (2, 20)], [(3, 17), (5, 17), (5, 13), (3, 13)]]
 PICTURE = b"P2\n3 2\n255\n0 64 128 192 224 255\n"
@@ -243,6 +244,11 @@ class TestResponses:
         assert call(server.address, "segment", GRID) == server.segments
         assert call(server.address, "algorithms") == server.catalogue
         assert call(server.address, "server_info") == server.info
+
+
+def test_every_code_has_a_kind():
+    codes = {(str(code.value[0]), code.name) for code in grpc.StatusCode} - {("0", "OK")}
+    assert {(number, code) for number, code, _, _ in KINDS} == codes
 
 
 class TestStatuses:

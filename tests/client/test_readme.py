@@ -21,11 +21,13 @@ README = (ROOT / "clients" / "python" / "README.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=["one call", "asyncio", "anyio", "carry", "tls"])
+@pytest.mark.parametrize(
+    "example", EXAMPLES, ids=["first answer", "pen", "asyncio", "anyio", "carry", "tls"]
+)
 def test_the_examples_run(example, server, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "room.yaml").write_text("image: room.pgm\n", encoding="utf-8")
-    for name in ("room.pgm", "sketch.png"):
+    for name in ("room.pgm", "sketch.png", "sketch.svg"):
         (tmp_path / name).write_bytes(b"")
     (tmp_path / "ca.pem").write_text("-----BEGIN CERTIFICATE-----\n", encoding="utf-8")
     (tmp_path / "robot-7.token").write_text("robot-7.secret\n", encoding="utf-8")

@@ -23,6 +23,8 @@ from sketchmatch_proto.v1 import (
 
 FOLDER = Path(__file__).with_name("golden")
 NAMES = sorted(path.stem for path in FOLDER.glob("*.json"))
+KINDS = [line.split() for line in (FOLDER / "kinds.txt").read_text(encoding="utf-8").splitlines()]
+"""Number and name of each code, its error in Python and C++, its failure in TypeScript."""
 FILES = tuple(
     module.DESCRIPTOR
     for module in (

@@ -284,6 +284,55 @@ class TestInstallation:
         assert "<name>sketchmatch</name>" in (share / "sketchmatch/package.xml").read_text()
 
 
+PORT = """
+cmake_minimum_required(VERSION 3.22)
+function(exists path)
+  if(NOT EXISTS "${path}")
+    message(FATAL_ERROR "${path} does not exist")
+  endif()
+endfunction()
+function(vcpkg_cmake_configure)
+  cmake_parse_arguments(PARSE_ARGV 0 given "" "SOURCE_PATH" "OPTIONS")
+  exists("${given_SOURCE_PATH}/CMakeLists.txt")
+  exists("${given_SOURCE_PATH}/../../proto/sketchmatch/v1")
+endfunction()
+function(vcpkg_cmake_install)
+  execute_process(COMMAND "${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${CURRENT_PACKAGES_DIR}"
+                  COMMAND_ERROR_IS_FATAL ANY OUTPUT_QUIET)
+endfunction()
+function(vcpkg_cmake_config_fixup)
+  cmake_parse_arguments(PARSE_ARGV 0 given "" "CONFIG_PATH" "")
+  exists("${CURRENT_PACKAGES_DIR}/${given_CONFIG_PATH}/sketchmatchConfig.cmake")
+endfunction()
+function(vcpkg_fixup_pkgconfig)
+  exists("${CURRENT_PACKAGES_DIR}/lib/pkgconfig/sketchmatch.pc")
+endfunction()
+function(vcpkg_install_copyright)
+  cmake_parse_arguments(PARSE_ARGV 0 given "" "" "FILE_LIST")
+  exists("${given_FILE_LIST}")
+endfunction()
+include("${PORT}/portfile.cmake")
+"""
+"""Stands in for vcpkg: each of its functions looks at what it is given."""
+
+
+class TestVcpkg:
+    FOLDER = FOLDER / "vcpkg" / "sketchmatch"
+
+    def test_the_port_finds_and_installs_what_it_names(self, built, tmp_path):
+        (tmp_path / "port.cmake").write_text(PORT, encoding="utf-8")
+        told = {"BUILD": built, "PORT": self.FOLDER, "CURRENT_PACKAGES_DIR": tmp_path / "packages"}
+        given = [f"-D{name}={value}" for name, value in told.items()]
+        run("cmake", *given, "-P", tmp_path / "port.cmake")
+
+    def test_the_port_depends_on_what_the_library_looks_for(self):
+        port = json.loads((self.FOLDER / "vcpkg.json").read_text(encoding="utf-8"))
+        named = {each if isinstance(each, str) else each["name"] for each in port["dependencies"]}
+        project = (FOLDER / "CMakeLists.txt").read_text(encoding="utf-8")
+        wanted = {name.lower() for name in re.findall(r"find_package\((\S+)", project)}
+        assert wanted - {"threads"} <= named
+
+
 def test_a_match_of_eight_objects_costs_less_than_a_millisecond_more_than_the_stub(built):
     figures = json.loads(run(built / "tests" / "overhead"))
     assert figures["objects"] == 8

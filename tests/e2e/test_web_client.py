@@ -6,7 +6,8 @@ import subprocess
 
 import pytest
 
-from tests.tools import require
+from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
+from tests.tools import ROOT, require
 from tests.web import CLIENTS, serving_pad
 
 README = (CLIENTS / "typescript" / "README.md").read_text(encoding="utf-8")
@@ -18,11 +19,11 @@ def url():
         yield address
 
 
-def node(code):
+def node(code, folder=CLIENTS / "web"):
     require(shutil.which("node"), "node")
     return subprocess.run(
         ["node", "--input-type=module", "--eval", code],
-        cwd=CLIENTS / "web",
+        cwd=folder,
         capture_output=True,
         text=True,
         check=False,
@@ -30,11 +31,47 @@ def node(code):
     )
 
 
+def test_the_readme_shows_a_first_answer_in_five_lines():
+    (first, *_) = re.findall(r"^```js\n(.*?)^```", README, re.S | re.M)
+    assert len(first.partition("\n\n")[2].splitlines()) == 5
+
+
 @pytest.mark.slow
-def test_the_first_answer_of_the_readme_is_what_it_says(url):
-    ((code, printed),) = re.findall(r"^```js\n(.*?)^```\n\n^```\n(.*?)^```", README, re.S | re.M)
-    done = node(code.replace("http://127.0.0.1:8080", url.rstrip("/")))
-    assert (done.stdout, done.stderr) == (printed, "")
+def test_every_program_of_the_readme_prints_what_it_says(url, tmp_path):
+    shutil.copy(LIVING_ROOM_SKETCH, tmp_path / "sketch.svg")
+    shutil.copy(LIVING_ROOM_MAP, tmp_path / "room.yaml")
+    shutil.copy(LIVING_ROOM_MAP.with_suffix(".pgm"), tmp_path / "room.pgm")
+    (tmp_path / "node_modules").symlink_to(CLIENTS / "node_modules")
+    programs = re.findall(r"^```js\n(.*?)^```\n\n^```\n(.*?)^```", README, re.S | re.M)
+    assert len(programs) == README.count("```js")
+    for code, printed in programs:
+        done = node(code.replace("http://127.0.0.1:8080", url.rstrip("/")), tmp_path)
+        assert (done.stdout, done.stderr) == (printed, "")
+
+
+@pytest.mark.slow
+def test_the_package_is_installed_as_the_readme_says(url, tmp_path):
+    (commands,) = re.findall(r"^```sh\n(.*?)^```", README, re.S | re.M)
+    ci, build, *rest = commands.splitlines()
+    # `built` has done these two.
+    assert (ci.rpartition("clients ")[2], build.rpartition("clients ")[2]) == ("ci", "run build")
+    (tmp_path / "package.json").write_text('{"type": "module"}', encoding="utf-8")
+    for command in rest:
+        told = command.replace("path/to/sketchmatch", str(ROOT))
+        done = subprocess.run(
+            ["bash", "-c", told], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        require(not re.search("EAI_AGAIN|ENOTFOUND", done.stderr), "a registry that npm reaches")
+        assert done.returncode == 0, done.stderr
+    done = node(
+        f"""
+        import {{ SketchmatchClient }} from "@sketchmatch/client";
+        const {{ apiVersion }} = await new SketchmatchClient("{url.rstrip("/")}").info();
+        console.log(apiVersion);
+        """,
+        tmp_path,
+    )
+    assert (done.stdout, done.stderr) == ("sketchmatch.v1\n", "")
 
 
 @pytest.mark.slow

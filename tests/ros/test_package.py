@@ -55,10 +55,12 @@ def test_ros_own_tools_take_every_interface(tmp_path):
     found = (
         python.exists()
         and not subprocess.run(
-            [python, "-c", "import rosidl_adapter, rosidl_parser"], capture_output=True, check=False
+            [python, "-c", "import em, rosidl_adapter, rosidl_parser"],
+            capture_output=True,
+            check=False,
         ).returncode
     )
-    require(found, "rosidl, by apt-get install python3-rosidl")
+    require(found, "rosidl, by apt-get install python3-empy python3-rosidl")
     done = subprocess.run(
         [python, "-c", _PARSE, OURS, tmp_path],
         capture_output=True,

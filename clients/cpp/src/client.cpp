@@ -239,6 +239,29 @@ struct Client::Impl {
                                    return (stub.get()->*method)(context, request, answer);
                                  });
   }
+
+  /// Returns the entries of all pages of a list. The timeout is for all of them.
+  template <typename Value, typename Stub, typename Request, typename Page, typename Entries>
+  [[nodiscard]] std::vector<Value> all_pages(const CallOptions& call,
+                                             const std::unique_ptr<Stub>& stub,
+                                             grpc::Status (Stub::*method)(grpc::ClientContext*,
+                                                                          const Request&, Page*),
+                                             const Entries& (Page::*entries)() const) const {
+    const auto limit = connection->limit(call);
+    const auto began = Clock::now();
+    Request request;
+    std::vector<Value> values;
+    while (true) {
+      const auto page = asked(what_is_left(call, limit, began), stub, method, request);
+      for (const auto& entry : (page.*entries)()) {
+        values.push_back(detail::decoded(entry));
+      }
+      if (page.next_page_token().empty()) {
+        return values;
+      }
+      request.set_page_token(page.next_page_token());
+    }
+  }
 };
 
 Client::Client(const std::string& address, const ClientOptions& options) {
@@ -299,6 +322,11 @@ MatchSummary Client::cancel_match(const std::string& match_id, const CallOptions
   return detail::decoded(answer.match());
 }
 
+std::vector<MatchSummary> Client::matches(const CallOptions& call) const {
+  return impl_->all_pages<MatchSummary>(call, impl_->matches, &v1::MatchService::Stub::ListMatches,
+                                        &v1::ListMatchesResponse::matches);
+}
+
 Segmentation Client::segment(const Source& source, const SegmentOptions& options,
                              const CallOptions& call) const {
   const auto request = detail::segment_request(source, options);
@@ -306,7 +334,7 @@ Segmentation Client::segment(const Source& source, const SegmentOptions& options
       impl_->asked(call, impl_->scenes, &v1::SceneService::Stub::Segment, request));
 }
 
-PutScene Client::put_scene(const Source& source, const SegmentOptions& options,
+PutScene Client::put_scene(const Source& source, const PutOptions& options,
                            const CallOptions& call) const {
   const auto request = detail::put_scene_request(source, options);
   return detail::decoded(
@@ -323,26 +351,14 @@ GotScene Client::get_scene(const std::string& name, bool include_source,
 }
 
 std::vector<SceneSummary> Client::list_scenes(const CallOptions& call) const {
-  const auto limit = impl_->connection->limit(call);
-  const auto began = Clock::now();
-  v1::ListScenesRequest request;
-  std::vector<SceneSummary> scenes;
-  while (true) {
-    const auto page = impl_->asked(what_is_left(call, limit, began), impl_->scenes,
-                                   &v1::SceneService::Stub::ListScenes, request);
-    for (const auto& scene : page.scenes()) {
-      scenes.push_back(detail::decoded(scene));
-    }
-    if (page.next_page_token().empty()) {
-      return scenes;
-    }
-    request.set_page_token(page.next_page_token());
-  }
+  return impl_->all_pages<SceneSummary>(call, impl_->scenes, &v1::SceneService::Stub::ListScenes,
+                                        &v1::ListScenesResponse::scenes);
 }
 
 StoredScene Client::update_scene(const std::string& name, const ObjectLabels& labels,
+                                 const std::optional<std::string>& title,
                                  const CallOptions& call) const {
-  const auto request = detail::update_scene_request(name, labels);
+  const auto request = detail::update_scene_request(name, labels, title);
   const auto answer =
       impl_->asked(call, impl_->scenes, &v1::SceneService::Stub::UpdateScene, request);
   return detail::decoded(answer.stored_scene());

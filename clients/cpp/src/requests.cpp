@@ -245,15 +245,20 @@ v1::SegmentRequest segment_request(const Source& source, const SegmentOptions& o
   return request;
 }
 
-v1::PutSceneRequest put_scene_request(const Source& source, const SegmentOptions& options) {
+v1::PutSceneRequest put_scene_request(const Source& source, const PutOptions& options) {
   v1::PutSceneRequest request;
   write_segmenting(source, options, request);
+  request.set_title(checked_text(options.title, "title"));
   return request;
 }
 
-v1::UpdateSceneRequest update_scene_request(const std::string& name, const ObjectLabels& labels) {
+v1::UpdateSceneRequest update_scene_request(const std::string& name, const ObjectLabels& labels,
+                                            const std::optional<std::string>& title) {
   v1::UpdateSceneRequest request;
   request.set_name(checked_text(name, "name"));
+  if (title) {
+    request.set_title(checked_text(*title, "title"));
+  }
   for (const auto& [object, label] : labels) {
     const auto field = numbered("labels", request.labels_size());
     auto* message = request.add_labels();

@@ -6,6 +6,7 @@
 #include <sketchmatch/v1/scene_service.pb.h>
 #include <sketchmatch/v1/transfer_service.pb.h>
 
+#include <optional>
 #include <sketchmatch/options.hpp>
 #include <sketchmatch/sources.hpp>
 #include <sketchmatch/stored.hpp>
@@ -26,11 +27,12 @@ v1::SegmentRequest segment_request(const Source& source, const SegmentOptions& o
 
 /// Returns the request to keep a scene.
 /// @throws InvalidRequestError As `match_request`.
-v1::PutSceneRequest put_scene_request(const Source& source, const SegmentOptions& options);
+v1::PutSceneRequest put_scene_request(const Source& source, const PutOptions& options);
 
-/// Returns the request for other labels of a scene.
+/// Returns the request for other labels of a scene, or another title.
 /// @throws InvalidRequestError If a text is no UTF-8.
-v1::UpdateSceneRequest update_scene_request(const std::string& name, const ObjectLabels& labels);
+v1::UpdateSceneRequest update_scene_request(const std::string& name, const ObjectLabels& labels,
+                                            const std::optional<std::string>& title);
 
 /// Returns the request to carry features.
 /// @throws InvalidRequestError If an option has no place in a message, or is for matches alone; or

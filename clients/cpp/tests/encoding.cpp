@@ -11,11 +11,18 @@
 #include <sstream>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
+#include <variant>
+
+#include "../src/fields.hpp"
 
 namespace sketchmatch::test {
 
 namespace {
 
+using detail::for_each_field;
+using detail::Of;
+using detail::OneOf;
 using google::protobuf::Descriptor;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
@@ -24,8 +31,7 @@ using google::protobuf::Message;
 const std::map<std::string, std::string> kWritten{
     {"MatchRequest",
      "sketch map pipeline seed time_budget weights alternatives allow_unmatched unmatched_price "
-     "pins "
-     "synonyms request_id keep_running priority"},
+     "pins synonyms request_id keep_running priority"},
     {"TransferRequest",
      "sketch map pipeline seed time_budget weights allow_unmatched unmatched_price pins synonyms "
      "object_map direction features y_axis radius allow_unknown"},
@@ -35,11 +41,12 @@ const std::map<std::string, std::string> kWritten{
     {"WatchMatchRequest", "match_id after"},
     {"GetMatchRequest", "match_id"},
     {"CancelMatchRequest", "match_id"},
+    {"ListMatchesRequest", "page_token"},
     {"SegmentRequest", "source segmenter profile"},
-    {"PutSceneRequest", "source segmenter profile"},
+    {"PutSceneRequest", "source segmenter profile title"},
     {"GetSceneRequest", "name include_source"},
     {"ListScenesRequest", "page_token"},
-    {"UpdateSceneRequest", "name labels"},
+    {"UpdateSceneRequest", "name labels title"},
     {"ObjectLabel", "object label"},
     {"DeleteSceneRequest", "name"},
     {"Source", "stroke_set polygon_set occupancy_grid image map_server_map file stored_scene"},
@@ -53,385 +60,6 @@ const std::map<std::string, std::string> kWritten{
     {"EncodedImage", "data"},
     {"MapServerMap", "yaml image objects"},
     {"EncodedFile", "name data part"},
-};
-
-template <typename Kind, typename Variant>
-std::optional<Kind> if_it_is(const Variant& variant) {
-  const auto* found = std::get_if<Kind>(&variant);
-  return found == nullptr ? std::nullopt : std::optional(*found);
-}
-
-#define FIELD(name) visit(#name, value.name)
-
-/// The fields that the client reads, by value: `of` names each of them to a visitor.
-struct Fields {
-  template <typename Visit>
-  static void of(const AlgorithmSelection& value, const Visit& visit) {
-    FIELD(name);
-    FIELD(parameters);
-  }
-
-  template <typename Visit>
-  static void of(const Pipeline& value, const Visit& visit) {
-    FIELD(sketch_segmenter);
-    FIELD(map_segmenter);
-    FIELD(histogram);
-    FIELD(similarity);
-    FIELD(searcher);
-    FIELD(judge);
-    FIELD(profile);
-  }
-
-  template <typename Visit>
-  static void of(const Weights& value, const Visit& visit) {
-    FIELD(similarity);
-    FIELD(rotation);
-    FIELD(dilation);
-    FIELD(shape);
-    FIELD(size);
-    FIELD(distance);
-  }
-
-  template <typename Visit>
-  static void of(const Point& value, const Visit& visit) {
-    FIELD(x);
-    FIELD(y);
-  }
-
-  template <typename Visit>
-  static void of(const Ring& value, const Visit& visit) {
-    visit("points", value);
-  }
-
-  template <typename Visit>
-  static void of(const SceneObject& value, const Visit& visit) {
-    FIELD(rings);
-    FIELD(label);
-    FIELD(area);
-    FIELD(centroid);
-    FIELD(certainty);
-  }
-
-  template <typename Visit>
-  static void of(const Scene& value, const Visit& visit) {
-    FIELD(objects);
-  }
-
-  template <typename Visit>
-  static void of(const MatchAccepted& value, const Visit& visit) {
-    FIELD(match_id);
-    FIELD(seed);
-    FIELD(pipeline);
-    FIELD(weights);
-    FIELD(time_budget);
-    FIELD(unmatched_price);
-  }
-
-  template <typename Visit>
-  static void of(const MatchScenes& value, const Visit& visit) {
-    FIELD(sketch);
-    FIELD(map);
-    FIELD(sketch_warnings);
-    FIELD(map_warnings);
-    FIELD(sketch_route);
-  }
-
-  template <typename Visit>
-  static void of(const ObjectRelation& value, const Visit& visit) {
-    FIELD(reference_object);
-    FIELD(phrase);
-    FIELD(degree);
-  }
-
-  template <typename Visit>
-  static void of(const ObjectMatch& value, const Visit& visit) {
-    FIELD(sketch_object);
-    FIELD(map_object);
-    FIELD(sketch_label);
-    FIELD(map_label);
-    FIELD(confidence);
-    FIELD(margin);
-    FIELD(relation);
-    FIELD(probability);
-  }
-
-  template <typename Visit>
-  static void of(const Progress& value, const Visit& visit) {
-    FIELD(phase);
-    FIELD(fraction);
-    FIELD(iteration);
-    FIELD(evaluations);
-    FIELD(confidence);
-    FIELD(upper_bound);
-    FIELD(object_matches);
-    FIELD(elapsed);
-  }
-
-  template <typename Visit>
-  static void of(const FmapConfidence& value, const Visit& visit) {
-    FIELD(total);
-    FIELD(similarity);
-    FIELD(rotation);
-    FIELD(dilation);
-    FIELD(shape);
-    FIELD(size);
-  }
-
-  template <typename Visit>
-  static void of(const ObjectPair& value, const Visit& visit) {
-    FIELD(first);
-    FIELD(second);
-  }
-
-  template <typename Visit>
-  static void of(const FmapEntry& value, const Visit& visit) {
-    FIELD(sketch_pair);
-    FIELD(map_pair);
-    FIELD(similarity);
-    FIELD(rotation_radians);
-    FIELD(dilation);
-  }
-
-  template <typename Visit>
-  static void of(const AlternativeMap& value, const Visit& visit) {
-    FIELD(object_matches);
-    FIELD(fmap_confidence);
-    FIELD(omap_confidence);
-    FIELD(probability);
-  }
-
-  template <typename Visit>
-  static void of(const Ambiguity& value, const Visit& visit) {
-    FIELD(maps);
-    FIELD(alternatives);
-    FIELD(deciding_sketch_objects);
-  }
-
-  template <typename Visit>
-  static void of(const MatchStatistics& value, const Visit& visit) {
-    FIELD(iterations);
-    FIELD(evaluations);
-    FIELD(segment_elapsed);
-    FIELD(describe_elapsed);
-    FIELD(relate_elapsed);
-    FIELD(search_elapsed);
-    FIELD(total_elapsed);
-  }
-
-  template <typename Visit>
-  static void of(const MatchResult& value, const Visit& visit) {
-    FIELD(match_id);
-    FIELD(seed);
-    FIELD(outcome);
-    FIELD(object_matches);
-    FIELD(unmatched_sketch_objects);
-    FIELD(unmatched_sketch_probabilities);
-    FIELD(unmatched_map_objects);
-    FIELD(omap_confidence);
-    FIELD(fmap_confidence);
-    FIELD(upper_bound);
-    FIELD(fmap_entries);
-    FIELD(rotation_radians);
-    FIELD(scale);
-    FIELD(statistics);
-    FIELD(alternatives);
-    FIELD(search_note);
-    FIELD(probability);
-    FIELD(place_probability);
-    FIELD(ambiguity);
-    FIELD(provisional);
-  }
-
-  template <typename Visit>
-  static void of(const MatchSummary& value, const Visit& visit) {
-    FIELD(match_id);
-    FIELD(request_id);
-    FIELD(state);
-    FIELD(created_at);
-    FIELD(ended_at);
-    FIELD(outcome);
-    FIELD(last_event);
-    FIELD(error_message);
-    FIELD(error_reason);
-  }
-
-  template <typename Visit>
-  static void of(const Segmentation& value, const Visit& visit) {
-    FIELD(scene);
-    FIELD(warnings);
-    FIELD(segmenter);
-    FIELD(route);
-  }
-
-  template <typename Visit>
-  static void of(const StoredScene& value, const Visit& visit) {
-    FIELD(name);
-    FIELD(scene);
-    FIELD(warnings);
-    FIELD(segmenter);
-    FIELD(route);
-  }
-
-  template <typename Visit>
-  static void of(const PutScene& value, const Visit& visit) {
-    FIELD(stored_scene);
-    FIELD(created);
-  }
-
-  template <typename Visit>
-  static void of(const GotScene& value, const Visit& visit) {
-    FIELD(stored_scene);
-    FIELD(source);
-  }
-
-  template <typename Visit>
-  static void of(const SceneSummary& value, const Visit& visit) {
-    FIELD(name);
-    FIELD(object_count);
-    FIELD(labels);
-    FIELD(put_time);
-  }
-
-  template <typename Visit>
-  static void of(const Route& value, const Visit& visit) {
-    FIELD(points);
-    FIELD(speeds_meters_per_second);
-  }
-
-  template <typename Visit>
-  static void of(const Zone& value, const Visit& visit) {
-    FIELD(rings);
-  }
-
-  template <typename Visit>
-  static void of(const Feature& value, const Visit& visit) {
-    FIELD(name);
-    visit("point", if_it_is<Point>(value.kind));
-    visit("route", if_it_is<Route>(value.kind));
-    visit("zone", if_it_is<Zone>(value.kind));
-  }
-
-  template <typename Visit>
-  static void of(const FeatureChange& value, const Visit& visit) {
-    FIELD(reason);
-    FIELD(first_point);
-    FIELD(last_point);
-    FIELD(sentence);
-  }
-
-  template <typename Visit>
-  static void of(const CarriedPoints& value, const Visit& visit) {
-    FIELD(deviations);
-    FIELD(sources);
-  }
-
-  template <typename Visit>
-  static void of(const CarriedFeature& value, const Visit& visit) {
-    FIELD(feature);
-    FIELD(lines);
-    FIELD(changes);
-    FIELD(drawn);
-  }
-
-  template <typename Visit>
-  static void of(const Warp& value, const Visit& visit) {
-    FIELD(kind);
-    FIELD(rotation_radians);
-    FIELD(scale);
-    FIELD(residual);
-    FIELD(weights);
-  }
-
-  template <typename Visit>
-  static void of(const Partners& value, const Visit& visit) {
-    FIELD(sketch_object);
-    FIELD(map_object);
-  }
-
-  template <typename Visit>
-  static void of(const Transfer& value, const Visit& visit) {
-    FIELD(features);
-    FIELD(warp);
-    visit("object_map", value.partners);
-    FIELD(scenes);
-    FIELD(match);
-  }
-
-  template <typename Visit>
-  static void of(const Algorithm& value, const Visit& visit) {
-    FIELD(kind);
-    FIELD(name);
-    FIELD(summary);
-    FIELD(description);
-    FIELD(distribution);
-    FIELD(distribution_version);
-    FIELD(parameters_schema);
-    FIELD(is_default);
-    FIELD(source_kinds);
-    FIELD(source);
-  }
-
-  template <typename Visit>
-  static void of(const Plugin& value, const Visit& visit) {
-    FIELD(distribution);
-    FIELD(version);
-    FIELD(state);
-    FIELD(reason);
-  }
-
-  template <typename Visit>
-  static void of(const Profile& value, const Visit& visit) {
-    FIELD(name);
-    FIELD(summary);
-    FIELD(pipeline);
-    FIELD(is_default);
-    FIELD(weights);
-    FIELD(allow_unmatched);
-  }
-
-  template <typename Visit>
-  static void of(const FileReader& value, const Visit& visit) {
-    FIELD(name);
-    FIELD(summary);
-    FIELD(suffixes);
-    FIELD(json_keys);
-    FIELD(source_kind);
-    FIELD(distribution);
-    FIELD(distribution_version);
-  }
-
-  template <typename Visit>
-  static void of(const Catalogue& value, const Visit& visit) {
-    FIELD(algorithms);
-    FIELD(plugins);
-    FIELD(profiles);
-    FIELD(readers);
-  }
-
-  template <typename Visit>
-  static void of(const ServerLimits& value, const Visit& visit) {
-    FIELD(max_request_bytes);
-    FIELD(max_objects);
-    FIELD(max_concurrent_matches);
-    FIELD(max_time_budget);
-    FIELD(max_waiting);
-    FIELD(max_wait);
-    FIELD(default_time_budget);
-    FIELD(max_matches_per_caller);
-    FIELD(max_requests_per_minute);
-    FIELD(max_comparisons);
-    FIELD(max_candidates);
-  }
-
-  template <typename Visit>
-  static void of(const ServerInfo& value, const Visit& visit) {
-    FIELD(version);
-    FIELD(api_version);
-    FIELD(plugin_api_version);
-    FIELD(limits);
-    FIELD(uptime);
-    FIELD(keeps_scenes);
-  }
 };
 
 template <typename Value>
@@ -469,11 +97,20 @@ class Writer {
   explicit Writer(Message& message) : message_(message) {}
 
   template <typename Value>
-  void operator()(const char* name, const Value& value) const {
-    put(*message_.GetDescriptor()->FindFieldByName(name), value);
+  void write(const Value& value) const {
+    for_each_field<Value>([&](const auto& field) {
+      put(*message_.GetDescriptor()->FindFieldByName(field.name), field.member(value));
+    });
   }
 
  private:
+  template <typename Kind, typename Variant>
+  void put(const FieldDescriptor& field, const OneOf<Kind, Variant>& value) const {
+    if (const auto* held = std::get_if<Kind>(&value.variant)) {
+      put(field, std::optional(*held));
+    }
+  }
+
   template <typename Value>
   void put(const FieldDescriptor& field, const std::optional<Value>& value) const {
     if (value) {
@@ -490,7 +127,7 @@ class Writer {
       if constexpr (kIsPlain<Value>) {
         add(field, value);
       } else {
-        write(value, *message_.GetReflection()->AddMessage(&message_, &field));
+        write_into(*message_.GetReflection()->AddMessage(&message_, &field), value);
       }
     }
   }
@@ -512,7 +149,7 @@ class Writer {
       reflection->SetString(&message_, &field, value);
     } else {
       auto* part = reflection->MutableMessage(&message_, &field);
-      write(value, *part);
+      write_into(*part, value);
       if (part->ByteSizeLong() == 0) {
         reflection->ClearField(&message_, &field);
       }
@@ -533,7 +170,7 @@ class Writer {
     }
   }
 
-  static void write(Seconds value, Message& message) {
+  static void write_into(Message& message, Seconds value) {
     google::protobuf::Duration duration;
     duration.set_seconds(static_cast<std::int64_t>(std::floor(value.count())));
     duration.set_nanos(
@@ -541,7 +178,7 @@ class Writer {
     message.CopyFrom(duration);
   }
 
-  static void write(std::chrono::system_clock::time_point value, Message& message) {
+  static void write_into(Message& message, std::chrono::system_clock::time_point value) {
     constexpr std::int64_t kNanos = 1'000'000'000;
     const auto count =
         std::chrono::duration_cast<std::chrono::nanoseconds>(value.time_since_epoch()).count();
@@ -551,15 +188,21 @@ class Writer {
     message.CopyFrom(timestamp);
   }
 
-  static void write(const Parameters& value, Message& message) {
+  static void write_into(Message& message, const Parameters& value) {
     message.CopyFrom(as_json_value(Value(value)).struct_value());
   }
 
-  static void write(const Source& value, Message& message) { message.CopyFrom(value.message()); }
+  static void write_into(Message& message, const Source& value) {
+    message.CopyFrom(value.message());
+  }
+
+  static void write_into(Message& message, const Ring& ring) {
+    Writer(message).put(*message.GetDescriptor()->FindFieldByName("points"), ring);
+  }
 
   template <typename Value>
-  static void write(const Value& value, Message& message) {
-    Fields::of(value, Writer(message));
+  static void write_into(Message& message, const Value& value) {
+    Writer(message).write(value);
   }
 
   Message& message_;
@@ -568,64 +211,63 @@ class Writer {
 /// Collects the full names of fields, those of the messages within too.
 class Collector {
  public:
-  Collector(const Descriptor& described, std::set<std::string>& names)
-      : described_(described), names_(names) {}
-
   template <typename Value>
-  void operator()(const char* name, const Value& value) const {
-    const auto* field = described_.FindFieldByName(name);
-    if (field == nullptr) {
-      throw std::logic_error(described_.full_name() + " has no field " + name);
-    }
-    if (names_.insert(field->full_name()).second) {
-      within(field->message_type(), value);
-    }
+  void collect(const Descriptor& described) {
+    for_each_field<Value>([&](const auto& field) {
+      const auto* found = described.FindFieldByName(field.name);
+      if (found == nullptr) {
+        throw std::logic_error(described.full_name() + " has no field " + field.name);
+      }
+      if (names.insert(found->full_name()).second) {
+        using Member = std::decay_t<decltype(field.member(std::declval<const Value&>()))>;
+        within(Of<Member>(), found->message_type());
+      }
+    });
   }
+
+  std::set<std::string> names;
 
  private:
   template <typename Value>
-  void within(const Descriptor* described, const std::optional<Value>& value) const {
-    if constexpr (!std::is_same_v<Value, Source>) {
-      within(described, value.value_or(Value{}));
-    }
+  void within(Of<std::optional<Value>> /*type*/, const Descriptor* described) {
+    within(Of<Value>(), described);
   }
 
   template <typename Value>
-  void within(const Descriptor* described, const std::vector<Value>& /*values*/) const {
-    within(described, Value{});
+  void within(Of<std::vector<Value>> /*type*/, const Descriptor* described) {
+    within(Of<Value>(), described);
   }
 
-  void within(const Descriptor* described, const Ring& value) const {
-    const bool is_ring = described->name() == "Ring";
-    if (is_ring) {
-      Fields::of(value, Collector(*described, names_));
-    } else {
-      within(described, Point{});
-    }
+  template <typename Kind, typename Variant>
+  void within(Of<OneOf<Kind, Variant>> /*type*/, const Descriptor* described) {
+    within(Of<Kind>(), described);
   }
+
+  void within(Of<Ring> /*type*/, const Descriptor* described) {
+    const auto* points = described->FindFieldByName("points");
+    if (points != nullptr) {
+      names.insert(points->full_name());
+    }
+    within(Of<Point>(), points == nullptr ? described : points->message_type());
+  }
+
+  void within(Of<Source> /*type*/, const Descriptor* /*described*/) {}
+  void within(Of<Seconds> /*type*/, const Descriptor* /*described*/) {}
+  void within(Of<std::chrono::system_clock::time_point> /*type*/, const Descriptor* /*of*/) {}
+  void within(Of<Parameters> /*type*/, const Descriptor* /*described*/) {}
 
   template <typename Value>
-  void within(const Descriptor* described, const Value& value) const {
-    if constexpr (!kIsPlain<Value> && !std::is_same_v<Value, Seconds> &&
-                  !std::is_same_v<Value, std::chrono::system_clock::time_point> &&
-                  !std::is_same_v<Value, Parameters>) {
-      Fields::of(value, Collector(*described, names_));
+  void within(Of<Value> /*type*/, const Descriptor* described) {
+    if constexpr (!kIsPlain<Value>) {
+      collect<Value>(*described);
     }
   }
-
-  const Descriptor& described_;
-  std::set<std::string>& names_;
 };
-
-template <typename Type, typename Value>
-void collect(std::set<std::string>& names, const Value& value = {}) {
-  Fields::of(value, Collector(*Type::descriptor(), names));
-}
 
 /// The full names of all fields that the client knows.
 const std::set<std::string>& known_fields() {
   static const std::set<std::string> known = [] {
-    std::set<std::string> names;
+    Collector collector;
     for (const auto& [type, fields] : kWritten) {
       std::istringstream words(fields);
       for (std::string word; words >> word;) {
@@ -633,22 +275,22 @@ const std::set<std::string>& known_fields() {
         if (google::protobuf::DescriptorPool::generated_pool()->FindFieldByName(name) == nullptr) {
           throw std::logic_error("the contract has no field " + name);
         }
-        names.insert(name);
+        collector.names.insert(name);
       }
     }
-    collect<v1::MatchAccepted, MatchAccepted>(names);
-    collect<v1::MatchScenes, MatchScenes>(names);
-    collect<v1::MatchProgress, Progress>(names);
-    collect<v1::MatchResult, MatchResult>(names);
-    collect<v1::MatchSummary, MatchSummary>(names);
-    collect<v1::SegmentResponse, Segmentation>(names);
-    collect<v1::PutSceneResponse, PutScene>(names);
-    collect<v1::GetSceneResponse, GotScene>(names);
-    collect<v1::SceneSummary, SceneSummary>(names);
-    collect<v1::TransferResponse, Transfer>(names);
-    collect<v1::ListAlgorithmsResponse, Catalogue>(names);
-    collect<v1::GetServerInfoResponse, ServerInfo>(names);
-    return names;
+    collector.collect<MatchAccepted>(*v1::MatchAccepted::descriptor());
+    collector.collect<MatchScenes>(*v1::MatchScenes::descriptor());
+    collector.collect<Progress>(*v1::MatchProgress::descriptor());
+    collector.collect<MatchResult>(*v1::MatchResult::descriptor());
+    collector.collect<MatchSummary>(*v1::MatchSummary::descriptor());
+    collector.collect<Segmentation>(*v1::SegmentResponse::descriptor());
+    collector.collect<PutScene>(*v1::PutSceneResponse::descriptor());
+    collector.collect<GotScene>(*v1::GetSceneResponse::descriptor());
+    collector.collect<SceneSummary>(*v1::SceneSummary::descriptor());
+    collector.collect<Transfer>(*v1::TransferResponse::descriptor());
+    collector.collect<Catalogue>(*v1::ListAlgorithmsResponse::descriptor());
+    collector.collect<ServerInfo>(*v1::GetServerInfoResponse::descriptor());
+    return collector.names;
   }();
   return known;
 }
@@ -676,26 +318,26 @@ void forget_unknown(Message& message, std::set<std::string>& forgotten) {
   }
 }
 
-template <typename Value>
-void written(const Value& value, Message& message) {
-  Fields::of(value, Writer(message));
-}
-
 }  // namespace
 
-void encode(const MatchAccepted& value, Message& message) { written(value, message); }
-void encode(const MatchScenes& value, Message& message) { written(value, message); }
-void encode(const Progress& value, Message& message) { written(value, message); }
-void encode(const MatchResult& value, Message& message) { written(value, message); }
-void encode(const MatchSummary& value, Message& message) { written(value, message); }
-void encode(const Segmentation& value, Message& message) { written(value, message); }
-void encode(const StoredScene& value, Message& message) { written(value, message); }
-void encode(const PutScene& value, Message& message) { written(value, message); }
-void encode(const GotScene& value, Message& message) { written(value, message); }
-void encode(const SceneSummary& value, Message& message) { written(value, message); }
-void encode(const Transfer& value, Message& message) { written(value, message); }
-void encode(const Catalogue& value, Message& message) { written(value, message); }
-void encode(const ServerInfo& value, Message& message) { written(value, message); }
+template <typename Value>
+void encode(const Value& value, Message& message) {
+  Writer(message).write(value);
+}
+
+template void encode(const MatchAccepted& value, Message& message);
+template void encode(const MatchScenes& value, Message& message);
+template void encode(const Progress& value, Message& message);
+template void encode(const MatchResult& value, Message& message);
+template void encode(const MatchSummary& value, Message& message);
+template void encode(const Segmentation& value, Message& message);
+template void encode(const StoredScene& value, Message& message);
+template void encode(const PutScene& value, Message& message);
+template void encode(const GotScene& value, Message& message);
+template void encode(const SceneSummary& value, Message& message);
+template void encode(const Transfer& value, Message& message);
+template void encode(const Catalogue& value, Message& message);
+template void encode(const ServerInfo& value, Message& message);
 
 std::set<std::string> forget_unknown(Message& message) {
   std::set<std::string> forgotten;

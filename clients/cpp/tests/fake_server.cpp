@@ -11,6 +11,19 @@
 
 namespace sketchmatch::test {
 
+namespace {
+
+/// Answers with the first page that is left, if any.
+template <typename Page>
+void turn(std::vector<Page>& pages, Page& answer) {
+  if (!pages.empty()) {
+    answer = pages.front();
+    pages.erase(pages.begin());
+  }
+}
+
+}  // namespace
+
 class FakeServer::Matches final : public v1::MatchService::Service {
  public:
   explicit Matches(FakeServer& fake) : fake_(fake) {}
@@ -69,6 +82,12 @@ class FakeServer::Matches final : public v1::MatchService::Service {
     return fake_.take(*request, *context);
   }
 
+  grpc::Status ListMatches(grpc::ServerContext* context, const v1::ListMatchesRequest* request,
+                           v1::ListMatchesResponse* answer) override {
+    turn(fake_.match_pages, *answer);
+    return fake_.take(*request, *context);
+  }
+
  private:
   FakeServer& fake_;
 };
@@ -97,10 +116,7 @@ class FakeServer::Scenes final : public v1::SceneService::Service {
 
   grpc::Status ListScenes(grpc::ServerContext* context, const v1::ListScenesRequest* request,
                           v1::ListScenesResponse* answer) override {
-    if (!fake_.pages.empty()) {
-      *answer = fake_.pages.front();
-      fake_.pages.erase(fake_.pages.begin());
-    }
+    turn(fake_.scene_pages, *answer);
     return fake_.take(*request, *context);
   }
 

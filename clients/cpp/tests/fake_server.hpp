@@ -33,7 +33,7 @@ class FakeServer {
   v1::SegmentResponse segments;
   v1::PutSceneResponse put;
   v1::GetSceneResponse got;
-  std::vector<v1::ListScenesResponse> pages;
+  std::vector<v1::ListScenesResponse> scene_pages;
   v1::UpdateSceneResponse updated;
   v1::TransferResponse carried;
   v1::ListAlgorithmsResponse catalogue;
@@ -47,6 +47,7 @@ class FakeServer {
   /// What it says of matches that have a name.
   v1::GetMatchResponse record;
   v1::CancelMatchResponse stopped;
+  std::vector<v1::ListMatchesResponse> match_pages;
 
   /// Fails with a status, so many times.
   void fail(const google::rpc::Status& status, int times = 1'000'000);

@@ -3,13 +3,17 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <iostream>
+#include <map>
 #include <optional>
 #include <regex>
 #include <set>
 #include <sketchmatch/sketchmatch.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -68,6 +72,55 @@ MatchOptions every_option() {
   options.pins = {Pin{"sofa", 3}, Pin{0, "couch", true}, Pin{2, std::nullopt}};
   options.synonyms = {{"couch", "sofa", "settee"}, {"desk", "bureau"}};
   return options;
+}
+
+/// What the golden request of the turned scene asks.
+struct Turned {
+  Source sketch = sources::polygons({{{1, -1}, {5, -1}, {5, -3}, {1, -3}},
+                                     {{7, -2}, {9, -2}, {9, -5}, {7, -5}},
+                                     {{2, -6}, {3, -6}, {3, -11}, {2, -11}}},
+                                    {"bed", "desk", "shelf"}, YAxis::down);
+  Source map = sources::polygons_with_holes({{{{22, 14}, {28, 14}, {28, 18}, {22, 18}}},
+                                             kBar,
+                                             {{{26, 2}, {30, 2}, {30, 10}, {26, 10}}},
+                                             {{{10, 4}, {20, 4}, {20, 6}, {10, 6}}}},
+                                            {"table", "bar", "bunk", "rack"});
+  MatchOptions options;
+
+  Turned() {
+    options.params["histogram"]["directions"] = 36;
+    options.searcher = "exact";
+    options.judge = "confidence";
+    options.seed = 7;
+    options.weights = Weights{1, 2, 3, 0.5, 0.25, 1.5};
+    options.alternatives = 2;
+  }
+};
+
+template <typename Error>
+bool is(const SketchmatchError& error) {
+  return dynamic_cast<const Error*>(&error) != nullptr;
+}
+
+/// Returns the name of an error's class.
+std::string kind_of(const SketchmatchError& error) {
+  static const std::map<std::string, bool (*)(const SketchmatchError&)> kinds{
+      {"InvalidRequestError", is<InvalidRequestError>},
+      {"ServerUnavailableError", is<ServerUnavailableError>},
+      {"ServerBusyError", is<ServerBusyError>},
+      {"DeadlineExceededError", is<DeadlineExceededError>},
+      {"NotAuthenticatedError", is<NotAuthenticatedError>},
+      {"NotFoundError", is<NotFoundError>},
+      {"StoreError", is<StoreError>},
+      {"NotSupportedError", is<NotSupportedError>},
+      {"CallCancelledError", is<CallCancelledError>},
+      {"ServerFailedError", is<ServerFailedError>}};
+  for (const auto& [name, is_one] : kinds) {
+    if (is_one(error)) {
+      return name;
+    }
+  }
+  return "";
 }
 
 /// Returns a message in text, as far as the client knows its fields.
@@ -195,27 +248,30 @@ TEST_F(Golden, TheNumberOfAnEventIsKnown) {
 }
 
 TEST_F(Golden, TheTurnedSceneIsAskedForAndAnswered) {
-  MatchOptions options;
-  options.params["histogram"]["directions"] = 36;
-  options.searcher = "exact";
-  options.judge = "confidence";
-  options.seed = 7;
-  options.weights = Weights{1, 2, 3, 0.5, 0.25, 1.5};
-  options.alternatives = 2;
+  const Turned turned;
   server.events = {golden<v1::MatchResponse>("MatchResponse.turned")};
-  const auto match =
-      client.match(sources::polygons({{{1, -1}, {5, -1}, {5, -3}, {1, -3}},
-                                      {{7, -2}, {9, -2}, {9, -5}, {7, -5}},
-                                      {{2, -6}, {3, -6}, {3, -11}, {2, -11}}},
-                                     {"bed", "desk", "shelf"}, YAxis::down),
-                   sources::polygons_with_holes({{{{22, 14}, {28, 14}, {28, 18}, {22, 18}}},
-                                                 kBar,
-                                                 {{{26, 2}, {30, 2}, {30, 10}, {26, 10}}},
-                                                 {{{10, 4}, {20, 4}, {20, 6}, {10, 6}}}},
-                                                {"table", "bar", "bunk", "rack"}),
-                   options);
+  const auto match = client.match(turned.sketch, turned.map, turned.options);
   expect_request<v1::MatchRequest>("MatchRequest.turned");
   EXPECT_EQ(match.object_map(), (ObjectMap{{0, 2}, {1, 0}, {2, 3}}));
+}
+
+TEST(GoldenAnswer, IsThatOfARealServer) {
+  const char* address = std::getenv("SKETCHMATCH_TEST_ADDRESS");  // NOLINT
+  if (address == nullptr) {
+    GTEST_SKIP() << "SKETCHMATCH_TEST_ADDRESS names no server";
+  }
+  const Turned turned;
+  const auto match = Client(address).match(turned.sketch, turned.map, turned.options);
+  std::ostringstream said;
+  said << std::fixed << std::setprecision(3);
+  for (const auto& line : match.result.object_matches) {
+    said << line.sketch_object << ' ' << line.sketch_label << " is " << line.map_object << ' '
+         << line.map_label << ", confidence " << line.confidence << '\n';
+  }
+  const std::ifstream file(golden_folder() + "/said/MatchRequest.turned.txt");
+  std::ostringstream expected;
+  expected << file.rdbuf();
+  EXPECT_EQ(said.str(), expected.str());
 }
 
 TEST_F(Golden, AStoredSceneIsPutAndFoundAgain) {
@@ -223,7 +279,8 @@ TEST_F(Golden, AStoredSceneIsPutAndFoundAgain) {
   const auto source = sources::polygons_with_holes({kBar, {{{1.5, 2.5}, {4.5, 3.5}, {0.5, 6.5}}}},
                                                    {"bar", ""}, YAxis::down);
   expect_told(
-      client.put_scene(source, {"tracing", {{"closing", 0.125}, {"mode", "neat"}}, "careful"}),
+      client.put_scene(
+          source, {{"tracing", {{"closing", 0.125}, {"mode", "neat"}}, "careful"}, "snack bar"}),
       server.put);
   expect_request<v1::PutSceneRequest>("PutSceneRequest");
 
@@ -241,7 +298,7 @@ TEST_F(Golden, AStoredSceneIsPutAndFoundAgain) {
 TEST_F(Golden, TheLabelsOfAStoredSceneAreChangedAndItIsForgotten) {
   server.updated = golden<v1::UpdateSceneResponse>("UpdateSceneResponse");
   expect_told(client.update_scene(golden<v1::UpdateSceneRequest>("UpdateSceneRequest").name(),
-                                  {{1, "rack"}, {3, ""}}),
+                                  {{1, "rack"}, {3, ""}}, "rack room"),
               server.updated.stored_scene());
   expect_request<v1::UpdateSceneRequest>("UpdateSceneRequest");
   client.delete_scene(server.updated.stored_scene().name());
@@ -250,11 +307,11 @@ TEST_F(Golden, TheLabelsOfAStoredSceneAreChangedAndItIsForgotten) {
 
 TEST_F(Golden, AllPagesOfAListAreOne) {
   const auto first = golden<v1::ListScenesResponse>("ListScenesResponse");
-  server.pages = {first, first};
+  server.scene_pages = {first, first};
   const auto asked = golden<v1::ListScenesRequest>("ListScenesRequest");
-  server.pages.at(0).set_next_page_token(asked.page_token());
-  server.pages.at(1).mutable_scenes()->RemoveLast();
-  server.pages.at(1).clear_next_page_token();
+  server.scene_pages.at(0).set_next_page_token(asked.page_token());
+  server.scene_pages.at(1).mutable_scenes()->RemoveLast();
+  server.scene_pages.at(1).clear_next_page_token();
   const auto scenes = client.list_scenes();
   expect_request(asked);
   EXPECT_EQ(server.requests().size(), 2U);
@@ -264,6 +321,19 @@ TEST_F(Golden, AllPagesOfAListAreOne) {
   expect_told(scenes.at(1), first.scenes(1));
   expect_told(scenes.at(2), first.scenes(0));
   EXPECT_EQ(scenes.at(1).object_count, 7U);
+}
+
+TEST_F(Golden, AllPagesOfMatchesAreOne) {
+  const auto first = golden<v1::ListMatchesResponse>("ListMatchesResponse");
+  server.match_pages = {first, {}};
+  const auto matches = client.matches();
+  auto asked = golden<v1::ListMatchesRequest>("ListMatchesRequest");
+  asked.set_page_token(first.next_page_token());
+  expect_request(asked);
+  EXPECT_EQ(server.requests().size(), 2U);
+  ASSERT_EQ(matches.size(), 2U);
+  expect_told(matches.at(0), first.matches(0));
+  expect_told(matches.at(1), first.matches(1));
 }
 
 TEST_F(Golden, FeaturesAreCarriedByAMatch) {
@@ -417,6 +487,25 @@ TEST_F(Golden, TheAnswersOfTheOtherMethodsLackNothing) {
   server.info.mutable_limits()->MergeFrom(
       golden<v1::GetServerInfoResponse>("GetServerInfoResponse.limits").limits());
   expect_told(client.server_info(), server.info);
+}
+
+TEST_F(Golden, EachCodeIsAnErrorOfTheKindThatEveryClientHas) {
+  std::ifstream file(golden_folder() + "/kinds.txt");
+  ClientOptions once;
+  once.retries = 0;
+  const Client caller(server.address(), once);
+  int count = 0;
+  int code = 0;
+  for (std::string name, kind, failure; file >> code >> name >> kind >> failure; ++count) {
+    server.fail(status_of(static_cast<grpc::StatusCode>(code), "no"));
+    try {
+      static_cast<void>(caller.match(strokes(), grid()));
+      ADD_FAILURE() << name;
+    } catch (const SketchmatchError& error) {
+      EXPECT_EQ(kind_of(error), kind) << name;
+    }
+  }
+  EXPECT_EQ(count, 16);
 }
 
 TEST_F(Golden, ARequestThatCannotBeUsedNamesItsFieldAndTheRemedy) {

@@ -82,13 +82,16 @@ TEST_F(Real, ASketchIsSegmented) {
 
 TEST_F(Real, ASceneIsKeptRelabelledAndForgotten) {
   const auto known = client();
-  const auto put = known.put_scene(sketch());
+  PutOptions options;
+  options.title = "living room";
+  const auto put = known.put_scene(sketch(), options);
   EXPECT_TRUE(put.created);
+  EXPECT_EQ(put.stored_scene.title, "living room");
   EXPECT_FALSE(known.put_scene(sketch()).created);
   const auto& name = put.stored_scene.name;
   EXPECT_EQ(known.match(sources::stored_scene(name), map()).object_map().at(0), 6U);
 
-  const auto other = known.update_scene(name, {{2, "cactus"}, {3, ""}});
+  const auto other = known.update_scene(name, {{2, "cactus"}, {3, ""}}, "desert");
   EXPECT_NE(other.name, name);
   EXPECT_EQ(other.scene.objects.at(2).label, "cactus");
   EXPECT_EQ(other.scene.objects.at(3).label, "");
@@ -101,6 +104,9 @@ TEST_F(Real, ASceneIsKeptRelabelledAndForgotten) {
   ASSERT_EQ(listed.size(), 2U);
   EXPECT_EQ(listed.at(0).name, other.name);
   EXPECT_EQ(listed.at(0).object_count, 8U);
+  EXPECT_EQ(listed.at(0).title, "desert");
+  EXPECT_EQ(listed.at(1).title, "living room");
+  EXPECT_EQ(known.update_scene(name, {}, "").title, "");
   known.delete_scene(name);
   known.delete_scene(other.name);
   EXPECT_TRUE(known.list_scenes().empty());

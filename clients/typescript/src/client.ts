@@ -1,4 +1,4 @@
-import { create, type MessageInitShape } from "@bufbuild/protobuf";
+import { create, type JsonObject, type MessageInitShape } from "@bufbuild/protobuf";
 import { type Client, createClient, type Interceptor, type Transport } from "@connectrpc/connect";
 import { createConnectTransport } from "@connectrpc/connect-web";
 
@@ -116,9 +116,7 @@ export class SketchmatchClient {
   /** Find the objects of one source. */
   async segment(
     source: Source,
-    options: {
-      segmenter?: { name?: string; parameters?: Record<string, number | string | boolean> };
-    } = {},
+    options: { segmenter?: { name?: string; parameters?: JsonObject }; profile?: string } = {},
     signal?: AbortSignal,
   ): Promise<SegmentResponse> {
     const request = create(SegmentRequestSchema, { ...options, source });

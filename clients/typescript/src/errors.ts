@@ -15,6 +15,8 @@ import {
  * - `unauthenticated`: the server wants a token, or another one.
  * - `gone`: what the request names is not there, or no more; make it anew.
  * - `late`: the time was too short.
+ * - `store`: the server cannot keep things, or not now; tell its operator.
+ * - `unsupported`: the server does not know the method; it is older, or another server.
  * - `cancelled`: the caller wanted no answer any more.
  * - `failed`: the server or an algorithm is at fault.
  */
@@ -25,6 +27,8 @@ export type Failure =
   | "unauthenticated"
   | "gone"
   | "late"
+  | "store"
+  | "unsupported"
   | "cancelled"
   | "failed";
 
@@ -33,8 +37,11 @@ const FAILURES: Partial<Record<Code, Failure>> = {
   [Code.ResourceExhausted]: "busy",
   [Code.Unavailable]: "away",
   [Code.Unauthenticated]: "unauthenticated",
+  [Code.PermissionDenied]: "unauthenticated",
   [Code.NotFound]: "gone",
   [Code.DeadlineExceeded]: "late",
+  [Code.FailedPrecondition]: "store",
+  [Code.Unimplemented]: "unsupported",
   [Code.Canceled]: "cancelled",
 };
 

@@ -2,6 +2,7 @@
 
 import { create } from "@bufbuild/protobuf";
 
+import { RequestFailed } from "./errors.js";
 import { type Scene } from "./gen/sketchmatch/v1/scene_pb.js";
 import { type Source, SourceSchema, YAxis } from "./gen/sketchmatch/v1/source_pb.js";
 
@@ -14,10 +15,18 @@ export interface PenStroke {
   readonly label?: string | undefined;
 }
 
-/** A polygon: the outer ring, then holes, and perhaps a name. */
+/** A polygon: the outer ring, then holes, perhaps a name, and how sure it is, up to 1, one thing. */
 export interface NamedPolygon {
   readonly rings: readonly (readonly (readonly [number, number])[])[];
   readonly label?: string | undefined;
+  readonly certainty?: number | undefined;
+}
+
+/** Where a grid lies: its lower left corner, in metres, and radians counter-clockwise. */
+export interface Origin {
+  readonly x: number;
+  readonly y: number;
+  readonly yaw?: number;
 }
 
 /** Return strokes of a pen. Screens' y grows down, as it does here unless told otherwise. */
@@ -40,9 +49,10 @@ export function strokes(drawn: readonly PenStroke[], y: Axis = "down"): Source {
 export function polygons(drawn: readonly NamedPolygon[], y: Axis = "up"): Source {
   const value = {
     yAxis: axis(y),
-    polygons: drawn.map(({ rings, label }) => ({
+    polygons: drawn.map(({ rings, label, certainty }) => ({
       label: label ?? "",
       rings: rings.map((ring) => ({ points: ring.map(([x, y]) => ({ x, y })) })),
+      ...(certainty === undefined ? {} : { certainty }),
     })),
   };
   return create(SourceSchema, { kind: { case: "polygonSet", value } });
@@ -50,9 +60,49 @@ export function polygons(drawn: readonly NamedPolygon[], y: Axis = "up"): Source
 
 /** Return the objects of a scene as they are. */
 export function scene(found: Scene): Source {
-  const polygons = found.objects.map(({ rings, label }) => ({ rings, label }));
+  const polygons = found.objects.map(({ rings, label, certainty }) => ({
+    rings,
+    label,
+    ...(certainty === undefined ? {} : { certainty }),
+  }));
   const value = { polygons, yAxis: YAxis.UP };
   return create(SourceSchema, { kind: { case: "polygonSet", value } });
+}
+
+/**
+ * Return a robot's occupancy grid: `data`, `info.width`, `info.resolution` and `info.origin` of a
+ * `nav_msgs/OccupancyGrid`, -1 unknown, 0 free … 100 occupied, row by row from the lowest.
+ */
+export function occupancyGrid(
+  cells: Int8Array | readonly number[],
+  columns: number,
+  resolutionMeters: number,
+  { x, y, yaw = 0 }: Origin = { x: 0, y: 0 },
+): Source {
+  const rows = cells.length / columns;
+  if (!Number.isInteger(rows)) {
+    const sentence = `${cells.length} cells are no rows of ${columns}; give the number of cells in a row`;
+    throw new RequestFailed(
+      sentence,
+      "invalid",
+      "INVALID_GRID",
+      "occupancy_grid.columns",
+      undefined,
+    );
+  }
+  const value = {
+    rows,
+    columns,
+    resolutionMeters,
+    origin: { xMeters: x, yMeters: y, yawRadians: yaw },
+    cells: new Uint8Array(Int8Array.from(cells).buffer),
+  };
+  return create(SourceSchema, { kind: { case: "occupancyGrid", value } });
+}
+
+/** Return a scene that the server keeps, by its name. */
+export function storedScene(name: string): Source {
+  return create(SourceSchema, { kind: { case: "storedScene", value: name } });
 }
 
 /**

@@ -174,6 +174,9 @@ class Client {
   // NOLINTNEXTLINE(modernize-use-nodiscard)
   MatchSummary cancel_match(const std::string& match_id, const CallOptions& call = {}) const;
 
+  /// Returns how all matches of one's own are, the latest first. The timeout is for all of it.
+  [[nodiscard]] std::vector<MatchSummary> matches(const CallOptions& call = {}) const;
+
   /// Finds the objects of one source, without a match.
   [[nodiscard]] Segmentation segment(const Source& source, const SegmentOptions& options = {},
                                      const CallOptions& call = {}) const;
@@ -183,7 +186,7 @@ class Client {
   /// @throws StoreError If the server keeps no scenes, or cannot.
   // Whoever knows the name already need not look.
   // NOLINTNEXTLINE(modernize-use-nodiscard)
-  PutScene put_scene(const Source& source, const SegmentOptions& options = {},
+  PutScene put_scene(const Source& source, const PutOptions& options = {},
                      const CallOptions& call = {}) const;
 
   /// Returns a scene that one has put.
@@ -198,13 +201,15 @@ class Client {
   /// for all of it.
   [[nodiscard]] std::vector<SceneSummary> list_scenes(const CallOptions& call = {}) const;
 
-  /// Gives objects of a kept scene other labels.
+  /// Gives objects of a kept scene other labels, or the scene another title.
   /// @param name Of the scene, which stays as it is.
   /// @param labels By index, from 0; an empty one takes the label away.
+  /// @param title What you call it from now on; an empty one takes the title away.
   /// @param call Timeout and cancellation.
-  /// @return The scene with these labels, under a name of its own.
+  /// @return The scene with these labels, under its own name, which a title does not change.
   /// @throws NotFoundError As `get_scene`.
   [[nodiscard]] StoredScene update_scene(const std::string& name, const ObjectLabels& labels,
+                                         const std::optional<std::string>& title = {},
                                          const CallOptions& call = {}) const;
 
   /// Forgets a scene; it stays for others who have put it.

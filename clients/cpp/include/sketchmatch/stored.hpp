@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <sketchmatch/options.hpp>
 #include <sketchmatch/scene.hpp>
 #include <sketchmatch/sources.hpp>
 #include <string>
@@ -20,6 +21,14 @@ struct StoredScene {
   std::vector<std::string> warnings;  ///< As in `Segmentation`.
   AlgorithmSelection segmenter;       ///< The segmenter that found the objects, as it ran.
   std::vector<Point> route;           ///< As in `Segmentation`.
+  std::string title;                  ///< What you call it; empty if nothing.
+};
+
+/// How to find the objects of a scene that is put, and what to call it.
+struct PutOptions : SegmentOptions {
+  /// For people who choose among scenes: up to 200 characters, and no part of the scene's name.
+  /// Left out: a scene that you have put already keeps its title.
+  std::string title;
 };
 
 /// What came of `Client::put_scene`.
@@ -42,6 +51,7 @@ struct SceneSummary {
   std::uint32_t object_count = 0;   ///< How many objects it has.
   std::vector<std::string> labels;  ///< Those of its objects that have one, in their order.
   Time put_time;                    ///< When the caller put it, or gave it its labels.
+  std::string title;                ///< What you call it; empty if nothing.
 };
 
 /// Labels of objects by their index, from 0.
