@@ -308,6 +308,14 @@ def test_a_match_that_cannot_be_had_is_refused_before_anything_is_drawn(client, 
     assert caught.value.field == field
 
 
+def test_a_way_of_y_that_is_none_is_refused_at_once(host):
+    request = CreateSketchRequest(match=MatchRequest(map=MAP), y_axis=9)
+    with grpc.insecure_channel(host.address) as channel, pytest.raises(grpc.RpcError) as caught:
+        SketchServiceStub(channel).CreateSketch(request, timeout=60)
+    assert caught.value.code() is grpc.StatusCode.INVALID_ARGUMENT
+    assert caught.value.details().startswith("y_axis is 9, which this server")
+
+
 def test_maps_of_no_use_are_refused_at_once(client):
     with pytest.raises(InvalidRequestError) as caught:
         client.sketch(sources.polygons([[(0, 0), (1, 1), (2, 2)], [(0, 0), (1, 0), (0, 1)]]))

@@ -305,3 +305,25 @@ def test_a_title_is_one_line_without_escape_sequences(client):
     put = client.put_scene(scene(3, 11), title="\x1b[31mour\nflat\u202e").stored_scene
     assert put.title == "our flat"
     assert client.update_scene(put.name, title="the\x07 flat").title == "the flat"
+
+
+def test_a_name_before_anything_was_put_is_not_found(tmp_path):
+    with (
+        hosting(setup(), store=tmp_path / "store") as host,
+        Client(host.address, timeout=60) as client,
+    ):
+        stored = sources.stored_scene(MISSING)
+        for call in (
+            lambda: client.match(SKETCH, stored),
+            lambda: client.sketch(stored),
+            lambda: client.transfer(SKETCH, stored, object_map={0: 0, 1: 1}),
+            lambda: client.get_scene(MISSING),
+        ):
+            with pytest.raises(NotFoundError, match="you keep no scene of this name here"):
+                call()
+
+
+def test_a_name_that_is_none_is_not_repeated_as_it_came(client):
+    with pytest.raises(NotFoundError) as caught:
+        client.get_scene("\x1b[31m" + 59 * "a")
+    assert str(caught.value).isprintable()

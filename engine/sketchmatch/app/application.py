@@ -342,6 +342,7 @@ class Application:
                 say(COMPILING)
 
         self._looking = asyncio.create_task(self._look())
+        await self.scenes.open()
         if self._kept:
             self._workers.compiling = compiling
             await self._workers.start(self._setup)

@@ -295,6 +295,7 @@ def _map_of_sketch(
 ) -> Generator[Message, None, None]:
     """Find the objects of the map of a sketch, once it is known that the match can be had."""
     engine, match = setup.engine, MatchRequest()
+    requests.upward_of(request.y_axis)
     match.CopyFrom(request.match)
     try:
         if match.HasField("sketch"):

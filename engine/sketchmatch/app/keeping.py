@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -12,7 +13,7 @@ from google.protobuf.wrappers_pb2 import BytesValue
 from sketchmatch.app.following import followed
 from sketchmatch.app.scenes import Described, SceneArchive, cleaned_title, without_store
 from sketchmatch.app.waiting import Caller
-from sketchmatch.errors import InvalidInputError, Reason, ServerStoppingError
+from sketchmatch.errors import InvalidInputError, Reason, ServerStoppingError, StoreError
 from sketchmatch_proto.v1.scene_service_pb2 import (
     DeleteSceneRequest,
     DeleteSceneResponse,
@@ -54,6 +55,12 @@ class Keeping:
     def path(self) -> Path | None:
         """The archive's file, or None where there is none."""
         return None if self._archive is None else self._archive.path
+
+    async def open(self) -> None:
+        """Make the file where there is none; what is wrong with it is told to who needs it."""
+        if self._archive is not None:
+            with suppress(StoreError):
+                await asyncio.to_thread(self._archive.open)
 
     async def put(self, data: bytes, caller: Caller) -> PutSceneResponse:
         """Find the objects of a source, and keep them; ``data`` is a ``PutSceneRequest``."""

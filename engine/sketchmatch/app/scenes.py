@@ -7,6 +7,7 @@ it lie its source and the histograms of its pairs, which the worker that compute
 from __future__ import annotations
 
 import json
+import re
 import sqlite3
 import time
 import zlib
@@ -83,7 +84,7 @@ LARGEST_KEPT = 32 * 1024 * 1024
 """Bytes of the histograms of a scene above which these are computed again."""
 
 _PAGE, _LONGEST_PAGE = 100, 1000
-_DIGITS = 64
+_A_NAME = re.compile(r"[0-9a-f]{64}")
 _HELD = 32
 _NAMED = 80
 _LONGEST_TITLE = 200
@@ -590,7 +591,7 @@ def _kept(connection: sqlite3.Connection, name: str, caller: str, field: str) ->
         (name, caller),
     ).fetchone()
     if found is None:
-        shown = quoted(name) if len(name) != _DIGITS else name
+        shown = name if _A_NAME.fullmatch(name) else quoted(name)
         raise NotFoundError(
             f"{field} is {shown[:_NAMED]}, and you keep no scene of this name here; put it, or "
             "list those there are"

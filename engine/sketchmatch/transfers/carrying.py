@@ -204,7 +204,8 @@ def _dense(ring: FloatArray, course: Course, closed: bool, step: float | None = 
     places = course.warp(drawn)
     wanted = (course.extent * _FINE if step is None else step) * _NEARLY
     lengths = np.hypot(*np.diff(places, axis=0).T)
-    counts = np.clip(np.ceil(lengths / wanted), 1, _MOST_POINTS / max(1, len(lengths))).astype(int)
+    most = max(1, _MOST_POINTS // max(1, len(lengths)))
+    counts = np.clip(np.ceil(lengths / wanted), 1, most).astype(int)
     sources = np.concatenate(
         [k + np.arange(count) / count for k, count in enumerate(counts)] + [[len(drawn) - 1.0]]
     )
@@ -221,6 +222,9 @@ def _thinned(
     pinned = np.unique(np.concatenate([[0], given, [len(way.points) - 1]]))
     kept: list[int] = [0]
     for first, last in pairwise(pinned.tolist()):
+        if last == first + 1:
+            kept.append(last)
+            continue
         leg = way.points[first : last + 1]
         finer = tolerance
         chosen = _simplified(leg, finer)
