@@ -284,6 +284,12 @@ def test_an_update_of_no_use_is_refused_by_field_and_changes_nothing(client, cha
 
 
 @pytest.mark.slow
+def test_a_whole_drawing_may_be_set_at_once(client):
+    strokes = {f"s{k}": np.repeat(outline(k % 4), 100, axis=0).tolist() for k in range(60)}
+    with client.sketch(MAP) as sketch:
+        assert sketch.update(strokes).stroke_count == 60
+
+
 def test_revisions_of_long_ago_are_forgotten(client):
     with client.sketch(MAP) as sketch:
         for k in range(258):
