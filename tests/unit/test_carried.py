@@ -310,3 +310,10 @@ def test_a_feature_that_is_none_is_refused_by_field(feature, field):
 def test_a_zone_may_repeat_its_first_point():
     ring = np.array([*box(0, 0), (0, 0)])
     assert len(Feature("zone", (ring,)).points) == 4
+
+
+def test_what_is_carried_beyond_all_bounds_is_refused_with_its_name():
+    feature = Feature(FeatureKind.POINT, (np.array([[9e8, 0.0]]),), "far")
+    with pytest.raises(InvalidInputError, match="a point 'far' that cannot be carried") as refused:
+        finish(carried([feature], course_between(SCENE, TURNED, SAME, features=[feature])))
+    assert refused.value.field == "features"

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
+from sketchmatch.errors import InvalidInputError, quoted
 from sketchmatch.model import FloatArray, Scene
 from sketchmatch.pipeline.slices import retold
 from sketchmatch.transfers.features import Carried, Change, ChangeReason, Feature, FeatureKind
@@ -263,7 +264,11 @@ def _result(feature: Feature, ways: Sequence[Way], course: Course) -> Carried:
     speeds = None
     if feature.speeds is not None:
         speeds = feature.speeds[np.floor(ways[0].sources).astype(int)]
-    there = Feature(feature.kind, tuple(way.points for way in ways), feature.name, speeds)
+    try:
+        there = Feature(feature.kind, tuple(way.points for way in ways), feature.name, speeds)
+    except InvalidInputError as error:
+        problem = f"hold a {feature.kind} {quoted(feature.name)} that cannot be carried: there it "
+        raise InvalidInputError(error.reason, "features", problem + error.problem) from None
     deviations = tuple(course.warp.deviations(way.drawn) for way in ways)
     return Carried(
         feature.kind, feature.name, there, deviations, tuple(way.sources for way in ways)
