@@ -49,7 +49,7 @@ def store(tmp_path):
 
 @pytest.fixture
 def archive(store):
-    archive = SceneArchive(store)
+    archive = SceneArchive(store, 1 << 24)
     archive.open()
     yield archive
     archive.close()

@@ -102,10 +102,10 @@ async def _measured(
     return [_rate_table(alone_rates, loads), _latency_table(loads, beside)]
 
 
-def processor_seconds(pid: int) -> float:
-    """Return the processor time of a process and of all that it started and that still run."""
+def processor_seconds(pid: int, children: bool = True) -> float:
+    """Return the processor time of a process, and of all that it started and that still run."""
     ticks = 0
-    for each in (pid, *children_of(pid)):
+    for each in (pid, *(children_of(pid) if children else ())):
         with suppress(FileNotFoundError):
             text = Path(f"/proc/{each}/stat").read_text(encoding="ascii")
             ticks += sum(map(int, text.rpartition(")")[2].split()[11:13]))

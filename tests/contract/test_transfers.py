@@ -166,3 +166,11 @@ def test_a_fault_of_a_feature_has_its_path(feature, field):
         requests.transfer_request(request, RequestLimits())
     assert refused.value.field == field
     assert refused.value.reason in (Reason.INVALID_FIELD, Reason.MISSING_FIELD)
+
+
+def test_a_direction_that_is_none_is_refused():
+    request = golden("TransferRequest.known")
+    request.direction = 7
+    with pytest.raises(InvalidInputError, match="direction is 7, which this server") as refused:
+        requests.transfer_request(request, RequestLimits())
+    assert refused.value.field == "direction"

@@ -51,6 +51,7 @@ def test_a_map_is_put_labelled_and_matched_with_by_its_name(scenes):
         ("scenes label", ["ff", "desk"], "'desk' is no label of an object; give its number"),
         ("scenes label", ["ff", "0=desk"], "'0=desk' is no label of an object"),
         ("scenes put", ["missing.yaml"], "missing.yaml"),
+        ("match", [LIVING_ROOM_SKETCH, "scene:"], "'' is no name of a scene"),
     ],
 )
 def test_what_is_of_no_use_is_said_in_one_line(scenes, command, arguments, said):
@@ -59,6 +60,35 @@ def test_what_is_of_no_use_is_said_in_one_line(scenes, command, arguments, said)
     assert done.stdout == ""
     (line,) = done.stderr.splitlines()
     assert said in line
+
+
+@pytest.mark.slow
+def test_objects_are_counted_from_1_where_there_is_none_of_the_number(scenes):
+    name = scenes("scenes put", LIVING_ROOM_MAP).stdout.strip()
+    done = scenes("scenes label", name, "1=desk", "9=lamp")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "'9=' names no object: the scene has objects 1 to 8" in done.stderr
+
+
+@pytest.mark.slow
+def test_a_stored_map_takes_what_is_carried_as_its_file_does(scenes, tmp_path):
+    drawn = tmp_path / "drawn.geojson"
+    way = {"type": "LineString", "coordinates": [[120, -150], [300, -220], [420, -180]]}
+    drawn.write_text(json.dumps({"type": "Feature", "properties": {}, "geometry": way}))
+    zone = {"type": "Polygon", "coordinates": [[[1, 1], [2, 1], [2, 2], [1, 1]]]}
+    zones = tmp_path / "zones.geojson"
+    zones.write_text(json.dumps({"type": "Feature", "properties": {}, "geometry": zone}))
+    stored = f"scene:{scenes('scenes put', LIVING_ROOM_MAP).stdout.strip()[:12]}"
+    picture = tmp_path / "carried.png"
+    done = scenes(
+        "transfer --radius 0.3", LIVING_ROOM_SKETCH, stored, drawn, "--overlay", picture
+    )
+    plain = scenes("transfer --radius 0.3", LIVING_ROOM_SKETCH, LIVING_ROOM_MAP, drawn)
+    assert (done.returncode, done.stdout) == (0, plain.stdout)
+    assert picture.stat().st_size > 10_000
+    moved = scenes("carry", zones, stored, LIVING_ROOM_MAP)
+    assert moved.returncode == 0
+    assert "zone" in moved.stdout
 
 
 @pytest.mark.slow

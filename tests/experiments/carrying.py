@@ -1,6 +1,7 @@
 """What is carried, measured: ways that people draw, and zones of old maps on new ones.
 
-``python -m tests.experiments.carrying --sketches 100 --maps 20`` prints a table of
+``python -m tests.experiments.carrying --sketches 100 --maps 20`` prints a table (of others than
+those so far where ``--first 1000`` says with which number to begin) of
 
 - ways through rooms, drawn by the study's people, by those of both generators, and by the study's
   where they stretch a room and draw one side of it larger than the other, carried through
@@ -270,11 +271,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--sketches", type=int, default=100)
     parser.add_argument("--maps", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0, help="number of the first of each")
     given = parser.parse_args()
-    for people in PEOPLE if given.sketches else ():
-        print(carried_ways(people, range(given.sketches)).row(people), flush=True)
+    ways, maps = (range(given.first, given.first + count) for count in (given.sketches, given.maps))
+    for people in PEOPLE if ways else ():
+        print(carried_ways(people, ways).row(people), flush=True)
     shares: list[float] = []
-    for number, found in enumerate(carried_zones(range(given.maps))):
+    for number, found in zip(maps, carried_zones(maps), strict=True):
         shares += found
         print(f"map {number}: median {np.median(found):.3f}, least {min(found):.3f}", flush=True)
     if shares:

@@ -63,10 +63,15 @@ SOUND = {
     "DeleteSketch": {"sketchId": "0" * 32},
 }
 """What a server does, or looks for and does not find."""
+OF_STORED = {
+    "Match": {"sketch": POLYGONS, "map": STORED},
+    "Transfer": {"sketch": POLYGONS, "map": STORED},
+    "CreateSketch": {"match": {"map": STORED}},
+}
 REQUESTS = {
     "INVALID_ARGUMENT": {"ListMatches": {"pageSize": -1}, "ListScenes": {"pageSize": -1}},
-    "NOT_FOUND": {**SOUND, "CreateSketch": {"match": {"map": STORED}}},
-    "FAILED_PRECONDITION": {**SOUND, "CreateSketch": {"match": {"map": STORED}}},
+    "NOT_FOUND": SOUND | OF_STORED,
+    "FAILED_PRECONDITION": SOUND | OF_STORED,
     "RESOURCE_EXHAUSTED": SOUND,
     "INTERNAL": {
         "Match": {**SOUND["Match"], **FAILING},

@@ -284,6 +284,12 @@ def test_an_update_of_no_use_is_refused_by_field_and_changes_nothing(client, cha
 
 
 @pytest.mark.slow
+def test_a_whole_drawing_may_be_set_at_once(client):
+    strokes = {f"s{k}": np.repeat(outline(k % 4), 100, axis=0).tolist() for k in range(60)}
+    with client.sketch(MAP) as sketch:
+        assert sketch.update(strokes).stroke_count == 60
+
+
 def test_revisions_of_long_ago_are_forgotten(client):
     with client.sketch(MAP) as sketch:
         for k in range(258):
@@ -306,6 +312,14 @@ def test_a_match_that_cannot_be_had_is_refused_before_anything_is_drawn(client, 
     with pytest.raises(InvalidRequestError) as caught:
         client.sketch(MAP, **options)
     assert caught.value.field == field
+
+
+def test_a_way_of_y_that_is_none_is_refused_at_once(host):
+    request = CreateSketchRequest(match=MatchRequest(map=MAP), y_axis=9)
+    with grpc.insecure_channel(host.address) as channel, pytest.raises(grpc.RpcError) as caught:
+        SketchServiceStub(channel).CreateSketch(request, timeout=60)
+    assert caught.value.code() is grpc.StatusCode.INVALID_ARGUMENT
+    assert caught.value.details().startswith("y_axis is 9, which this server")
 
 
 def test_maps_of_no_use_are_refused_at_once(client):

@@ -2,7 +2,7 @@
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import replace
 
 import grpc
@@ -13,6 +13,7 @@ from sketchmatch.app.setup import RequestLimits, Setup
 from sketchmatch.model import Scene
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import default_registry
+from sketchmatch.server.tokens import new_token
 from sketchmatch_client import (
     Client,
     InvalidRequestError,
@@ -253,3 +254,76 @@ def test_a_server_says_whether_it_keeps_scenes(client):
     assert client.server_info().keeps_scenes
     with hosting(setup()) as host, Client(host.address) as without:
         assert not without.server_info().keeps_scenes
+
+
+@pytest.fixture
+def anna_and_bert(tmp_path):
+    """Two callers with tokens, at one server."""
+    known = {name: new_token(name) for name in ("anna", "bert")}
+    file = tmp_path / "tokens"
+    file.write_text("".join(f"{entry.line}\n" for _, entry in known.values()))
+    with (
+        hosting(setup(), store=tmp_path / "store", tokens=file) as host,
+        ExitStack() as stack,
+    ):
+        yield [
+            stack.enter_context(Client(host.address, timeout=60, token=token))
+            for token, _ in known.values()
+        ]
+
+
+def test_the_same_name_is_the_same_answer_whoever_put_it(anna_and_bert):
+    anna, bert = anna_and_bert
+    put = anna.put_scene(MAP, title="of anna").stored_scene
+    stored = sources.stored_scene(put.name)
+    with pytest.raises(NotFoundError, match=r"^map\.stored_scene is"):
+        bert.match(SKETCH, stored)
+    with pytest.raises(NotFoundError, match=r"^name is"):
+        bert.get_scene(put.name)
+    again = bert.put_scene(MAP)
+    assert (again.stored_scene.name, again.created) == (put.name, True)
+    assert again.stored_scene.title == "", "a title is the caller's own"
+    assert answer(bert.match(SKETCH, stored)) == answer(anna.match(SKETCH, stored))
+    assert anna.get_scene(put.name).stored_scene.scene == again.stored_scene.scene
+    labels = [client.update_scene(put.name, {2: "sofa"}) for client in (anna, bert)]
+    assert labels[0].name == labels[1].name != put.name
+    assert labels[0].scene == labels[1].scene
+
+
+def test_a_scene_is_forgotten_by_its_caller_alone(anna_and_bert):
+    anna, bert = anna_and_bert
+    anna.put_scene(MAP)
+    name = bert.put_scene(MAP).stored_scene.name
+    expected = answer(bert.match(SKETCH, sources.stored_scene(name)))
+    anna.delete_scene(name)
+    with pytest.raises(NotFoundError):
+        anna.match(SKETCH, sources.stored_scene(name))
+    assert answer(bert.match(SKETCH, sources.stored_scene(name))) == expected
+
+
+def test_a_title_is_one_line_without_escape_sequences(client):
+    put = client.put_scene(scene(3, 11), title="\x1b[31mour\nflat\u202e").stored_scene
+    assert put.title == "our flat"
+    assert client.update_scene(put.name, title="the\x07 flat").title == "the flat"
+
+
+def test_a_name_before_anything_was_put_is_not_found(tmp_path):
+    with (
+        hosting(setup(), store=tmp_path / "store") as host,
+        Client(host.address, timeout=60) as client,
+    ):
+        stored = sources.stored_scene(MISSING)
+        for call in (
+            lambda: client.match(SKETCH, stored),
+            lambda: client.sketch(stored),
+            lambda: client.transfer(SKETCH, stored, object_map={0: 0, 1: 1}),
+            lambda: client.get_scene(MISSING),
+        ):
+            with pytest.raises(NotFoundError, match="you keep no scene of this name here"):
+                call()
+
+
+def test_a_name_that_is_none_is_not_repeated_as_it_came(client):
+    with pytest.raises(NotFoundError) as caught:
+        client.get_scene("\x1b[31m" + 59 * "a")
+    assert str(caught.value).isprintable()

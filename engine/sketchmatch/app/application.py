@@ -27,10 +27,9 @@ from sketchmatch.app.orders import Order, Wish
 from sketchmatch.app.packed import check_size
 from sketchmatch.app.quotas import Rates
 from sketchmatch.app.remembered import Remembered
-from sketchmatch.app.scenes import SCENES_BYTES
+from sketchmatch.app.scenes import SceneArchive
 from sketchmatch.app.setup import Setup
 from sketchmatch.app.sketches import Sketches
-from sketchmatch.app.store import Store
 from sketchmatch.app.tasks import Record, State, Task
 from sketchmatch.app.waiting import Caller, FairQueue
 from sketchmatch.app.worker import flags
@@ -145,14 +144,10 @@ class Application:
     workers
         How many worker processes wait at least; without any, requests are answered in threads of
         this process, but for strangers' plugins.
-    store
-        Where scenes are kept; None where none are.
-    archive
-        Where matches are kept; None for nowhere.
+    scenes, archive
+        Where scenes and matches are kept; None for nowhere.
     matched
         Called when a match has ended that has a result, with its events but progress.
-    scenes_bytes
-        Bytes that kept scenes may take.
 
     Attributes
     ----------
@@ -168,12 +163,11 @@ class Application:
         self,
         setup: Setup,
         workers: int = 0,
-        store: Store | None = None,
+        scenes: SceneArchive | None = None,
         archive: Archive | None = None,
         matched: Callable[[list[MatchResponse]], None] = lambda _: None,
-        scenes_bytes: int = SCENES_BYTES,
     ) -> None:
-        self.scenes = Keeping(self, store, scenes_bytes)
+        self.scenes = Keeping(self, scenes)
         self.sketches = Sketches(self)
         self._remembered = Remembered(self.scenes.path)
         self._setup = self._remembering(setup)
@@ -352,6 +346,7 @@ class Application:
                 say(COMPILING)
 
         self._looking = asyncio.create_task(self._look())
+        await self.scenes.open()
         if self._kept:
             self._workers.compiling = compiling
             await self._workers.start(self._setup)

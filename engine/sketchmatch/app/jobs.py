@@ -16,6 +16,7 @@ from sketchmatch.app.costs import Costs
 from sketchmatch.app.scenes import (
     LARGEST_KEPT,
     Described,
+    cleaned_title,
     described_by,
     name_of,
     segmentation,
@@ -263,17 +264,24 @@ def _former(objects: bytes, result: bytes) -> Former:
 
 
 def _put_scene(request: PutSceneRequest, setup: Setup) -> Generator[Message, None, None]:
-    """Find the objects of a source to be kept; one that is kept already is told by its name."""
-    engine, given = setup.engine, request.source
+    """Find the objects of a source to be kept; one that is kept already is told by its name.
+
+    Either has the title of the request, which only the caller's own list of scenes keeps.
+    """
+    engine, given, title = setup.engine, request.source, cleaned_title(request.title)
     source, segmenter = _source_and_segmenter(request, setup)
     name, data = name_of(given, segmenter, engine.registry)
     if setup.shelf is not None and (known := setup.shelf.record(name)) is not None:
-        yield GetSceneResponse(stored_scene=StoredScene.FromString(known))
+        record = StoredScene.FromString(known)
+        record.title = title
+        yield GetSceneResponse(stored_scene=record)
         return
     with requests.paths_of(request):
         found = engine.segment(source, segmenter, f"source.{source.field}")
     record = responses.stored_scene(name, found, segmenter)
-    yield GetSceneResponse(stored_scene=record, source=Source.FromString(data))
+    response = GetSceneResponse(stored_scene=record, source=Source.FromString(data))
+    response.stored_scene.title = title
+    yield response
     if setup.shelf is not None:
         found = setup.shelf.decoded(name, record.SerializeToString())
     for each in _describe(found.scene, request.profile, setup):
@@ -287,6 +295,7 @@ def _map_of_sketch(
 ) -> Generator[Message, None, None]:
     """Find the objects of the map of a sketch, once it is known that the match can be had."""
     engine, match = setup.engine, MatchRequest()
+    requests.upward_of(request.y_axis)
     match.CopyFrom(request.match)
     try:
         if match.HasField("sketch"):

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from google.protobuf.wrappers_pb2 import BytesValue
 
 from sketchmatch.app.following import followed
-from sketchmatch.app.scenes import SCENES_BYTES, Described, SceneArchive, without_store
-from sketchmatch.app.store import Store
+from sketchmatch.app.scenes import Described, SceneArchive, cleaned_title, without_store
 from sketchmatch.app.waiting import Caller
-from sketchmatch.errors import InvalidInputError, Reason, ServerStoppingError
+from sketchmatch.errors import InvalidInputError, Reason, ServerStoppingError, StoreError
 from sketchmatch_proto.v1.scene_service_pb2 import (
     DeleteSceneRequest,
     DeleteSceneResponse,
@@ -21,7 +21,6 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
     GetSceneResponse,
     ListScenesRequest,
     ListScenesResponse,
-    PutSceneRequest,
     PutSceneResponse,
     StoredScene,
     UpdateSceneRequest,
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["Keeping"]
 
 _Result = TypeVar("_Result")
-_LONGEST_TITLE = 200
 
 
 class Keeping:
@@ -44,17 +42,13 @@ class Keeping:
     ----------
     app
         Finds objects.
-    store
+    archive
         Where scenes are kept; None where none are.
-    max_bytes
-        Bytes that they may take together.
     """
 
-    def __init__(
-        self, app: Application, store: Store | None, max_bytes: int = SCENES_BYTES
-    ) -> None:
+    def __init__(self, app: Application, archive: SceneArchive | None) -> None:
         self._app = app
-        self._archive = None if store is None else SceneArchive(store, max_bytes)
+        self._archive = archive
         self._writing: set[asyncio.Future[None]] = set()
 
     @property
@@ -62,13 +56,20 @@ class Keeping:
         """The archive's file, or None where there is none."""
         return None if self._archive is None else self._archive.path
 
+    async def open(self) -> None:
+        """Make the file where there is none; what is wrong with it is told to who needs it."""
+        if self._archive is not None:
+            with suppress(StoreError):
+                await asyncio.to_thread(self._archive.open)
+
     async def put(self, data: bytes, caller: Caller) -> PutSceneResponse:
         """Find the objects of a source, and keep them; ``data`` is a ``PutSceneRequest``."""
         archive = self._kept("the request")
-        title = _title(await asyncio.to_thread(_title_in, data))
         await asyncio.to_thread(archive.open)
         while True:
             found, histograms = await self._found(data, caller)
+            title = found.stored_scene.title  # of the request: what is kept has none
+            found.stored_scene.ClearField("title")
             if found.HasField("source"):
                 put = await asyncio.to_thread(archive.put, found, caller.known, title, self._most)
                 for packed in histograms:
@@ -105,7 +106,7 @@ class Keeping:
     async def update(self, request: UpdateSceneRequest, caller: Caller) -> UpdateSceneResponse:
         """Keep a scene of a caller with other labels, or under another title."""
         labels = [(each.object, each.label) for each in request.labels]
-        title = _title(request.title) if request.HasField("title") else None
+        title = cleaned_title(request.title) if request.HasField("title") else None
         most = self._most
         record = await self._asked(
             request.name,
@@ -163,16 +164,3 @@ class Keeping:
             problem = "is not set; give the name of a scene"
             raise InvalidInputError(Reason.MISSING_FIELD, "name", problem)
         return await asyncio.to_thread(job, archive)
-
-
-def _title_in(data: bytes) -> str:
-    return PutSceneRequest.FromString(data).title
-
-
-def _title(given: str) -> str:
-    """Return a title as it is kept."""
-    title = " ".join(given.split())
-    if len(title) > _LONGEST_TITLE:
-        problem = f"has {len(title)} characters; give up to {_LONGEST_TITLE}"
-        raise InvalidInputError(Reason.INVALID_FIELD, "title", problem)
-    return title

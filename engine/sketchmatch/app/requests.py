@@ -54,6 +54,7 @@ __all__ = [
     "source_type",
     "time_budget",
     "transfer_request",
+    "upward_of",
 ]
 
 Stored: TypeAlias = Callable[[str, str], Segmentation]
@@ -139,8 +140,11 @@ def transfer_request(
     InvalidInputError
         If it cannot be used, with the path of the field.
     """
-    there = transfer_service_pb2.TransferDirection.Name(request.direction)
-    back = there == "TRANSFER_DIRECTION_MAP_TO_SKETCH"
+    if request.direction not in transfer_service_pb2.TransferDirection.values():
+        problem = f"is {request.direction}, which this server's contract does not know; give "
+        problem += "TRANSFER_DIRECTION_SKETCH_TO_MAP or TRANSFER_DIRECTION_MAP_TO_SKETCH"
+        raise InvalidInputError(Reason.INVALID_FIELD, "direction", problem)
+    back = request.direction == transfer_service_pb2.TRANSFER_DIRECTION_MAP_TO_SKETCH
     pairs = tuple((each.sketch_object, each.map_object) for each in request.object_map)
     return TransferRequest(
         match=match_request(request, limits, readers, stored),
@@ -347,7 +351,7 @@ def _features(request: transfer_service_pb2.TransferRequest) -> tuple[Feature, .
     lines = (each.route.points for each in given)
     rings = (ring.points for each in given for ring in each.zone.rings)
     check_vertices(sum(map(len, lines)) + sum(map(len, rings)), "features")
-    upward = _upward(request.y_axis)
+    upward = upward_of(request.y_axis)
     return tuple(_feature(each, f"features[{k}]", upward) for k, each in enumerate(given))
 
 
@@ -376,7 +380,7 @@ def _feature(message: transfer_service_pb2.Feature, field: str, upward: float) -
 
 def _stroke_set(message: source_pb2.StrokeSet) -> StrokeSet:
     check_vertices(sum(len(stroke.points) for stroke in message.strokes), "")
-    upward = _upward(message.y_axis)
+    upward = upward_of(message.y_axis)
     strokes = []
     for k, stroke in enumerate(message.strokes):
         points = _points(stroke.points, upward)
@@ -402,7 +406,7 @@ def _polygon_set(message: source_pb2.PolygonSet) -> PolygonSet:
     check_objects(len(message.polygons), "")
     rings = (ring for polygon in message.polygons for ring in polygon.rings)
     check_vertices(sum(len(ring.points) for ring in rings), "")
-    upward = _upward(message.y_axis)
+    upward = upward_of(message.y_axis)
     return PolygonSet(
         tuple(
             LabelledPolygon(
@@ -442,7 +446,14 @@ def _points(
     return np.array(flat, dtype=np.float64).reshape(-1, 2)
 
 
-def _upward(y_axis: int) -> float:
+def upward_of(y_axis: int) -> float:
+    """Return by what y is multiplied so that it grows upwards.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is none of the contract.
+    """
     if y_axis not in source_pb2.YAxis.values():
         raise InvalidInputError(
             Reason.INVALID_FIELD,

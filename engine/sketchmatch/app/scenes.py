@@ -7,6 +7,7 @@ it lie its source and the histograms of its pairs, which the worker that compute
 from __future__ import annotations
 
 import json
+import re
 import sqlite3
 import time
 import zlib
@@ -45,10 +46,10 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
 
 __all__ = [
     "LARGEST_KEPT",
-    "SCENES_BYTES",
     "Described",
     "SceneArchive",
     "Shelf",
+    "cleaned_title",
     "described_by",
     "name_of",
     "segmentation",
@@ -57,8 +58,6 @@ __all__ = [
 
 _FILE, _VERSION = "scenes", 2
 _MIB = 1024 * 1024
-SCENES_BYTES = 1024 * _MIB
-"""Bytes of all scenes together, where nobody says another number."""
 
 _SCHEMA = """
 CREATE TABLE contents (
@@ -85,9 +84,10 @@ LARGEST_KEPT = 32 * 1024 * 1024
 """Bytes of the histograms of a scene above which these are computed again."""
 
 _PAGE, _LONGEST_PAGE = 100, 1000
-_DIGITS = 64
+_A_NAME = re.compile(r"[0-9a-f]{64}")
 _HELD = 32
 _NAMED = 80
+_LONGEST_TITLE = 200
 
 
 def name_of(
@@ -110,6 +110,21 @@ def name_of(
     digest = sha256(json.dumps(made, sort_keys=True).encode())
     digest.update(data)
     return digest.hexdigest(), data
+
+
+def cleaned_title(given: str) -> str:
+    """Return what a caller calls a scene, in one line.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is too long.
+    """
+    title = cleaned_label(given)
+    if len(title) > _LONGEST_TITLE:
+        problem = f"has {len(title)} characters; give up to {_LONGEST_TITLE}"
+        raise InvalidInputError(Reason.INVALID_FIELD, "title", problem)
+    return title
 
 
 def segmentation(record: StoredScene) -> Segmentation:
@@ -174,7 +189,7 @@ class SceneArchive:
         Bytes of all together.
     """
 
-    def __init__(self, store: Store, max_bytes: int = SCENES_BYTES) -> None:
+    def __init__(self, store: Store, max_bytes: int) -> None:
         self._file: Database = store.database(_FILE, _SCHEMA, _VERSION, max_bytes)
 
     @property
@@ -576,7 +591,7 @@ def _kept(connection: sqlite3.Connection, name: str, caller: str, field: str) ->
         (name, caller),
     ).fetchone()
     if found is None:
-        shown = quoted(name) if len(name) != _DIGITS else name
+        shown = name if _A_NAME.fullmatch(name) else quoted(name)
         raise NotFoundError(
             f"{field} is {shown[:_NAMED]}, and you keep no scene of this name here; put it, or "
             "list those there are"

@@ -63,6 +63,7 @@ _COMPILING = 2
 """Workers that compile at the same time: one begins at the beginning, and one at the end."""
 _GIVES_WAY = 10
 _NAMED = 5
+_TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
 _REMEDY = "tell its author or choose another"
 _Key = frozenset[tuple[str, str]]
 """Distributions, with their versions, whose algorithms a worker loads beside the engine's own."""
@@ -509,8 +510,9 @@ class _Worker(asyncio.Protocol):
         """Return what the process has taken of processors; 0 where the system does not tell."""
         assert self._process is not None
         try:
-            text = Path(f"/proc/{self._process.pid}/stat").read_text(encoding="ascii")
-            return sum(map(int, text.rpartition(")")[2].split()[11:13])) / os.sysconf("SC_CLK_TCK")
+            with open(f"/proc/{self._process.pid}/stat", "rb") as file:  # noqa: PTH123 (often)
+                ticks = file.read().rpartition(b")")[2].split()[11:13]
+            return sum(map(int, ticks)) / _TICKS
         except OSError:
             return 0.0
 

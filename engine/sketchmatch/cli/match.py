@@ -74,7 +74,7 @@ def match(
     """
     from sketchmatch.cli import display, output, pictures, places
     from sketchmatch.cli.answering import answerer
-    from sketchmatch.cli.sources import in_metres, source_of, stored_of
+    from sketchmatch.cli.sources import in_metres, source_or_stored
 
     options.refuse_config(config, server)
     if keep_running and server is None:
@@ -101,8 +101,8 @@ def match(
         answerer(server, config, access) as asked,
     ):
         sources = (
-            stored_of(sketch, asked) or source_of(sketch, "sketch"),
-            stored_of(map_, asked) or source_of(map_, "map"),
+            source_or_stored(sketch, "sketch", asked),
+            source_or_stored(map_, "map", asked),
         )
         answer = display.watch(asked.events(*sources, **chosen))
     metres = in_metres(sources[1])

@@ -145,7 +145,9 @@ def _way(points: Sequence[Point]) -> FloatArray | None:
 
 
 def grid_in(path: Path) -> OccupancyGrid | None:
-    """Return the robot's map in a file, if it is one."""
+    """Return the robot's map in a file, if it is one; of a kept scene the file is elsewhere."""
+    if is_kept(path):
+        return None
     if (files := read_map_files(path)) is not None:
         return files.grid()
     bag, topic = bag_and_topic(path)

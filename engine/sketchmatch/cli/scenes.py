@@ -27,8 +27,8 @@ _HERE = "127.0.0.1:50051"
 def scenes() -> None:
     """Keep scenes on a server, for matches to come.
 
-    A scene has the hash of what it is as its name, and `match` takes scene:NAME for a file. You see
-    what you have put yourself.
+    A scene has the hash of what it is as its name, and `match`, `transfer` and `carry` take
+    scene:NAME for a file. You see what you have put yourself.
     """
 
 
@@ -135,7 +135,12 @@ def label(
 
     given = _labels(labels)
     with client_of(server, "--server", access) as client:
-        output.write_line(client.update_scene(whole_name(name, client), given).name)
+        whole = whole_name(name, client)
+        count = len(client.get_scene(whole).stored_scene.scene.objects)
+        if (most := max(given)) >= count:
+            problem = f"names no object: the scene has objects 1 to {count}"
+            raise InvalidInputError(Reason.INVALID_FIELD, quoted(f"{most + 1}="), problem)
+        output.write_line(client.update_scene(whole, given).name)
 
 
 @app.command("delete")

@@ -22,7 +22,14 @@ from sketchmatch_proto.v1.source_pb2 import MapServerMap, Source
 if TYPE_CHECKING:
     from sketchmatch.cli.answering import Answerer
 
-__all__ = ["content_of", "in_metres", "is_kept", "source_of", "stored_of", "whole_name"]
+__all__ = [
+    "content_of",
+    "in_metres",
+    "is_kept",
+    "source_of",
+    "source_or_stored",
+    "whole_name",
+]
 
 _KEPT = "scene:"
 _DIGITS = 64
@@ -38,8 +45,8 @@ def is_kept(path: Path) -> bool:
     return str(path).startswith(_KEPT)
 
 
-def stored_of(path: Path, asked: Answerer) -> Source | None:
-    """Return the scene that was typed for a file, as in scene:5f2b; None where none was.
+def source_or_stored(path: Path, side: str, asked: Answerer) -> Source:
+    """Return a file as :func:`source_of` does, or the scene that was typed for it: scene:5f2b.
 
     Raises
     ------
@@ -47,7 +54,7 @@ def stored_of(path: Path, asked: Answerer) -> Source | None:
         If there is none of the name, or no server that could keep any.
     """
     if not is_kept(path):
-        return None
+        return source_of(path, side)
     if not isinstance(asked, Client):
         problem = "is kept by a server, and none is asked; give --server"
         raise InvalidInputError(Reason.INVALID_FIELD, quoted(str(path)), problem)
@@ -64,6 +71,9 @@ def whole_name(name: str, client: Client) -> str:
     """
     if len(name) >= _DIGITS:
         return name
+    if not name:
+        problem = "is no name of a scene; `sketchmatch scenes list` shows those there are"
+        raise InvalidInputError(Reason.INVALID_FIELD, quoted(name), problem)
     known = [each.name for each in client.list_scenes() if each.name.startswith(name)]
     if len(known) == 1:
         return known[0]

@@ -102,7 +102,7 @@ def transfer(
     """
     from sketchmatch.cli import carried, pictures, places
     from sketchmatch.cli.answering import answerer
-    from sketchmatch.cli.sources import source_of
+    from sketchmatch.cli.sources import source_or_stored
     from sketchmatch.transfers import files
 
     options.refuse_config(config, server)
@@ -130,7 +130,10 @@ def transfer(
         options.pins_as_typed(list(known)),
         answerer(server, config, access) as asked,
     ):
-        sources = source_of(sketch, "sketch"), source_of(map_, "map")
+        sources = (
+            source_or_stored(sketch, "sketch", asked),
+            source_or_stored(map_, "map", asked),
+        )
         with carried.places_of(features):
             answer = asked.transfer(*sources, carried.messages(given.features), **chosen)
     found = carried.Carriage.of(answer, given, forth)
@@ -185,7 +188,7 @@ def carry(
     """
     from sketchmatch.cli import carried, pictures, places
     from sketchmatch.cli.answering import answerer
-    from sketchmatch.cli.sources import in_metres, source_of
+    from sketchmatch.cli.sources import in_metres, source_or_stored
     from sketchmatch.transfers import files
     from sketchmatch_client import InvalidRequestError
 
@@ -201,7 +204,10 @@ def carry(
         options.pins_as_typed(list(known)),
         answerer(server, config, access) as asked,
     ):
-        sources = source_of(old, "old map"), source_of(new, "new map")
+        sources = (
+            source_or_stored(old, "old map", asked),
+            source_or_stored(new, "new map", asked),
+        )
         grids = all(map(in_metres, sources))
         answers, problems = [], []
         for name in carried.segmenters(segmenter, grids and not known):

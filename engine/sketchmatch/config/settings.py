@@ -18,7 +18,10 @@ from sketchmatch.model.limits import SourceLimits
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
 from sketchmatch.pipeline.selection import STAGES
 
-__all__ = ["Settings", "annotation_of", "keys_of", "static_paths"]
+__all__ = ["KEPT_MIB", "Settings", "annotation_of", "keys_of", "static_paths"]
+
+KEPT_MIB = 1024
+"""Most that kept matches may take, and kept scenes, where nobody says another number."""
 
 Path = tuple[str, ...]
 """Where a setting is, e.g. ``("server", "address")``."""
@@ -249,13 +252,13 @@ class _Server(_Section):
         30.0, gt=0, le=36_500, description="How long a match is kept after its end."
     )
     keep_matches_mib: int = Field(
-        1024,
+        KEPT_MIB,
         ge=1,
         le=1_000_000,
         description="Most that kept matches may take, in MiB; the oldest go first.",
     )
     keep_scenes_mib: int = Field(
-        1024,
+        KEPT_MIB,
         ge=1,
         le=1_000_000,
         description="Most that kept scenes may take, in MiB; what does not fit is refused.",

@@ -140,7 +140,10 @@ def compare_labels(
            [-1, -1,  1],
            [ 0,  0,  0]])
     """
-    drawn, mapped = list(map(_meaning, template)), list(map(_meaning, argument))
+    given = list(template), list(argument)
+    if not all(map(any, given)):
+        return None  # as most sketches have it
+    drawn, mapped = (list(map(_meaning, labels)) for labels in given)
     if not any(drawn) or not any(mapped):
         return None
     groups = _grouped([[_meaning(label) for label in group] for group in synonyms])

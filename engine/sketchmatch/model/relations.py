@@ -144,7 +144,8 @@ class SceneDescriptor:
         if a < b:
             return frozen_floats(self.histograms[pair_index(a, b, self.objects)])
         dual = self.histograms[pair_index(b, a, self.objects)]
-        return frozen_floats(np.roll(dual, self.directions // 2))
+        half = self.directions - self.directions // 2
+        return frozen_floats(np.concatenate([dual[half:], dual[:half]]))
 
 
 @dataclass(frozen=True, eq=False)

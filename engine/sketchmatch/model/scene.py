@@ -84,24 +84,28 @@ class SceneObject:
             raise InvalidInputError(
                 Reason.INVALID_POLYGON, "rings", "is empty; give at least an outer ring"
             )
-        outer = arrays[0]
-        extent = float(np.ptp(outer, axis=0).max())
-        polygon = shapely.Polygon(outer, arrays[1:])
-        if abs(_signed_area(outer)) <= _FLAT * extent * extent and not _crosses_itself(outer):
+        outer, areas = arrays[0], [_signed_area(ring) for ring in arrays]
+        extent = float((outer.max(axis=0) - outer.min(axis=0)).max())
+        if abs(areas[0]) <= _FLAT * extent * extent and not _crosses_itself(outer):
             raise InvalidInputError(
                 Reason.INVALID_POLYGON, "", "has no area; give three corners not on one line"
             )
+        oriented = tuple(
+            frozen_floats(ring if (area > 0) == (k == 0) else ring[::-1])
+            for k, (ring, area) in enumerate(zip(arrays, areas, strict=True))
+        )
+        polygon = shapely.Polygon(oriented[0], oriented[1:])
         if not polygon.is_valid:
-            raise InvalidInputError(Reason.INVALID_POLYGON, "", _explain(polygon))
+            raise InvalidInputError(
+                Reason.INVALID_POLYGON, "", _explain(shapely.Polygon(outer, arrays[1:]))
+            )
         if polygon.area <= _FLAT * extent * extent:
             raise InvalidInputError(
                 Reason.INVALID_POLYGON, "", "has no area left between its holes; remove a hole"
             )
-        oriented = tuple(
-            frozen_floats(ring if (_signed_area(ring) > 0) == (k == 0) else ring[::-1])
-            for k, ring in enumerate(arrays)
-        )
-        return cls(oriented, label_from(label), certainty)
+        made = cls(oriented, label_from(label), certainty)
+        vars(made)["polygon"] = polygon  # which is what the property would make again
+        return made
 
     @classmethod
     def from_polygon(cls, polygon: Any, label: Any = "") -> Self:
@@ -299,7 +303,7 @@ class Scene:
                 content.update(np.ascontiguousarray(ring, dtype="<f8").tobytes())
         return content.hexdigest()
 
-    @property
+    @cached_property
     def labels(self) -> tuple[str, ...]:
         """The objects' names, empty where there is none."""
         return tuple(item.label for item in self.objects)
@@ -376,7 +380,8 @@ def _clean_ring(ring: Any, field: str) -> FloatArray:
         raise InvalidInputError(
             Reason.INVALID_POLYGON, field, f"reaches beyond ±{_FAR:g}; use a larger unit"
         )
-    points = np.compress((points != np.roll(points, 1, axis=0)).any(axis=1), points, axis=0)
+    before = np.concatenate([points[-1:], points[:-1]])
+    points = np.compress((points != before).any(axis=1), points, axis=0)
     if len(points) < 3:
         raise InvalidInputError(
             Reason.INVALID_POLYGON,
@@ -405,4 +410,5 @@ def _explain(polygon: shapely.Polygon) -> str:
 
 def _signed_area(ring: FloatArray) -> float:
     x, y = (ring - ring[0]).T
-    return float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2.0
+    after = np.concatenate([ring[1:], ring[:1]]) - ring[0]  # a tenth of what np.roll takes
+    return float(np.dot(x, after[:, 1]) - np.dot(y, after[:, 0])) / 2.0

@@ -196,7 +196,7 @@ def _needed_directions(*scenes: Scene) -> int:
     a, b = object_pairs(len(template)).T
     # The narrower, the larger: objects about one centroid are not narrow at all.
     lengths = np.hypot(*(centroids[a] - centroids[b]).T) / (sizes[a] + sizes[b])
-    narrow = float(np.quantile(lengths, 1.0 - _NARROWER, method="higher"))
+    narrow = float(np.sort(lengths)[math.ceil((1.0 - _NARROWER) * (len(lengths) - 1))])
     least, most = _DIRECTIONS
     most = min(most, _QUICK_HISTOGRAM_VALUES // pair_count(max(map(len, scenes))))
     wanted = min(_MEETING * 2.0 * math.pi * narrow, most)

@@ -285,6 +285,14 @@ class Histograms:
         return rolled_rows(self.values, -self.main_turns[0])
 
     @cached_property
+    def blocks(self) -> FloatArray:
+        """Those in blocks that one product of matrices takes, the last one filled up with zeros."""
+        block = max(1, BLAS_MULTIPLICATIONS // (3 * _BLAS_ROWS * self.bins))
+        found = np.zeros((math.ceil(len(self) / block), block, self.bins))
+        found.reshape(-1, self.bins)[: len(self)] = self.ahead
+        return found
+
+    @cached_property
     def spectra(self) -> ComplexArray:
         """The Fourier transforms of the values."""
         return np.fft.rfft(self.values)
@@ -312,11 +320,9 @@ class _MainTurns:
 
     def __init__(self, template: Histograms, argument: Histograms) -> None:
         self.template, self.argument = template, argument
-        bins = template.bins
-        block = max(1, BLAS_MULTIPLICATIONS // (3 * _BLAS_ROWS * bins))
+        self.blocks = argument.blocks
+        _, block, bins = self.blocks.shape
         self.tile_shape = (_BLAS_ROWS, block * max(1, 8 * _TILE_VALUES // (block * bins)))
-        self.blocks = np.zeros((math.ceil(len(argument) / block), block, bins))
-        self.blocks.reshape(-1, bins)[: len(argument)] = argument.ahead
 
     def alone(self, rows: slice, columns: slice) -> tuple[IntArray, FloatArray]:
         whole, rest = self.template.main_turns
@@ -327,7 +333,8 @@ class _MainTurns:
 
     def with_products(self, rows: slice, columns: slice) -> tuple[IntArray, FloatArray, FloatArray]:
         ahead, block = self.template.ahead[rows], self.blocks.shape[1]
-        about = np.concatenate([np.roll(ahead, k, axis=1) for k in (-1, 0, 1)])
+        around = np.concatenate([ahead[:, -1:], ahead, ahead[:, :1]], axis=1)
+        about = np.concatenate([around[:, 2:], ahead, around[:, :-2]])
         others = self.blocks[columns.start // block : math.ceil(columns.stop / block)]
         rests = self.template.main_turns[1][rows], self.argument.main_turns[1][columns]
         product = interpolated_products(about @ others.swapaxes(1, 2), *rests)

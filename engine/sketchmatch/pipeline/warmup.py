@@ -24,6 +24,7 @@ from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, Pipeline, default_names
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.pipeline.unmatched import Part, omission_confidences, part_of
+from sketchmatch.pipeline.words import directional_relations
 from sketchmatch.registry import Registered, Registry
 
 __all__ = [
@@ -161,6 +162,7 @@ def _load_common() -> None:
     part = finish(part_of(Part.whole(table, own), (0, 1)))
     assert part.own is not None
     own_confidence(Fmap(np.array([0])), part.table, part.own)
+    directional_relations(np.ones((1, 4)))
 
 
 def _load_algorithm(algorithm: type[Algorithm]) -> None:

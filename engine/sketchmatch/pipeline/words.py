@@ -12,7 +12,8 @@ import numpy as np
 import shapely
 
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.model import BoolArray, FloatArray, IntArray, Scene, SceneDescriptor
+from sketchmatch.kernels.directions import HalfTurns, effective_forces
+from sketchmatch.model import FloatArray, Scene, SceneDescriptor
 from sketchmatch.model.arrays import sealed
 from sketchmatch.pipeline.result import ObjectRelation
 
@@ -191,55 +192,19 @@ def directional_degrees(histograms: FloatArray, directions: FloatArray) -> Float
     peaks = rows.max(axis=1, keepdims=True)
     rows = rows / np.where(peaks > 0.0, peaks, 1.0)
     bins = rows.shape[1]
-    mirrored = rows[:, -np.arange(bins) % bins]
     totals = np.maximum(rows.sum(axis=1), 1.0)
     starts = directions * bins / (2.0 * math.pi)
-    left, left_moments = _effective(rows, starts)
-    right, right_moments = _effective(mirrored, -starts)
+    left, left_moments = effective_forces(rows, _half_turns(bins, tuple(starts.tolist())), 1)
+    right, right_moments = effective_forces(rows, _half_turns(bins, tuple((-starts).tolist())), -1)
     # share · (1 − 2|φ|/π), where φ is the moment over the forces, times 2π/n.
     loss = np.abs(left_moments - right_moments) * 4.0 / bins
     degrees: FloatArray = np.clip((left + right - loss) / totals[:, None], 0.0, 1.0)
     return degrees
 
 
-def _effective(rows: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the effective forces counter-clockwise of directions, and their first moments.
-
-    Parameters
-    ----------
-    rows
-        Shape (m, n).
-    starts
-        Shape (d,): the directions, in bins; so is the deviation that the moments are about.
-
-    Returns
-    -------
-    forces, moments : ndarray
-        Shape (m, d).
-    """
-    places, low, width, ahead = _half_turns(rows.shape[1], tuple(starts.tolist()))
-    every = rows[:, places] * width
-    forces = np.where(ahead, every, 0.0)
-    against = np.where(ahead, 0.0, every).sum(axis=2)
-    effective = np.maximum(forces.sum(axis=2) - against, 0.0)
-    before = np.cumsum(forces, axis=2) - forces
-    kept = np.clip(effective[:, :, None] - before, 0.0, forces)
-    share = np.divide(kept, forces, out=np.zeros_like(kept), where=forces > 0.0)
-    return effective, (kept * (low + 0.5 * width * share)).sum(axis=2)
-
-
 @lru_cache(maxsize=64)
-def _half_turns(
-    bins: int, starts: tuple[float, ...]
-) -> tuple[IntArray, FloatArray, FloatArray, BoolArray]:
-    """Return the bins of half a turn from each of some directions.
-
-    Returns
-    -------
-    places, low, width, ahead : ndarray
-        Shape (d, k): which they are, how far off, how much of each, and whether they lie within a
-        quarter turn, where one ends. Where a direction needs fewer, the last ones count nothing.
-    """
+def _half_turns(bins: int, starts: tuple[float, ...]) -> HalfTurns:
+    """Return the bins of half a turn counter-clockwise of some directions, given in bins."""
     half, least = bins / 2.0, bins // 2 + 3
     places = np.zeros((len(starts), least), dtype=np.int64)
     low, width = np.full(places.shape, half), np.zeros(places.shape)
@@ -250,7 +215,7 @@ def _half_turns(
         low[k, :count], width[k, :count] = stops[:-1], np.diff(stops)
         middles = start + low[k, :count] + width[k, :count] / 2.0
         places[k, :count] = np.floor(middles + 0.5).astype(np.int64) % bins
-    return sealed(places), sealed(low), sealed(width), sealed(low < bins / 4.0)
+    return HalfTurns(sealed(places), sealed(low), sealed(width), sealed(low < bins / 4.0))
 
 
 def _relation(degrees: FloatArray) -> DirectionalRelation:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from typing import Self
 
 __all__ = [
@@ -21,6 +22,7 @@ OWN_DISTRIBUTION = "sketchmatch"
 """The distribution that the engine and the built-in algorithms come in."""
 
 
+@lru_cache(maxsize=1024)
 def canonical(distribution: str) -> str:
     """Return a distribution's name as the packaging standards compare it.
 

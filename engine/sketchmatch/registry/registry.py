@@ -169,6 +169,12 @@ class Registry:
         for item in algorithms:
             offered.setdefault((item.kind, item.name), []).append(item)
         self.algorithms = tuple(item for items in offered.values() for item in _selectable(items))
+        self._of_kind = {
+            kind: tuple(
+                sorted((a for a in self.algorithms if a.kind is kind), key=lambda a: a.name)
+            )
+            for kind in Kind
+        }
         ours = (item for item in self.algorithms if item.distribution == OWN_DISTRIBUTION)
         self._own = frozenset(item.algorithm for item in ours)
         self.conflicts = tuple(_conflict(items) for items in offered.values() if len(items) > 1)
@@ -176,9 +182,7 @@ class Registry:
 
     def of_kind(self, kind: Kind) -> tuple[Registered, ...]:
         """Return the algorithms of a kind, by name."""
-        return tuple(
-            sorted((item for item in self.algorithms if item.kind is kind), key=lambda i: i.name)
-        )
+        return self._of_kind[kind]
 
     def whose(self, algorithm: Algorithm | type[Algorithm]) -> str:
         """Return an algorithm's kind, name and distribution, to begin a sentence with."""

@@ -19,9 +19,11 @@ from grpc_reflection.v1alpha import reflection
 import sketchmatch
 from sketchmatch.app.application import Application
 from sketchmatch.app.archive import Archive
+from sketchmatch.app.scenes import SceneArchive
 from sketchmatch.app.setup import Setup
 from sketchmatch.app.store import Store
 from sketchmatch.config.addresses import is_of_this_machine
+from sketchmatch.config.settings import KEPT_MIB
 from sketchmatch.errors import InvalidInputError, Reason, SketchmatchError, StoreError
 from sketchmatch.server.called import Handlers
 from sketchmatch.server.callers import CallerInterceptor
@@ -138,8 +140,8 @@ class ServerSettings:
     web_origins: tuple[str, ...] = ()
     store_named: bool = True
     matches_days: float = 30.0
-    matches_bytes: int = 1 << 30
-    scenes_bytes: int = 1 << 30
+    matches_bytes: int = KEPT_MIB << 20
+    scenes_bytes: int = KEPT_MIB << 20
     traces_endpoint: str | None = None
     web_robots: tuple[str, ...] = ()
 
@@ -177,10 +179,8 @@ async def serve(
     files = _Files(settings, say)
     metrics, setup = Metrics(_METHODS), load()
     store = _opened(settings, say)
-    archive = None if store is None else _archive(store, settings, metrics)
-    app = Application(
-        setup, settings.workers, store, archive, metrics.matched, settings.scenes_bytes
-    )
+    archives = (None, None) if store is None else _archives(store, settings, metrics)
+    app = Application(setup, settings.workers, *archives, metrics.matched)
     traces = Traces.sent_to(settings.traces_endpoint)
     interceptors = [
         *traces.interceptors,
@@ -445,13 +445,17 @@ def _opened(settings: ServerSettings, say: Callable[[str], None]) -> Store | Non
         return None
 
 
-def _archive(store: Store, settings: ServerSettings, metrics: Metrics) -> Archive:
-    return Archive(
+def _archives(
+    store: Store, settings: ServerSettings, metrics: Metrics
+) -> tuple[SceneArchive, Archive]:
+    """Return where scenes are kept, and matches."""
+    matches = Archive(
         store,
         settings.matches_days * _DAY,
         settings.matches_bytes,
         lambda count: metrics.unkept.add(count=count),
     )
+    return SceneArchive(store, settings.scenes_bytes), matches
 
 
 def _grpc_server(

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
+from sketchmatch.errors import InvalidInputError, quoted
 from sketchmatch.model import FloatArray, Scene
 from sketchmatch.pipeline.slices import retold
 from sketchmatch.transfers.features import Carried, Change, ChangeReason, Feature, FeatureKind
@@ -204,7 +205,8 @@ def _dense(ring: FloatArray, course: Course, closed: bool, step: float | None = 
     places = course.warp(drawn)
     wanted = (course.extent * _FINE if step is None else step) * _NEARLY
     lengths = np.hypot(*np.diff(places, axis=0).T)
-    counts = np.clip(np.ceil(lengths / wanted), 1, _MOST_POINTS / max(1, len(lengths))).astype(int)
+    most = max(1, _MOST_POINTS // max(1, len(lengths)))
+    counts = np.clip(np.ceil(lengths / wanted), 1, most).astype(int)
     sources = np.concatenate(
         [k + np.arange(count) / count for k, count in enumerate(counts)] + [[len(drawn) - 1.0]]
     )
@@ -221,6 +223,9 @@ def _thinned(
     pinned = np.unique(np.concatenate([[0], given, [len(way.points) - 1]]))
     kept: list[int] = [0]
     for first, last in pairwise(pinned.tolist()):
+        if last == first + 1:
+            kept.append(last)
+            continue
         leg = way.points[first : last + 1]
         finer = tolerance
         chosen = _simplified(leg, finer)
@@ -259,7 +264,11 @@ def _result(feature: Feature, ways: Sequence[Way], course: Course) -> Carried:
     speeds = None
     if feature.speeds is not None:
         speeds = feature.speeds[np.floor(ways[0].sources).astype(int)]
-    there = Feature(feature.kind, tuple(way.points for way in ways), feature.name, speeds)
+    try:
+        there = Feature(feature.kind, tuple(way.points for way in ways), feature.name, speeds)
+    except InvalidInputError as error:
+        problem = f"hold a {feature.kind} {quoted(feature.name)} that cannot be carried: there it "
+        raise InvalidInputError(error.reason, "features", problem + error.problem) from None
     deviations = tuple(course.warp.deviations(way.drawn) for way in ways)
     return Carried(
         feature.kind, feature.name, there, deviations, tuple(way.sources for way in ways)

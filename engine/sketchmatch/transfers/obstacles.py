@@ -76,21 +76,29 @@ class Obstacles:
         clear: FloatArray = (away.astype(np.float64) - _CORNER) * self.resolution
         return clear
 
-    def cells(self, points: FloatArray) -> IntArray:
-        """Return row and column of the cells of points, shape (m, 2), perhaps beyond the grid."""
+    def local(self, points: FloatArray) -> FloatArray:
+        """Return points as row and column in units of cells, shape (m, 2)."""
         x, y, yaw = self.origin
         c, s = math.cos(yaw), math.sin(yaw)
-        local = (points - (x, y)) @ np.array([[c, -s], [s, c]]) / self.resolution
-        found: IntArray = np.floor(local[:, ::-1]).astype(np.int64)
+        found = (points - (x, y)) @ np.array([[-s, c], [c, s]])
+        found /= self.resolution
+        return found
+
+    def placed(self, local: FloatArray) -> FloatArray:
+        """Return the points at rows and columns, shape (m, 2): what :meth:`local` undoes."""
+        x, y, yaw = self.origin
+        c, s = math.cos(yaw), math.sin(yaw)
+        found: FloatArray = (local * self.resolution) @ np.array([[-s, c], [c, s]]) + (x, y)
+        return found
+
+    def cells(self, points: FloatArray) -> IntArray:
+        """Return row and column of the cells of points, shape (m, 2), perhaps beyond the grid."""
+        found: IntArray = np.floor(self.local(points)).astype(np.int64)
         return found
 
     def places(self, cells: IntArray) -> FloatArray:
         """Return the middles of cells, shape (m, 2)."""
-        x, y, yaw = self.origin
-        c, s = math.cos(yaw), math.sin(yaw)
-        local = (cells[:, ::-1] + 0.5) * self.resolution
-        found: FloatArray = local @ np.array([[c, s], [-s, c]]) + (x, y)
-        return found
+        return self.placed(cells + 0.5)
 
     def inside(self, points: FloatArray) -> BoolArray:
         """Return which points lie on the grid."""

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 import shapely
 
+from sketchmatch.kernels.smoothing import pull_smooth
 from sketchmatch.model import BoolArray, FloatArray, IntArray
 from sketchmatch.transfers.features import Change, ChangeReason
 from sketchmatch.transfers.obstacles import Obstacles, Window, sampled
@@ -447,26 +448,8 @@ def _smoothed(line: FloatArray, obstacles: Obstacles, radius: float) -> FloatArr
     """Return a line pulled smooth between its ends, as far as it stays clear."""
     room = obstacles.needed(radius) + _SLACK * obstacles.resolution
     points = sampled(line, 2.0 * obstacles.resolution)
-    for _ in range(_SMOOTHINGS):
-        for odd in (1, 2):
-            middle = np.arange(odd, len(points) - 1, 2)
-            if not len(middle):
-                continue
-            moved = 0.5 * points[middle] + 0.25 * (points[middle - 1] + points[middle + 1])
-            kept = _legs_clear(points, middle, moved, obstacles, room)
-            points[middle[kept]] = moved[kept]
-    return points
-
-
-def _legs_clear(
-    points: FloatArray,
-    middle: IntArray,
-    moved: FloatArray,
-    obstacles: Obstacles,
-    radius: float,
-) -> BoolArray:
-    """Return which points may move: those whose legs to both neighbours stay clear."""
-    legs = [moved[None] + _SHARES * (points[middle + step] - moved)[None] for step in (-1, 1)]
-    samples = np.concatenate([moved[None], *legs])
-    clear = obstacles.clear(samples.reshape(-1, 2), radius).reshape(samples.shape[:2])
-    return np.asarray(clear.all(axis=0))
+    found = obstacles.local(points)
+    pull_smooth(found, obstacles.clearance, room, _SMOOTHINGS, len(_SHARES))
+    smooth = obstacles.placed(found)
+    smooth[[0, -1]] = points[[0, -1]]
+    return smooth

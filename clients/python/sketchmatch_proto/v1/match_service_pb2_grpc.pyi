@@ -49,6 +49,10 @@ class MatchServiceStub:
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct
       the request; the same one fails again.
+    * `NOT_FOUND`: sketch or map is a stored scene, and the caller keeps none of this name here. Put it, or
+      list those there are.
+    * `FAILED_PRECONDITION`: sketch or map is a stored scene, and the store is damaged or gone, or there is
+      none. Send the source itself.
     * `RESOURCE_EXHAUSTED`: as many matches run and wait as may, or this one waited too long for its
       turn; send the same request again after the time in `RetryInfo`. Without `RetryInfo` the
       request is larger than the transport lets through; make it smaller (`GetServerInfo` tells the
@@ -161,6 +165,10 @@ class MatchServiceAsyncStub:
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct
       the request; the same one fails again.
+    * `NOT_FOUND`: sketch or map is a stored scene, and the caller keeps none of this name here. Put it, or
+      list those there are.
+    * `FAILED_PRECONDITION`: sketch or map is a stored scene, and the store is damaged or gone, or there is
+      none. Send the source itself.
     * `RESOURCE_EXHAUSTED`: as many matches run and wait as may, or this one waited too long for its
       turn; send the same request again after the time in `RetryInfo`. Without `RetryInfo` the
       request is larger than the transport lets through; make it smaller (`GetServerInfo` tells the
@@ -275,6 +283,10 @@ class MatchServiceServicer(metaclass=abc.ABCMeta):
 
         * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct
           the request; the same one fails again.
+        * `NOT_FOUND`: sketch or map is a stored scene, and the caller keeps none of this name here. Put it, or
+          list those there are.
+        * `FAILED_PRECONDITION`: sketch or map is a stored scene, and the store is damaged or gone, or there is
+          none. Send the source itself.
         * `RESOURCE_EXHAUSTED`: as many matches run and wait as may, or this one waited too long for its
           turn; send the same request again after the time in `RetryInfo`. Without `RetryInfo` the
           request is larger than the transport lets through; make it smaller (`GetServerInfo` tells the

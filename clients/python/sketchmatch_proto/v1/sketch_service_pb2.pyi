@@ -74,7 +74,9 @@ global___CreateSketchResponse = CreateSketchResponse
 
 @typing.final
 class UpdateSketchRequest(google.protobuf.message.Message):
-    """What is drawn, changed or erased. First a revision is restored, then strokes are erased, then set."""
+    """What is drawn, changed or erased. First a revision is restored, then strokes are erased, then set.
+    It may have up to 1 MiB: a drawing that is larger is set by several updates.
+    """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 

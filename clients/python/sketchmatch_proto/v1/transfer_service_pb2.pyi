@@ -156,7 +156,7 @@ class TransferRequest(google.protobuf.message.Message):
     """Which way y grows in `features`. In the response it always grows upwards."""
     radius: builtins.float
     """How far routes are kept away from obstacles: half the width of the robot, in metres, or the
-    units of a side that is no grid. On a grid obstacles are what is occupied or unknown, and absent
+    units of a side that is no grid, to within a cell. On a grid obstacles are what is occupied or unknown, and absent
     means 0; elsewhere they are the objects, and absent means that routes are not kept out of them.
     """
     allow_unknown: builtins.bool

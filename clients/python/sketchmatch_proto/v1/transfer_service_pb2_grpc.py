@@ -42,6 +42,10 @@ class TransferServiceServicer(object):
         * `INVALID_ARGUMENT`: a field is missing or cannot be used, or the matched objects are mirrored or
         lie such that every warp folds; `BadRequest` has the path. Correct the request; the same one
         fails again.
+        * `NOT_FOUND`: a side is a stored scene, and the caller keeps none of this name here. Put it, or
+        list those there are.
+        * `FAILED_PRECONDITION`: a side is a stored scene, and the store is damaged or gone, or there is none.
+        Send the source itself.
         * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
         `RetryInfo`. Without `RetryInfo` the request is larger than the transport lets through.
         * `DEADLINE_EXCEEDED`: the call's deadline passed, or the time budget ended before there was any
