@@ -101,15 +101,29 @@ export function inkOutline(
   ).map(([x = 0, y = 0]) => [x, y] as const);
 }
 
-/** Return a closed path through the middles of an outline, as SVG and canvas read it. */
-export function pathOf(outline: readonly Xy[]): string {
+/** Go along the closed curve through the middles of an outline. */
+export function traced(
+  outline: readonly Xy[],
+  pen: { move: (to: Xy) => void; bend: (by: Xy, to: Xy) => void },
+): void {
   const [first] = outline;
-  if (!first || outline.length < 3) return "";
-  const parts = outline.map(([x, y], k) => {
-    const [nx, ny] = outline[(k + 1) % outline.length] ?? [x, y];
-    return `${round(x)},${round(y)} ${round((x + nx) / 2)},${round((y + ny) / 2)}`;
+  if (!first || outline.length < 3) return;
+  pen.move(first);
+  outline.forEach((by, k) => {
+    const [nx, ny] = outline[(k + 1) % outline.length] ?? by;
+    pen.bend(by, [(by[0] + nx) / 2, (by[1] + ny) / 2]);
   });
-  return `M${round(first[0])},${round(first[1])}Q${parts.join(" ")}Z`;
+}
+
+/** Return that curve as SVG reads it. */
+export function pathOf(outline: readonly Xy[]): string {
+  const parts: string[] = [];
+  const at = ([x, y]: Xy) => `${round(x)},${round(y)}`;
+  traced(outline, {
+    move: (to) => parts.push(`M${at(to)}Q`),
+    bend: (by, to) => parts.push(`${at(by)} ${at(to)} `),
+  });
+  return parts.length ? `${parts.join("")}Z` : "";
 }
 
 /** Return the drawing as SVG that our server reads, each stroke but zones a line with its name. */

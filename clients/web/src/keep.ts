@@ -13,6 +13,8 @@ export interface Kept {
 }
 
 const LATEST = "latest";
+/** Longer than an answer takes, shorter than it takes to lose a page. */
+const KEPT_MS = 200;
 const mine = tab();
 
 /** Return what this tab had, or else a copy of what was drawn last in any. */
@@ -29,10 +31,22 @@ async function sheet(name: string): Promise<Kept | undefined> {
   return drawing && map ? { drawing: drawing as Drawing, map: map as Kept["map"] } : undefined;
 }
 
-export async function keepDrawing(drawing: Drawing): Promise<void> {
-  await kept(mine, drawing);
-  await kept(LATEST, mine);
+let unkept: Drawing | null = null;
+
+/** Keep a drawing: soon, since what is drawn is answered first, or at once where the page is left. */
+export function keepDrawing(drawing: Drawing): void {
+  if (!unkept) setTimeout(() => void keepNow(), KEPT_MS);
+  unkept = drawing;
 }
+
+async function keepNow(): Promise<void> {
+  const drawing = unkept;
+  unkept = null;
+  if (drawing) await Promise.all([kept(mine, drawing), kept(LATEST, mine)]);
+}
+
+addEventListener("pagehide", () => void keepNow());
+document.addEventListener("visibilitychange", () => void keepNow());
 
 /** Keep the map, which may be large and seldom changes, beside what is drawn. */
 export async function keepMap(map: Kept["map"]): Promise<void> {

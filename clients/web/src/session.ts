@@ -88,8 +88,9 @@ export class Session {
   /** Match this from now on, and nothing else. */
   update(strokes: readonly Stroke[], pins: readonly Pin[], map: PlaceMap): void {
     this.#wanted = { strokes, pins, map };
-    // What changes in one go is one change.
-    this.#soon(0);
+    clearTimeout(this.#timer);
+    // What changes in one go is one change, and sent before it is painted.
+    queueMicrotask(() => void this.#sync());
   }
 
   /** Match nothing more. */

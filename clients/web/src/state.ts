@@ -85,9 +85,9 @@ export const client = new SketchmatchClient(location.origin, {
   token: () => sessionStorage.getItem("token") ?? "",
 });
 
-/** Milliseconds from the pen up to the first answer on the screen, the latest last. */
-export const latencies: number[] = [];
-let asked: number | null = null;
+/** When the first answer to each change was on the screen, as `performance.now()` has it. */
+export const shownAt: number[] = [];
+let isAsked = false;
 
 const session = new Session(client, (event) =>
   batch(() => {
@@ -104,8 +104,8 @@ const session = new Session(client, (event) =>
         trouble.value = null;
         reading.value = 0;
         answered.value = event.answered;
-        if (asked !== null) timed(asked);
-        asked = null;
+        if (isAsked) whenShown(() => shownAt.push(performance.now()));
+        isAsked = false;
         break;
       case "failed":
         running.value = false;
@@ -115,8 +115,9 @@ const session = new Session(client, (event) =>
   }),
 );
 
-function timed(since: number): void {
-  requestAnimationFrame(() => latencies.push(performance.now() - since));
+/** Do something once the frame that is next is painted. */
+function whenShown(act: () => void): void {
+  requestAnimationFrame(() => setTimeout(act));
 }
 
 export const readings = computed(() => 1 + (answered.value?.result.alternatives.length ?? 0));
@@ -306,7 +307,7 @@ export function cancel(): void {
 export function matchNow(): void {
   const map = place.peek();
   const strokes = thingStrokes.peek();
-  asked = performance.now();
+  isAsked = true;
   cancelled.value = false;
   trouble.value = null;
   asking.value = null;
@@ -537,7 +538,7 @@ export async function start(): Promise<void> {
   replace(linked?.drawing ?? kept?.drawing ?? EMPTY);
   const map = linked?.place || kept?.map || "living-room";
   await mapped(map);
-  effect(() => void keepDrawing(drawing.value));
+  effect(() => keepDrawing(drawing.value));
   effect(() => {
     const here = place.value;
     if (here) void keepMap(here.place || here);
