@@ -1,12 +1,15 @@
 """The sketch pad in a real browser, against a real server."""
 
+import base64
 import json
 import math
 import re
 import shutil
+import zlib
 from itertools import pairwise
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 import yaml
 from PIL import Image, ImageColor
@@ -641,6 +644,128 @@ def test_a_link_opens_the_sketch_and_its_match_in_another_browser(pad, visit):
     assert answer(other) == names()
 
 
+def link_of(said):
+    """Return what stands behind the # of a link that says this."""
+    packing = zlib.compressobj(9, zlib.DEFLATED, -15)
+    data = packing.compress(said.encode()) + packing.flush()
+    return base64.urlsafe_b64encode(data).decode().rstrip("=")
+
+
+SQUARE = [0, 0, 50, 0, 0, 50, -50, 0, 0, -50]
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "no JSON",
+        json.dumps({"p": "kitchen", "s": [{"d": SQUARE, "i": "a"}]}),
+        json.dumps({"p": "kitchen", "s": [{"d": SQUARE, "i": "a"}] * 2, "n": []}),
+        json.dumps({"p": "kitchen", "s": [{"d": ["x", *SQUARE], "i": "a"}], "n": []}),
+        json.dumps({"p": "kitchen", "s": [], "n": [{"strokes": 3, "thing": "1"}]}),
+        '{"p": "kitchen", "s": [], "n": [], "x": "' + "a" * 100_000_000 + '"}',
+    ],
+    ids=["no JSON", "no pins", "one id for two", "no numbers", "broken pins", "a bomb"],
+)
+def test_a_broken_link_is_told_and_what_was_drawn_stays(pad, visit, said):
+    page = visit(pad)
+    draw_kitchen(Hand(page))
+    wait_for_answer(page, 6)
+    page.evaluate("(said) => { location.hash = said; location.reload(); }", link_of(said))
+    page.get_by_test_id("notice").get_by_text("The link is broken").wait_for()
+    wait_for_answer(page, 6)
+
+
+@pytest.mark.parametrize("kept", [{"lines": 3}, {"strokes": [{"id": "a", "points": [[0, 0]]}]}])
+def test_a_sheet_that_an_earlier_page_kept_otherwise_is_an_empty_one(pad, visit, kept):
+    page = visit(pad)
+    hand = Hand(page)
+    hand.box(0, 0, 80, 60)
+    put = """(kept) => new Promise((done) => {
+      const opening = indexedDB.open('keyval-store');
+      opening.onsuccess = () => {
+        const work = opening.result.transaction('keyval', 'readwrite');
+        work.objectStore('keyval').put(kept, sessionStorage.getItem('sheet'));
+        work.oncomplete = () => done();
+      };
+    })"""
+    wait_until(lambda: page.evaluate(IS_KEPT), "the sheet is not kept")
+    page.evaluate(put, kept)
+    page.reload()
+    page.get_by_test_id("map-thing-0").wait_for()
+    page.get_by_test_id("show-me").wait_for()
+
+
+IS_KEPT = """() => new Promise((done) => {
+  const opening = indexedDB.open('keyval-store');
+  opening.onsuccess = () => {
+    const store = opening.result.transaction('keyval').objectStore('keyval');
+    store.get(sessionStorage.getItem('sheet')).onsuccess = ({ target }) =>
+      done(Boolean(target.result && target.result.strokes.length));
+  };
+})"""
+
+
+def test_a_browser_that_may_keep_nothing_shows_the_pad_all_the_same(pad, visit):
+    page = visit(pad)
+    refuse = """for (const store of ['localStorage', 'sessionStorage', 'indexedDB'])
+      Object.defineProperty(window, store, {
+        get() { throw new DOMException('not here', 'SecurityError'); } });"""
+    page.add_init_script(refuse)
+    page.reload()
+    page.get_by_test_id("show-me").click()
+    wait_for_answer(page, 8)
+
+
+def test_what_another_page_of_the_address_has_set_spoils_nothing(pad, visit):
+    page = visit(pad)
+    for key, value in (("robot", "{"), ("language", "constructor"), ("theme", '"x"')):
+        page.evaluate("([key, value]) => localStorage.setItem(key, value)", [key, value])
+    page.reload()
+    page.get_by_test_id("show-me").wait_for()
+
+
+def test_long_strokes_are_matched_too(pad, visit, tmp_path):
+    strokes = []
+    for x, y, width, height in KITCHEN.values():
+        ring = [*corners(x, y, width, height), corners(x, y, width, height)[0]]
+        sides = [np.linspace(a, b, 2_000) for a, b in pairwise(ring)]
+        strokes.append({"points": np.concatenate(sides).round(2).tolist()})
+    file = tmp_path / "long.json"
+    file.write_text(json.dumps({"y_axis": "down", "strokes": strokes}))
+    page = visit(pad)
+    page.get_by_test_id("sketch-file").set_input_files(file)
+    wait_for_answer(page, 6)
+    assert answer(page) == names()
+
+
+def test_a_file_that_falls_on_the_paper_is_opened(pad, visit):
+    page = visit(pad)
+    draw_kitchen(Hand(page))
+    wait_for_answer(page, 6)
+    saved = saved_text(page, "save-strokes")
+    page.get_by_test_id("clear").click()
+    page.get_by_test_id("show-me").wait_for()
+    carry = """(text) => {
+      const carried = new DataTransfer();
+      carried.items.add(new File([text], 'sketch.json'));
+      return carried;
+    }"""
+    carried = page.evaluate_handle(carry, saved)
+    page.get_by_test_id("paper").dispatch_event("drop", {"dataTransfer": carried})
+    wait_for_answer(page, 6)
+
+
+def test_a_file_that_no_request_can_hold_is_refused_by_its_size(visit, tmp_path):
+    file = tmp_path / "large.png"
+    with file.open("wb") as large:
+        large.truncate(3 << 20)
+    with serving_pad("--max-request-mib", "2") as (_, url):
+        page = visit(url)
+        page.get_by_test_id("map-file").set_input_files(file)
+        notice = page.get_by_test_id("notice")
+        notice.get_by_text("large.png has 3 MiB, and this server reads 2 MiB at most").wait_for()
+
+
 @pytest.mark.parametrize(
     ("name", "data", "sentence"),
     [
@@ -779,6 +904,21 @@ def test_each_tab_has_its_own_sheet_and_a_new_one_begins_with_the_latest(pad, vi
     wait_for_answer(page, 6)
 
 
+def test_a_tab_that_was_duplicated_has_a_sheet_of_its_own(pad, visit):
+    page = visit(pad)
+    draw_kitchen(Hand(page))
+    wait_for_answer(page, 6)
+    with page.expect_popup() as opened:  # which has the same session storage
+        page.evaluate("void window.open(location.href)")
+    other = opened.value
+    wait_for_answer(other, 6)
+    other.get_by_test_id("clear").click()
+    other.get_by_test_id("show-me").wait_for()
+    other.close()
+    page.reload()
+    wait_for_answer(page, 6)
+
+
 def touch(session, kind, points):
     session.send(
         "Input.dispatchTouchEvent",
@@ -884,6 +1024,12 @@ def test_a_server_that_wants_a_token_is_given_it(tmp_path, browser):
         page = context.new_page()
         page.goto(url)
         dialog = page.get_by_role("dialog")
+        dialog.locator("input").fill("not this one")
+        dialog.get_by_role("button").click()
+        dialog.get_by_text("This server wants a token.").wait_for()
+        page.keyboard.press("Escape")
+        dialog.wait_for(state="hidden")
+        page.get_by_test_id("headline").get_by_role("button", name="Connect").click()
         dialog.locator("input").fill(token)
         dialog.get_by_role("button").click()
         page.get_by_test_id("map-thing-0").wait_for()

@@ -4,7 +4,7 @@ import { useEffect, useRef } from "preact/hooks";
 
 import { AnswerPanel, currentName } from "./answer";
 import { geoJson, waypoints } from "./carry";
-import { canRedo, canUndo, drawing, nameStrokes, redo, undo } from "./document";
+import { canRedo, canUndo, drawing, LONGEST_NAME, nameStrokes, redo, undo } from "./document";
 import { download, drawingSvg, strokesJson } from "./files";
 import { Icon, type IconName } from "./icons";
 import { MapPane } from "./map";
@@ -57,6 +57,10 @@ export function App() {
   }, [language.value]);
   useEffect(() => {
     window.addEventListener("keydown", pressed);
+    // A browser would leave the page for a file that falls beside the map.
+    for (const name of ["dragover", "drop"] as const) {
+      window.addEventListener(name, (event) => event.preventDefault());
+    }
     return () => window.removeEventListener("keydown", pressed);
   }, []);
   return (
@@ -295,7 +299,7 @@ function StoredMaps() {
             name="title"
             aria-label={t.keepMapAs}
             defaultValue={map.title}
-            maxLength={80}
+            maxLength={LONGEST_NAME}
             autocomplete="off"
           />
           <button type="submit" class="quiet" data-testid="keep-map">
@@ -512,7 +516,7 @@ function NameDialog() {
             aria-labelledby="name-title"
             defaultValue={currentName()}
             autocomplete="off"
-            maxLength={80}
+            maxLength={LONGEST_NAME}
           />
           <datalist id="names">
             {[...names].map((name) => (
@@ -538,7 +542,7 @@ function TokenDialog() {
     else dialog.current?.close();
   }, [wanted]);
   return (
-    <dialog ref={dialog} aria-labelledby="token-title">
+    <dialog ref={dialog} id="token-dialog" aria-labelledby="token-title">
       {wanted && (
         <form
           method="dialog"

@@ -6,13 +6,18 @@ import { getStroke } from "perfect-freehand";
 import {
   type Drawing,
   type InkPoint,
+  isDrawing,
+  LONGEST_NAME,
   newId,
   type Pin,
   type Stroke,
   type StrokeKind,
 } from "./document";
 import { boxOf, type Xy } from "./geometry";
+import { contentOf } from "./maps";
+import { texts } from "./texts";
 
+const LARGEST_LINK = 32 << 20;
 const ROUTE_NAMES = new Set(["route", "path"]);
 
 /** Return strokes as our JSON has them; zones stand beside, for they are no things. */
@@ -41,6 +46,9 @@ export function parseStrokes(text: string): Stroke[] | null {
   }
   if (typeof document !== "object" || document === null || !("strokes" in document)) return null;
   const down = "y_axis" in document && document.y_axis === "down" ? 1 : -1;
+  if (Array.isArray(document.strokes) && !document.strokes.length) {
+    throw broken(texts.peek().noStrokes);
+  }
   const strokes = parsed(document.strokes, "strokes", down).map((stroke): Stroke => {
     const isRoute = ROUTE_NAMES.has(stroke.label.toLowerCase());
     return isRoute ? { ...stroke, label: "", kind: "route" } : stroke;
@@ -61,7 +69,7 @@ function parsed(list: unknown, field: string, down: number): Stroke[] {
       }
       return [x as number, down * (y as number), typeof t === "number" ? t : 0, 0.5];
     });
-    return { ...ink(read), label: typeof label === "string" ? label : "" };
+    return { ...ink(read), label: typeof label === "string" ? label.slice(0, LONGEST_NAME) : "" };
   });
 }
 
@@ -200,15 +208,27 @@ export async function unpacked(text: string): Promise<Shared | null> {
       }
       return { ...ink(points), id: i, label: l ?? "", kind: kind ?? "thing" };
     });
-    return { place: p, drawing: { strokes, pins: n, scale: u } };
+    const drawing = { strokes, pins: n, ...(u === undefined ? {} : { scale: u }) };
+    return isDrawing(drawing) && typeof p === "string" ? { place: p, drawing } : null;
   } catch {
     return null;
   }
 }
 
+/** Return what comes out of a stream; a short link may hold more than the browser does. */
 async function through(blob: Blob, stream: CompressionStream): Promise<Uint8Array> {
-  const answer = new Response(blob.stream().pipeThrough(stream));
-  return new Uint8Array(await answer.arrayBuffer());
+  const parts: Uint8Array[] = [];
+  let size = 0;
+  const reader = blob.stream().pipeThrough(stream).getReader();
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    parts.push(part.value);
+    size += part.value.length;
+    if (size > LARGEST_LINK) {
+      await reader.cancel();
+      throw new RangeError("the link holds too much");
+    }
+  }
+  return contentOf(new Blob(parts as BlobPart[]));
 }
 
 /** Have the browser save a file. */

@@ -32,6 +32,7 @@ import { isPlace } from "./maps";
 import {
   answered,
   asking,
+  bringSketch,
   dark,
   fingerDraws,
   isLit,
@@ -101,6 +102,10 @@ export function SketchPane() {
       ref={element}
       class={`paper tool-${spaced.value ? "hand" : tool.value}`}
       data-testid="paper"
+      onDrop={({ dataTransfer }) => {
+        const file = dataTransfer?.files[0];
+        if (file) void bringSketch(file);
+      }}
     >
       <canvas
         ref={still}

@@ -39,6 +39,7 @@ import {
 } from "./maps";
 import { NotSent, type Robot, robots, send } from "./robot";
 import { type Answered, type Progress, Session } from "./session";
+import { remember, remembered } from "./settings";
 import { texts } from "./texts";
 
 export type Tool = "pen" | "route" | "zone" | "eraser" | "move" | "name";
@@ -76,13 +77,13 @@ export const asking = signal<number | null>(null);
 /** Which reading is shown: 0 for the best, k for alternative k − 1. */
 export const reading = signal(0);
 export const naming = signal<readonly string[] | null>(null);
-export const theme = signal<Theme>((localStorage.getItem("theme") as Theme | null) ?? "auto");
+export const theme = signal(themeNamed(remembered("theme")));
 export const dark = signal(false);
 /** Grows each time the sheets are to be shown whole. */
 export const refit = signal(0);
 
 export const client = new SketchmatchClient(location.origin, {
-  token: () => sessionStorage.getItem("token") ?? "",
+  token: () => remembered("token", "tab") ?? "",
 });
 
 /** When the first answer to each change was on the screen, as `performance.now()` has it. */
@@ -167,10 +168,10 @@ export const question = computed(() => {
 });
 
 /** Half the width of the robot, in metres: how far routes stay away from walls and things. */
-export const radius = signal(Number(localStorage.getItem("radius") ?? 0.2));
+export const radius = signal(Number(remembered("radius") ?? 0.2) || 0);
 
 export function setRadius(metres: number): void {
-  localStorage.setItem("radius", `${metres}`);
+  remember("radius", `${metres}`);
   radius.value = metres;
 }
 
@@ -221,9 +222,17 @@ export const robot = signal<Robot>({
   url: "",
   topic: "/sketched_route",
   frame: "map",
-  ...(JSON.parse(localStorage.getItem("robot") ?? "{}") as Partial<Robot>),
+  ...chosenRobot(),
 });
 export const sending = signal(false);
+
+function chosenRobot(): Partial<Robot> {
+  try {
+    return JSON.parse(remembered("robot") ?? "{}") as Partial<Robot>;
+  } catch {
+    return {}; // another page of this address has one, too
+  }
+}
 
 export async function lookForRobots(): Promise<void> {
   bridges.value ??= await robots();
@@ -233,7 +242,7 @@ export async function lookForRobots(): Promise<void> {
 export async function sendRoutes(to: Robot): Promise<void> {
   const t = texts.peek();
   robot.value = to;
-  localStorage.setItem("robot", JSON.stringify(to));
+  remember("robot", JSON.stringify(to));
   sending.value = true;
   try {
     for (const way of carried.peek()) {
@@ -526,18 +535,25 @@ export async function link(): Promise<string> {
 }
 
 export function showToken(token: string): void {
-  sessionStorage.setItem("token", token.trim());
-  void (place.peek() ? matchNow() : start());
+  remember("token", token.trim(), "tab");
+  trouble.value = null;
+  if (place.peek()) matchNow();
+  else void mapped(wantedMap);
 }
+
+let wantedMap: string | PlaceMap = "living-room";
 
 /** Show what was there before, or what the link says, and keep it from now on. */
 export async function start(): Promise<void> {
   const linked = location.hash.length > 1 ? await unpacked(location.hash.slice(1)) : null;
-  if (linked) history.replaceState(null, "", location.pathname);
-  const kept = linked ? undefined : await restored();
-  replace(linked?.drawing ?? kept?.drawing ?? EMPTY);
-  const map = linked?.place || kept?.map || "living-room";
-  await mapped(map);
+  if (location.hash.length > 1) {
+    history.replaceState(null, "", location.pathname);
+    if (!linked) notice.value = texts.peek().brokenLink;
+  }
+  const kept = await restored();
+  replace((linked ?? kept)?.drawing ?? EMPTY);
+  wantedMap = (linked ? linked.place : kept?.map) || wantedMap;
+  await mapped(wantedMap);
   effect(() => keepDrawing(drawing.value));
   effect(() => {
     const here = place.value;
@@ -595,7 +611,11 @@ const paint = () => {
 prefersDark.addEventListener("change", paint);
 effect(paint);
 
+function themeNamed(name: string | null): Theme {
+  return name === "light" || name === "dark" ? name : "auto";
+}
+
 export function choose(shown: Theme): void {
-  localStorage.setItem("theme", shown);
+  remember("theme", shown);
   theme.value = shown;
 }

@@ -21,6 +21,10 @@ __all__ = ["ErrorInterceptor", "OpeningInterceptor"]
 
 _OURS = "/sketchmatch."
 _SHORT_BYTES = 65_536
+_DRAWN_BYTES = 1 << 20
+_UPDATE = "/sketchmatch.v1.SketchService/UpdateSketch"
+"""May be longer: a fast pen has a thousand points a second, of 30 bytes each."""
+
 _log = logging.getLogger(__name__)
 _Context = grpc.aio.ServicerContext[Any, Any]
 
@@ -46,36 +50,36 @@ class OpeningInterceptor(WrappingInterceptor):
 
     def wrapped(self, handler: Any, path: str) -> Any:
         """Return the method's handler, with its requests opened by us."""
-        del path
         if handler.request_deserializer is None:
             return handler
         kind, read = kind_of(handler), partial(Packed, read=handler.request_deserializer)
         opening = _opening_each if handler.request_streaming else _opening
-        method = opening(getattr(handler, kind))
+        limit = _DRAWN_BYTES if path == _UPDATE else _SHORT_BYTES
+        method = opening(getattr(handler, kind), limit)
         return handler._replace(request_deserializer=read, **{kind: method})
 
 
-def _opening(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
+def _opening(method: Callable[[Any, _Context], Awaitable[Any]], limit: int) -> Any:
     async def call(packed: Packed, context: _Context) -> Any:
-        return await method(await _opened(packed, context), context)
+        return await method(await _opened(packed, limit, context), context)
 
     return call
 
 
-def _opening_each(method: Callable[[Any, _Context], AsyncIterable[Any]]) -> Any:
+def _opening_each(method: Callable[[Any, _Context], AsyncIterable[Any]], limit: int) -> Any:
     """Return the same for a stream of requests that is answered by a stream."""
 
     async def call(requests: AsyncIterable[Packed], context: _Context) -> AsyncIterator[Any]:
-        opened = (await _opened(packed, context) async for packed in requests)
+        opened = (await _opened(packed, limit, context) async for packed in requests)
         async for response in method(opened, context):
             yield response
 
     return call
 
 
-async def _opened(packed: Packed, context: _Context) -> Any:
+async def _opened(packed: Packed, limit: int, context: _Context) -> Any:
     try:
-        return packed.opened(_SHORT_BYTES)
+        return packed.opened(limit)
     except InvalidInputError as error:
         await _abort(context, error)
 
