@@ -5,7 +5,9 @@ import json
 import math
 import re
 import shutil
+import sqlite3
 import zlib
+from contextlib import closing
 from itertools import pairwise
 from xml.etree import ElementTree
 
@@ -477,9 +479,13 @@ def test_a_map_is_kept_by_the_server_under_a_name_and_chosen_again(visit, tmp_pa
         for x, y, width, height in ((-150, -80, 90, 50), (120, 60, 60, 80), (0, 90, 40, 40)):
             hand.box(x, y, width, height)
         page.get_by_test_id("pair-0").wait_for()
+        linked = copied_link(page)
         page.get_by_test_id("tool-zone").click()
         hand.box(-20, 0, 60, 40)
         page.get_by_test_id("zone").wait_for(state="attached")
+        another = visit(linked, place=None)
+        another.locator(".map-pane .title", has_text="our flat").wait_for()
+        another.get_by_test_id("pair-0").wait_for()
 
 
 def test_a_server_that_keeps_nothing_is_not_asked_for_what_it_keeps(visit):
@@ -492,6 +498,28 @@ def test_a_server_that_keeps_nothing_is_not_asked_for_what_it_keeps(visit):
         page.get_by_test_id("place-kitchen").click()
         page.get_by_test_id("place-kitchen").wait_for(state="hidden")
         assert "ListScenes" not in asked
+
+
+def copied_link(page):
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.get_by_test_id("open-file").click()
+    page.get_by_test_id("copy-link").click()
+    page.get_by_test_id("notice").get_by_text("The link is copied.").wait_for()
+    return page.evaluate("navigator.clipboard.readText()")
+
+
+def test_what_is_wrong_with_the_servers_store_is_said_where_its_maps_would_be(visit, tmp_path):
+    store = tmp_path / "store"
+    store.mkdir()
+    with closing(sqlite3.connect(store / "scenes.sqlite")) as older:
+        older.execute("PRAGMA user_version = 1")
+    with serving_pad("--store", str(store)) as (_, url):
+        page = visit(url)
+        page.get_by_test_id("open-places").click()
+        page.get_by_test_id("store-trouble").get_by_text("of another version").wait_for()
+        page.get_by_test_id("place-kitchen").click()
+        draw_kitchen(Hand(page))
+        wait_for_answer(page, 6)
 
 
 def labels(page):
@@ -613,31 +641,56 @@ def test_a_thing_is_erased_moved_and_named(pad, visit):
     wait_for_answer(page, 6)
 
 
-def test_strokes_and_svg_are_saved_and_opened_again(pad, visit, tmp_path):
+SAVED = {"strokes": "json", "svg": "svg", "excalidraw": "excalidraw"}
+
+
+def test_strokes_svg_and_excalidraw_are_saved_and_opened_again_with_route_and_name(
+    pad, visit, tmp_path
+):
+    page = visit(pad)
+    hand = Hand(page)
+    draw_kitchen(hand)
+    wait_for_answer(page, 6)
+    page.get_by_test_id("tool-name").click()
+    hand.tap(*KITCHEN["stove"][:2])
+    page.get_by_role("dialog").locator("input").fill("my oven")
+    page.keyboard.press("Enter")
+    page.get_by_test_id("tool-route").click()
+    hand.draw([(-100, -20), (-90, 90), (60, 90)], closed=False)
+    page.get_by_test_id("route").wait_for(state="attached")
+    for item, ending in SAVED.items():
+        (tmp_path / f"sketch.{ending}").write_text(saved_text(page, f"save-{item}"))
+    for ending in SAVED.values():
+        page.get_by_test_id("clear").click()
+        page.get_by_test_id("pairs").wait_for(state="detached")
+        page.get_by_test_id("sketch-file").set_input_files(tmp_path / f"sketch.{ending}")
+        wait_for_answer(page, 6)
+        assert answer(page) == names()
+        page.get_by_test_id("pair-1").get_by_text("my oven").wait_for()
+        page.get_by_test_id("route").wait_for(state="attached")
+
+
+def test_other_readings_are_paged_through(pad, visit):
     page = visit(pad)
     draw_kitchen(Hand(page))
     wait_for_answer(page, 6)
-    for item, name in (("save-strokes", "sketch.json"), ("save-svg", "sketch.svg")):
-        page.get_by_test_id("open-file").click()
-        with page.expect_download() as saved:
-            page.get_by_test_id(item).click()
-        saved.value.save_as(tmp_path / name)
-    for name in ("sketch.json", "sketch.svg"):
-        page.get_by_test_id("clear").click()
-        page.get_by_test_id("pairs").wait_for(state="detached")
-        page.get_by_test_id("sketch-file").set_input_files(tmp_path / name)
-        wait_for_answer(page, 6)
-        assert answer(page) == names()
+    best = answer(page)
+    reading = page.get_by_test_id("reading")
+    count = int(re.fullmatch(r"Reading 1 of (\d+)", reading.inner_text())[1])
+    assert count > 1
+    page.get_by_role("button", name="Next reading").click()
+    reading.get_by_text(f"Reading 2 of {count}").wait_for()
+    assert answer(page) != best
+    page.get_by_role("button", name="Previous reading").click()
+    reading.get_by_text(f"Reading 1 of {count}").wait_for()
+    assert answer(page) == best
 
 
 def test_a_link_opens_the_sketch_and_its_match_in_another_browser(pad, visit):
-    page = visit(pad, permissions=["clipboard-read", "clipboard-write"])
+    page = visit(pad)
     draw_kitchen(Hand(page))
     wait_for_answer(page, 6)
-    page.get_by_test_id("open-file").click()
-    page.get_by_test_id("copy-link").click()
-    page.get_by_test_id("notice").wait_for()
-    link = page.evaluate("navigator.clipboard.readText()")
+    link = copied_link(page)
     assert link.startswith(f"{pad}#")
     other = visit(link, place=None)
     wait_for_answer(other, 6)

@@ -5,7 +5,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { AnswerPanel, currentName } from "./answer";
 import { geoJson, waypoints } from "./carry";
 import { canRedo, canUndo, drawing, LONGEST_NAME, nameStrokes, redo, undo } from "./document";
-import { download, drawingSvg, strokesJson } from "./files";
+import { download, drawingExcalidraw, drawingSvg, strokesJson } from "./files";
 import { Icon, type IconName } from "./icons";
 import { MapPane } from "./map";
 import { Mending } from "./mending";
@@ -16,6 +16,7 @@ import { Tuning } from "./tuning";
 import {
   asking,
   bringMap,
+  canBeLinked,
   bringSketch,
   carried,
   choose,
@@ -33,6 +34,7 @@ import {
   refit,
   showToken,
   storedMaps,
+  storeTrouble,
   theme,
   type Theme,
   type Tool,
@@ -281,6 +283,16 @@ function PlaceMenu() {
 function StoredMaps() {
   const t = texts.value;
   const [map, stored] = [place.value, storedMaps.value];
+  if (storeTrouble.value) {
+    return (
+      <>
+        <h2>{t.stored}</h2>
+        <p class="trouble" data-testid="store-trouble">
+          {storeTrouble.value}
+        </p>
+      </>
+    );
+  }
   if (!stored) return null;
   return (
     <>
@@ -401,6 +413,12 @@ function FileMenu() {
         drawn,
         "save-svg",
       )}
+      {item(
+        t.saveExcalidraw,
+        () => save("sketch.excalidraw", "application/json", drawingExcalidraw(drawing.peek())),
+        drawn,
+        "save-excalidraw",
+      )}
       {item(t.savePictureSvg, () => void savePicture("svg"), drawn, "save-picture-svg")}
       {item(t.savePicturePng, () => void savePicture("png"), drawn, "save-picture-png")}
       {item(
@@ -416,7 +434,7 @@ function FileMenu() {
         "save-waypoints",
       )}
       <hr />
-      {item(t.copyLink, () => void copyLink(), drawn && Boolean(place.value?.place), "copy-link")}
+      {item(t.copyLink, () => void copyLink(), drawn && canBeLinked.value, "copy-link")}
     </Menu>
   );
 }

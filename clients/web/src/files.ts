@@ -154,6 +154,49 @@ export function drawingSvg(drawing: Drawing): string {
   ].join("\n");
 }
 
+/** Return the drawing as Excalidraw opens it, each stroke but zones grouped with its name. */
+export function drawingExcalidraw(drawing: Drawing): string {
+  const strokes = drawing.strokes.filter(({ kind }) => kind !== "zone");
+  const elements = strokes.flatMap(({ id, points, label, kind, pressed }) => {
+    const { x0, y0, x1, y1 } = boxOf(points);
+    const [x, y] = [points[0]?.[0] ?? 0, points[0]?.[1] ?? 0];
+    const name = kind === "route" ? "route" : label;
+    const common = { groupIds: name ? [id] : [], angle: 0, strokeColor: "#22303c", opacity: 100 };
+    const line = {
+      ...common,
+      id,
+      type: "freedraw",
+      x: round(x),
+      y: round(y),
+      width: round(x1 - x0),
+      height: round(y1 - y0),
+      strokeWidth: 2,
+      points: points.map(([px, py]) => [round(px - x), round(py - y)]),
+      pressures: pressed ? points.map(([, , , pressure]) => round(pressure, 3)) : [],
+      simulatePressure: !pressed,
+    };
+    const size = 16;
+    const text = {
+      ...common,
+      id: `${id}-name`,
+      type: "text",
+      text: name,
+      originalText: name,
+      x: round((x0 + x1) / 2 - (name.length * size) / 4),
+      y: round((y0 + y1) / 2 - size / 2),
+      width: (name.length * size) / 2,
+      height: 1.25 * size,
+      fontSize: size,
+      fontFamily: 2,
+      textAlign: "center",
+      verticalAlign: "middle",
+    };
+    return name ? [line, text] : [line];
+  });
+  const file = { type: "excalidraw", version: 2, source: "sketchmatch", elements };
+  return `${JSON.stringify({ ...file, appState: {}, files: {} })}\n`;
+}
+
 /** What a link says. */
 export interface Shared {
   readonly place: string;

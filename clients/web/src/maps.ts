@@ -183,35 +183,34 @@ export interface StoredMap {
 
 /** Return the maps that the server keeps, the latest first; null where it keeps none. */
 export async function listStored(client: SketchmatchClient): Promise<StoredMap[] | null> {
-  try {
-    if (!(await client.info()).keepsScenes) return null;
-    const { scenes } = await client.scenes.listScenes({});
-    return scenes.map(({ name, title, labels, objectCount }) => ({
-      name,
-      title: title || labels.slice(0, 3).join(", ") || name.slice(0, 8),
-      things: objectCount,
-    }));
-  } catch {
-    return null; // the pane tells what is wrong with the server
-  }
+  if (!(await client.info()).keepsScenes) return null;
+  const { scenes } = await client.scenes.listScenes({});
+  return scenes.map(({ name, title, labels, objectCount }) => ({
+    name,
+    title: titleOf(name, title, labels),
+    things: objectCount,
+  }));
+}
+
+function titleOf(name: string, title: string, labels: readonly string[]): string {
+  return title || labels.slice(0, 3).join(", ") || name.slice(0, 8);
 }
 
 /** Load a map that the server keeps. */
-export async function openStored(
-  client: SketchmatchClient,
-  { name, title }: StoredMap,
-): Promise<PlaceMap> {
+export async function openStored(client: SketchmatchClient, name: string): Promise<PlaceMap> {
   const { storedScene, source } = await client.scenes.getScene({ name, includeSource: true });
   const kind = source?.kind;
-  const { scene, warnings, segmenter } = storedScene ?? {};
+  const { scene, warnings, segmenter, title = "" } = storedScene ?? {};
+  const things = thingsOf(scene);
+  const labels = things.flatMap(({ label }) => (label ? [label] : []));
   return {
     place: "",
-    title,
-    things: thingsOf(scene),
+    title: titleOf(name, title, labels),
+    things,
     warnings: warnings ?? [],
     underlay: kind ? await underlayOf(kind) : null,
     found: {
-      source: source ?? sources.polygons(thingsOf(scene)),
+      source: source ?? sources.polygons(things),
       stored: name,
       segmenter: segmenter?.name ?? "",
       parameters: segmenter?.parameters ?? {},

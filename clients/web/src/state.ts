@@ -403,13 +403,24 @@ export async function bringMap(files: readonly File[]): Promise<void> {
 /** The maps that the server keeps; null where it keeps none. */
 export const storedMaps = signal<readonly StoredMap[] | null>(null);
 
+/** What is wrong with what the server keeps; empty if nothing is. */
+export const storeTrouble = signal("");
+
 export async function lookForStored(): Promise<void> {
-  storedMaps.value = await listStored(client);
+  storeTrouble.value = "";
+  try {
+    storedMaps.value = await listStored(client);
+  } catch (thrown) {
+    storedMaps.value = null;
+    const { failure, message } = RequestFailed.from(thrown);
+    // The answer's pane tells of a server that does not answer.
+    if (failure === "failed") storeTrouble.value = message;
+  }
 }
 
-export async function chooseStored(map: StoredMap): Promise<void> {
+export async function chooseStored({ name }: StoredMap): Promise<void> {
   await telling(async () => {
-    show(await openStored(client, map));
+    show(await openStored(client, name));
     forget();
     refit.value++;
   });
@@ -529,8 +540,17 @@ export async function showMe(): Promise<void> {
   });
 }
 
+/** Whether others can open the map that is shown: one of the gallery, or one that the server keeps. */
+export const canBeLinked = computed(() => addressOf(place.value) !== "");
+
+function addressOf(map: PlaceMap | null): string {
+  return map?.place || (map?.found.stored ? KEPT_BY_SERVER + map.found.stored : "");
+}
+
+const KEPT_BY_SERVER = "stored/";
+
 export async function link(): Promise<string> {
-  const shared = { place: place.peek()?.place ?? "", drawing: drawing.peek() };
+  const shared = { place: addressOf(place.peek()), drawing: drawing.peek() };
   return `${location.origin}${location.pathname}#${await packed(shared)}`;
 }
 
@@ -561,6 +581,9 @@ export async function start(): Promise<void> {
   });
 }
 
+/** Failures of a map that is not there, or not for whoever asks. */
+const FOR_OTHERS: ReadonlySet<string> = new Set(["gone", "invalid", "failed"]);
+
 async function mapped(map: string | PlaceMap): Promise<void> {
   if (typeof map !== "string") {
     show(map);
@@ -568,11 +591,19 @@ async function mapped(map: string | PlaceMap): Promise<void> {
   }
   for (;;) {
     try {
-      show(await openPlace(client, isPlace(map) ? map : "living-room"));
+      if (map.startsWith(KEPT_BY_SERVER)) {
+        show(await openStored(client, map.slice(KEPT_BY_SERVER.length)));
+      } else show(await openPlace(client, isPlace(map) ? map : "living-room"));
       refit.value++;
       return;
     } catch (thrown) {
-      trouble.value = RequestFailed.from(thrown);
+      const failed = RequestFailed.from(thrown);
+      if (map.startsWith(KEPT_BY_SERVER) && FOR_OTHERS.has(failed.failure)) {
+        notice.value = failed.message;
+        map = "living-room";
+        continue;
+      }
+      trouble.value = failed;
       if (trouble.value.failure !== "away" && trouble.value.failure !== "busy") return;
       await new Promise((later) => setTimeout(later, 1500));
     }
