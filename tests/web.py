@@ -1,6 +1,7 @@
 """The sketch pad as built, a browser for it, and hands to draw with."""
 
 import fcntl
+import json
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -54,6 +55,21 @@ def chromium() -> Iterator[Any]:
             browser.close()
 
 
+def checked(check: str, *arguments: str, told: Any = None) -> Any:
+    """Run a program of ``clients/web/checks`` with its input as JSON, and return what it prints."""
+    built()
+    done = subprocess.run(
+        ["node", str(CLIENTS / "web" / "checks" / f"{check}.mjs"), *arguments],
+        input=json.dumps(told),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=240,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return json.loads(done.stdout)
+
+
 @contextmanager
 def serving_pad(*arguments: str) -> Iterator[tuple[processes.Server, str]]:
     """Run a server process that shows the pad, and yield it with the pad's address."""
@@ -61,6 +77,12 @@ def serving_pad(*arguments: str) -> Iterator[tuple[processes.Server, str]]:
     options = ("--web-address", "127.0.0.1:0", "--workers", "0", *arguments)
     with processes.server(*options) as server:
         yield server, server.wait_for(r"the sketch pad is at (\S+)")
+
+
+def corners(x: float, y: float, width: float, height: float) -> list[tuple[float, float]]:
+    """Return the corners of a box around its middle."""
+    w, h = width / 2, height / 2
+    return [(x - w, y - h), (x + w, y - h), (x + w, y + h), (x - w, y + h)]
 
 
 class Hand:
@@ -85,8 +107,7 @@ class Hand:
         self.page.mouse.up()
 
     def box(self, x: float, y: float, width: float, height: float) -> None:
-        w, h = width / 2, height / 2
-        self.draw([(x - w, y - h), (x + w, y - h), (x + w, y + h), (x - w, y + h)])
+        self.draw(corners(x, y, width, height))
 
     def tap(self, x: float, y: float) -> None:
         mx, my = self.middle

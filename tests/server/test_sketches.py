@@ -140,6 +140,20 @@ def test_a_sketch_grows_object_by_object(client):
         assert len(objects.scene.objects) == 4
 
 
+def test_ten_seconds_of_a_fast_pen_are_one_update(client):
+    with drawing(client) as (sketch, watching):
+        sketch.update({f"s{k}": outline(k) for k in range(3)})
+        corners = np.array(outline(3))
+        along = np.linspace(0, len(corners) - 1, 10_000)
+        line = [np.interp(along, range(len(corners)), corners[:, axis]) for axis in (0, 1)]
+        drawn = [(float(x), float(y), float(t)) for x, y, t in zip(*line, along, strict=True)]
+        made = sketch.update({"s3": drawn})
+        found = watching.outcome(made.revision).result.result
+        assert {m.sketch_object: m.map_object for m in found.object_matches} == {
+            k: k for k in range(4)
+        }
+
+
 STEPS = st.lists(
     st.tuples(st.sampled_from(["set", "erase", "undo"]), st.integers(0, 8), st.integers(0, 2)),
     min_size=1,

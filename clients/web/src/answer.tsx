@@ -94,7 +94,14 @@ function Headline() {
         </div>
       )}
       {failed && !running.value ? (
-        <p class="trouble">{failedText(failed.failure, failed.reason, failed.message)}</p>
+        <div class="row">
+          <p class="trouble">{failedText(failed.failure, failed.reason, failed.message)}</p>
+          {failed.failure === "unauthenticated" && (
+            <button type="button" class="quiet" onClick={askForToken}>
+              {t.connect}
+            </button>
+          )}
+        </div>
       ) : found ? (
         <Verdict />
       ) : (
@@ -102,6 +109,11 @@ function Headline() {
       )}
     </div>
   );
+}
+
+/** Show the dialog again that somebody has closed. */
+function askForToken(): void {
+  document.querySelector<HTMLDialogElement>("dialog#token-dialog")?.showModal();
 }
 
 function failedText(failure: string, reason: string, message: string): string {

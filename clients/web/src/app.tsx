@@ -4,8 +4,8 @@ import { useEffect, useRef } from "preact/hooks";
 
 import { AnswerPanel, currentName } from "./answer";
 import { geoJson, waypoints } from "./carry";
-import { canRedo, canUndo, drawing, nameStrokes, redo, undo } from "./document";
-import { download, drawingSvg, strokesJson } from "./files";
+import { canRedo, canUndo, drawing, LONGEST_NAME, nameStrokes, redo, undo } from "./document";
+import { download, drawingExcalidraw, drawingSvg, strokesJson } from "./files";
 import { Icon, type IconName } from "./icons";
 import { MapPane } from "./map";
 import { Mending } from "./mending";
@@ -16,6 +16,7 @@ import { Tuning } from "./tuning";
 import {
   asking,
   bringMap,
+  canBeLinked,
   bringSketch,
   carried,
   choose,
@@ -33,6 +34,7 @@ import {
   refit,
   showToken,
   storedMaps,
+  storeTrouble,
   theme,
   type Theme,
   type Tool,
@@ -57,6 +59,10 @@ export function App() {
   }, [language.value]);
   useEffect(() => {
     window.addEventListener("keydown", pressed);
+    // A browser would leave the page for a file that falls beside the map.
+    for (const name of ["dragover", "drop"] as const) {
+      window.addEventListener(name, (event) => event.preventDefault());
+    }
     return () => window.removeEventListener("keydown", pressed);
   }, []);
   return (
@@ -277,6 +283,16 @@ function PlaceMenu() {
 function StoredMaps() {
   const t = texts.value;
   const [map, stored] = [place.value, storedMaps.value];
+  if (storeTrouble.value) {
+    return (
+      <>
+        <h2>{t.stored}</h2>
+        <p class="trouble" data-testid="store-trouble">
+          {storeTrouble.value}
+        </p>
+      </>
+    );
+  }
   if (!stored) return null;
   return (
     <>
@@ -295,7 +311,7 @@ function StoredMaps() {
             name="title"
             aria-label={t.keepMapAs}
             defaultValue={map.title}
-            maxLength={80}
+            maxLength={LONGEST_NAME}
             autocomplete="off"
           />
           <button type="submit" class="quiet" data-testid="keep-map">
@@ -397,6 +413,12 @@ function FileMenu() {
         drawn,
         "save-svg",
       )}
+      {item(
+        t.saveExcalidraw,
+        () => save("sketch.excalidraw", "application/json", drawingExcalidraw(drawing.peek())),
+        drawn,
+        "save-excalidraw",
+      )}
       {item(t.savePictureSvg, () => void savePicture("svg"), drawn, "save-picture-svg")}
       {item(t.savePicturePng, () => void savePicture("png"), drawn, "save-picture-png")}
       {item(
@@ -412,7 +434,7 @@ function FileMenu() {
         "save-waypoints",
       )}
       <hr />
-      {item(t.copyLink, () => void copyLink(), drawn && Boolean(place.value?.place), "copy-link")}
+      {item(t.copyLink, () => void copyLink(), drawn && canBeLinked.value, "copy-link")}
     </Menu>
   );
 }
@@ -512,7 +534,7 @@ function NameDialog() {
             aria-labelledby="name-title"
             defaultValue={currentName()}
             autocomplete="off"
-            maxLength={80}
+            maxLength={LONGEST_NAME}
           />
           <datalist id="names">
             {[...names].map((name) => (
@@ -538,7 +560,7 @@ function TokenDialog() {
     else dialog.current?.close();
   }, [wanted]);
   return (
-    <dialog ref={dialog} aria-labelledby="token-title">
+    <dialog ref={dialog} id="token-dialog" aria-labelledby="token-title">
       {wanted && (
         <form
           method="dialog"

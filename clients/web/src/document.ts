@@ -32,6 +32,42 @@ export interface Drawing {
   readonly scale?: number | undefined;
 }
 
+/** Longer names are cut off, here as where they are typed. */
+export const LONGEST_NAME = 80;
+
+/** Whether something that was kept or sent is a drawing in all its parts. */
+export function isDrawing(value: unknown): value is Drawing {
+  const { strokes, pins, scale } = (value ?? {}) as Partial<Record<keyof Drawing, unknown>>;
+  if (!Array.isArray(strokes) || !strokes.every(isStroke)) return false;
+  if (new Set(strokes.map(({ id }) => id)).size < strokes.length) return false;
+  if (!Array.isArray(pins) || !pins.every(isPin)) return false;
+  return scale === undefined || (Number.isFinite(scale) && (scale as number) > 0);
+}
+
+function isStroke(value: unknown): value is Stroke {
+  const { id, points, label, kind, pressed } = (value ?? {}) as Partial<
+    Record<keyof Stroke, unknown>
+  >;
+  return (
+    typeof id === "string" &&
+    0 < id.length &&
+    id.length <= 64 &&
+    typeof label === "string" &&
+    typeof pressed === "boolean" &&
+    (kind === "thing" || kind === "route" || kind === "zone") &&
+    Array.isArray(points) &&
+    points.every(
+      (point) => Array.isArray(point) && point.length === 4 && point.every(Number.isFinite),
+    )
+  );
+}
+
+function isPin(value: unknown): value is Pin {
+  const { strokes, thing } = (value ?? {}) as Partial<Record<keyof Pin, unknown>>;
+  const isText = (each: unknown) => typeof each === "string";
+  return Array.isArray(strokes) && strokes.every(isText) && (thing === null || isText(thing));
+}
+
 export const EMPTY: Drawing = { strokes: [], pins: [] };
 
 const current = signal<Drawing>(EMPTY);

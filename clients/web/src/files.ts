@@ -6,13 +6,18 @@ import { getStroke } from "perfect-freehand";
 import {
   type Drawing,
   type InkPoint,
+  isDrawing,
+  LONGEST_NAME,
   newId,
   type Pin,
   type Stroke,
   type StrokeKind,
 } from "./document";
 import { boxOf, type Xy } from "./geometry";
+import { contentOf } from "./maps";
+import { texts } from "./texts";
 
+const LARGEST_LINK = 32 << 20;
 const ROUTE_NAMES = new Set(["route", "path"]);
 
 /** Return strokes as our JSON has them; zones stand beside, for they are no things. */
@@ -41,6 +46,9 @@ export function parseStrokes(text: string): Stroke[] | null {
   }
   if (typeof document !== "object" || document === null || !("strokes" in document)) return null;
   const down = "y_axis" in document && document.y_axis === "down" ? 1 : -1;
+  if (Array.isArray(document.strokes) && !document.strokes.length) {
+    throw broken(texts.peek().noStrokes);
+  }
   const strokes = parsed(document.strokes, "strokes", down).map((stroke): Stroke => {
     const isRoute = ROUTE_NAMES.has(stroke.label.toLowerCase());
     return isRoute ? { ...stroke, label: "", kind: "route" } : stroke;
@@ -61,7 +69,7 @@ function parsed(list: unknown, field: string, down: number): Stroke[] {
       }
       return [x as number, down * (y as number), typeof t === "number" ? t : 0, 0.5];
     });
-    return { ...ink(read), label: typeof label === "string" ? label : "" };
+    return { ...ink(read), label: typeof label === "string" ? label.slice(0, LONGEST_NAME) : "" };
   });
 }
 
@@ -101,15 +109,29 @@ export function inkOutline(
   ).map(([x = 0, y = 0]) => [x, y] as const);
 }
 
-/** Return a closed path through the middles of an outline, as SVG and canvas read it. */
-export function pathOf(outline: readonly Xy[]): string {
+/** Go along the closed curve through the middles of an outline. */
+export function traced(
+  outline: readonly Xy[],
+  pen: { move: (to: Xy) => void; bend: (by: Xy, to: Xy) => void },
+): void {
   const [first] = outline;
-  if (!first || outline.length < 3) return "";
-  const parts = outline.map(([x, y], k) => {
-    const [nx, ny] = outline[(k + 1) % outline.length] ?? [x, y];
-    return `${round(x)},${round(y)} ${round((x + nx) / 2)},${round((y + ny) / 2)}`;
+  if (!first || outline.length < 3) return;
+  pen.move(first);
+  outline.forEach((by, k) => {
+    const [nx, ny] = outline[(k + 1) % outline.length] ?? by;
+    pen.bend(by, [(by[0] + nx) / 2, (by[1] + ny) / 2]);
   });
-  return `M${round(first[0])},${round(first[1])}Q${parts.join(" ")}Z`;
+}
+
+/** Return that curve as SVG reads it. */
+export function pathOf(outline: readonly Xy[]): string {
+  const parts: string[] = [];
+  const at = ([x, y]: Xy) => `${round(x)},${round(y)}`;
+  traced(outline, {
+    move: (to) => parts.push(`M${at(to)}Q`),
+    bend: (by, to) => parts.push(`${at(by)} ${at(to)} `),
+  });
+  return parts.length ? `${parts.join("")}Z` : "";
 }
 
 /** Return the drawing as SVG that our server reads, each stroke but zones a line with its name. */
@@ -130,6 +152,49 @@ export function drawingSvg(drawing: Drawing): string {
     "</g>",
     "</svg>\n",
   ].join("\n");
+}
+
+/** Return the drawing as Excalidraw opens it, each stroke but zones grouped with its name. */
+export function drawingExcalidraw(drawing: Drawing): string {
+  const strokes = drawing.strokes.filter(({ kind }) => kind !== "zone");
+  const elements = strokes.flatMap(({ id, points, label, kind, pressed }) => {
+    const { x0, y0, x1, y1 } = boxOf(points);
+    const [x, y] = [points[0]?.[0] ?? 0, points[0]?.[1] ?? 0];
+    const name = kind === "route" ? "route" : label;
+    const common = { groupIds: name ? [id] : [], angle: 0, strokeColor: "#22303c", opacity: 100 };
+    const line = {
+      ...common,
+      id,
+      type: "freedraw",
+      x: round(x),
+      y: round(y),
+      width: round(x1 - x0),
+      height: round(y1 - y0),
+      strokeWidth: 2,
+      points: points.map(([px, py]) => [round(px - x), round(py - y)]),
+      pressures: pressed ? points.map(([, , , pressure]) => round(pressure, 3)) : [],
+      simulatePressure: !pressed,
+    };
+    const size = 16;
+    const text = {
+      ...common,
+      id: `${id}-name`,
+      type: "text",
+      text: name,
+      originalText: name,
+      x: round((x0 + x1) / 2 - (name.length * size) / 4),
+      y: round((y0 + y1) / 2 - size / 2),
+      width: (name.length * size) / 2,
+      height: 1.25 * size,
+      fontSize: size,
+      fontFamily: 2,
+      textAlign: "center",
+      verticalAlign: "middle",
+    };
+    return name ? [line, text] : [line];
+  });
+  const file = { type: "excalidraw", version: 2, source: "sketchmatch", elements };
+  return `${JSON.stringify({ ...file, appState: {}, files: {} })}\n`;
 }
 
 /** What a link says. */
@@ -186,15 +251,27 @@ export async function unpacked(text: string): Promise<Shared | null> {
       }
       return { ...ink(points), id: i, label: l ?? "", kind: kind ?? "thing" };
     });
-    return { place: p, drawing: { strokes, pins: n, scale: u } };
+    const drawing = { strokes, pins: n, ...(u === undefined ? {} : { scale: u }) };
+    return isDrawing(drawing) && typeof p === "string" ? { place: p, drawing } : null;
   } catch {
     return null;
   }
 }
 
+/** Return what comes out of a stream; a short link may hold more than the browser does. */
 async function through(blob: Blob, stream: CompressionStream): Promise<Uint8Array> {
-  const answer = new Response(blob.stream().pipeThrough(stream));
-  return new Uint8Array(await answer.arrayBuffer());
+  const parts: Uint8Array[] = [];
+  let size = 0;
+  const reader = blob.stream().pipeThrough(stream).getReader();
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    parts.push(part.value);
+    size += part.value.length;
+    if (size > LARGEST_LINK) {
+      await reader.cancel();
+      throw new RangeError("the link holds too much");
+    }
+  }
+  return contentOf(new Blob(parts as BlobPart[]));
 }
 
 /** Have the browser save a file. */

@@ -236,6 +236,14 @@ export function arrowOf(points: readonly Xy[]): string | null {
   return `translate(${end[0]} ${end[1]}) rotate(${turn})`;
 }
 
+/** Walls and floor of an occupancy grid by night and by day, as four bytes of a picture. */
+const NIGHT = [pixelOf(214, 208, 196, 225), pixelOf(255, 255, 255, 14)] as const;
+const DAY = [pixelOf(58, 66, 76, 225), pixelOf(255, 255, 255, 205)] as const;
+
+function pixelOf(...bytes: readonly [number, number, number, number]): number {
+  return new Uint32Array(Uint8Array.from(bytes).buffer)[0] ?? 0;
+}
+
 /** Return an occupancy grid in the page's colours, unknown left blank; other pictures as they are. */
 export async function paint(underlay: Underlay, night: boolean): Promise<Painting> {
   const bitmap = await createImageBitmap(underlay.pixels);
@@ -247,19 +255,11 @@ export async function paint(underlay: Underlay, night: boolean): Promise<Paintin
   if (!context) return { picture: null, width, height };
   context.drawImage(bitmap, 0, 0);
   const pixels = context.getImageData(0, 0, width, height);
-  const { data } = pixels;
-  const [wall, floor] = night
-    ? ([
-        [214, 208, 196, 225],
-        [255, 255, 255, 14],
-      ] as const)
-    : ([
-        [58, 66, 76, 225],
-        [255, 255, 255, 205],
-      ] as const);
-  for (let k = 0; k < data.length; k += 4) {
-    const shade = data[k] ?? 205;
-    data.set(shade < 100 ? wall : shade > 230 ? floor : [0, 0, 0, 0], k);
+  const [wall, floor] = night ? NIGHT : DAY;
+  const whole = new Uint32Array(pixels.data.buffer);
+  for (let k = 0; k < whole.length; k++) {
+    const shade = pixels.data[4 * k] ?? 205;
+    whole[k] = shade < 100 ? wall : shade > 230 ? floor : 0;
   }
   context.putImageData(pixels, 0, 0);
   const picture = await new Promise<Blob | null>((done) => canvas.toBlob(done));

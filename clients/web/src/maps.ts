@@ -5,6 +5,7 @@ import type { Scene } from "@sketchmatch/client/v1/scene";
 import type { Source } from "@sketchmatch/client/v1/source";
 
 import { boxOf, type Box, type Xy } from "./geometry";
+import { texts } from "./texts";
 
 export interface Thing {
   readonly id: string;
@@ -31,6 +32,12 @@ export interface PlaceMap {
   readonly warnings: readonly string[];
   /** What its things were found in, and how. */
   readonly found: Found;
+}
+
+/** Whether something that was kept is a map, as this page has them. */
+export function isMap(value: unknown): value is PlaceMap {
+  const { things, found, title } = (value ?? {}) as Partial<PlaceMap>;
+  return Array.isArray(things) && typeof title === "string" && found?.source?.kind !== undefined;
 }
 
 /** How the things of a map were found, so that they can be looked for otherwise. */
@@ -64,7 +71,7 @@ export async function openPlace(client: SketchmatchClient, place: Place): Promis
     fetched(`${folder}/map.yaml`).then((answer) => answer.text()),
     fetched(`${folder}/map.png`).then((answer) => answer.blob()),
   ]);
-  const source = sources.mapServerMap(yaml, await bytesOf(pixels));
+  const source = sources.mapServerMap(yaml, await bytesOf(client, pixels));
   const all = await found(client, source);
   // What the yaml does not name is a piece of a wall.
   const things = all.things.filter(({ label }) => label);
@@ -94,7 +101,7 @@ export async function openMap(
     const base = named.split(/[\\/]/).at(-1) ?? "";
     const picture = files.find(({ name }) => name === base) ?? files.find((file) => file !== yaml);
     if (!picture) throw new RequestFailed(lacking(base), "invalid", "", "map", undefined);
-    const source = sources.mapServerMap(text, await bytesOf(picture));
+    const source = sources.mapServerMap(text, await bytesOf(client, picture));
     const seen = await shownPixels(picture);
     return {
       ...(await found(client, source, yaml.name)),
@@ -104,7 +111,7 @@ export async function openMap(
     };
   }
   if (!first) throw new RequestFailed(lacking(""), "invalid", "", "map", undefined);
-  const source = sources.file(first.name, await bytesOf(first));
+  const source = sources.file(first.name, await bytesOf(client, first));
   return {
     ...(await found(client, source, first.name)),
     place: "",
@@ -176,35 +183,34 @@ export interface StoredMap {
 
 /** Return the maps that the server keeps, the latest first; null where it keeps none. */
 export async function listStored(client: SketchmatchClient): Promise<StoredMap[] | null> {
-  try {
-    if (!(await client.info()).keepsScenes) return null;
-    const { scenes } = await client.scenes.listScenes({});
-    return scenes.map(({ name, title, labels, objectCount }) => ({
-      name,
-      title: title || labels.slice(0, 3).join(", ") || name.slice(0, 8),
-      things: objectCount,
-    }));
-  } catch {
-    return null; // the pane tells what is wrong with the server
-  }
+  if (!(await client.info()).keepsScenes) return null;
+  const { scenes } = await client.scenes.listScenes({});
+  return scenes.map(({ name, title, labels, objectCount }) => ({
+    name,
+    title: titleOf(name, title, labels),
+    things: objectCount,
+  }));
+}
+
+function titleOf(name: string, title: string, labels: readonly string[]): string {
+  return title || labels.slice(0, 3).join(", ") || name.slice(0, 8);
 }
 
 /** Load a map that the server keeps. */
-export async function openStored(
-  client: SketchmatchClient,
-  { name, title }: StoredMap,
-): Promise<PlaceMap> {
+export async function openStored(client: SketchmatchClient, name: string): Promise<PlaceMap> {
   const { storedScene, source } = await client.scenes.getScene({ name, includeSource: true });
   const kind = source?.kind;
-  const { scene, warnings, segmenter } = storedScene ?? {};
+  const { scene, warnings, segmenter, title = "" } = storedScene ?? {};
+  const things = thingsOf(scene);
+  const labels = things.flatMap(({ label }) => (label ? [label] : []));
   return {
     place: "",
-    title,
-    things: thingsOf(scene),
+    title: titleOf(name, title, labels),
+    things,
     warnings: warnings ?? [],
     underlay: kind ? await underlayOf(kind) : null,
     found: {
-      source: source ?? sources.polygons(thingsOf(scene)),
+      source: source ?? sources.polygons(things),
       stored: name,
       segmenter: segmenter?.name ?? "",
       parameters: segmenter?.parameters ?? {},
@@ -248,7 +254,7 @@ export async function openOutlines(
   client: SketchmatchClient,
   file: File,
 ): Promise<{ outlines: { points: Xy[]; label: string }[]; route: Xy[] }> {
-  const source = sources.file(file.name, await bytesOf(file));
+  const source = sources.file(file.name, await bytesOf(client, file));
   const { scene, route } = await naming(file.name, () => client.segment(source));
   return {
     outlines: thingsOf(scene).map(({ rings, label }) => {
@@ -324,7 +330,26 @@ async function fetched(path: string): Promise<Response> {
   return answer;
 }
 
-async function bytesOf(blob: Blob): Promise<Uint8Array> {
+/** Return what is in a file; one that no request can hold is not read first. */
+async function bytesOf(client: SketchmatchClient, blob: Blob): Promise<Uint8Array> {
+  if (blob.size > ALWAYS_READ) {
+    const most = Number((await client.info()).limits?.maxRequestBytes ?? Infinity);
+    if (blob.size > most) {
+      const name = blob instanceof File ? blob.name : "";
+      const said = texts.peek().tooLarge(name, mebibytes(blob.size), mebibytes(most));
+      throw new RequestFailed(said, "invalid", "", "", undefined);
+    }
+  }
+  return contentOf(blob);
+}
+
+const ALWAYS_READ = 1 << 20;
+
+function mebibytes(size: number): string {
+  return `${Math.ceil(size / (1 << 20))} MiB`;
+}
+
+export async function contentOf(blob: Blob): Promise<Uint8Array> {
   return new Uint8Array(await blob.arrayBuffer());
 }
 
@@ -339,7 +364,7 @@ function gridOf(yaml: string, pixels: Blob): Underlay {
 
 /** Return a picture that browsers show; null where the file holds none that they know. */
 async function shownPixels(file: Blob): Promise<Blob | null> {
-  const bytes = await bytesOf(file);
+  const bytes = await contentOf(file);
   if (bytes[0] === 0x50 && bytes[1] === 0x35) return pngOfPgm(bytes);
   try {
     (await createImageBitmap(file)).close();

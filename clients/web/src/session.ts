@@ -71,6 +71,8 @@ interface Sketch {
 }
 
 const RETRY_MS = 1500;
+/** A point has 30 bytes, and the server reads a mebibyte at once. */
+const POINTS_OF_UPDATE = 15_000;
 
 export class Session {
   readonly #client: SketchmatchClient;
@@ -88,8 +90,9 @@ export class Session {
   /** Match this from now on, and nothing else. */
   update(strokes: readonly Stroke[], pins: readonly Pin[], map: PlaceMap): void {
     this.#wanted = { strokes, pins, map };
-    // What changes in one go is one change.
-    this.#soon(0);
+    clearTimeout(this.#timer);
+    // What changes in one go is one change, and sent before it is painted.
+    queueMicrotask(() => void this.#sync());
   }
 
   /** Match nothing more. */
@@ -171,18 +174,22 @@ export class Session {
       if (sketch.outcome) this.#tell(sketch.outcome);
       return;
     }
-    sketch.revision++;
+    const parts = partsOf(set);
+    // What is told before the last of them is overtaken.
+    sketch.revision += parts.length;
     sketch.strokes = wanted.strokes;
     sketch.pins = pins;
     sketch.curve = [];
     sketch.outcome = null;
     this.#tell({ kind: "running" });
-    await this.#client.sketches.updateSketch({
-      sketchId: sketch.id,
-      eraseStrokes: erased,
-      setStrokes: set.map((stroke) => ({ strokeId: stroke.id, stroke: travelling(stroke) })),
-      ...(isSaid ? { pins: { pins: pins.map(pinOf) } } : {}),
-    });
+    for (const [k, part] of parts.entries()) {
+      await this.#client.sketches.updateSketch({
+        sketchId: sketch.id,
+        eraseStrokes: k === 0 ? erased : [],
+        setStrokes: part.map((stroke) => ({ strokeId: stroke.id, stroke: travelling(stroke) })),
+        ...(isSaid && k === parts.length - 1 ? { pins: { pins: pins.map(pinOf) } } : {}),
+      });
+    }
   }
 
   async #watch(sketch: Sketch): Promise<void> {
@@ -270,6 +277,21 @@ function changesOf(
     erased: [...gone, ...stay.slice(kept)].map(({ id }) => id),
     set: wants.filter((stroke, k) => k >= kept || stroke !== stay[k]),
   };
+}
+
+/** Return strokes in the parts in which they travel: an update is short. */
+function partsOf(strokes: readonly Stroke[]): Stroke[][] {
+  const parts: Stroke[][] = [[]];
+  let points = 0;
+  for (const stroke of strokes) {
+    if (points && points + stroke.points.length > POINTS_OF_UPDATE) {
+      parts.push([]);
+      points = 0;
+    }
+    parts.at(-1)?.push(stroke);
+    points += stroke.points.length;
+  }
+  return parts;
 }
 
 /** Return what the person said, by the numbers of the things as they are now. */

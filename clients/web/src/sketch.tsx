@@ -1,6 +1,6 @@
 /** The paper: ink, and what the answer says of it. */
 
-import { effect, signal, useSignal } from "@preact/signals";
+import { batch, effect, signal, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 
 import { colourOf } from "./colours";
@@ -14,7 +14,7 @@ import {
   type Stroke,
   type StrokeKind,
 } from "./document";
-import { ink, inkOutline, pathOf } from "./files";
+import { ink, inkOutline, traced } from "./files";
 import {
   badgePlace,
   boxOf,
@@ -32,6 +32,7 @@ import { isPlace } from "./maps";
 import {
   answered,
   asking,
+  bringSketch,
   dark,
   fingerDraws,
   isLit,
@@ -52,7 +53,14 @@ const REACH = 12;
 
 const paths = new WeakMap<Stroke, Path2D>();
 const live = signal<InkPoint[] | null>(null);
-const offset = signal<{ ids: ReadonlySet<string>; dx: number; dy: number } | null>(null);
+const offset = signal<Offset | null>(null);
+
+/** Strokes that are being moved, and how far. */
+interface Offset {
+  readonly ids: ReadonlySet<string>;
+  readonly dx: number;
+  readonly dy: number;
+}
 
 interface Finger {
   at: Xy;
@@ -68,27 +76,23 @@ export function SketchPane() {
 
   useEffect(
     () =>
-      effect(() => {
-        void dark.value;
+      eachFrame(() => {
+        const [strokes, seen, moved] = [drawing.value.strokes, view.value, offset.value];
         const { width, height } = size.value;
-        paintStill(still.current, width, height, view.value, drawing.value.strokes);
+        void dark.value;
+        return () => paintStill(still.current, width, height, seen, strokes, moved);
       }),
     [],
   );
-  useEffect(() => {
-    let frame = 0;
-    const stop = effect(() => {
-      const points = live.value;
-      const { width, height } = size.value;
-      const seen = view.value;
-      cancelAnimationFrame(frame);
-      frame = requestAnimationFrame(() => paintWet(wet.current, width, height, seen, points));
-    });
-    return () => {
-      stop();
-      cancelAnimationFrame(frame);
-    };
-  }, []);
+  useEffect(
+    () =>
+      eachFrame(() => {
+        const [points, seen] = [live.value, view.value];
+        const { width, height } = size.value;
+        return () => paintWet(wet.current, width, height, seen, points);
+      }),
+    [],
+  );
   useEffect(() => (element.current ? handled(element.current, view, spaced) : undefined), []);
 
   const empty = !drawing.value.strokes.length && !live.value;
@@ -98,6 +102,10 @@ export function SketchPane() {
       ref={element}
       class={`paper tool-${spaced.value ? "hand" : tool.value}`}
       data-testid="paper"
+      onDrop={({ dataTransfer }) => {
+        const file = dataTransfer?.files[0];
+        if (file) void bringSketch(file);
+      }}
     >
       <canvas
         ref={still}
@@ -109,6 +117,20 @@ export function SketchPane() {
       {empty && <Hint />}
     </div>
   );
+}
+
+/** Look at signals whenever they change, and paint what they said last in the next frame. */
+function eachFrame(look: () => () => void): () => void {
+  let frame = 0;
+  const stop = effect(() => {
+    const painting = look();
+    cancelAnimationFrame(frame);
+    frame = requestAnimationFrame(painting);
+  });
+  return () => {
+    stop();
+    cancelAnimationFrame(frame);
+  };
 }
 
 function Hint() {
@@ -208,10 +230,10 @@ function paintStill(
   height: number,
   view: View,
   strokes: readonly Stroke[],
+  moved: Offset | null,
 ): void {
   const context = prepared(canvas, width, height, view);
   if (!context) return;
-  const moved = offset.value;
   const colours = {
     thing: inkColour("thing"),
     route: inkColour("route"),
@@ -219,7 +241,7 @@ function paintStill(
   } satisfies Record<StrokeKind, string>;
   for (const stroke of strokes) {
     let path = paths.get(stroke);
-    if (!path) paths.set(stroke, (path = new Path2D(pathOf(inkOutline(stroke, true)))));
+    if (!path) paths.set(stroke, (path = inkPath(inkOutline(stroke, true))));
     context.fillStyle = colours[stroke.kind];
     const shifted = moved?.ids.has(stroke.id) ? moved : null;
     if (shifted) context.translate(shifted.dx, shifted.dy);
@@ -227,6 +249,16 @@ function paintStill(
     if (stroke.kind === "zone") fillArea(context, stroke);
     if (shifted) context.translate(-shifted.dx, -shifted.dy);
   }
+}
+
+function inkPath(outline: readonly Xy[]): Path2D {
+  const path = new Path2D();
+  traced(outline, {
+    move: ([x, y]) => path.moveTo(x, y),
+    bend: ([cx, cy], [x, y]) => path.quadraticCurveTo(cx, cy, x, y),
+  });
+  path.closePath();
+  return path;
 }
 
 function fillArea(context: CanvasRenderingContext2D, { points }: Stroke): void {
@@ -246,7 +278,7 @@ function paintWet(
   if (!context || !points?.length) return;
   const kind = kindOf(tool.peek());
   context.fillStyle = inkColour(kind);
-  context.fill(new Path2D(pathOf(inkOutline({ points, pressed: pressed(points), kind }, false))));
+  context.fill(inkPath(inkOutline({ points, pressed: pressed(points), kind }, false)));
 }
 
 /** Return what a tool draws. */
@@ -430,7 +462,16 @@ function handled(
     const points = pending.stroke;
     const shift = offset.peek();
     const chosen = tool.peek();
-    drop();
+    batch(() => {
+      drop();
+      done(chosen, { points, shift, point, tapped });
+    });
+  };
+  const done = (
+    chosen: Tool,
+    made: { points: InkPoint[]; shift: Offset | null; point: Xy; tapped: boolean },
+  ): void => {
+    const { points, shift, point, tapped } = made;
     switch (chosen) {
       case "pen":
       case "route":

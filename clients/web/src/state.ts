@@ -39,6 +39,7 @@ import {
 } from "./maps";
 import { NotSent, type Robot, robots, send } from "./robot";
 import { type Answered, type Progress, Session } from "./session";
+import { remember, remembered } from "./settings";
 import { texts } from "./texts";
 
 export type Tool = "pen" | "route" | "zone" | "eraser" | "move" | "name";
@@ -76,18 +77,18 @@ export const asking = signal<number | null>(null);
 /** Which reading is shown: 0 for the best, k for alternative k − 1. */
 export const reading = signal(0);
 export const naming = signal<readonly string[] | null>(null);
-export const theme = signal<Theme>((localStorage.getItem("theme") as Theme | null) ?? "auto");
+export const theme = signal(themeNamed(remembered("theme")));
 export const dark = signal(false);
 /** Grows each time the sheets are to be shown whole. */
 export const refit = signal(0);
 
 export const client = new SketchmatchClient(location.origin, {
-  token: () => sessionStorage.getItem("token") ?? "",
+  token: () => remembered("token", "tab") ?? "",
 });
 
-/** Milliseconds from the pen up to the first answer on the screen, the latest last. */
-export const latencies: number[] = [];
-let asked: number | null = null;
+/** When the first answer to each change was on the screen, as `performance.now()` has it. */
+export const shownAt: number[] = [];
+let isAsked = false;
 
 const session = new Session(client, (event) =>
   batch(() => {
@@ -104,8 +105,8 @@ const session = new Session(client, (event) =>
         trouble.value = null;
         reading.value = 0;
         answered.value = event.answered;
-        if (asked !== null) timed(asked);
-        asked = null;
+        if (isAsked) whenShown(() => shownAt.push(performance.now()));
+        isAsked = false;
         break;
       case "failed":
         running.value = false;
@@ -115,8 +116,9 @@ const session = new Session(client, (event) =>
   }),
 );
 
-function timed(since: number): void {
-  requestAnimationFrame(() => latencies.push(performance.now() - since));
+/** Do something once the frame that is next is painted. */
+function whenShown(act: () => void): void {
+  requestAnimationFrame(() => setTimeout(act));
 }
 
 export const readings = computed(() => 1 + (answered.value?.result.alternatives.length ?? 0));
@@ -166,10 +168,10 @@ export const question = computed(() => {
 });
 
 /** Half the width of the robot, in metres: how far routes stay away from walls and things. */
-export const radius = signal(Number(localStorage.getItem("radius") ?? 0.2));
+export const radius = signal(Number(remembered("radius") ?? 0.2) || 0);
 
 export function setRadius(metres: number): void {
-  localStorage.setItem("radius", `${metres}`);
+  remember("radius", `${metres}`);
   radius.value = metres;
 }
 
@@ -220,9 +222,17 @@ export const robot = signal<Robot>({
   url: "",
   topic: "/sketched_route",
   frame: "map",
-  ...(JSON.parse(localStorage.getItem("robot") ?? "{}") as Partial<Robot>),
+  ...chosenRobot(),
 });
 export const sending = signal(false);
+
+function chosenRobot(): Partial<Robot> {
+  try {
+    return JSON.parse(remembered("robot") ?? "{}") as Partial<Robot>;
+  } catch {
+    return {}; // another page of this address has one, too
+  }
+}
 
 export async function lookForRobots(): Promise<void> {
   bridges.value ??= await robots();
@@ -232,7 +242,7 @@ export async function lookForRobots(): Promise<void> {
 export async function sendRoutes(to: Robot): Promise<void> {
   const t = texts.peek();
   robot.value = to;
-  localStorage.setItem("robot", JSON.stringify(to));
+  remember("robot", JSON.stringify(to));
   sending.value = true;
   try {
     for (const way of carried.peek()) {
@@ -306,7 +316,7 @@ export function cancel(): void {
 export function matchNow(): void {
   const map = place.peek();
   const strokes = thingStrokes.peek();
-  asked = performance.now();
+  isAsked = true;
   cancelled.value = false;
   trouble.value = null;
   asking.value = null;
@@ -393,13 +403,24 @@ export async function bringMap(files: readonly File[]): Promise<void> {
 /** The maps that the server keeps; null where it keeps none. */
 export const storedMaps = signal<readonly StoredMap[] | null>(null);
 
+/** What is wrong with what the server keeps; empty if nothing is. */
+export const storeTrouble = signal("");
+
 export async function lookForStored(): Promise<void> {
-  storedMaps.value = await listStored(client);
+  storeTrouble.value = "";
+  try {
+    storedMaps.value = await listStored(client);
+  } catch (thrown) {
+    storedMaps.value = null;
+    const { failure, message } = RequestFailed.from(thrown);
+    // The answer's pane tells of a server that does not answer.
+    if (failure === "failed") storeTrouble.value = message;
+  }
 }
 
-export async function chooseStored(map: StoredMap): Promise<void> {
+export async function chooseStored({ name }: StoredMap): Promise<void> {
   await telling(async () => {
-    show(await openStored(client, map));
+    show(await openStored(client, name));
     forget();
     refit.value++;
   });
@@ -519,30 +540,49 @@ export async function showMe(): Promise<void> {
   });
 }
 
+/** Whether others can open the map that is shown: one of the gallery, or one that the server keeps. */
+export const canBeLinked = computed(() => addressOf(place.value) !== "");
+
+function addressOf(map: PlaceMap | null): string {
+  return map?.place || (map?.found.stored ? KEPT_BY_SERVER + map.found.stored : "");
+}
+
+const KEPT_BY_SERVER = "stored/";
+
 export async function link(): Promise<string> {
-  const shared = { place: place.peek()?.place ?? "", drawing: drawing.peek() };
+  const shared = { place: addressOf(place.peek()), drawing: drawing.peek() };
   return `${location.origin}${location.pathname}#${await packed(shared)}`;
 }
 
 export function showToken(token: string): void {
-  sessionStorage.setItem("token", token.trim());
-  void (place.peek() ? matchNow() : start());
+  remember("token", token.trim(), "tab");
+  trouble.value = null;
+  if (place.peek()) matchNow();
+  else void mapped(wantedMap);
 }
+
+let wantedMap: string | PlaceMap = "living-room";
 
 /** Show what was there before, or what the link says, and keep it from now on. */
 export async function start(): Promise<void> {
   const linked = location.hash.length > 1 ? await unpacked(location.hash.slice(1)) : null;
-  if (linked) history.replaceState(null, "", location.pathname);
-  const kept = linked ? undefined : await restored();
-  replace(linked?.drawing ?? kept?.drawing ?? EMPTY);
-  const map = linked?.place || kept?.map || "living-room";
-  await mapped(map);
-  effect(() => void keepDrawing(drawing.value));
+  if (location.hash.length > 1) {
+    history.replaceState(null, "", location.pathname);
+    if (!linked) notice.value = texts.peek().brokenLink;
+  }
+  const kept = await restored();
+  replace((linked ?? kept)?.drawing ?? EMPTY);
+  wantedMap = (linked ? linked.place : kept?.map) || wantedMap;
+  await mapped(wantedMap);
+  effect(() => keepDrawing(drawing.value));
   effect(() => {
     const here = place.value;
     if (here) void keepMap(here.place || here);
   });
 }
+
+/** Failures of a map that is not there, or not for whoever asks. */
+const FOR_OTHERS: ReadonlySet<string> = new Set(["gone", "invalid", "failed"]);
 
 async function mapped(map: string | PlaceMap): Promise<void> {
   if (typeof map !== "string") {
@@ -551,11 +591,19 @@ async function mapped(map: string | PlaceMap): Promise<void> {
   }
   for (;;) {
     try {
-      show(await openPlace(client, isPlace(map) ? map : "living-room"));
+      if (map.startsWith(KEPT_BY_SERVER)) {
+        show(await openStored(client, map.slice(KEPT_BY_SERVER.length)));
+      } else show(await openPlace(client, isPlace(map) ? map : "living-room"));
       refit.value++;
       return;
     } catch (thrown) {
-      trouble.value = RequestFailed.from(thrown);
+      const failed = RequestFailed.from(thrown);
+      if (map.startsWith(KEPT_BY_SERVER) && FOR_OTHERS.has(failed.failure)) {
+        notice.value = failed.message;
+        map = "living-room";
+        continue;
+      }
+      trouble.value = failed;
       if (trouble.value.failure !== "away" && trouble.value.failure !== "busy") return;
       await new Promise((later) => setTimeout(later, 1500));
     }
@@ -594,7 +642,11 @@ const paint = () => {
 prefersDark.addEventListener("change", paint);
 effect(paint);
 
+function themeNamed(name: string | null): Theme {
+  return name === "light" || name === "dark" ? name : "auto";
+}
+
 export function choose(shown: Theme): void {
-  localStorage.setItem("theme", shown);
+  remember("theme", shown);
   theme.value = shown;
 }

@@ -2,6 +2,8 @@
 
 import { computed, signal } from "@preact/signals";
 
+import { remember, remembered } from "./settings";
+
 const en = {
   language: "English",
   tagline: "Draw a place. See it on the robot's map.",
@@ -41,11 +43,16 @@ const en = {
   openSketchHint: "Strokes, SVG, Excalidraw, a photo",
   saveStrokes: "Save strokes (JSON)",
   saveSvg: "Save drawing (SVG)",
+  saveExcalidraw: "Save drawing (Excalidraw)",
   savePictureSvg: "Save picture of both (SVG)",
   savePicturePng: "Save picture of both (PNG)",
   saveCarried: "Save routes and zones (GeoJSON)",
   saveWaypoints: "Save waypoints (nav2 YAML)",
   copyLink: "Copy a link to this",
+  brokenLink: "The link is broken; ask for it once more.",
+  noStrokes: "it has none",
+  tooLarge: (file: string, size: string, most: string) =>
+    `${file} has ${size}, and this server reads ${most} at most; scale it down.`,
   linkCopied: "The link is copied. Whoever opens it here sees this sketch and its match.",
   settings: "Language and colours",
   theme: "Colours",
@@ -170,7 +177,7 @@ const de: Texts = {
   route: "Weg",
   zone: "Zone",
   eraser: "Radieren",
-  move: "Verschieben",
+  move: "Bewegen",
   name: "Benennen",
   undo: "Zurück",
   redo: "Wieder vor",
@@ -183,11 +190,16 @@ const de: Texts = {
   openSketchHint: "Striche, SVG, Excalidraw, ein Foto",
   saveStrokes: "Striche sichern (JSON)",
   saveSvg: "Zeichnung sichern (SVG)",
+  saveExcalidraw: "Zeichnung sichern (Excalidraw)",
   savePictureSvg: "Bild von beidem sichern (SVG)",
   savePicturePng: "Bild von beidem sichern (PNG)",
   saveCarried: "Wege und Zonen sichern (GeoJSON)",
   saveWaypoints: "Wegpunkte sichern (nav2-YAML)",
   copyLink: "Link hierzu kopieren",
+  brokenLink: "Der Link ist beschädigt; lass ihn dir noch einmal geben.",
+  noStrokes: "es sind keine darin",
+  tooLarge: (file, size, most) =>
+    `${file} hat ${size}, und dieser Server liest höchstens ${most}; verkleinere es.`,
   linkCopied: "Der Link ist kopiert. Wer ihn hier öffnet, sieht diese Skizze und ihre Zuordnung.",
   settings: "Sprache und Farben",
   theme: "Farben",
@@ -289,11 +301,11 @@ export const LANGUAGES = { en, de } as const;
 export type Language = keyof typeof LANGUAGES;
 
 function isLanguage(name: string | null | undefined): name is Language {
-  return name != null && name in LANGUAGES;
+  return name != null && Object.hasOwn(LANGUAGES, name);
 }
 
 function preferred(): Language {
-  const kept = localStorage.getItem("language");
+  const kept = remembered("language");
   if (isLanguage(kept)) return kept;
   return navigator.languages.map((name) => name.slice(0, 2)).find(isLanguage) ?? "en";
 }
@@ -302,6 +314,6 @@ export const language = signal<Language>(preferred());
 export const texts = computed<Texts>(() => LANGUAGES[language.value]);
 
 export function speak(name: Language): void {
-  localStorage.setItem("language", name);
+  remember("language", name);
   language.value = name;
 }
