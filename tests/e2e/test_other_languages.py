@@ -7,6 +7,7 @@ import subprocess
 
 import pytest
 
+from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 from sketchmatch_client import Client, SketchmatchError
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from tests.client.fake_server import running
@@ -22,6 +23,18 @@ SAID = {file.stem: file.read_text("utf-8").splitlines() for file in (FOLDER / "s
 STATUSES = [name for name in NAMES if name.startswith("Status.")]
 _OFFLINE = re.compile("dial tcp|Could ?n.t resolve|failed to download|EAI_AGAIN|ENOTFOUND", re.I)
 
+PLACE = {
+    "sketch.svg": LIVING_ROOM_SKETCH,
+    "room.yaml": LIVING_ROOM_MAP,
+    "room.pgm": LIVING_ROOM_MAP.with_suffix(".pgm"),
+}
+FIRST = {
+    "clients/go": ("hello/main.go", "go", "func main() {"),
+    "clients/rust": ("examples/hello.rs", "rust", "async fn main()"),
+    "proto/examples": ("hello.mjs", "js", "const options"),
+}
+"""The first program of each page, its language, and how it begins after its imports."""
+
 _BUILT = shutil.ignore_patterns("Cargo.lock", "target", "node_modules", "package-lock.json")
 
 
@@ -29,6 +42,7 @@ class Program:
     """The program of a page, in a copy of the checkout, built as the page says."""
 
     def __init__(self, folder, page, files=(), **environment):
+        self.page = page
         self.folder = folder / page
         for name in ("proto", page):
             shutil.copytree(ROOT / name, folder / name, dirs_exist_ok=True, ignore=_BUILT)
@@ -36,13 +50,24 @@ class Program:
             (self.folder / name).write_text(text, "utf-8")
         self._environment = {**os.environ, "PATH": f"{TOOLS}:{os.environ['PATH']}", **environment}
         text = (self.folder / "README.md").read_text("utf-8")
-        self._build, self._run = map(
+        self._build, self._hello, self._run = map(
             steps, re.findall(r"^```console\n(.*?)^```", text, re.S | re.M)
         )
         for step in self._build:
             done = self._bash(step.command)
             require(not _OFFLINE.search(done.stderr), f"a registry that `{step.command}` reaches")
             assert done.returncode == 0, done.stderr
+
+    def hello(self, file, address):
+        """Run the page's first program, and return what it prints and what the page shows."""
+        for name, original in PLACE.items():
+            shutil.copy(original, self.folder / name)
+        program = self.folder / file
+        program.write_text(program.read_text("utf-8").replace("localhost:50051", address), "utf-8")
+        (step,) = self._hello
+        done = self._bash(step.command)
+        assert (done.returncode, done.stderr) == (0, "")
+        return step, done.stdout.splitlines()
 
     def example(self, address):
         """Run what the page shows, and see that it shows the same."""
@@ -111,7 +136,7 @@ def blocks(page, language):
 def go(folder):
     require(shutil.which("go"), "go")
     tool("buf")
-    found = blocks("clients/go/README.md", "go")
+    _, *found = blocks("clients/go/README.md", "go")
     code = _IN_GO + "".join(_GO_BLOCK.format(k, block) for k, block in enumerate(found))
     return Program(folder, "clients/go", {"blocks.go": code}, GOFLAGS="-p=1")
 
@@ -121,8 +146,8 @@ def rust(folder):
     protoc = folder / "protoc"
     protoc.write_text(f'#!/bin/sh\nexec {tool("python")} -m grpc_tools.protoc "$@"\n')
     protoc.chmod(0o755)
-    # The other block, on encryption, wants a feature of tonic that takes minutes to build.
-    call, _ = blocks("clients/rust/README.md", "rust")
+    # The last block, on encryption, wants a feature of tonic that takes minutes to build.
+    _, call, _ = blocks("clients/rust/README.md", "rust")
     code = (ROOT / "clients" / "rust" / "src" / "main.rs").read_text("utf-8")
     files = {"src/main.rs": code + _RUST_BLOCK.format(call)}
     return Program(folder, "clients/rust", files, PROTOC=str(protoc), CARGO_BUILD_JOBS="1")
@@ -140,6 +165,20 @@ def program(request, tmp_path_factory):
 
 def test_the_pages_example_has_the_answer_that_it_shows(program, address):
     program.example(address)
+
+
+def test_the_pages_first_program_finds_all_that_is_sketched(program, address):
+    step, lines = program.hello(FIRST[program.page][0], address)
+    assert len(lines) == 8
+    assert step.missing_in(lines) is None, lines
+
+
+@pytest.mark.parametrize("page", FIRST)
+def test_the_page_shows_its_first_program_which_has_about_twenty_lines(page):
+    file, language, begin = FIRST[page]
+    program = (ROOT / page / file).read_text("utf-8")
+    assert program in blocks(f"{page}/README.md", language)
+    assert len(program[program.index(begin) :].splitlines()) <= 23
 
 
 def test_the_golden_request_has_the_golden_answer(program, address):
