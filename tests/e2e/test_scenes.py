@@ -80,9 +80,7 @@ def test_a_stored_map_takes_what_is_carried_as_its_file_does(scenes, tmp_path):
     zones.write_text(json.dumps({"type": "Feature", "properties": {}, "geometry": zone}))
     stored = f"scene:{scenes('scenes put', LIVING_ROOM_MAP).stdout.strip()[:12]}"
     picture = tmp_path / "carried.png"
-    done = scenes(
-        "transfer --radius 0.3", LIVING_ROOM_SKETCH, stored, drawn, "--overlay", picture
-    )
+    done = scenes("transfer --radius 0.3", LIVING_ROOM_SKETCH, stored, drawn, "--overlay", picture)
     plain = scenes("transfer --radius 0.3", LIVING_ROOM_SKETCH, LIVING_ROOM_MAP, drawn)
     assert (done.returncode, done.stdout) == (0, plain.stdout)
     assert picture.stat().st_size > 10_000

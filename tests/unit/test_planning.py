@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from sketchmatch.errors import AnswerUnavailableError
-from sketchmatch.kernels.smoothing import pull_smooth
 from sketchmatch.model import OccupancyGrid, Scene
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.engine import Engine
@@ -19,7 +16,6 @@ from sketchmatch.transfers.features import ChangeReason, Feature, FeatureKind
 from sketchmatch.transfers.obstacles import Obstacles, sampled
 from sketchmatch.transfers.planning import Landmarks, Way, kept_clear
 from sketchmatch.transfers.transfer import TransferRequest, run_transfer
-from tests.oracle.smoothing import pulled
 
 SIDE, CELL = 240, 0.1
 FAR = Landmarks(np.zeros((1, 2)) - 99.0, np.zeros((1, 2)) - 99.0, np.ones(1), ("far",))
@@ -135,16 +131,3 @@ def test_a_time_budget_is_for_the_match_alone():
         radius=0.3,
     )
     assert len(finish(run_transfer(request, Engine(default_registry()))).features) == 1
-
-
-@settings(max_examples=30)
-@given(st.integers(0, 2**32 - 1), st.integers(0, 4), st.integers(1, 6))
-def test_a_line_is_pulled_smooth_as_it_is_defined(seed, rounds, parts):
-    rng = np.random.default_rng(seed)
-    room = rng.uniform(0.0, 1.0, (8, 9))
-    line = rng.uniform(-0.5, 9.5, (int(rng.integers(1, 12)), 2))
-    least = rng.uniform(0.0, 0.6)
-    found = line.copy()
-    pull_smooth(found, room, least, rounds, parts)
-    assert found == pytest.approx(pulled(line, room, least, rounds, parts), abs=1e-9)
-    assert (found[[0, -1]] == line[[0, -1]]).all()

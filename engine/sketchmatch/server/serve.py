@@ -179,8 +179,8 @@ async def serve(
     files = _Files(settings, say)
     metrics, setup = Metrics(_METHODS), load()
     store = _opened(settings, say)
-    archives = (None, None) if store is None else _archives(store, settings, metrics)
-    app = Application(setup, settings.workers, *archives, metrics.matched)
+    scenes, matches = _archives(store, settings, metrics)
+    app = Application(setup, settings.workers, scenes, matches, metrics.matched)
     traces = Traces.sent_to(settings.traces_endpoint)
     interceptors = [
         *traces.interceptors,
@@ -446,9 +446,11 @@ def _opened(settings: ServerSettings, say: Callable[[str], None]) -> Store | Non
 
 
 def _archives(
-    store: Store, settings: ServerSettings, metrics: Metrics
-) -> tuple[SceneArchive, Archive]:
-    """Return where scenes are kept, and matches."""
+    store: Store | None, settings: ServerSettings, metrics: Metrics
+) -> tuple[SceneArchive | None, Archive | None]:
+    """Return where scenes are kept, and matches; None for nowhere."""
+    if store is None:
+        return None, None
     matches = Archive(
         store,
         settings.matches_days * _DAY,

@@ -80,8 +80,7 @@ class Obstacles:
         """Return points as row and column in units of cells, shape (m, 2)."""
         x, y, yaw = self.origin
         c, s = math.cos(yaw), math.sin(yaw)
-        found = (points - (x, y)) @ np.array([[-s, c], [c, s]])
-        found /= self.resolution
+        found: FloatArray = (points - (x, y)) @ np.array([[-s, c], [c, s]]) / self.resolution
         return found
 
     def placed(self, local: FloatArray) -> FloatArray:
@@ -98,7 +97,7 @@ class Obstacles:
 
     def places(self, cells: IntArray) -> FloatArray:
         """Return the middles of cells, shape (m, 2)."""
-        return self.placed(cells + 0.5)
+        return self.placed(cells.astype(np.float64) + 0.5)
 
     def inside(self, points: FloatArray) -> BoolArray:
         """Return which points lie on the grid."""
