@@ -25,6 +25,7 @@ _RESTS = {"at once": 0.0, "after a rest": 0.5}
 """Seconds between an answer and the next change."""
 
 _PARTS = "page", "server", "paint"
+"""Until a change is sent, until the last of its answer has come, until that is painted."""
 
 _WATCHED = """
   window.marks = { up: 0, sent: 0, heard: [] };
@@ -51,9 +52,7 @@ def main() -> None:
     parser.add_argument("--strokes", type=int, default=60, help="how often a thing is moved")
     parser.add_argument("--workers", default="1")
     chosen = parser.parse_args()
-    table = Table(
-        "next change", "p50 ms", "p95 ms", "most ms", "page", "server", "paint", "server ms"
-    )
+    table = Table("next change", "p50 ms", "p95 ms", "most ms", *_PARTS, "server ms")
     with serving_pad("--workers", chosen.workers) as (server, url), chromium() as browser:
         page = browser.new_page(viewport={"width": 1440, "height": 900}, reduced_motion="reduce")
         page.add_init_script(_WATCHED)
@@ -73,9 +72,7 @@ def main() -> None:
                 f"{1000 * spent / chosen.strokes:.0f}",
             )
         frames = _frames(page)
-    table.title = (
-        f"pen up to the answer on the screen, 8 things; {os.getloadavg()[0]:.1f} busy beside"
-    )
+    table.title = f"pen up to the answer on the screen, 8 things, load {os.getloadavg()[0]:.1f}"
     Console().print(table)
     print(f"a stroke of 2000 points: {frames}")
 

@@ -1007,6 +1007,25 @@ def test_on_a_tablet_a_finger_draws_and_two_fingers_move_the_paper(pad, visit):
     assert strokes(page) == 3
 
 
+@pytest.mark.parametrize("size", [(390, 844), (844, 390), (1024, 768)])
+@pytest.mark.parametrize("locale", ["en-GB", "de-DE"])
+def test_there_is_room_to_draw_and_no_tool_hides_another(pad, visit, size, locale):
+    width, height = size
+    options = {"viewport": {"width": width, "height": height}, "has_touch": True}
+    page = visit(pad, place=None, locale=locale, **options)
+    assert page.get_by_test_id("paper").bounding_box()["height"] > 120
+    assert page.get_by_test_id("map").bounding_box()["height"] > 120
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    boxes = [
+        [tool.bounding_box() for tool in page.locator(within).all()]
+        for within in (".toolbar .tool", ".toolbar .tool-name")
+    ]
+    for row in boxes:
+        for left, right in pairwise(row):
+            assert left["x"] + left["width"] <= right["x"] + 0.5
+        assert row[-1]["x"] + row[-1]["width"] <= width
+
+
 def test_once_a_pen_has_drawn_a_palm_does_nothing_and_fingers_move_the_paper(pad, visit):
     page = visit(pad, viewport={"width": 1024, "height": 768}, has_touch=True)
     pen = """([kind, id, type, x, y]) => {
