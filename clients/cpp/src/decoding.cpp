@@ -110,6 +110,7 @@ SceneObject decoded(const v1::SceneObject& message);
 ObjectMatch decoded(const v1::ObjectMatch& message);
 FmapEntry decoded(const v1::FmapEntry& message);
 AlternativeMap decoded(const v1::AlternativeMap& message);
+ObjectGroup decoded(const v1::ObjectGroup& message);
 Algorithm decoded(const v1::Algorithm& message);
 Plugin decoded(const v1::Plugin& message);
 Profile decoded(const v1::Profile& message);
@@ -228,6 +229,11 @@ Ambiguity decoded(const v1::Ambiguity& message) {
           numbers(message.deciding_sketch_objects())};
 }
 
+ObjectGroup decoded(const v1::ObjectGroup& message) {
+  return {numbers(message.sketch_objects()), numbers(message.map_objects()),
+          SKETCHMATCH_KNOWN(message, probability)};
+}
+
 MatchStatistics decoded(const v1::MatchStatistics& message) {
   return {message.iterations(),
           message.evaluations(),
@@ -262,6 +268,7 @@ MatchResult decoded(const v1::MatchResult& message) {
     result.ambiguity = decoded(message.ambiguity());
   }
   result.provisional = message.provisional();
+  result.object_groups = all(message.object_groups());
   return result;
 }
 

@@ -208,6 +208,13 @@ struct Fields {
   }
 
   template <typename Visit>
+  static void of(const ObjectGroup& value, const Visit& visit) {
+    FIELD(sketch_objects);
+    FIELD(map_objects);
+    FIELD(probability);
+  }
+
+  template <typename Visit>
   static void of(const MatchStatistics& value, const Visit& visit) {
     FIELD(iterations);
     FIELD(evaluations);
@@ -240,6 +247,7 @@ struct Fields {
     FIELD(place_probability);
     FIELD(ambiguity);
     FIELD(provisional);
+    FIELD(object_groups);
   }
 
   template <typename Visit>
