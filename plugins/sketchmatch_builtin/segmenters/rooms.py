@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import cast
 
 import cv2
@@ -38,7 +40,7 @@ from sketchmatch_builtin.segmenters._cells import (
 from sketchmatch_builtin.segmenters._doorways import divided, doorway, parts_that_meet
 from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of
 from sketchmatch_builtin.segmenters._leaves import divided_at_openings
-from sketchmatch_builtin.segmenters._plans import drawn
+from sketchmatch_builtin.segmenters._plans import Plan, drawn
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 
 __all__ = ["RoomSegmenter"]
@@ -185,7 +187,7 @@ class RoomSegmenter(Segmenter):
     def segment(self, source: OccupancyGrid | StrokeSet | PolygonSet | Image) -> Segmentation:
         """Return the rooms, in metres in the map's frame or in the drawing's unit and frame."""
         if not isinstance(source, OccupancyGrid):
-            return self._of_drawing(source, _NARROW)
+            return self._of_drawing(source)
         params, cell = self.params, source.resolution
         free, corner = free_cells(source, params)
         widest = _WIDEST if params.door_width is None else params.door_width
@@ -221,31 +223,49 @@ class RoomSegmenter(Segmenter):
         """
         if isinstance(source, OccupancyGrid) or self.params.door_width is not None:
             return ()
+        plan = self._plan(source)
         cuts = []
-        for share in _OTHERWISE_NARROW:
+        for parts in self._by_width(plan, _OTHERWISE_NARROW):
             with suppress(InvalidInputError):
-                cuts.append(self._of_drawing(source, share))
+                cuts.append(self._of_plan(source, plan, parts))
         return tuple(cuts)
 
-    def _of_drawing(self, source: StrokeSet | PolygonSet | Image, narrow: float) -> Segmentation:
-        params = self.params
-        plan = drawn(source, params.door_width)
-        cell, door = plan.cell, plan.door
-        furniture = door if params.furniture is None else params.furniture / cell
-        inside = _furnished(plan.free, furniture)
-        path = {"stroke_set": "strokes", "polygon_set": "polygons", "image": "pixels"}[source.field]
-        area = params.min_area
-        if area is None:
-            area = _SMALLEST_SHARE * np.count_nonzero(inside) * cell**2
-        least = max(area / cell**2, 1.0)
-        if params.door_width is None:
-            parts = divided_by_width(inside, narrow, _NARROWEST * max(inside.shape), least)
-            cut = "where it is less than half as wide"
+    def _plan(self, source: StrokeSet | PolygonSet | Image) -> Plan:
+        """Return the free cells of a drawing, furniture among them."""
+        plan, furniture = drawn(source, self.params.door_width), self.params.furniture
+        longest = plan.door if furniture is None else furniture / plan.cell
+        return replace(plan, free=_furnished(plan.free, longest))
+
+    def _by_width(self, plan: Plan, shares: Sequence[float]) -> list[Mask]:
+        least = max(self._least(plan) / plan.cell**2, 1.0)
+        return divided_by_width(plan.free, shares, _NARROWEST * max(plan.free.shape), least)
+
+    def _least(self, plan: Plan) -> float:
+        """Return the area of the smallest room in a drawing."""
+        if self.params.min_area is not None:
+            return self.params.min_area
+        return float(_SMALLEST_SHARE * np.count_nonzero(plan.free) * plan.cell**2)
+
+    def _of_drawing(self, source: StrokeSet | PolygonSet | Image) -> Segmentation:
+        plan = self._plan(source)
+        if self.params.door_width is None:
+            (parts,) = self._by_width(plan, [_NARROW])
         else:
-            parts = divided(inside, door, least)
-            cut = f"at passages of up to {params.door_width:.2g}"
-        outlines, passages = self._outlines(inside, parts, area, cell, path, cut)
-        rooms = [[cell * ring + plan.corner for ring in _rings(room)] for room in outlines]
+            least = max(self._least(plan) / plan.cell**2, 1.0)
+            parts = divided(plan.free, plan.door, least)
+        return self._of_plan(source, plan, parts)
+
+    def _of_plan(
+        self, source: StrokeSet | PolygonSet | Image, plan: Plan, parts: Mask
+    ) -> Segmentation:
+        width = self.params.door_width
+        cut = "where it is less than half as wide"
+        if width is not None:
+            cut = f"at passages of up to {width:.2g}"
+        path = {"stroke_set": "strokes", "polygon_set": "polygons", "image": "pixels"}[source.field]
+        area = self._least(plan)
+        outlines, passages = self._outlines(plan.free, parts, area, plan.cell, path, cut)
+        rooms = [[plan.cell * ring + plan.corner for ring in _rings(room)] for room in outlines]
         labels, unplaced = labels_of(
             [shapely.Polygon(outer, inner) for outer, *inner in rooms], _names(source), 0.0
         )
