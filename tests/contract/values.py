@@ -38,6 +38,7 @@ from sketchmatch.pipeline.result import (
     Ambiguity,
     Correspondence,
     MatchResult,
+    ObjectGroup,
     ObjectMatch,
     ObjectRelation,
     Statistics,
@@ -425,6 +426,7 @@ RESULT = MatchResult(
     place_probability=0.905,
     ambiguity=Ambiguity(maps=2, alternatives=(0,), deciding_sketch_objects=(0, 1, 2)),
     unmatched_sketch_probabilities=(0.575,),
+    groups=(ObjectGroup((0, 1), (3,), 0.735), ObjectGroup((2,), (0, 1, 2))),
 )
 EVENTS = {
     "MatchResponse.accepted": ACCEPTED,

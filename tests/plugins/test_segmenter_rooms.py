@@ -69,6 +69,14 @@ def test_a_floors_rooms_are_found_in_reading_order():
     assert found.warnings == ()
 
 
+def test_rooms_that_a_door_joins_open_into_each_other_and_no_others():
+    found = segmented(floor(), door_width=1.2)
+    corridor = max(range(6), key=lambda k: np.ptp(found.scene.objects[k].polygon.bounds[::2]))
+    assert found.passages == tuple(
+        (min(k, corridor), max(k, corridor)) for k in range(6) if k != corridor
+    )
+
+
 @pytest.mark.slow
 def test_rooms_do_not_overlap_and_keep_off_walls():
     polygons = [item.polygon for item in segmented(floor()).scene.objects]

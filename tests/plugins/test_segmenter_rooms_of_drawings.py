@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import shapely
 
-from sketchmatch import match
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import Image, LabelledPolygon, OccupancyGrid, PolygonSet, Stroke, StrokeSet
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
+from tests.experiments.regions import HALVES, RSI, Tally, drawing, robot_map
 from tests.tools import ROOT, require
 
 WALLS = [
@@ -194,9 +194,6 @@ DRAWN = {
 """Regions of the masks that people drew from memory, looked at in the contact sheet."""
 
 
-RSI = ROOT.parent / "shared" / "data" / "sketches" / "rooms-rsi"
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DRAWN)
 def test_masks_that_people_drew_are_cut_into_regions(name):
@@ -205,49 +202,52 @@ def test_masks_that_people_drew_are_cut_into_regions(name):
     assert len(segmented(read_source(path)).scene) == DRAWN[name]
 
 
-def belonging(path):
-    """The sets of an annotator: points of the sketch, and of the plan, from the top left."""
-    found = []
-    for line in path.read_text().splitlines():
-        words = line.split()
-        if line.startswith("#"):
-            if "match" in line:
-                found.append(([], []))
-            side = 0 if "map1" in line else 1
-        elif words:
-            row, column = map(float, words)
-            found[-1][side].append((column, row))
-    return [both for both in found if all(both)]
-
-
-def sets_at(item, points_of_sets, height):
-    """The sets of which a point lies in a region, or within 2 pixels of it."""
-    region = item.polygon.buffer(2.0)
-    return {
-        number
-        for number, points in enumerate(points_of_sets)
-        if any(region.contains(shapely.Point(x, height - y)) for x, y in points)
-    }
+@pytest.mark.slow
+@pytest.mark.parametrize("half", HALVES)
+def test_regions_that_people_drew_find_those_that_they_are_on_the_plan(half):
+    require(RSI.exists(), "the sketches of people")
+    counted = sum((drawing(name) for name in HALVES[half]), Tally())
+    assert counted.agreed >= 30
+    assert counted.matched >= 0.85 * counted.agreed
+    assert counted.right >= 0.85 * counted.judged
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("annotator", "least"), [(1, 35), (2, 34)])
-def test_regions_that_people_drew_find_those_that_they_are_on_the_plan(annotator, least):
-    require(RSI.exists(), "the sketches of people")
-    plan = read_source(RSI / "model_simple.png")
-    mapped = segmented(plan).scene
-    right, judged = 0, 0
-    for name in DRAWN:
-        drawn = read_source(RSI / "sketches" / f"{name}.png")
-        sets = belonging(RSI / "truth" / f"annotator-{annotator}" / f"gt_{name}_model_simple.dat")
-        sketch = segmented(drawn).scene
-        for a, b in match(sketch, mapped).object_map.items():
-            here = sets_at(sketch.objects[a], [points for points, _ in sets], len(drawn.pixels))
-            there = sets_at(mapped.objects[b], [points for _, points in sets], len(plan.pixels))
-            judged += bool(here or there)
-            right += bool(here & there)
-    assert right >= least
-    assert right >= 0.8 * judged
+@pytest.mark.parametrize(("name", "right"), [("01", 8), ("02", 6)])
+def test_regions_of_a_robots_map_find_those_of_the_layout(name, right):
+    require(RSI.exists(), "the maps of a flat")
+    assert robot_map(name).matched >= right
+
+
+def test_a_drawing_is_cut_coarser_and_finer():
+    # A hall, and corridors a quarter, not half, and more than half as wide.
+    cells = np.zeros((500, 900), np.uint8)
+    for x, y, width, height in (
+        (250, 150, 300, 300),
+        (360, 20, 75, 140),
+        (540, 230, 300, 140),
+        (20, 205, 240, 185),
+    ):
+        cells[y : y + height, x : x + width] = 255
+    segmenter = RoomSegmenter()
+    cuts = [segmenter.segment(Image(cells)), *segmenter.other_cuts(Image(cells))]
+    assert [len(each.scene) for each in cuts] == [3, 2, 4]
+
+
+def test_there_is_one_cut_where_a_width_is_given_and_of_a_robots_map():
+    path = RSI / "sketches" / "06.png"
+    require(path.exists(), "the sketch 06")
+    assert RoomSegmenter(RoomSegmenter.Params(door_width=40.0)).other_cuts(read_source(path)) == ()
+    assert RoomSegmenter().other_cuts(OccupancyGrid(np.zeros((30, 30), np.int8), 0.1)) == ()
+
+
+def test_drawn_rooms_open_into_each_other_at_their_doors_alone():
+    found = segmented(strokes(WALLS))
+    rooms = found.scene.objects
+    assert all(0 < rooms[a].polygon.distance(rooms[b].polygon) < 0.2 for a, b in found.passages)
+    # All five can be walked to, and no more is open than leads to them.
+    assert {k for pair in found.passages for k in pair} == set(range(5))
+    assert len(found.passages) == 4
 
 
 def free_cells(*boxes):
@@ -259,7 +259,7 @@ def free_cells(*boxes):
 
 def places(cells):
     """The areas of places, the largest first."""
-    mask = divided_by_width(cells, 0.5, 2.0, 20.0)
+    (mask,) = divided_by_width(cells, [0.5], 2.0, 20.0)
     return sorted(cv2.connectedComponentsWithStats(mask, connectivity=8)[2][1:, 4], reverse=True)
 
 

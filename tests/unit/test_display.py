@@ -244,6 +244,20 @@ def test_other_maps_are_told_by_the_objects_that_differ(monkeypatch):
     ]
 
 
+def test_what_is_several_on_one_side_is_told_as_one(monkeypatch):
+    groups = [
+        match_pb2.ObjectGroup(sketch_objects=[2], map_objects=[1, 2], probability=0.9),
+        match_pb2.ObjectGroup(sketch_objects=[0, 1], map_objects=[0]),
+    ]
+    told = answer(object_groups=groups, unmatched_sketch_objects=[2])
+    lines = shown(told, monkeypatch)
+    assert lines[-2:] == [
+        "As one, 90 %: No. 3 is bed and No. 3 on the map",
+        "As one: desk and shelf are No. 1 on the map",
+    ]
+    assert not any("no partner" in each for each in lines)
+
+
 def test_a_pair_that_could_be_another_keeps_its_margin_where_there_is_little_room(monkeypatch):
     relation = match_pb2.ObjectRelation(reference_object=1, phrase="to the right of and below it")
     told = {"relation": relation, "probability": 0.5}

@@ -126,6 +126,10 @@ inline auto fields(Of<Ambiguity> /*type*/) {
   return std::tuple{FIELD(maps), FIELD(alternatives), FIELD(deciding_sketch_objects)};
 }
 
+inline auto fields(Of<ObjectGroup> /*type*/) {
+  return std::tuple{FIELD(sketch_objects), FIELD(map_objects), FIELD(probability)};
+}
+
 inline auto fields(Of<MatchStatistics> /*type*/) {
   return std::tuple{FIELD(iterations),       FIELD(evaluations),    FIELD(segment_elapsed),
                     FIELD(describe_elapsed), FIELD(relate_elapsed), FIELD(search_elapsed),
@@ -152,7 +156,8 @@ inline auto fields(Of<MatchResult> /*type*/) {
                     FIELD(probability),
                     FIELD(place_probability),
                     FIELD(ambiguity),
-                    FIELD(provisional)};
+                    FIELD(provisional),
+                    FIELD(object_groups)};
 }
 
 inline auto fields(Of<MatchSummary> /*type*/) {

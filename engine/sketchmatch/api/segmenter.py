@@ -25,11 +25,15 @@ class Segmentation:
     route
         Shape (k, 2), the way that a person drew through the scene, in its coordinates and from
         its beginning to its end, or None. It is no object and never influences a match.
+    passages
+        Pairs of objects, by index, that open into each other, as rooms do: people may take two such
+        for one. Empty where objects are things.
     """
 
     scene: Scene
     warnings: tuple[str, ...] = ()
     route: FloatArray | None = None
+    passages: tuple[tuple[int, int], ...] = ()
 
 
 class Segmenter(Algorithm, ABC):
@@ -52,3 +56,12 @@ class Segmenter(Algorithm, ABC):
         InvalidInputError
             With a path relative to the source, if nothing usable is in it.
         """
+
+    def other_cuts(self, source: Any) -> tuple[Segmentation, ...]:  # noqa: ARG002 (for others)
+        """Return what else the objects of ``source`` may be: cut coarser, or finer.
+
+        Where one object ends and the next begins is not always plain, as in free space. A match
+        takes the cut of either side that fits the other best, and that of :meth:`segment` where
+        nothing speaks for another. There is no other by default.
+        """
+        return ()

@@ -174,6 +174,14 @@ def result(value: MatchResult) -> match_pb2.MatchResult:
         ambiguity=_ambiguity(value.ambiguity),
         unmatched_sketch_probabilities=value.unmatched_sketch_probabilities,
         provisional=value.provisional,
+        object_groups=[
+            match_pb2.ObjectGroup(
+                sketch_objects=group.sketch_objects,
+                map_objects=group.map_objects,
+                probability=group.probability,
+            )
+            for group in value.groups
+        ],
     )
 
 

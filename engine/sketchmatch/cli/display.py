@@ -368,6 +368,7 @@ def _answer(match: Match, metres: bool) -> RenderableType:
             *(Text(""), Text(""), Text("")),
         ]
         for k, probability in unmatched
+        if not any(k in group.sketch_objects for group in result.object_groups)
     ]
     parts = result.fmap_confidence
     detail = (
@@ -386,6 +387,7 @@ def _answer(match: Match, metres: bool) -> RenderableType:
         Rows(_headline(match), columns, rows),
         "",
         *map(plain, lines),
+        *(plain(_as_one(group, sketched, mapped)) for group in result.object_groups),
         *_alternatives(result, sketched, mapped),
     )
 
@@ -432,6 +434,15 @@ def _relation(line: match_pb2.ObjectMatch, labels: Sequence[str]) -> Text:
     if not line.HasField("relation"):
         return Text("")
     return plain(f"{line.relation.phrase} {named(line.relation.reference_object, labels)}")
+
+
+def _as_one(group: match_pb2.ObjectGroup, sketched: Sequence[str], mapped: Sequence[str]) -> str:
+    """Say which objects of one side are, together, which of the other."""
+    drawn = " and ".join(named(k, sketched) for k in group.sketch_objects)
+    there = " and ".join(named(k, mapped) for k in group.map_objects)
+    verb = "is" if len(group.sketch_objects) == 1 else "are"
+    how = f", {likely(group.probability)}" if group.HasField("probability") else ""
+    return f"As one{how}: {drawn} {verb} {there} on the map"
 
 
 def _alternatives(

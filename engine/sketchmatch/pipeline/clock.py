@@ -86,7 +86,8 @@ class Clock:
 
     @contextmanager
     def timing(self, stage: str) -> Iterator[None]:
-        """Take the time of a stage."""
+        """Take the time of a stage, of several times that of all together."""
         began = time.monotonic()
         yield
-        self.seconds[stage] = time.monotonic() - began
+        spent = time.monotonic() - began
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + spent

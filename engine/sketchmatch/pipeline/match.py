@@ -6,6 +6,7 @@ import math
 import uuid
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TypeVar
 
 from sketchmatch.api import Segmentation
@@ -16,6 +17,7 @@ from sketchmatch.pipeline import reading
 from sketchmatch.pipeline.answer import answer
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison, check_scenes, compare, is_swapped
+from sketchmatch.pipeline.cuts import Fit, fitting_cut, groups_of
 from sketchmatch.pipeline.describe import described, with_directions
 from sketchmatch.pipeline.events import (
     Accepted,
@@ -37,8 +39,9 @@ from sketchmatch.pipeline.request import (
     finds_partial,
     price_in_force,
 )
+from sketchmatch.pipeline.result import MatchResult, Statistics
 from sketchmatch.pipeline.search import Goal, Search, search
-from sketchmatch.pipeline.segment import segment_side
+from sketchmatch.pipeline.segment import other_cuts, segment_side
 from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, Pipeline, resolve
 from sketchmatch.pipeline.slices import retold
 from sketchmatch.pipeline.warmup import loading_kernels
@@ -47,6 +50,9 @@ from sketchmatch.registry import Kind, Registry
 __all__ = ["run_match"]
 
 _Value = TypeVar("_Value")
+
+_AMPLE = 10.0
+"""Of the time that finding objects takes: what must be left for trying other cuts of them."""
 
 
 def run_match(
@@ -163,10 +169,64 @@ def _events(
                 yield Progress(Phase.COMPILE, clock.elapsed())
     if clock.is_time_to_tell():
         yield Progress(Phase.SEGMENT, clock.elapsed())
+    # What is known of single objects is known of those of the first cut; and where each object must
+    # have a partner, none is left that may be part of another.
+    is_open = price is not None and not request.pins and request.former is None
     with clock.timing("segment"), limited_to(limits):
         sketch = segment_side("sketch", request.sketch, pipeline, registry)
         clock.check(Phase.SEGMENT)
         map_ = segment_side("map", request.map, pipeline, registry)
+        drawn: tuple[Segmentation, ...] = (sketch,)
+        mapped: tuple[Segmentation, ...] = (map_,)
+        if is_open and clock.left() > _AMPLE * clock.spent():
+            drawn += other_cuts("sketch", request.sketch, pipeline, registry)
+            mapped += other_cuts("map", request.map, pipeline, registry)
+    remembered = Memory()
+
+    def matched(sketch: Segmentation, map_: Segmentation) -> Generator[MatchEvent, None, None]:
+        return _matched(request, plan, (sketch, map_), registry, match_id, clock, remembered)
+
+    if len(drawn) + len(mapped) > 2:
+        fit = yield from fitting_cut(drawn, mapped, matched, clock)
+        yield Segmented(fit.sketch, fit.map)
+    else:
+        work = _matched(request, plan, (sketch, map_), registry, match_id, clock, memory)
+        fit = Fit(sketch, map_, (yield from _but_the_end(work)))
+    result = fit.result
+    if is_open:
+        groups = yield from groups_of(fit, matched, clock)
+        result = replace(result, groups=groups, statistics=_as_of_now(result.statistics, clock))
+    yield Finished(result)
+
+
+def _but_the_end(
+    work: Generator[MatchEvent, None, None],
+) -> Generator[MatchEvent, None, MatchResult]:
+    """Go on with a match to its end, yielding all but that, and return what came of it."""
+    results: list[MatchResult] = []
+
+    def tell(event: MatchEvent) -> Iterator[MatchEvent]:
+        if isinstance(event, Finished):
+            results.append(event.result)
+        else:
+            yield event
+
+    yield from retold(work, tell)
+    return results[0]
+
+
+def _matched(
+    request: MatchRequest,
+    plan: _Plan,
+    sides: tuple[Segmentation, Segmentation],
+    registry: Registry,
+    match_id: str,
+    clock: Clock,
+    memory: Memory | None,
+) -> Generator[MatchEvent, None, None]:
+    """Match two scenes, from Segmented to Finished."""
+    pipeline, goal = plan.pipeline, plan.goal
+    sketch, map_ = sides
     scenes = (sketch.scene, map_.scene)
     check_scenes(scenes, pipeline.histogram)
     check_exponent(pipeline.histogram.exponent)
@@ -188,7 +248,12 @@ def _events(
         found = yield from _watched_search(work, comparison.swapped, clock)
         judging = judged(comparison, found, goal, pipeline.judge, registry, plan.usual)
         verdict = yield from retold(judging, lambda _: _told(found, comparison.swapped, clock))
-    yield Finished(answer(comparison, found, verdict, goal, (sketch, map_), match_id, clock))
+    yield Finished(answer(comparison, found, verdict, goal, sides, match_id, clock))
+
+
+def _as_of_now(so_far: Statistics, clock: Clock) -> Statistics:
+    """Return what a match took, with what was tried after it."""
+    return replace(so_far, seconds=MappingProxyType({**clock.seconds, "total": clock.spent()}))
 
 
 def _compared(

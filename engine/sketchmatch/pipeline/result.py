@@ -17,6 +17,7 @@ __all__ = [
     "Ambiguity",
     "Correspondence",
     "MatchResult",
+    "ObjectGroup",
     "ObjectMatch",
     "ObjectRelation",
     "Statistics",
@@ -125,6 +126,24 @@ class Ambiguity:
 
 
 @dataclass(frozen=True)
+class ObjectGroup:
+    """Several objects of one side, or of both, that are one place on the other.
+
+    Attributes
+    ----------
+    sketch_objects, map_objects
+        Indices from 0, in order; at most one line of :attr:`MatchResult.matches` joins two of them.
+    probability
+        How likely the sketch shows this place and these belong together, all of them taken for one
+        object; None where unknown.
+    """
+
+    sketch_objects: tuple[int, ...]
+    map_objects: tuple[int, ...]
+    probability: float | None = None
+
+
+@dataclass(frozen=True)
 class Correspondence:
     """One entry of the FMAP, read from sketch to map.
 
@@ -229,6 +248,10 @@ class MatchResult(Tabular):
         unknown.
     provisional
         Whether it was looked for near former maps alone, to be quick.
+    groups
+        Where several objects of one side are one of the other, as regions that people draw as one:
+        which. What of them has no line of its own is among the unmatched; all that is said beside
+        takes objects one by one.
     """
 
     matches: tuple[ObjectMatch, ...]
@@ -253,6 +276,7 @@ class MatchResult(Tabular):
     ambiguity: Ambiguity | None = None
     unmatched_sketch_probabilities: tuple[float, ...] = ()
     provisional: bool = False
+    groups: tuple[ObjectGroup, ...] = ()
 
     @property
     def object_map(self) -> dict[int, int]:
@@ -350,6 +374,17 @@ class MatchResult(Tabular):
         rows += [
             (name(k, self.sketch.labels[k]), "no partner", "", likely or "", "")
             for k, likely in unmatched
+            if not any(k in group.sketch_objects for group in self.groups)
+        ]
+        rows += [
+            (
+                " + ".join(name(k, self.sketch.labels[k]) for k in group.sketch_objects),
+                " + ".join(name(k, self.map.labels[k]) for k in group.map_objects),
+                "as one",
+                "" if group.probability is None else likelihood(group.probability),
+                "",
+            )
+            for group in self.groups
         ]
         return Table(self._headline(), heads, rows, 2)
 

@@ -16,7 +16,7 @@ from sketchmatch.pipeline.guard import blaming, inspecting
 from sketchmatch.pipeline.selection import Pipeline
 from sketchmatch.registry import Registry
 
-__all__ = ["segment", "segment_side"]
+__all__ = ["other_cuts", "segment", "segment_side"]
 
 _LONGEST = 400
 
@@ -66,6 +66,28 @@ def segment_side(
     return segment(given, segmenter, registry, f"{side}.{given.field}")
 
 
+def other_cuts(
+    side: str, given: Source | Scene | Segmentation, pipeline: Pipeline, registry: Registry
+) -> tuple[Segmentation, ...]:
+    """Return what else the objects of one side of a match may be, for what is not segmented yet.
+
+    Raises
+    ------
+    PluginError
+        If the segmenter breaks its contract.
+    """
+    segmenter = pipeline.segmenter(side)
+    if segmenter is None or isinstance(given, Scene | Segmentation):
+        return ()
+    if not isinstance(given, segmenter.sources):  # what people mended is as they want it
+        return ()
+    with blaming(segmenter, registry), inspecting(segmenter, registry, given):
+        cuts = tuple(segmenter.other_cuts(given))
+        for found in cuts:
+            _check_contract(found)
+    return tuple(_with_notes(found, given) for found in cuts)
+
+
 def _read_by(segmenter: Segmenter, source: Source, field: str) -> tuple[Source, str]:
     """Return what a segmenter reads of a source, and its path: of a mended map, the objects."""
     if isinstance(source, OccupancyGrid) and not isinstance(source, segmenter.sources):
@@ -103,9 +125,16 @@ def _check_contract(found: Any) -> None:
         _check_route(found.route)
     if not all(isinstance(warning, str) for warning in found.warnings):
         raise TypeError("its warnings are not all strings")
+    _check_passages(found.passages, len(found.scene))
 
 
 def _check_route(route: Any) -> None:
     points = np.asarray(route, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
         raise ValueError(f"its route has shape {points.shape}, not (k, 2), or is not finite")
+
+
+def _check_passages(passages: Any, objects: int) -> None:
+    for pair in passages:
+        if not (len(pair) == 2 and pair[0] != pair[1] and all(0 <= k < objects for k in pair)):
+            raise ValueError(f"its passages join {pair}, not two of its {objects} objects")

@@ -19,6 +19,7 @@ __all__ = [
     "divided",
     "doorway",
     "grow",
+    "parts_that_meet",
     "passages",
     "roomed",
     "widths",
@@ -36,6 +37,8 @@ _DOORWAY = 3.0
 _RAY = 0.1
 # What nothing leads into, and is nowhere this share of a doorway wide, is a cupboard or a shaft.
 _SHAFT = 0.5
+# In cells from either side: how wide a cut may be, and a half of it at a corner.
+_BORDER = 2
 
 
 def doorway(free: Mask, most: float) -> float:
@@ -206,6 +209,29 @@ def passages(labels: Labels, width: _Widths) -> tuple[IntArray, FloatArray]:
     passage = np.zeros(len(found))
     np.maximum.at(passage, number.reshape(-1), np.concatenate(widths))
     return found, passage
+
+
+def parts_that_meet(free: Mask, parts: Labels) -> IntArray:
+    """Return which parts of free space, cut along their borders, open into each other.
+
+    Parameters
+    ----------
+    free
+        1 where a cell is free, 0 elsewhere.
+    parts
+        The number of each cell's part, 0 along borders and where it is not free.
+
+    Returns
+    -------
+    ndarray
+        Shape (k, 2), the smaller number first.
+    """
+    framed, labels = np.pad(free, 1), np.pad(parts, 1)
+    sides = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
+    for _ in range(_BORDER):
+        around = cv2.dilate(labels.astype(np.float32), sides).astype(np.int32)
+        labels = np.where((labels == 0) & (framed > 0), around, labels)
+    return passages(labels, np.zeros(labels.shape, np.float32))[0]
 
 
 def _near(mask: NDArray[np.bool_], reach: float) -> Mask:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -24,19 +25,21 @@ _STEP = 1.16
 _SMALLEST = 2.0
 
 
-def divided_by_width(free: Mask, share: float, narrowest: float, least: float) -> Mask:
-    """Return the free cells without those along the borders between places.
+def divided_by_width(
+    free: Mask, shares: Sequence[float], narrowest: float, least: float
+) -> list[Mask]:
+    """Return the free cells without those along the borders between places, for each share.
 
     How wide free space is at a cell is the widest disc within it that covers the cell. From the
     widest cells down, each joins the places that it touches, that a disc of this width can be moved
-    to, and that are nowhere more than 1 / ``share`` times as wide: these become one by that. It
+    to, and that are nowhere more than 1 / share times as wide: these become one by that. It
     begins a new one where there are none.
 
     Parameters
     ----------
     free
         1 where a cell is free, 0 elsewhere.
-    share
+    shares
         Of the width of the wider place: what is narrower is another place.
     narrowest
         Half the width, in cells, from which a place counts.
@@ -45,30 +48,39 @@ def divided_by_width(free: Mask, share: float, narrowest: float, least: float) -
 
     Returns
     -------
-    ndarray
+    list of ndarray
         Shape of ``free``: places are components of cells joined by sides or corners.
     """
-    cut = np.zeros_like(free)
+    cuts = [np.zeros_like(free) for _ in shares]
     rows, columns = np.nonzero(free)
     if rows.size:
         window = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-        cut[window] = _divided(np.pad(free[window], 1), share, narrowest, least)[1:-1, 1:-1]
-    return cut
+        found = _divided(np.pad(free[window], 1), shares, narrowest, least)
+        for cut, parts in zip(cuts, found, strict=True):
+            cut[window] = parts[1:-1, 1:-1]
+    return cuts
 
 
-def _divided(free: Mask, share: float, narrowest: float, least: float) -> Mask:
+def _divided(free: Mask, shares: Sequence[float], narrowest: float, least: float) -> list[Mask]:
     """Return the same of free cells in a frame of cells that are not."""
     distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    places = _Places(np.zeros(free.shape, np.int32))
+    cuts = [_Places(np.zeros(free.shape, np.int32)) for _ in shares]
     width = float(distance.max())
     while width >= narrowest:
         fits = (distance >= width).astype(np.uint8)
         away, way = cv2.distanceTransformWithLabels(
             1 - fits, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
         )
-        new = (away < width) & (free > 0) & (places.labels == 0)
-        places.add(new, np.asarray(way, dtype=np.int32), fits > 0, width, share)
+        covered = (away < width) & (free > 0)
+        for places, share in zip(cuts, shares, strict=True):
+            new = covered & (places.labels == 0)
+            places.add(new, np.asarray(way, dtype=np.int32), fits > 0, width, share)
         width /= _STEP
+    return [_without_borders(free, places, least) for places in cuts]
+
+
+def _without_borders(free: Mask, places: _Places, least: float) -> Mask:
+    """Return the free cells without those along the borders of places that are large enough."""
     labels, widest = places.labels, places.widest
     area = np.bincount(labels.reshape(-1), minlength=len(widest))
     large = area >= np.maximum(_SMALLEST * widest**2, least)

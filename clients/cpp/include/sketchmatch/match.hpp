@@ -134,6 +134,13 @@ struct Ambiguity {
   std::vector<std::uint32_t> deciding_sketch_objects;  ///< Ask who the first of them is.
 };
 
+/// Several objects of one side, or of both, that are one place on the other.
+struct ObjectGroup {
+  std::vector<std::uint32_t> sketch_objects;  ///< Indices in the sketch.
+  std::vector<std::uint32_t> map_objects;     ///< Indices in the map.
+  std::optional<double> probability;          ///< How likely they belong together.
+};
+
 /// What a match cost.
 struct MatchStatistics {
   std::uint64_t iterations = 0;   ///< Of the search.
@@ -167,6 +174,7 @@ struct MatchResult {
   std::optional<double> place_probability;              ///< How likely it is this place at all.
   std::optional<Ambiguity> ambiguity;                   ///< Which maps are about as likely.
   bool provisional = false;                             ///< Whether the sketch goes on.
+  std::vector<ObjectGroup> object_groups;               ///< What is several on one side.
 };
 
 /// A finished match. Written to a stream it is a small table.

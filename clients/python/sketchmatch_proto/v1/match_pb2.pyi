@@ -218,7 +218,10 @@ global___MatchAccepted = MatchAccepted
 
 @typing.final
 class MatchScenes(google.protobuf.message.Message):
-    """What the segmenters found. All indices in later messages point into these scenes."""
+    """What the segmenters found. All indices in later messages point into these scenes. Where a segmenter
+    can cut a source otherwise, as `rooms` cuts a drawing coarser or finer, it is the cut that fits the
+    other side best, and need not be the one that `SceneService.Segment` returns.
+    """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -348,6 +351,7 @@ class MatchResult(google.protobuf.message.Message):
     AMBIGUITY_FIELD_NUMBER: builtins.int
     UNMATCHED_SKETCH_PROBABILITIES_FIELD_NUMBER: builtins.int
     PROVISIONAL_FIELD_NUMBER: builtins.int
+    OBJECT_GROUPS_FIELD_NUMBER: builtins.int
     match_id: builtins.str
     """Name of the match, as in `MatchAccepted`."""
     seed: builtins.int
@@ -436,6 +440,13 @@ class MatchResult(google.protobuf.message.Message):
         none where the sketch shows another place, either. Empty where nothing is known of probabilities.
         """
 
+    @property
+    def object_groups(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectGroup]:
+        """Where several objects of one side are, together, one of the other, as regions of a floor that a
+        person draws as one: which. At most one line of `object_matches` joins two of them; the others are
+        among the unmatched, as all that is said beside takes objects one by one.
+        """
+
     def __init__(
         self,
         *,
@@ -459,9 +470,10 @@ class MatchResult(google.protobuf.message.Message):
         ambiguity: global___Ambiguity | None = ...,
         unmatched_sketch_probabilities: collections.abc.Iterable[builtins.float] | None = ...,
         provisional: builtins.bool = ...,
+        object_groups: collections.abc.Iterable[global___ObjectGroup] | None = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["_place_probability", b"_place_probability", "_probability", b"_probability", "_upper_bound", b"_upper_bound", "ambiguity", b"ambiguity", "fmap_confidence", b"fmap_confidence", "place_probability", b"place_probability", "probability", b"probability", "statistics", b"statistics", "upper_bound", b"upper_bound"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_place_probability", b"_place_probability", "_probability", b"_probability", "_upper_bound", b"_upper_bound", "alternatives", b"alternatives", "ambiguity", b"ambiguity", "fmap_confidence", b"fmap_confidence", "fmap_entries", b"fmap_entries", "match_id", b"match_id", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence", "outcome", b"outcome", "place_probability", b"place_probability", "probability", b"probability", "provisional", b"provisional", "rotation_radians", b"rotation_radians", "scale", b"scale", "search_note", b"search_note", "seed", b"seed", "statistics", b"statistics", "unmatched_map_objects", b"unmatched_map_objects", "unmatched_sketch_objects", b"unmatched_sketch_objects", "unmatched_sketch_probabilities", b"unmatched_sketch_probabilities", "upper_bound", b"upper_bound"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["_place_probability", b"_place_probability", "_probability", b"_probability", "_upper_bound", b"_upper_bound", "alternatives", b"alternatives", "ambiguity", b"ambiguity", "fmap_confidence", b"fmap_confidence", "fmap_entries", b"fmap_entries", "match_id", b"match_id", "object_groups", b"object_groups", "object_matches", b"object_matches", "omap_confidence", b"omap_confidence", "outcome", b"outcome", "place_probability", b"place_probability", "probability", b"probability", "provisional", b"provisional", "rotation_radians", b"rotation_radians", "scale", b"scale", "search_note", b"search_note", "seed", b"seed", "statistics", b"statistics", "unmatched_map_objects", b"unmatched_map_objects", "unmatched_sketch_objects", b"unmatched_sketch_objects", "unmatched_sketch_probabilities", b"unmatched_sketch_probabilities", "upper_bound", b"upper_bound"]) -> None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_place_probability", b"_place_probability"]) -> typing.Literal["place_probability"] | None: ...
     @typing.overload
@@ -470,6 +482,40 @@ class MatchResult(google.protobuf.message.Message):
     def WhichOneof(self, oneof_group: typing.Literal["_upper_bound", b"_upper_bound"]) -> typing.Literal["upper_bound"] | None: ...
 
 global___MatchResult = MatchResult
+
+@typing.final
+class ObjectGroup(google.protobuf.message.Message):
+    """Several objects of one side, or of both, that are one place on the other."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    SKETCH_OBJECTS_FIELD_NUMBER: builtins.int
+    MAP_OBJECTS_FIELD_NUMBER: builtins.int
+    PROBABILITY_FIELD_NUMBER: builtins.int
+    probability: builtins.float
+    """How likely the sketch shows this place and these belong together, all of them taken for one
+    object, within [0, 1]. Absent where nothing is known of probabilities.
+    """
+    @property
+    def sketch_objects(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.int]:
+        """Indices in the sketch's scene, from 0, in order; at least one."""
+
+    @property
+    def map_objects(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.int]:
+        """Indices in the map's scene, from 0, in order; at least one."""
+
+    def __init__(
+        self,
+        *,
+        sketch_objects: collections.abc.Iterable[builtins.int] | None = ...,
+        map_objects: collections.abc.Iterable[builtins.int] | None = ...,
+        probability: builtins.float | None = ...,
+    ) -> None: ...
+    def HasField(self, field_name: typing.Literal["_probability", b"_probability", "probability", b"probability"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_probability", b"_probability", "map_objects", b"map_objects", "probability", b"probability", "sketch_objects", b"sketch_objects"]) -> None: ...
+    def WhichOneof(self, oneof_group: typing.Literal["_probability", b"_probability"]) -> typing.Literal["probability"] | None: ...
+
+global___ObjectGroup = ObjectGroup
 
 @typing.final
 class Ambiguity(google.protobuf.message.Message):

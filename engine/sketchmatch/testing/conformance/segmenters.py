@@ -45,14 +45,19 @@ def sources_are_known(algorithm: type[Any]) -> None:
 
 
 def scenes_are_found(algorithm: type[Any]) -> None:
-    """Return a Segmentation with a Scene, of a plain source of each type."""
+    """Return a Segmentation with a Scene, of a plain source of each type, and so each other cut."""
     for source in _samples(algorithm):
-        found = algorithm().segment(source)
-        fits = isinstance(found, Segmentation) and isinstance(found.scene, Scene)
-        require(fits, f"of {source.field}, it returned a {type(found).__name__}")
-        if found.route is not None:
-            shape = np.shape(found.route)
-            require(len(shape) == 2 and shape[1] == 2, f"the route has shape {shape}")
+        segmenter = algorithm()
+        for found in (segmenter.segment(source), *segmenter.other_cuts(source)):
+            fits = isinstance(found, Segmentation) and isinstance(found.scene, Scene)
+            require(fits, f"of {source.field}, it returned a {type(found).__name__}")
+            if found.route is not None:
+                shape = np.shape(found.route)
+                require(len(shape) == 2 and shape[1] == 2, f"the route has shape {shape}")
+            for pair in found.passages:
+                a, b = pair
+                fits = a != b and all(0 <= k < len(found.scene) for k in pair)
+                require(fits, f"of {source.field}, a passage joins {pair}")
 
 
 def warnings_are_sentences(algorithm: type[Any]) -> None:
