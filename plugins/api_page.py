@@ -6,11 +6,13 @@
 from __future__ import annotations
 
 import re
+from importlib import import_module
 from pathlib import Path
 
 from griffe2md import ConfigDict, render_package_docs
 
 from sketchmatch.cli.reference import markdown
+from sketchmatch.model.caching import cached_property
 
 __all__ = ["page"]
 
@@ -55,7 +57,22 @@ def _module(name: str) -> str:
     """Return what there is to say of a module, without links to what has no anchor, and roles."""
     text = render_package_docs(name, _OPTIONS)
     text = re.sub(r"\[([^][]+)\]\(#[^()]*\)", r"\1", text)
+    for value in sorted(_values(name)):  # which griffe takes for methods
+        text = re.sub(rf"^{value}\(\) -> ", f"{value}: ", text, flags=re.MULTILINE)
     return re.sub(r"::$", ":", markdown(text), flags=re.MULTILINE).rstrip() + "\n"
+
+
+def _values(name: str) -> set[str]:
+    """Return the names of what classes of a module compute once."""
+    members = [
+        each
+        for cls in vars(import_module(name)).values()
+        if isinstance(cls, type)
+        for each in vars(cls).values()
+    ]
+    return {
+        each.attrname for each in members if isinstance(each, cached_property) and each.attrname
+    }
 
 
 if __name__ == "__main__":

@@ -60,5 +60,7 @@ class SketchmatchConan(ConanFile):
     def package_info(self) -> None:
         """Say what to link."""
         self.cpp_info.libs = ["sketchmatch"]
-        self.cpp_info.set_property("cmake_target_name", "sketchmatch::sketchmatch")
+        # CMake finds the package by its own files, as everywhere.
+        self.cpp_info.set_property("cmake_find_mode", "none")
+        self.cpp_info.builddirs = ["lib/cmake/sketchmatch"]
         self.cpp_info.requires = ["grpc::grpc++", "protobuf::libprotobuf", "yaml-cpp::yaml-cpp"]
