@@ -40,6 +40,10 @@ _CLOSED = 1.5
 """How far regions that are one grow towards each other, by their distance."""
 
 
+_REST = 0.9
+"""Of what outlines do not have in common: what is left at most where regions are one."""
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """A match of one cut of either side.
@@ -97,8 +101,8 @@ def groups_of(
     """Return which regions of one side are, together, one of the other.
 
     Two regions that open into each other, of which one has no partner, are taken for one where that
-    has more of a partner's outline, more lines are expected to be right, and none is another: what
-    gains most comes first.
+    has clearly more of a partner's outline, more lines are expected to be right, and none is
+    another: what gains most comes first.
     """
     trials = _Trials(trial, clock, Phase.SEARCH)
     singles = tuple(tuple((k,) for k in range(len(side.scene))) for side in (fit.sketch, fit.map))
@@ -166,8 +170,8 @@ class _Joined:
     def joins(self) -> Iterator[tuple[_Parts, ...]]:
         """Yield the parts with two that open into each other as one, where that may be a partner.
 
-        It has more of the outline of the one's partner, or of an object without any where none of
-        the two has one, than each of the two.
+        It has clearly more of the outline of the one's partner, or of an object without any where
+        none of the two has one, than each of the two.
         """
         partners = self.fit.result.object_map
         known = (partners, {b: a for a, b in partners.items()})
@@ -179,8 +183,12 @@ class _Joined:
                 joined = tuple(sorted(self.parts[side][a] + self.parts[side][b]))
                 shape = _union([self.given[side].scene.objects[k] for k in joined]).polygon
                 if any(
-                    self._overlap(side, shape, k)
-                    > max(self._overlap(side, self._shape(side, each), k) for each in (a, b))
+                    1.0 - self._overlap(side, shape, k)
+                    < _REST
+                    * (
+                        1.0
+                        - max(self._overlap(side, self._shape(side, each), k) for each in (a, b))
+                    )
                     for k in ([of[a]] if a in of else [of[b]] if b in of else free)
                 ):
                     rest = [part for k, part in enumerate(self.parts[side]) if k not in (a, b)]

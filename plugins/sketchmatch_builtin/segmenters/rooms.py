@@ -103,10 +103,10 @@ class RoomSegmenter(Segmenter):
     87.1 %. Neither its other ten floors nor its smallest rooms are in ours. MAORIS [2]_ reports
     0.98 by Matthews' coefficient, on empty floors, which was not measured here.
 
-    Of 12 masks that people drew of one building from memory, matched with its plan, 76 of 82
+    Of 12 masks that people drew of one building from memory, matched with its plan, 75 of 82
     regions whose partners [2]_'s two annotators agree on have such a partner; of the lines and
     groups, counted with each annotator, 77 of 85 are right. In the half on which the cuts were
-    tuned it is 42 of 47 and 40 of 44, in the other 34 of 35 and 37 of 41. With one cut of either
+    tuned it is 41 of 47 and 40 of 44, in the other 34 of 35 and 37 of 41. With one cut of either
     side and no groups it is 36 of 48 and 36 of 44, and in the other half the same. Of the
     annotators' 117 sets of regions 77 are found: the others are mostly nooks that no cut parts.
 
