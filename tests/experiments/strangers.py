@@ -1,10 +1,10 @@
 """Sketches to check with what was learned: other places, and people who draw step by step.
 
 Nothing is learned from these but how often the right map is not known. What the study measures with
-is again made otherwise, by ``tests.experiments.generators``. A floor is divided
-again and again, and one thing stands in each part. Who draws it goes from each thing to the next,
-by how far and in which direction it is from one that is drawn already, so that errors add up on the
-way; and a size is remembered by how much larger the thing is than that one.
+is again made otherwise, by ``tests.experiments.generators``. A floor is divided again and again,
+and one thing stands in each part. Who draws it goes from each thing to the next, by how far and in
+which direction it is from one that is drawn already, so that errors add up on the way; and a size
+is remembered by how much larger the thing is than that one.
 """
 
 from __future__ import annotations

@@ -545,6 +545,16 @@ def test_a_sketch_is_known_by_its_maps_and_which_of_them_is_right():
     assert others >= 2
 
 
+def test_without_what_chance_achieves_the_same_is_known_of_maps():
+    draw = partial(crowd_drawing, uneven=True)
+    (whole,), (bare_one,) = known_of(3, draw), known_of(3, draw, chance=False)
+    assert whole.described.decoys
+    assert not bare_one.described.decoys
+    assert whole.right == bare_one.right
+    for one, other in zip(whole.described.measured, bare_one.described.measured, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 def test_other_places_count_more_where_a_sketch_shows_enough():
     def case(drawn, elsewhere):
         return Known(
