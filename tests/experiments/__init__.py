@@ -15,5 +15,6 @@ The thesis's figures, and so its scenes and sketches, are not available. What st
 - ``records``, ``tables``, ``plots``, ``claims``, ``examples``: what is read out of it all, and
   ``report``, a ``document`` of these;
 - ``regions``: rooms that people drew of a real building, merged or left out on real floors;
-- ``learn``: price and probabilities of the engine, from ``drawings`` that no table is made of.
+- ``learn``: price and probabilities of the engine, from ``drawings`` that no table is made of, and
+  what the judge goes by, from ``training``, ``halls``, a ``crowd`` and ``strangers``.
 """

@@ -1,6 +1,6 @@
 """What the engine knows of right and wrong maps, learned from sketches that no table is made of.
 
-Run it with ``python -m tests.experiments.learn``; it takes some minutes and writes
+Run it with ``python -m tests.experiments.learn``; it takes an hour or more and writes
 ``learned.json`` beside this file, from which the numbers of
 :mod:`sketchmatch_builtin.judges.calibration` are copied and the report tells how they were chosen,
 and ``posterior.json`` beside that module:
@@ -9,25 +9,33 @@ and ``posterior.json`` beside that module:
   has;
 - ``posterior``: what evidence counts for with the judge ``posterior``, by
   :mod:`tests.experiments.posterior`: first of places and maps, from few numbers of each line, then
-  of maps alone, from more of them and from more sketches of other kinds;
+  of maps alone, from more of them and from more sketches of other kinds, and last how likely the
+  right map is not known, from a crowd of all kinds;
 - and how well the probabilities of both hold on yet other sketches.
+
+``--sketches 50`` learns from so many of each kind, to try it, and ``--into`` writes into another
+folder. ``--kept`` names a folder for the sketches in numbers: who was interrupted goes on there.
 """
 
 from __future__ import annotations
 
+import argparse
 import itertools
 import json
-from collections.abc import Callable
+import pickle
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 from sketchmatch_builtin.judges import calibration
+from tests.experiments.crowd import crowd_drawing
 from tests.experiments.drawings import Drawing
 from tests.experiments.odds import considered_by, errors, learned_odds
 from tests.experiments.posterior import (
     Known,
+    doubting,
     gone_on,
     judged_errors,
     known_of,
@@ -35,6 +43,7 @@ from tests.experiments.posterior import (
     posterior_text,
 )
 from tests.experiments.runs import each_of
+from tests.experiments.strangers import stranger_drawing
 from tests.experiments.training import hall_drawing, inventive_drawing, training_drawing
 
 __all__ = ["LEARNED", "SKETCHES", "THESIS"]
@@ -48,20 +57,38 @@ JUDGE = Path(calibration.__file__).with_name("posterior.json")
 SKETCHES = {
     "odds": 600,
     "check": 600,
-    "posterior": 13000,
+    "training": 13000,
     "many": 300,
     "again": 1200,
     "halls": 2300,
     "inventive": 1500,
     "anything": 1500,
+    "crowd": 3800,
+    "uneven": 3400,
+    "strangers": 600,
+    "checked": 200,
 }
-"""How many there are; from ``again``, the first ones of ``posterior``, on it goes on with maps."""
+"""How many there are; of ``again``, the first ones of ``training``, to ``anything`` it goes on with
+maps, and from ``crowd`` on it learns to doubt; ``checked`` are further ``strangers``."""
+
+_KINDS: dict[str, Callable[[int], Drawing]] = {
+    "training": training_drawing,
+    "many": partial(training_drawing, many=True),
+    "halls": hall_drawing,
+    "inventive": inventive_drawing,
+    "anything": partial(inventive_drawing, anything=True),
+    "crowd": crowd_drawing,
+    "uneven": partial(crowd_drawing, uneven=True),
+    "strangers": stranger_drawing,
+}
+
+_OF_PLACES = ("training", "many", "strangers")
+"""Kinds of which some sketches are of other places."""
 
 _FEWEST = 4
 """How many objects a sketch has at least that is gone on with."""
 
-CHECKED = 1000
-"""Sketches beyond those for ``posterior`` that its probabilities are checked with."""
+_AT_ONCE = 200
 
 THESIS = (1.0, 1.0, 1.0)
 """The weights of the thesis."""
@@ -72,16 +99,25 @@ _FIRST_PRICE = 0.35
 _Case = TypeVar("_Case")
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Learn, print and write."""
-    found = {"sketches": SKETCHES, "odds": _odds(), "posterior": _posterior()}
-    text = json.dumps(found, indent=1, ensure_ascii=False)
-    LEARNED.write_text(text + "\n", encoding="utf-8")
+    parser = argparse.ArgumentParser("python -m tests.experiments.learn")
+    parser.add_argument("--sketches", type=int, help="at most so many of each kind")
+    parser.add_argument("--into", type=Path, help="a folder for both files")
+    parser.add_argument("--kept", type=Path, help="a folder for sketches in numbers")
+    given = parser.parse_args(arguments)
+    counts = {part: min(most, given.sketches or most) for part, most in SKETCHES.items()}
+    learned, judge = (given.into / path.name if given.into else path for path in (LEARNED, JUDGE))
+    odds = _odds(counts)
+    text, found = _posterior(counts, given.kept)
+    judge.write_text(text, encoding="utf-8")
+    every = {"sketches": counts, "odds": odds, "posterior": {"errors": found}}
+    learned.write_text(json.dumps(every, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def _odds() -> dict[str, Any]:
+def _odds(counts: dict[str, int]) -> dict[str, Any]:
     known, others = (
-        _all_of(partial(considered_by, THESIS, _FIRST_PRICE, part), part)
+        _all_of(partial(considered_by, THESIS, _FIRST_PRICE, part), part, counts[part])
         for part in ("odds", "check")
     )
     learned = learned_odds(known)
@@ -90,38 +126,47 @@ def _odds() -> dict[str, Any]:
     return found
 
 
-def _posterior() -> dict[str, Any]:
-    few, many = SKETCHES["posterior"], SKETCHES["many"]
-    lavish = partial(training_drawing, many=True)
-    first = learned_posterior(_known(range(few)) + _known(range(many), lavish))
-    learned = gone_on(first, further())
-    JUDGE.write_text(posterior_text(learned), encoding="utf-8")
-    found = judged_errors(_known(range(few, few + CHECKED)), learned)
+def _posterior(counts: dict[str, int], kept: Path | None) -> tuple[str, dict[str, float]]:
+    """Return what was learned, and its errors."""
+    of = {kind: _known(kind, range(counts[kind]), kept) for kind in _KINDS}
+    learned = learned_posterior([*of["training"], *of["many"]])
+    again = _known("training", range(counts["again"]), kept)
+    further = [*again, *of["halls"], *of["inventive"], *of["anything"]]
+    learned = gone_on(
+        learned, [each for each in further if not each.elsewhere and len(each.truth) >= _FEWEST]
+    )
+    learned = doubting(learned, [*of["crowd"], *of["uneven"]], of["strangers"])
+    others = counts["strangers"]
+    checked = _known("strangers", range(others, others + counts["checked"]), kept)
+    found = judged_errors(checked, learned)
     print(found)
-    return {"errors": found}
+    return posterior_text(learned), found
 
 
-def further() -> list[Known]:
-    """Return the sketches that are gone on with: of this place, and of enough to tell something."""
-    kinds: dict[str, Callable[[int], Drawing]] = {
-        "again": training_drawing,
-        "halls": hall_drawing,
-        "inventive": inventive_drawing,
-        "anything": partial(inventive_drawing, anything=True),
-    }
-    every = [each for kind, draw in kinds.items() for each in _known(range(SKETCHES[kind]), draw)]
-    return [each for each in every if not each.elsewhere and len(each.truth) >= _FEWEST]
-
-
-def _known(numbers: range, draw: Callable[[int], Drawing] = training_drawing) -> list[Known]:
+def _known(kind: str, numbers: range, kept: Path | None) -> list[Known]:
     """Return sketches in numbers, showing progress."""
-    every = each_of(partial(known_of, draw=draw), numbers, "sketches for posterior")
-    return list(itertools.chain.from_iterable(every))
+    parts = [numbers[k : k + _AT_ONCE] for k in range(0, len(numbers), _AT_ONCE)]
+    title = f"{kind}, {_AT_ONCE} at once"
+    return list(itertools.chain.from_iterable(each_of(partial(_some, kind, kept), parts, title)))
 
 
-def _all_of(do: Callable[[int], list[_Case]], part: str) -> list[_Case]:
+def _some(kind: str, kept: Path | None, numbers: range) -> list[Known]:
+    """Return some sketches in numbers; those that are kept are read."""
+    file = kept / f"{kind}-{numbers.start}-{numbers.stop}.pickle" if kept else None
+    if file and file.exists():
+        found: list[Known] = pickle.loads(file.read_bytes())
+        return found
+    chance = kind in _OF_PLACES
+    every = [known_of(number, _KINDS[kind], chance) for number in numbers]
+    found = list(itertools.chain.from_iterable(every))
+    if file:
+        file.write_bytes(pickle.dumps(found))
+    return found
+
+
+def _all_of(do: Callable[[int], list[_Case]], part: str, count: int) -> list[_Case]:
     """Return what is done with each sketch of a part, showing progress."""
-    every = each_of(do, range(SKETCHES[part]), f"sketches for {part}")
+    every = each_of(do, range(count), f"sketches for {part}")
     return list(itertools.chain.from_iterable(every))
 
 

@@ -13,13 +13,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 
 from sketchmatch.model import BoolArray, FloatArray, IntArray
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import default_registry
-from sketchmatch_builtin.alignment import Whole, sides_of
+from sketchmatch_builtin.alignment import Measured, Whole, sides_of
 from sketchmatch_builtin.histograms.constant import ConstantForce
 from sketchmatch_builtin.judges._described import described
 from sketchmatch_builtin.judges._evidence import (
@@ -42,7 +42,15 @@ from tests.experiments.networks import Case, fitted_maps, fitted_place
 from tests.experiments.reliability import reliability
 from tests.experiments.training import training_drawing
 
-__all__ = ["Known", "gone_on", "judged_errors", "known_of", "learned_posterior", "posterior_text"]
+__all__ = [
+    "Known",
+    "doubting",
+    "gone_on",
+    "judged_errors",
+    "known_of",
+    "learned_posterior",
+    "posterior_text",
+]
 
 _ENGINE = Engine(default_registry())
 
@@ -52,6 +60,9 @@ _UNRELATED = 0.3
 
 _OTHER_PLACES = 6.0
 """What a sketch of another place counts for: taking it for this one is the worse mistake."""
+
+_SHIFTS = -4.0, 4.0
+"""How far the odds of the right map's not being known may be shifted."""
 
 _LABELLED, _RIGHTLY, _WORDS = 0.7, 0.9, 0.5
 """How many objects have a label, how many of these the right one, and how many words there are for
@@ -80,36 +91,41 @@ class Known:
     truth: IntArray
 
 
-def known_of(number: int, draw: Callable[[int], Drawing] = training_drawing) -> list[Known]:
-    """Return a sketch in numbers: the one of that number, of a kind that somebody draws."""
+def known_of(
+    number: int, draw: Callable[[int], Drawing] = training_drawing, chance: bool = True
+) -> list[Known]:
+    """Return a sketch in numbers: the one of that number, of a kind that somebody draws.
+
+    Without what chance achieves, it tells nothing of places.
+    """
     drawn = draw(number)
     scenes = drawn.scene, drawn.map
     compared = finish(_ENGINE.compare(scenes, ConstantForce(), CrossCorrelation()))
     swapped = compared.swapped
     sides = sides_of(scenes[::-1] if swapped else scenes, swapped, None, None, None)
     try:
-        found = described(scenes, sides, compared.table)
+        found = described(scenes, sides, compared.table, chance=chance)
     except ValueError:  # nothing fits at all
         return []
     found = replace(
         found,
         maps=found.maps[:JUDGED],
-        measured=found.measured.at(slice(JUDGED)),
+        measured=_in_half_the_room(found.measured.at(slice(JUDGED))),
+        decoys=tuple(map(_in_half_the_room, found.decoys)),
     )
     right = np.flatnonzero((found.maps == drawn.truth).all(axis=1))
     elsewhere = bool((drawn.truth < 0).all())
     return [Known(found, int(right[0]) if len(right) else -1, elsewhere, drawn.truth)]
 
 
+def _in_half_the_room(measured: Measured) -> Measured:
+    lines, wholes = (each.astype(np.float32) for each in (measured.lines, measured.wholes))
+    return Measured(lines, wholes, measured.matched)
+
+
 def learned_posterior(cases: Sequence[Known]) -> Posterior:
     """Return what makes the truth likeliest."""
-    rng = np.random.default_rng(0)
-    told = [
-        replace(each, described=replace(each.described, related=False))
-        if rng.random() < _UNRELATED
-        else each
-        for each in cases
-    ]
+    told = _some_unrelated(cases)
     here = [each for each in told if not each.elsewhere]
     found = [each for each in here if each.right >= 0]
     # Each is learned from without relations too, since places are told by such worths.
@@ -119,20 +135,10 @@ def learned_posterior(cases: Sequence[Known]) -> Posterior:
     )
     layers = {True: maps, False: bare}
     labels = _labels(found, layers)
-    shares = [_shares(_worths(each, layers)) for each in here]
-    lost = _logit(
-        np.array(
-            [
-                lost_numbers(share, each.described.drawn, each.described.mapped)
-                for share, each in zip(shares, here, strict=True)
-            ]
-        ),
-        np.array([each.right < 0 for each in here], dtype=float),
-        np.ones(len(here)),
-    )
+    lost = _logit(_lost_numbers(here, layers), _unknown(here), np.ones(len(here)))
     luck = [
-        float((each.described.maps[share.argmax()] == each.truth).mean())
-        for share, each in zip(shares, here, strict=True)
+        float((each.described.maps[_worths(each, layers).argmax()] == each.truth).mean())
+        for each in here
         if each.right < 0
     ]
     place = _rounded_place(
@@ -157,6 +163,32 @@ def gone_on(first: Posterior, cases: Sequence[Known]) -> Posterior:
     maps = _rounded_layers(fitted_maps([_case(each, True) for each in found], start=first.maps))
     labels = _labels(found, {True: maps, False: first.bare})
     return first._replace(maps=maps, labels=_rounded(labels))
+
+
+def doubting(learned: Posterior, cases: Sequence[Known], others: Sequence[Known]) -> Posterior:
+    """Return what was learned, and how likely the right map is not known.
+
+    Parameters
+    ----------
+    learned
+        What maps are worth.
+    cases
+        Sketches of this place of very many kinds, from which is learned where that is likely.
+    others
+        Sketches of another kind, of which as many are lost as are expected to be.
+    """
+    layers = {True: learned.maps, False: learned.bare}
+    told, checked = (
+        _some_unrelated([each for each in some if not each.elsewhere]) for some in (cases, others)
+    )
+    lost = _logit(_lost_numbers(told, layers), _unknown(told), np.ones(len(told)))
+    odds, unknown = _lost_numbers(checked, layers) @ lost, _unknown(checked)
+
+    def loss(shift: float) -> float:
+        return float((np.logaddexp(0.0, odds + shift) - unknown * (odds + shift)).mean())
+
+    lost[0] += minimize_scalar(loss, bounds=_SHIFTS, method="bounded").x
+    return learned._replace(lost=_rounded(lost))
 
 
 def judged_errors(cases: Sequence[Known], learned: Posterior) -> dict[str, float]:
@@ -185,6 +217,31 @@ def judged_errors(cases: Sequence[Known], learned: Posterior) -> dict[str, float
             float(np.mean([here > 0.5 for here, ours in places if not ours])), 2
         ),
     }
+
+
+def _some_unrelated(cases: Sequence[Known]) -> list[Known]:
+    """Return sketches, of some of which no relations are known."""
+    rng = np.random.default_rng(0)
+    return [
+        replace(each, described=replace(each.described, related=False))
+        if rng.random() < _UNRELATED
+        else each
+        for each in cases
+    ]
+
+
+def _lost_numbers(cases: Sequence[Known], layers: dict[bool, Layers]) -> FloatArray:
+    values = [_worths(each, layers) for each in cases]
+    return np.array(
+        [
+            lost_numbers(each.described, _shares(of_maps), float(of_maps.max()))
+            for each, of_maps in zip(cases, values, strict=True)
+        ]
+    )
+
+
+def _unknown(cases: Sequence[Known]) -> FloatArray:
+    return np.array([each.right < 0 for each in cases], dtype=float)
 
 
 def _counts(case: Known) -> bool:

@@ -39,7 +39,7 @@ from tests.plugins.test_align import seen_as, sloppy, strewn
 from tests.searching import relations_of
 from tests.strategies import random_table
 
-OF_LINE, OF_BARE, OF_MAP, OF_SCENE, PLACE, LOST = 22, 9, 8, 3, 38, 5
+OF_LINE, OF_BARE, OF_MAP, OF_SCENE, PLACE, LOST = 22, 9, 8, 3, 38, 6
 
 
 def learned(rng=None, scale=0.3, width=3, score=1.0, constant=2.0, lost=-2.0, luck=0.4):
@@ -495,10 +495,11 @@ def test_what_was_learned_has_the_shapes_that_are_read(related):
     assert 0.0 < found.elsewhere < 1.0
 
 
-def test_whether_the_right_map_is_known_follows_from_the_best_share():
+def test_whether_the_right_map_is_known_follows_from_the_best_share_and_worth():
+    known = Described(np.array([[0, 1, 2, 3]]), scored(-1.0), (), 4, 10, True)
     np.testing.assert_allclose(
-        lost_numbers(np.array([0.2, 0.5, 0.3]), 4, 10),
-        [1.0, 4.0, math.log(10), math.log(0.5), 0.4],
+        lost_numbers(known, np.array([0.2, 0.5, 0.3]), -6.0),
+        [1.0, 4.0, math.log(10), math.log(0.5), 0.4, -1.5],
     )
 
 

@@ -1,6 +1,9 @@
 """What the judge ``posterior`` learns from, and that learning finds what is there."""
 
 import ast
+import json
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,15 +12,19 @@ import shapely
 from sketchmatch_builtin.alignment import Line, Measured, Whole
 from sketchmatch_builtin.judges._evidence import JUDGED, Described, weighed, worths
 from sketchmatch_builtin.judges.calibration import posterior_of
-from tests.experiments import halls, networks, posterior, training
+from tests.experiments import crowd, halls, learn, networks, posterior, strangers, training
+from tests.experiments.crowd import crowd_drawing
 from tests.experiments.networks import Case, fitted_place
 from tests.experiments.posterior import (
     Known,
+    doubting,
     gone_on,
     known_of,
     learned_posterior,
     posterior_text,
 )
+from tests.experiments.runs import each_of
+from tests.experiments.strangers import stranger_drawing
 from tests.experiments.training import hall_drawing, inventive_drawing, training_drawing
 from tests.tools import ROOT
 
@@ -161,6 +168,47 @@ def test_of_halls_and_of_the_inventive_the_truth_is_a_partial_map():
         assert set(extras) == {0, 1, 2}
 
 
+@pytest.mark.parametrize(
+    "draw",
+    [
+        crowd_drawing,
+        partial(crowd_drawing, uneven=True),
+        stranger_drawing,
+    ],
+)
+def test_of_the_crowd_and_of_strangers_the_truth_is_a_partial_map(draw):
+    drawings = [draw(number) for number in range(40)]
+    again = draw(7)
+    for one, two in zip(again.scene.objects, drawings[7].scene.objects, strict=True):
+        np.testing.assert_array_equal(one.rings[0], two.rings[0])
+    extras, elsewhere = set(), 0
+    for each in drawings:
+        assert each.truth.shape == (len(each.scene),)
+        assert each.truth.max() < len(each.map)
+        known = each.truth[each.truth >= 0]
+        assert len(set(known.tolist())) == len(known)
+        elsewhere += not len(known)
+        if len(known):
+            extras.add(len(each.truth) - len(known))
+        for scene in (each.scene, each.map):
+            outlines = [item.polygon for item in scene.objects]
+            assert not any(a.intersects(b) for k, a in enumerate(outlines) for b in outlines[:k])
+    assert extras >= {0, 1, 2}
+    assert 4 <= elsewhere <= 24 if draw is stranger_drawing else elsewhere == 0
+
+
+def test_the_crowd_is_wrong_about_places_by_what_no_pose_makes_good():
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        centres = rng.normal(0.0, 3.0, (9, 2))
+        wrong = crowd._wrong(centres, rng) @ [1.0, 1.0j]
+        z = centres @ [1.0, 1.0j]
+        z = z - z.mean()
+        assert abs(wrong.mean()) < 1e-9
+        assert abs(np.vdot(z, wrong)) < 1e-9 * np.linalg.norm(z)
+        assert 0.3 < np.sqrt(np.mean(abs(wrong) ** 2)) < 2.0  # ways to be wrong add up
+
+
 def test_of_what_is_like_anything_few_are_like_what_is_there():
     def corners(anything):
         rng = np.random.default_rng(0)
@@ -185,7 +233,7 @@ def test_a_simplified_outline_is_as_large(simple):
 
 
 def test_no_code_of_the_generators_that_measure_is_learned_from():
-    for module in (training, halls, posterior):
+    for module in (training, halls, crowd, strangers, posterior):
         text = (ROOT / "tests" / "experiments" / f"{module.__name__.split('.')[-1]}.py").read_text()
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.ImportFrom):
@@ -250,7 +298,7 @@ def test_what_was_learned_is_written_and_read_again():
         fitted_place(np.random.default_rng(0).normal(size=(9, 38)), np.arange(9) < 5, np.ones(9))
     )
     learned = posterior.Posterior(
-        layers, layers, place, np.array([1.0, -2.0]), np.arange(5.0), 0.25
+        layers, layers, place, np.array([1.0, -2.0]), np.arange(6.0), 0.25
     )
     text = posterior_text(learned)
     again = posterior_of(text)
@@ -318,6 +366,57 @@ def test_who_goes_on_learns_what_lines_are_beside_others():
     }
     assert told["first"] < 0.7
     assert told["found"] > 0.95
+
+
+def test_how_often_the_right_map_is_unknown_follows_from_what_the_best_is_worth():
+    rng = np.random.default_rng(0)
+    first = learned_posterior(made_up(rng, 60))
+
+    def lost_where_nothing_fits(count, missing):
+        """Return cases of this place whose right map is unknown where all lines deviate a lot."""
+        found = []
+        for each in made_up(rng, count, elsewhere=0.0):
+            lost = rng.random() < missing
+            each.described.measured.lines[:, :, Line.PLACE] *= 30.0 if lost else 1.0
+            found.append(replace(each, right=-1 if lost else max(each.right, 0)))
+        return found
+
+    def doubts(learned, cases, lost):
+        return np.mean(
+            [weighed(each.described, learned).lost for each in cases if (each.right < 0) == lost]
+        )
+
+    checked = lost_where_nothing_fits(150, 0.5)
+    often = doubting(first, lost_where_nothing_fits(300, 0.5), lost_where_nothing_fits(300, 0.5))
+    assert doubts(often, checked, True) > 0.8
+    assert doubts(often, checked, False) < 0.3
+    # Where fewer are lost, all are doubted less; in nothing else do they differ.
+    seldom = doubting(first, lost_where_nothing_fits(300, 0.5), lost_where_nothing_fits(300, 0.02))
+    assert seldom.lost[0] <= often.lost[0]
+    for before, after in ((first.maps, seldom.maps), (first.place, seldom.place)):
+        for one, other in zip(before, after, strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.slow
+def test_learning_runs_from_start_to_end_and_goes_on_where_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr(networks, "_EPOCHS", 2)
+    monkeypatch.setattr(learn, "each_of", partial(each_of, processes=1))
+    found = []
+    for into in ("one", "two"):
+        (tmp_path / into).mkdir()
+        (tmp_path / "kept").mkdir(exist_ok=True)
+        learn.main(
+            ["--sketches", "8", "--into", str(tmp_path / into), "--kept", str(tmp_path / "kept")]
+        )
+        found.append(
+            [(tmp_path / into / name).read_text() for name in ("learned.json", "posterior.json")]
+        )
+    assert found[0] == found[1]
+    learned = posterior_of(found[0][1])
+    assert learned.maps.of_lines.shape == (2, 22)
+    assert learned.lost.shape == (6,)
+    assert json.loads(found[0][0])["sketches"]["training"] == 8
 
 
 def test_slopes_of_maps_are_those_of_small_steps():
@@ -444,6 +543,16 @@ def test_a_sketch_is_known_by_its_maps_and_which_of_them_is_right():
                 assert not known.elsewhere
     assert rights >= 4
     assert others >= 2
+
+
+def test_without_what_chance_achieves_the_same_is_known_of_maps():
+    draw = partial(crowd_drawing, uneven=True)
+    (whole,), (bare_one,) = known_of(3, draw), known_of(3, draw, chance=False)
+    assert whole.described.decoys
+    assert not bare_one.described.decoys
+    assert whole.right == bare_one.right
+    for one, other in zip(whole.described.measured, bare_one.described.measured, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_other_places_count_more_where_a_sketch_shows_enough():

@@ -274,7 +274,7 @@ def weighed(known: Described, learned: Posterior, elsewhere: float | None = None
     shares = np.zeros(len(known.maps))
     shares[: len(values)] = np.exp(values + labels - (values + labels).max())
     shares /= shares.sum()
-    lost = float(lost_numbers(shares, known.drawn, known.mapped) @ learned.lost)
+    lost = float(lost_numbers(known, shares, float(values.max())) @ learned.lost)
     if elsewhere is None:
         elsewhere = _elsewhere(known, learned)
     return Weighed(shares, _logistic(lost), elsewhere)
@@ -289,10 +289,23 @@ def _elsewhere(known: Described, learned: Posterior) -> float:
     return _logistic(-here)
 
 
-def lost_numbers(shares: FloatArray, drawn: int, mapped: int) -> FloatArray:
-    """Return what says whether the right map is among those that are known."""
+def lost_numbers(known: Described, shares: FloatArray, best: float) -> FloatArray:
+    """Return what says whether the right map is among those that are known, shape (6,).
+
+    Parameters
+    ----------
+    known
+        The maps.
+    shares
+        How likely each is right if one of them is.
+    best
+        What the best is worth: where the right one is not known, none fits well.
+    """
+    drawn, mapped = known.drawn, known.mapped
     few = min(drawn, _MOST_DRAWN)
-    return np.array([1.0, few, math.log(mapped), math.log(shares.max()), drawn / mapped])
+    return np.array(
+        [1.0, few, math.log(mapped), math.log(shares.max()), drawn / mapped, best / drawn]
+    )
 
 
 def within(numbers: FloatArray, scaling: FloatArray) -> FloatArray:

@@ -147,7 +147,7 @@ class Posterior(NamedTuple):
     labels
         Shape (2,): what labels count for that mean the same, and that do not.
     lost
-        Shape (5,): what the numbers count for that say whether the right map is known.
+        Shape (6,): what the numbers count for that say whether the right map is known.
     luck
         As in :class:`Calibration`.
     """
