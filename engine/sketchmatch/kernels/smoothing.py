@@ -34,6 +34,7 @@ def pull_smooth(
 
     Examples
     --------
+    >>> import numpy as np
     >>> corner = np.array([[0.5, 0.5], [0.5, 2.5], [2.5, 2.5]])
     >>> pull_smooth(corner, np.ones((3, 3)), 0.5, 1, 4)
     >>> corner.tolist()
