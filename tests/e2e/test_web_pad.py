@@ -1085,7 +1085,7 @@ def test_it_speaks_german_to_who_asks_for_it(pad, visit):
     assert page.get_by_role("heading", name="Karte des Roboters").is_visible()
     page.get_by_test_id("open-settings").click()
     page.get_by_label("English").check()
-    assert page.get_by_role("heading", name="Robot's map").is_visible()
+    page.get_by_role("heading", name="Robot's map").wait_for()
 
 
 def test_a_server_that_wants_a_token_is_given_it(tmp_path, browser):

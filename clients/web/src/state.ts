@@ -414,7 +414,7 @@ export async function lookForStored(): Promise<void> {
     storedMaps.value = null;
     const { failure, message } = RequestFailed.from(thrown);
     // The answer's pane tells of a server that does not answer.
-    if (failure === "failed") storeTrouble.value = message;
+    if (failure === "store" || failure === "failed") storeTrouble.value = message;
   }
 }
 
@@ -582,7 +582,7 @@ export async function start(): Promise<void> {
 }
 
 /** Failures of a map that is not there, or not for whoever asks. */
-const FOR_OTHERS: ReadonlySet<string> = new Set(["gone", "invalid", "failed"]);
+const FOR_OTHERS: ReadonlySet<string> = new Set(["gone", "invalid", "store", "failed"]);
 
 async function mapped(map: string | PlaceMap): Promise<void> {
   if (typeof map !== "string") {
