@@ -674,15 +674,16 @@ def test_other_readings_are_paged_through(pad, visit):
     page = visit(pad)
     draw_kitchen(Hand(page))
     wait_for_answer(page, 6)
-    best = answer(page)
     reading = page.get_by_test_id("reading")
-    count = int(re.fullmatch(r"Reading 1 of (\d+)", reading.inner_text())[1])
-    assert count > 1
+    # The whole match, which comes a moment after the first answer, has readings of its own.
+    page.get_by_test_id("cancel").wait_for(state="detached")
+    reading.get_by_text(re.compile(r"^Reading 1 of ([2-9]|\d\d)$")).wait_for()
+    best = answer(page)
     page.get_by_role("button", name="Next reading").click()
-    reading.get_by_text(f"Reading 2 of {count}").wait_for()
+    reading.get_by_text(re.compile(r"^Reading 2 of ")).wait_for()
     assert answer(page) != best
     page.get_by_role("button", name="Previous reading").click()
-    reading.get_by_text(f"Reading 1 of {count}").wait_for()
+    reading.get_by_text(re.compile(r"^Reading 1 of ")).wait_for()
     assert answer(page) == best
 
 
