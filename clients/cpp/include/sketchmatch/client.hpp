@@ -167,8 +167,8 @@ class Client {
   [[nodiscard]] MatchRecord get_match(const std::string& match_id,
                                       const CallOptions& call = {}) const;
 
-  /// Stops a match of one's own, and returns how it is. One that has ended stays as it is, but one that
-  /// was interrupted is cancelled, and so not done again.
+  /// Stops a match of one's own, and returns how it is. One that has ended stays as it is, but one
+  /// that was interrupted is cancelled, and so not done again.
   /// @throws NotFoundError As `watch`.
   // Whoever cancels need not ask how the match ended.
   // NOLINTNEXTLINE(modernize-use-nodiscard)
