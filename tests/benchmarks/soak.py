@@ -97,8 +97,13 @@ class _Links:
 
     async def start(self) -> str:
         """Return the address at which callers find the server."""
-        listening = await asyncio.start_server(self._accept, "127.0.0.1", 0)
-        return f"127.0.0.1:{listening.sockets[0].getsockname()[1]}"
+        self._listening = await asyncio.start_server(self._accept, "127.0.0.1", 0)
+        return f"127.0.0.1:{self._listening.sockets[0].getsockname()[1]}"
+
+    def end(self) -> None:
+        """Pass on nothing more."""
+        self._listening.close()
+        self.cut()
 
     def cut(self) -> None:
         """Reset all links."""
@@ -106,16 +111,18 @@ class _Links:
             each.transport.abort()
 
     async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        try:
-            there, back = await asyncio.open_connection(self._host, self._port)
-        except OSError:
-            writer.transport.abort()
-            return
-        ends = {writer, back}
-        self._open |= ends
-        with suppress(asyncio.CancelledError):  # the soak is over, and streams would tell of it
-            await asyncio.gather(self._pass(reader, back), self._pass(there, writer))
-        self._open -= ends
+        ends = {writer}
+        # The server may be away, or the soak over, which streams would tell of.
+        with suppress(OSError, asyncio.CancelledError):
+            try:
+                there, back = await asyncio.open_connection(self._host, self._port)
+                ends.add(back)
+                self._open |= ends
+                await asyncio.gather(self._pass(reader, back), self._pass(there, writer))
+            finally:
+                self._open -= ends
+                for each in ends:
+                    each.transport.abort()
 
     async def _pass(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with suppress(OSError):
@@ -144,6 +151,7 @@ class _Soak:
         ends = time.monotonic() + seconds
         await self._used(seconds, sampling=True)
         assert time.monotonic() >= ends
+        self._links.end()
         await self._at_rest()
         self._judge()
 
