@@ -25,17 +25,17 @@ demo: $(VENV)/runtime
 	@$(BIN)/sketchmatch demo
 
 test: $(VENV)/dev
-	$(call says,lint and all tests but the slow ones,10 minutes)
+	$(call says,lint and all tests but the slow ones,5 minutes)
 	@$(MAKE) --no-print-directory lint
 	$(PYTEST) -m "not slow"
 
 test-slow: $(VENV)/dev
-	$(call says,the slow tests,40 minutes)
+	$(call says,the slow tests,25 minutes)
 	$(PYTEST) -m slow
 
 # With examples that no run had before; the others draw the same ones each time.
 test-all: $(VENV)/dev
-	$(call says,lint and all tests,50 minutes)
+	$(call says,lint and all tests,30 minutes)
 	@$(MAKE) --no-print-directory lint
 	$(PYTEST) --hypothesis-profile new
 
