@@ -32,7 +32,7 @@ from sketchmatch_client._channel import (
 from sketchmatch_client._course import Course, watched
 from sketchmatch_client._match import Match, MatchCollector, ProgressCallback, tell_progress
 from sketchmatch_client._requests import MatchOptions, match_request, segment_request
-from sketchmatch_client._retry import Attempts, checked_retries
+from sketchmatch_client._retry import Attempts, Counted, checked_retries
 from sketchmatch_client._sketch import AsyncSketch, create_request
 from sketchmatch_client._transfer import TransferOptions, transfer_request
 from sketchmatch_client.errors import (
@@ -253,17 +253,11 @@ class AsyncClient:
 
     async def delete_scene(self, name: str, *, timeout: float | None = None) -> None:
         """Forget a scene; it stays for others who have put it."""
-        sent = 0
-
-        def delete(*request: Any, **options: Any) -> Any:
-            nonlocal sent
-            sent += 1
-            return self._keeping.DeleteScene(*request, **options)
-
+        deletion = Counted(self._keeping.DeleteScene)
         try:
-            await self._asked(delete, _scenes.delete_request(name), timeout)
+            await self._asked(deletion, _scenes.delete_request(name), timeout)
         except NotFoundError:
-            if sent == 1:
+            if deletion.asked == 1:
                 raise
             # It is gone by a request whose answer was lost.
 

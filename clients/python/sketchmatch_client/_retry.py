@@ -6,6 +6,8 @@ import math
 import random
 import reprlib
 import time
+from collections.abc import Callable
+from typing import Any
 
 from sketchmatch_client._channel import within
 from sketchmatch_client.errors import (
@@ -15,7 +17,7 @@ from sketchmatch_client.errors import (
     SketchmatchError,
 )
 
-__all__ = ["Attempts", "checked_retries"]
+__all__ = ["Attempts", "Counted", "checked_retries"]
 
 _SHORTEST = 0.1
 _LONGEST = 5.0
@@ -73,6 +75,25 @@ class Attempts:
     def succeeded(self) -> None:
         """Hear that the server answers."""
         self._backoff, self._gives_up = _SHORTEST, math.inf
+
+
+class Counted:
+    """A method of the server that knows how often it was asked.
+
+    Parameters
+    ----------
+    method
+        The method.
+    """
+
+    def __init__(self, method: Callable[..., Any]) -> None:
+        self._method = method
+        self.asked = 0
+
+    def __call__(self, *request: Any, **options: Any) -> Any:
+        """Ask it."""
+        self.asked += 1
+        return self._method(*request, **options)
 
 
 def checked_retries(retries: int) -> int:

@@ -39,7 +39,6 @@ _MOST = 60
 _CLOSED = 1.5
 """How far regions that are one grow towards each other, by their distance."""
 
-
 _REST = 0.9
 """Of what outlines do not have in common: what is left at most where regions are one."""
 
@@ -182,18 +181,18 @@ class _Joined:
                     continue
                 joined = tuple(sorted(self.parts[side][a] + self.parts[side][b]))
                 shape = _union([self.given[side].scene.objects[k] for k in joined]).polygon
-                if any(
-                    1.0 - self._overlap(side, shape, k)
-                    < _REST
-                    * (
-                        1.0
-                        - max(self._overlap(side, self._shape(side, each), k) for each in (a, b))
-                    )
-                    for k in ([of[a]] if a in of else [of[b]] if b in of else free)
-                ):
+                others = [of[a]] if a in of else [of[b]] if b in of else free
+                if any(self._fits_better(side, shape, (a, b), other) for other in others):
                     rest = [part for k, part in enumerate(self.parts[side]) if k not in (a, b)]
                     fewer = tuple(sorted([*rest, joined]))
                     yield (*self.parts[:side], fewer, *self.parts[side + 1 :])
+
+    def _fits_better(
+        self, side: int, joined: shapely.Polygon, apart: tuple[int, int], other: int
+    ) -> bool:
+        """Whether two as one have clearly more in common with an object than each of them has."""
+        single = max(self._overlap(side, self._shape(side, each), other) for each in apart)
+        return 1.0 - self._overlap(side, joined, other) < _REST * (1.0 - single)
 
     def _doors(self, side: int) -> list[tuple[int, int]]:
         """Return which objects of a side open into each other."""
