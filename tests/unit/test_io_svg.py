@@ -150,6 +150,24 @@ def test_a_document_type_without_definitions_is_harmless():
     assert len(decode_svg(document).strokes) == 1
 
 
+def test_the_entities_with_which_illustrator_names_things_are_words():
+    document = """<?xml version="1.0" encoding="utf-8"?>
+<!-- Generator: Adobe Illustrator 16.0.0, SVG Export Plug-In . SVG Version: 6.00 Build 0)  -->
+<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd" [
+  <!ENTITY ns_extend "http://ns.adobe.com/Extensibility/1.0/">
+  <!ENTITY ns_svg "http://www.w3.org/2000/svg">
+  <!ENTITY st0 "fill:none;stroke:#000000;">
+]>
+<svg xmlns:x="&ns_extend;" xmlns="&ns_svg;" width="9" height="9">
+  <switch>
+    <foreignObject requiredExtensions="&ns_extend;" width="1" height="1"/>
+    <g x:extraneous="self"><path id="desk" style="&st0;" d="M1 1h2v2"/></g>
+  </switch>
+</svg>"""
+    (stroke,) = decode_svg(document.encode()).strokes
+    assert (stroke.label, stroke.points.tolist()) == ("desk", [[1, -1], [3, -1], [3, -3]])
+
+
 def laughs(depth):
     """Entities that grow tenfold with each level."""
     return "".join(f'<!ENTITY l{k} "' + f"&l{k - 1};" * 10 + '">' for k in range(1, depth + 1))
@@ -176,12 +194,33 @@ def uses(depth):
             "INVALID_FILE",
             "entities",
         ),
+        ('<!DOCTYPE s [<!ENTITY % x "a">]><svg/>', "INVALID_FILE", "entities"),
+        ('<!DOCTYPE s [<!ATTLIST rect width CDATA "9">]><svg/>', "INVALID_FILE", "DTD of its own"),
+        ('<!DOCTYPE s [<!ENTITY x "<g/>">]><svg>&x;</svg>', "INVALID_FILE", "entities"),
+        (f'<!DOCTYPE s [<!ENTITY x "{"a" * 1001}">]><svg>&x;</svg>', "INVALID_FILE", "entities"),
+        (
+            f'<!DOCTYPE s [<!ENTITY x "{"a" * 1000}">]><svg>{"&x;" * 8389}</svg>',
+            "INVALID_FILE",
+            "its entities 8389 times",
+        ),
         (f"<svg>{uses(9)}</svg>", "LIMIT_EXCEEDED", "the limit of 100000 elements"),
         ('<svg><g id="a"><use href="#a"/><use href="#a"/></g></svg>', "LIMIT_EXCEEDED", "elements"),
         ("<svg>" + "<g>" * 250 + "</g>" * 250 + "</svg>", "INVALID_FILE", "the limit of 200"),
         ("<svg>" + "<g>" * 100_000, "INVALID_FILE", "the limit of 200"),
     ],
-    ids=["laughs", "external", "use bomb", "use loop", "deep", "deep and open"],
+    ids=[
+        "laughs",
+        "external",
+        "parameter",
+        "defaults",
+        "element",
+        "long",
+        "repeated",
+        "use bomb",
+        "use loop",
+        "deep",
+        "deep and open",
+    ],
 )
 def test_documents_meant_to_harm_are_refused(document, reason, words):
     with pytest.raises(InvalidInputError, match=words) as caught:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, NoReturn
 from xml.etree import ElementTree
 from xml.parsers import expat
 
@@ -33,6 +33,8 @@ _VALUES_OF_ELEMENT = 4
 _DEEPEST = 200
 _LONGEST_CAUSE = 100
 _LISTED = 6
+# Characters of an entity, and of all that stands in the place of entities.
+_LONGEST_WORD, _MOST_REPLACED = 1000, 8 << 20
 
 
 def decode_text(data: bytes) -> str:
@@ -85,7 +87,10 @@ def check_values(text: str) -> None:
 def load_xml(
     data: bytes, kind: str = "XML", watch: Callable[[Mapping[str, str], int], None] | None = None
 ) -> ElementTree.Element:
-    """Parse XML without entities of its own, of no more elements and numbers than are allowed.
+    """Parse XML of no more elements and numbers than are allowed, and no entities but short words.
+
+    Illustrator names its namespaces by entities. Those that stand for other elements or entities,
+    or for files, are none that a drawing needs, and how documents are made to explode.
 
     Parameters
     ----------
@@ -101,15 +106,22 @@ def load_xml(
     Raises
     ------
     InvalidInputError
-        If it is not XML, defines entities, is nested too deeply or too large.
+        If it is not XML, defines anything but short words, is nested too deeply or too large.
     """
     depth, see = 0, watch or _counting()
+    references = data.count(b"&")
 
-    def doctype(_name: str, _system: str | None, _public: str | None, subset: int) -> None:
-        if subset:
-            raise _refused(
-                f"defines entities or a DTD of its own; save it as plain {kind} without them"
-            )
+    def entity(_name: str, parameter: bool, value: str | None, *_where: str | None) -> None:
+        if parameter or value is None or len(value) > _LONGEST_WORD or set("&<%") & set(value):
+            defined()
+        if references * len(value) > _MOST_REPLACED:
+            raise _refused(f"uses its entities {references} times; save it as plain {kind}")
+
+    def defined(*_declaration: object) -> NoReturn:
+        raise _refused(
+            "defines entities other than short words, or a DTD of its own; "
+            f"save it as plain {kind} without them"
+        )
 
     def start(_name: str, attributes: dict[str, str]) -> None:
         nonlocal depth
@@ -123,7 +135,8 @@ def load_xml(
         depth -= 1
 
     parser = expat.ParserCreate()
-    parser.StartDoctypeDeclHandler = doctype
+    parser.EntityDeclHandler = entity
+    parser.AttlistDeclHandler = parser.ElementDeclHandler = parser.NotationDeclHandler = defined
     parser.StartElementHandler = start
     parser.EndElementHandler = end
     try:

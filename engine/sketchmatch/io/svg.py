@@ -23,7 +23,8 @@ which Excalidraw draws one, its hatching or filling first, the last: the outline
 which is drawn twice. A pen stroke that was exported as the outline of its ink becomes the line
 again (:mod:`sketchmatch.io._svg_ink`).
 
-Nothing outside the document is ever opened, and a document that defines entities is refused.
+Nothing outside the document is ever opened. Entities may be short words, as Illustrator's are; a
+document that defines others is refused.
 """
 
 from __future__ import annotations
@@ -96,8 +97,8 @@ def decode_svg(data: bytes) -> StrokeSet:
     Raises
     ------
     InvalidInputError
-        If it is not SVG, defines entities, is too large or nested too deeply, has nothing drawn
-        in it, uses what cannot be followed, or a shape cannot be read; then its path is
+        If it is not SVG, defines entities that are no words, is too large or nested too deeply,
+        has nothing drawn in it, uses what cannot be followed, or a shape cannot be read; then its path is
         ``shapes[k]``, counted from 0. What is too large
         :func:`sketchmatch.model.limits.source_limits` says.
 
