@@ -47,16 +47,37 @@ def test_closed_polylines_are_objects_in_metres_and_open_ones_are_left_out(drawi
     space.add_lwpolyline([*SQUARE, SQUARE[0]])
     space.add_polyline2d(SQUARE, close=True)
     space.add_lwpolyline(SQUARE)
-    space.add_line((0, 0), (9, 9))
+    space.add_line((500, 0), (509, 9))
     found = read(drawing)
     assert [polygon.label for polygon in found.polygons] == ["FURN", "", ""]
     assert [area(polygon) for polygon in found.polygons] == pytest.approx([2.0] * 3)
     assert found.polygons[0].rings[0].max(axis=0).tolist() == [2.0, 1.0]
     assert found.notes == (
         "The objects are on several layers, of which FILE#LAYER,… chooses some: 0 (2), FURN (1).",
-        "Left out because they enclose no area or are no objects: open or empty lines (1), "
-        "elements of type LINE (1).",
+        "Left out because they enclose no area or are no objects: open or empty lines (2).",
     )
+
+
+def test_lines_and_arcs_that_meet_all_around_are_an_object_of_their_layer(drawing):
+    space = drawing.modelspace()
+    space.add_line((2000, 0), (0, 0))
+    space.add_line((2000.0000004, 0), (2000, 1000))
+    space.add_arc((1000, 1000), 1000, 0, 180)
+    space.add_lwpolyline([(0, 1000), (0, 300), (0, 0)])
+    table = {"layer": "FURN"}
+    corners = [(5000, 0), (6000, 0), (6000, 1000), (5000, 1000)]
+    for k in range(4):
+        space.add_line(corners[k], corners[k - 1], dxfattribs=table)
+    space.add_line((5000, 0), (4000, 0), dxfattribs=table)  # a leg of it
+    for k in range(3):
+        space.add_line((9000, k * 1000), (9000, k * 1000 + 999))  # gaps of a millimetre
+    space.add_line((20000, 0), (21000, 0))
+    space.add_line((21000, 0), (20000, 0))  # drawn twice
+    found = read(drawing)
+    assert [polygon.label for polygon in found.polygons] == ["", "FURN"]
+    sizes = [area(polygon) for polygon in found.polygons]
+    assert sizes == pytest.approx([2.0 + np.pi / 2, 1.0], rel=1e-3)
+    assert found.notes[1].endswith("no objects: open or empty lines (5).")
 
 
 def test_bulges_circles_ellipses_and_splines_are_as_large_as_they_are(drawing):

@@ -36,11 +36,14 @@ _COMPARED = 20
 _DEEPEST = 50
 # From this share of its convex hull on a block is what its closed shapes cover.
 _FILLED = 0.5
+# Ends of lines within this share of all lines of the layer are one place.
+_JOINED = 1e-5
 # Two areas that share this much are one, drawn as an outline and as a hatch.
 _SAME = 0.95
 _CLOSED = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE"}
 _HATCHES = {"HATCH", "MPOLYGON"}
-_LINES_OF_BLOCKS = {*_CLOSED, "LINE", "ARC", "SOLID", "TRACE", "3DFACE"}
+_PIECES = {"LINE", "ARC"}
+_LINES_OF_BLOCKS = {*_CLOSED, *_PIECES, "SOLID", "TRACE", "3DFACE"}
 _TEXTS = {"TEXT", "MTEXT"}
 _NAMING = ("NAME", "LABEL")
 _BINARY = b"AutoCAD Binary DXF"
@@ -59,8 +62,9 @@ class DxfReader(Reader):
     """Reads the closed shapes and the inserted blocks of a drawing, in metres.
 
     Closed polylines with their arcs, circles, ellipses, closed splines and hatches are objects, and
-    so is each insert of a block: what its closed shapes cover, or the convex hull of all its lines
-    where that is little. A hatch in an outline of its own is one object. The model space is read,
+    so are lines, arcs and open curves of a layer that meet end to end all around an area, and each
+    insert of a block: what its closed shapes cover, or the convex hull of all its lines where that
+    is little. A hatch in an outline of its own is one object. The model space is read,
     and in it the layers that are switched on, or those named as in ``plan.dxf#FURNITURE,DOORS``.
     The name of an object is the text in it, or else that of its block, or else of its layer. Where
     the drawing says its unit (``$INSUNITS``), lengths become metres.
@@ -177,6 +181,7 @@ def _metres(drawing: Any) -> tuple[float, tuple[str, ...]]:
 
 def _shapes(drawing: Any, entities: Iterable[Any], left_out: Counter[str]) -> Iterator[_Shape]:
     sizes = _Sizes(drawing)
+    pieces: dict[str, list[FloatArray]] = {}
     for each in entities:
         kind, layer = each.dxftype(), each.dxf.get("layer", "0")
         if kind == "INSERT":
@@ -187,14 +192,41 @@ def _shapes(drawing: Any, entities: Iterable[Any], left_out: Counter[str]) -> It
                     left_out["empty blocks"] += 1
                 else:
                     yield _Shape(area, _block_name(each), layer, False)
-        elif kind in _HATCHES or kind in _CLOSED:
+        elif kind in _HATCHES or kind in _CLOSED or kind in _PIECES:
             area = _area(each)
-            if area is None:
+            if area is not None:
+                yield _Shape(area, "", layer, kind in _HATCHES)
+            elif kind in _HATCHES or not len(points := _points(each)):
                 left_out["open or empty lines"] += 1
             else:
-                yield _Shape(area, "", layer, kind in _HATCHES)
+                pieces.setdefault(layer, []).append(points)
         elif kind not in _TEXTS:
             left_out[f"elements of type {kind[:40]}"] += 1
+    for layer, lines in pieces.items():
+        loops, rest = _loops(lines)
+        left_out["open or empty lines"] += rest
+        yield from (_Shape(area, "", layer, False) for area in loops)
+
+
+def _loops(lines: list[FloatArray]) -> tuple[list[Any], int]:
+    """Return the areas around which lines go end to end, and how many other lines they make."""
+    lines = [within_reach(line) for line in lines]
+    grid = _JOINED * float(np.ptp(np.concatenate(lines), axis=0).max())
+    # Only ends that are equal are joined.
+    met = [np.concatenate([line[:1], line[-1:]]) for line in lines]
+    ends = np.round(np.array(met) / grid) * grid
+    chains = shapely.line_merge(
+        shapely.MultiLineString(
+            [
+                np.concatenate([end[:1], line[1:-1], end[1:]])
+                for line, end in zip(lines, ends, strict=True)
+            ]
+        )
+    )
+    parts = shapely.get_parts(chains)
+    areas = [area_within(shapely.get_coordinates(part)) for part in parts[shapely.is_closed(parts)]]
+    loops = [area for area in areas if area.area > 0.0]
+    return loops, len(parts) - len(loops)
 
 
 def _single(insert: Any) -> Iterator[Any]:
