@@ -390,29 +390,22 @@ def test_the_assignment_is_the_cheapest_and_its_reduced_costs_are_a_proof(rows, 
         assert total >= found + sum(reduced[k, c] for k, c in enumerate(p)) - 1e-12
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_no_map_of_a_cell_loses_less_than_its_costs(seed):
+def test_no_map_of_a_cell_loses_less_than_its_costs():
     """The bound of a cell, entry by entry, against ζ of every map that belongs to it."""
-    rng = np.random.default_rng(seed)
-    table = random_table(rng, 4, 5)
-    weights = WEIGHTS[seed % len(WEIGHTS)]
-    every = every_confidence(table, weights)
-    first = next(iter(every))
-    incumbent = every[first]
-    relations, spread = relations_of(table, weights)
-    box = some_box(rng)
-    terms = _cells.cell_terms(relations, incumbent, spread, box)
     belonging = 0
-    for partners, value in every.items():
-        if value > incumbent and belongs(table, partners, box):
-            belonging += 1
-            loss = terms.base + sum(_costs(relations, terms, partners))
-            assert 1.0 - value >= loss - 1e-12
-    test_no_map_of_a_cell_loses_less_than_its_costs.belonging += belonging
-
-
-test_no_map_of_a_cell_loses_less_than_its_costs.belonging = 0
-
-
-def test_cells_had_maps():
-    assert test_no_map_of_a_cell_loses_less_than_its_costs.belonging > 20
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        table = random_table(rng, 4, 5)
+        weights = WEIGHTS[seed % len(WEIGHTS)]
+        every = every_confidence(table, weights)
+        first = next(iter(every))
+        incumbent = every[first]
+        relations, spread = relations_of(table, weights)
+        box = some_box(rng)
+        terms = _cells.cell_terms(relations, incumbent, spread, box)
+        for partners, value in every.items():
+            if value > incumbent and belongs(table, partners, box):
+                belonging += 1
+                loss = terms.base + sum(_costs(relations, terms, partners))
+                assert 1.0 - value >= loss - 1e-12, seed
+    assert belonging > 20
