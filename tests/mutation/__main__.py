@@ -83,10 +83,10 @@ def _try_all(cases: list[Case], jobs: int, known: dict[str, bool]) -> dict[str, 
         for k in range(jobs if left else 0):
             copies.put(Copy(Path(folder) / str(k)))
 
-        def attempt(module: Module, mutant: Mutant) -> bool:
+        def attempt(module: Module, mutant: Mutant) -> str | None:
             copy = copies.get()
             try:
-                return copy.kills(module, mutant.applied(module.source))
+                return copy.killer(module, mutant.applied(module.source))
             finally:
                 copies.put(copy)
 
@@ -94,11 +94,12 @@ def _try_all(cases: list[Case], jobs: int, known: dict[str, bool]) -> dict[str, 
         try:
             for count, future in enumerate(as_completed(futures), 1):
                 name = futures[future][1].name
-                killed[name] = future.result()
-                line = {"key": keys[name], "name": name, "killed": killed[name]}
+                killer = future.result()
+                killed[name] = killer is not None
+                line = {"key": keys[name], "name": name, "killed": killed[name], "by": killer}
                 with RESULTS.open("a", encoding="utf-8") as file:
                     print(json.dumps(line, ensure_ascii=False), file=file)
-                word = "killed" if killed[name] else "SURVIVED"
+                word = f"killed by {killer}:" if killed[name] else "SURVIVED"
                 print(f"{count}/{len(left)} {word} {name}", flush=True)
         except BaseException:
             pool.shutdown(cancel_futures=True)
