@@ -63,7 +63,7 @@ _GROUPS = {
             "_backtrack": _EXACT,
             "_branch": _EXACT,
             "_cells": _EXACT,
-            "_evolution": "plugins/test_easm",
+            "_evolution": "plugins/test_easm_steps plugins/test_easm",
             "_fixed": _EXACT,
             "_growers": "plugins/test_fsnn_pso",
             "_memetic": "plugins/test_direct",

@@ -33,8 +33,17 @@ class Copy:
             elif source.exists():
                 shutil.copy2(source, target)
 
-    def killer(self, module: Module, text: str) -> str | None:
+    def killer(
+        self, module: Module, text: str, rounds: tuple[bool, ...] | None = None
+    ) -> str | None:
         """Return the test that fails, or hangs, where a module has another text; None if all pass.
+
+        Parameters
+        ----------
+        module, text
+            What is changed, and into what.
+        rounds
+            Of each round whether kernels are interpreted; all of the module's where it is left out.
 
         Raises
         ------
@@ -42,7 +51,7 @@ class Copy:
             If a test fails without any change.
         """
         before: list[Path] = []
-        for interpreted in module.interpreted:
+        for interpreted in rounds or module.interpreted:
             name = "-".join((str(interpreted), *(Path(path).stem for path in module.tests)))
             times = [self.folder / f"{name}.json", *before]
             self._measure(module, interpreted, times)
