@@ -66,7 +66,7 @@ _GROUPS = {
             "_evolution": "plugins/test_easm_steps plugins/test_easm",
             "_fixed": _EXACT,
             "_growers": "plugins/test_fsnn_pso",
-            "_memetic": "plugins/test_direct",
+            "_memetic": "plugins/test_direct_steps plugins/test_direct",
             "_moves": "plugins/test_direct",
             "_neighbours": "plugins/test_nn plugins/test_nn_pso plugins/test_fsnn_pso",
             "_ranking": f"plugins/test_direct {_EXACT}",
