@@ -67,7 +67,7 @@ _GROUPS = {
             "_fixed": _EXACT,
             "_growers": "plugins/test_fsnn_pso",
             "_memetic": "plugins/test_direct_steps plugins/test_direct",
-            "_moves": "plugins/test_direct",
+            "_moves": "plugins/test_direct_steps plugins/test_direct",
             "_neighbours": "plugins/test_nn plugins/test_nn_pso plugins/test_fsnn_pso",
             "_ranking": f"plugins/test_direct {_EXACT}",
             "_relations": _EXACT,
@@ -108,8 +108,8 @@ _GROUPS = {
 }
 
 _COMPILED = {"_jit"}
-_ROUNDS = {"kernels": (True,), "searchers": (True, False)}
-"""Of groups whose modules hold kernels, how their tests run."""
+_ROUNDS = {"kernels": (True,), "searchers": (True, False), "alignment": (True, False)}
+"""Of groups whose tests run interpreted, at first or always; others run compiled."""
 
 
 @dataclass(frozen=True)
@@ -151,9 +151,7 @@ def modules() -> list[Module]:
             path, text = file.relative_to(ROOT).as_posix(), file.read_text(encoding="utf-8")
             if ">>>" in text:
                 tests.insert(0, path)
-            interpreted = (False,)
-            if "@kernel" in text or (group == "kernels" and file.stem not in _COMPILED):
-                interpreted = _ROUNDS.get(group, interpreted)
+            interpreted = (False,) if file.stem in _COMPILED else _ROUNDS.get(group, (False,))
             if file.stem != "__init__":
                 found.append(Module(group, path, tuple(tests), interpreted))
     return found

@@ -18,8 +18,8 @@ from hypothesis import Phase, settings
 
 from tests.interpreted import INTERPRETED
 
-_QUICK = 2.0
-_QUICK_IN_ALL = 40.0
+_QUICK = 0.7
+_QUICK_IN_ALL = 15.0
 _LEAST_LIMIT = 5.0 if INTERPRETED else 60.0  # kernels compile in between
 _PATIENCE = 5.0
 

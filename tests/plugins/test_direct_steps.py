@@ -8,10 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sketchmatch.api.kernels import empty_map_state
+from sketchmatch.api.kernels import empty_map_state, place_map
 from sketchmatch.model import DILATION_SCALE, RelationTable, object_pairs
 from sketchmatch_builtin.searchers import _memetic as steps
-from sketchmatch_builtin.searchers._moves import empty_moves, read_relations
+from sketchmatch_builtin.searchers._moves import (
+    empty_moves,
+    read_relations,
+    renew_moves,
+    weigh_moves,
+)
 from tests.oracle import maps as oracle
 from tests.searching import geometric_table
 from tests.strategies import random_table
@@ -115,3 +120,18 @@ def test_rotation_and_level_of_a_map_are_those_of_its_entries(seed, objects):
     assert np.exp(1j * rotation) == pytest.approx(whole / abs(whole), abs=1e-9)
     levels = [DILATION_SCALE * np.log(dilation) for _, _, dilation in entries]
     assert level == pytest.approx(np.mean(levels), abs=1e-9)
+
+
+@pytest.mark.parametrize("weights", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (2.0, 1.0, 0.0)])
+def test_where_dilation_counts_for_nothing_only_moves_above_a_threshold_are_evaluated(weights):
+    evaluated = above = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        table = random_table(rng, 5, 6)
+        state, moves, _ = read(table, weights)
+        threshold = place_map(state, rng.permutation(6)[:5])
+        renew_moves(state, moves)
+        for a in range(5):
+            evaluated += weigh_moves(state, moves, a, threshold)
+            above += (moves.values >= 0.0).sum()
+    assert evaluated == above > 100
