@@ -71,7 +71,7 @@ def _known(survivors_again: bool) -> Iterator[tuple[str, bool]]:
             yield result["name"], True
 
 
-def _try_all(cases: list[Case], jobs: int, known: dict[str, bool]) -> dict[str, bool]:
+def _try_all(cases: list[Case], jobs: int, known: dict[str, bool], quick: bool) -> dict[str, bool]:
     """Return of each mutant, by name, whether a test killed it."""
     keys = {mutant.name: _key(module, mutant) for module, mutant in cases}
     killed = {
@@ -83,10 +83,11 @@ def _try_all(cases: list[Case], jobs: int, known: dict[str, bool]) -> dict[str, 
         for k in range(jobs if left else 0):
             copies.put(Copy(Path(folder) / str(k)))
 
-        def attempt(module: Module, mutant: Mutant) -> bool:
+        def attempt(module: Module, mutant: Mutant) -> str | None:
             copy = copies.get()
             try:
-                return copy.kills(module, mutant.applied(module.source))
+                rounds = module.interpreted[: 1 if quick else None]
+                return copy.killer(module, mutant.applied(module.source), rounds)
             finally:
                 copies.put(copy)
 
@@ -94,11 +95,13 @@ def _try_all(cases: list[Case], jobs: int, known: dict[str, bool]) -> dict[str, 
         try:
             for count, future in enumerate(as_completed(futures), 1):
                 name = futures[future][1].name
-                killed[name] = future.result()
-                line = {"key": keys[name], "name": name, "killed": killed[name]}
-                with RESULTS.open("a", encoding="utf-8") as file:
-                    print(json.dumps(line, ensure_ascii=False), file=file)
-                word = "killed" if killed[name] else "SURVIVED"
+                killer = future.result()
+                killed[name] = killer is not None
+                line = {"key": keys[name], "name": name, "killed": killed[name], "by": killer}
+                if killed[name] or not quick:
+                    with RESULTS.open("a", encoding="utf-8") as file:
+                        print(json.dumps(line, ensure_ascii=False), file=file)
+                word = f"killed by {killer}:" if killed[name] else "SURVIVED"
                 print(f"{count}/{len(left)} {word} {name}", flush=True)
         except BaseException:
             pool.shutdown(cancel_futures=True)
@@ -132,6 +135,9 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--fresh", action="store_true", help="forget what came of earlier runs")
     parser.add_argument("--survivors", action="store_true", help="trust what was killed before")
+    parser.add_argument(
+        "--quick", action="store_true", help="one round; what survives it is not kept"
+    )
     parser.add_argument("groups", nargs="*", metavar="GROUP", help=" ".join(groups))
     chosen = parser.parse_args()
     if chosen.fresh:
@@ -141,7 +147,7 @@ def main() -> int:
     for group in chosen.groups or groups:
         some = [m for m in chosen_modules if m.group == group and fnmatch(m.path, chosen.only)]
         cases = sample(some, chosen.sample, equivalent)
-        killed = _try_all(cases, chosen.jobs, dict(_known(chosen.survivors)))
+        killed = _try_all(cases, chosen.jobs, dict(_known(chosen.survivors)), chosen.quick)
         if cases:
             shares[group] = _report(group, cases, killed)
     return 1 if min(shares.values(), default=1.0) < _GOAL else 0

@@ -63,11 +63,11 @@ _GROUPS = {
             "_backtrack": _EXACT,
             "_branch": _EXACT,
             "_cells": _EXACT,
-            "_evolution": "plugins/test_easm",
+            "_evolution": "plugins/test_easm_steps plugins/test_easm",
             "_fixed": _EXACT,
             "_growers": "plugins/test_fsnn_pso",
-            "_memetic": "plugins/test_direct",
-            "_moves": "plugins/test_direct",
+            "_memetic": "plugins/test_direct_steps plugins/test_direct",
+            "_moves": "plugins/test_direct_steps plugins/test_direct",
             "_neighbours": "plugins/test_nn plugins/test_nn_pso plugins/test_fsnn_pso",
             "_ranking": f"plugins/test_direct {_EXACT}",
             "_relations": _EXACT,
@@ -108,6 +108,8 @@ _GROUPS = {
 }
 
 _COMPILED = {"_jit"}
+_ROUNDS = {"kernels": (True,), "searchers": (True, False), "alignment": (True, False)}
+"""Of groups whose tests run interpreted, at first or always; others run compiled."""
 
 
 @dataclass(frozen=True)
@@ -123,14 +125,15 @@ class Module:
     tests
         Files whose tests run until one fails; first its own examples, if it has any.
     interpreted
-        Whether its kernels run as plain Python, so that none is compiled anew for each mutant. That
-        is far too slow for whole searches: those are compiled, a minute or two a mutant.
+        Of each round of tests whether kernels run as plain Python, so that none is compiled anew
+        for each mutant. Most of what searches is found so, on few objects; what is left is tried
+        on whole searches, which are compiled, a minute or two a mutant.
     """
 
     group: str
     path: str
     tests: tuple[str, ...]
-    interpreted: bool
+    interpreted: tuple[bool, ...]
 
     @cached_property
     def source(self) -> str:
@@ -145,10 +148,10 @@ def modules() -> list[Module]:
         for file in sorted((ROOT / folder).glob("*.py")):
             names = named.get(file.stem, f"unit/test_{file.stem}").split()
             tests = [f"tests/{name}.py" for name in names]
-            path = file.relative_to(ROOT).as_posix()
-            if ">>>" in file.read_text(encoding="utf-8"):
+            path, text = file.relative_to(ROOT).as_posix(), file.read_text(encoding="utf-8")
+            if ">>>" in text:
                 tests.insert(0, path)
-            interpreted = group == "kernels" and file.stem not in _COMPILED
+            interpreted = (False,) if file.stem in _COMPILED else _ROUNDS.get(group, (False,))
             if file.stem != "__init__":
                 found.append(Module(group, path, tuple(tests), interpreted))
     return found

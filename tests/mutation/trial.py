@@ -15,7 +15,7 @@ from tests.tools import ROOT
 
 _COPIED = ("engine", "plugins", "clients", "proto", "tests", "pyproject.toml", "README.md")
 _SOURCES = ("engine", "plugins", "plugins/sketchmatch-example-searcher/src", "clients/python", ".")
-_LEAST_SECONDS = {True: 30.0, False: 300.0}
+_LEAST_SECONDS = 300.0
 _PATIENCE = 5.0
 
 
@@ -24,7 +24,7 @@ class Copy:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._limits: dict[Module, float] = {}
+        self._limits: dict[Path, float] = {}
         ignored = shutil.ignore_patterns("__pycache__", ".hypothesis", "found", "node_modules")
         for name in _COPIED:
             source, target = ROOT / name, folder / name
@@ -33,43 +33,80 @@ class Copy:
             elif source.exists():
                 shutil.copy2(source, target)
 
-    def kills(self, module: Module, text: str) -> bool:
-        """Return whether a test fails, or hangs, where a module has another text.
+    def killer(
+        self, module: Module, text: str, rounds: tuple[bool, ...] | None = None
+    ) -> str | None:
+        """Return the test that fails, or hangs, where a module has another text; None if all pass.
+
+        Parameters
+        ----------
+        module, text
+            What is changed, and into what.
+        rounds
+            Of each round whether kernels are interpreted; all of the module's where it is left out.
 
         Raises
         ------
         RuntimeError
             If a test fails without any change.
         """
-        if module not in self._limits:
-            began = time.monotonic()
-            if self._fails(module, None, writes_bytecode=True):
-                raise RuntimeError(f"a test of {module.path} fails without any change")
-            self._limits[module] = max(
-                _LEAST_SECONDS[module.interpreted], _PATIENCE * (time.monotonic() - began)
-            )
+        before: list[Path] = []
+        for interpreted in rounds or module.interpreted:
+            name = "-".join((str(interpreted), *(Path(path).stem for path in module.tests)))
+            times = [self.folder / f"{name}.json", *before]
+            self._measure(module, interpreted, times)
+            last = times[0].with_suffix(".last")
+            last.unlink(missing_ok=True)
+            if self._fails_with(module, text, interpreted, times):
+                return last.read_text(encoding="utf-8") if last.exists() else "at import"
+            before.append(times[0])
+        return None
+
+    def _measure(self, module: Module, interpreted: bool, times: list[Path]) -> None:
+        """Find out how long each test of a module takes without any change, unless it is known."""
+        if times[0] in self._limits:
+            return
+        began = time.monotonic()
+        failed = self._fails(module, interpreted, times, None, writes_bytecode=True)
+        self._limits[times[0]] = max(_LEAST_SECONDS, _PATIENCE * (time.monotonic() - began))
+        # Interpreted, a test may fail that is about time, and does not take part then. In another
+        # order all must pass as well.
+        if (failed and not interpreted) or self._fails(module, interpreted, times, None):
+            last = times[0].with_suffix(".last")
+            which = last.read_text(encoding="utf-8") if last.exists() else "a test"
+            raise RuntimeError(f"{which} of {module.path} fails without any change")
+
+    def _fails_with(self, module: Module, text: str, interpreted: bool, times: list[Path]) -> bool:
         file = self.folder / module.path
-        original, times = file.read_bytes(), file.stat()
+        original, status = file.read_bytes(), file.stat()
         try:
             file.write_text(text, encoding="utf-8")
-            return self._fails(module, self._limits[module])
+            return self._fails(module, interpreted, times, self._limits[times[0]])
         finally:
             # With its old time its bytecode, which the first run wrote, is valid again.
             file.write_bytes(original)
-            os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
+            os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
 
-    def _fails(self, module: Module, limit: float | None, writes_bytecode: bool = False) -> bool:
+    def _fails(
+        self,
+        module: Module,
+        interpreted: bool,
+        times: list[Path],
+        limit: float | None,
+        writes_bytecode: bool = False,
+    ) -> bool:
         paths = os.pathsep.join(str(self.folder / source) for source in _SOURCES)
         environment = {
             **os.environ,
             "PYTHONPATH": paths,
-            "NUMBA_DISABLE_JIT": "1" if module.interpreted else "0",
+            "NUMBA_DISABLE_JIT": "1" if interpreted else "0",
             "NUMBA_CACHE_DIR": str(self.folder / "compiled"),
+            "MUTATION_TIMES": os.pathsep.join(map(str, times)),
         }
-        options = ["-x", "-q", "-p", "no:cacheprovider", "-p", "tests.mutation.quick"]
-        bytecode = [] if writes_bytecode else ["-B"]
+        options = ["-q", "-p", "no:cacheprovider", "-p", "tests.mutation.quick"]
+        bytecode = [] if writes_bytecode else ["-B", "-x"]
         process = subprocess.Popen(
-            [sys.executable, *bytecode, "-m", "pytest", *options, *module.tests],
+            [sys.executable, *bytecode[:1], "-m", "pytest", *bytecode[1:], *options, *module.tests],
             cwd=self.folder,
             env=environment,
             start_new_session=True,
@@ -77,10 +114,14 @@ class Copy:
             stderr=subprocess.DEVNULL,
         )
         try:
-            return process.wait(limit) != 0
+            return process.wait(limit) not in _PASSED
         except subprocess.TimeoutExpired:
             return True
         finally:
             if process.poll() is None:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
+
+
+_PASSED = (0, 5)
+"""What pytest ends with where all tests passed, or none was left to run."""

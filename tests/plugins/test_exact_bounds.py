@@ -298,6 +298,69 @@ def _look_at_nodes(seed):
     return int(looked_at)
 
 
+def _whole_search(table, partners, value, room=None):
+    """Return what a search of one cell with all maps takes, from a map and its ζ.
+
+    ``room`` is how much memory it has, if not enough.
+    """
+    relations, spread = relations_of(table, WEIGHTS[0])
+    found = Ranking(np.array([partners]), np.array([value]))
+    shape = table.template_objects, table.argument_objects
+    cells = _roomy_cell(relations, *shape, spread)
+    cells = _cells.Cells(cells.boxes[:1], np.array([0.99]), cells.allowed[:1])
+    tree = _residual.empty_tree(*shape)
+    tree = tree._replace(blocks=tree.blocks[:room])
+    fixed, place = _fixed.empty_fixed(shape[0]), _branch.first_place(0)
+    return relations, found, spread, cells, tree, fixed, place, np.full(1, -np.inf)
+
+
+def _small_search(seed=0, room=None):
+    """Return the same of a small scene, from the worst map, and the best ζ."""
+    table = random_table(np.random.default_rng(seed), 4, 5)
+    every = every_confidence(table, WEIGHTS[0])
+    worst = min(every, key=every.get)
+    return _whole_search(table, worst, every[worst], room), max(every.values())
+
+
+def test_a_search_of_cells_takes_no_second_step_where_one_takes_its_budget():
+    table = random_table(np.random.default_rng(0), 10, 10)
+    places = []
+    for budget in (1, 10 * 9 // 2 * 10 * 9):  # the second is how many costs the root has
+        search = _whole_search(table, range(10), 0.1)
+        _branch.search_cells(*search, 1, 10**9)  # a cell begins
+        _branch.search_cells(*search, budget, 10**9)
+        places.append(search[6])
+    assert places[0].tolist() == places[1].tolist()
+    assert places[0][_branch.NODES] == 1
+
+
+@pytest.mark.parametrize("most", range(1, 8))
+def test_a_search_of_cells_looks_at_as_many_nodes_as_it_may(most):
+    search, _ = _small_search()
+    place = search[6]
+    _branch.search_cells(*search, 10**9, most)
+    assert (place[_branch.CELL], place[_branch.NODES]) == (0, most)
+
+
+def test_a_cell_that_there_is_no_memory_for_is_given_up_with_its_bound():
+    search, _ = _small_search(room=1)
+    place, given_up = search[6:]
+    _branch.search_cells(*search, 10**9, 10**9)
+    assert (place[_branch.CELL], given_up[0]) == (1, 0.99)
+
+
+def test_what_is_given_up_for_want_of_memory_has_a_true_bound():
+    outcomes = set()
+    for room in range(1, 300, 7):
+        search, best = _small_search(seed=room, room=room)
+        _branch.search_cells(*search, 10**9, 10**9)
+        found, given_up = search[1].values[0], search[7][0]
+        outcomes.add((given_up > -np.inf, found >= best - TRUE))
+        assert max(found, given_up) >= best - TRUE
+        assert given_up <= 1.0 + TRUE
+    assert {(True, False), (False, True)} <= outcomes
+
+
 @given(SEEDS, st.integers(2, 5), st.sampled_from([(0.0, 1.0, 0.0), *WEIGHTS]))
 @settings(max_examples=150)
 def test_what_fixed_objects_lose_is_never_more_than_any_direction_of_the_cell_costs(
@@ -390,29 +453,22 @@ def test_the_assignment_is_the_cheapest_and_its_reduced_costs_are_a_proof(rows, 
         assert total >= found + sum(reduced[k, c] for k, c in enumerate(p)) - 1e-12
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_no_map_of_a_cell_loses_less_than_its_costs(seed):
+def test_no_map_of_a_cell_loses_less_than_its_costs():
     """The bound of a cell, entry by entry, against ζ of every map that belongs to it."""
-    rng = np.random.default_rng(seed)
-    table = random_table(rng, 4, 5)
-    weights = WEIGHTS[seed % len(WEIGHTS)]
-    every = every_confidence(table, weights)
-    first = next(iter(every))
-    incumbent = every[first]
-    relations, spread = relations_of(table, weights)
-    box = some_box(rng)
-    terms = _cells.cell_terms(relations, incumbent, spread, box)
     belonging = 0
-    for partners, value in every.items():
-        if value > incumbent and belongs(table, partners, box):
-            belonging += 1
-            loss = terms.base + sum(_costs(relations, terms, partners))
-            assert 1.0 - value >= loss - 1e-12
-    test_no_map_of_a_cell_loses_less_than_its_costs.belonging += belonging
-
-
-test_no_map_of_a_cell_loses_less_than_its_costs.belonging = 0
-
-
-def test_cells_had_maps():
-    assert test_no_map_of_a_cell_loses_less_than_its_costs.belonging > 20
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        table = random_table(rng, 4, 5)
+        weights = WEIGHTS[seed % len(WEIGHTS)]
+        every = every_confidence(table, weights)
+        first = next(iter(every))
+        incumbent = every[first]
+        relations, spread = relations_of(table, weights)
+        box = some_box(rng)
+        terms = _cells.cell_terms(relations, incumbent, spread, box)
+        for partners, value in every.items():
+            if value > incumbent and belongs(table, partners, box):
+                belonging += 1
+                loss = terms.base + sum(_costs(relations, terms, partners))
+                assert 1.0 - value >= loss - 1e-12, seed
+    assert belonging > 20

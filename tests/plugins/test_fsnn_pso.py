@@ -138,6 +138,19 @@ def test_slices_and_stored_closeness_do_not_change_what_grows():
         assert other.evaluations == found.evaluations
 
 
+@pytest.mark.parametrize(
+    ("options", "most"),
+    [({}, 150), ({"store_bytes": 16 * 150 * 9}, 9), ({"budget": 299}, 0), ({"store_bytes": 0}, 0)],
+)
+def test_closeness_is_stored_where_there_is_room_and_a_vector_fits_a_slice(options, most):
+    table = random_table(np.random.default_rng(5), 5, 6)  # 10 × 15 vectors
+    grows, _ = grower(table, **options)
+    for row in range(10):
+        finish(grows.grow_from(row, 0))
+    assert len(grows._store.values) == most
+    assert 0 < grows._store.used[0] <= most if most else grows._store.used[0] == 0
+
+
 def test_an_fmap_grows_from_a_first_vector_once():
     table = random_table(np.random.default_rng(5), 4, 5)
     grows, found = grower(table)

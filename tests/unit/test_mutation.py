@@ -97,7 +97,7 @@ def test_mutants_of_equal_lines_have_names_of_their_own():
 
 
 def module(path, source):
-    made = Module("group", path, (), True)
+    made = Module("group", path, (), (True,))
     vars(made)["source"] = source
     return made
 
@@ -146,7 +146,10 @@ def test_a_mutant_is_tried_in_a_copy_and_killed_where_a_test_fails(tmp_path, mon
         "engine/sketchmatch/__init__.py": "",
         "engine/sketchmatch/sums.py": "def double(x):\n    return x + x\n",
         "tests/mutation/__init__.py": "",
-        "tests/mutation/quick.py": (ROOT / "tests/mutation/quick.py").read_text("utf-8"),
+        **{
+            path: (ROOT / path).read_text("utf-8")
+            for path in ("tests/interpreted.py", "tests/mutation/quick.py")
+        },
         "tests/test_sums.py": (
             "from sketchmatch.sums import double\n"
             "def test_it():\n    assert double(2) == 4\n    assert double(0) == 0\n"
@@ -157,13 +160,12 @@ def test_a_mutant_is_tried_in_a_copy_and_killed_where_a_test_fails(tmp_path, mon
         (home / path).write_text(text, encoding="utf-8")
     monkeypatch.setattr("tests.mutation.trial.ROOT", home)
     copy = Copy(tmp_path / "copy")
-    made = Module("group", "engine/sketchmatch/sums.py", ("tests/test_sums.py",), True)
+    made = Module("group", "engine/sketchmatch/sums.py", ("tests/test_sums.py",), (True, False))
     before = Path(home / made.path).read_text(encoding="utf-8")
-    assert copy.kills(made, before.replace("x + x", "x - x"))
-    assert not copy.kills(made, before.replace("x + x", "2 * x"))
+    assert copy.killer(made, before.replace("x + x", "x - x")) == "tests/test_sums.py::test_it"
+    assert copy.killer(made, before.replace("x + x", "2 * x")) is None
     assert (home / made.path).read_text("utf-8") == before
     assert (tmp_path / "copy" / made.path).read_text("utf-8") == before
-    copy.folder.joinpath("tests/test_sums.py").write_text("def test_it(): assert 0", "utf-8")
-    again = Module("group", made.path, made.tests, False)
+    (home / "tests/test_sums.py").write_text("def test_it(): assert 0", "utf-8")
     with pytest.raises(RuntimeError, match="without any change"):
-        copy.kills(again, before)
+        Copy(tmp_path / "another").killer(made, before)

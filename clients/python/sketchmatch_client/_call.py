@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from threading import Event, RLock
-from types import TracebackType
 from typing import Any, Protocol, Self
 
 from sketchmatch_client._course import Course
@@ -116,12 +115,7 @@ class MatchCall(Generator[MatchResponse, None, None]):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _next(self) -> MatchResponse | None:

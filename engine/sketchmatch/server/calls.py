@@ -12,7 +12,7 @@ from urllib.parse import unquote
 
 import grpc
 
-from sketchmatch.server.wrapping import WrappingInterceptor, kind_of
+from sketchmatch.server.wrapping import WrappingInterceptor, kind_of, status_of
 
 __all__ = ["CallLogInterceptor", "facts", "note", "noted"]
 
@@ -58,14 +58,9 @@ def _told(method: Callable[[Any, _Context], Awaitable[Any]], name: str) -> Any:
             cancelled = True
             raise
         finally:
-            code = "CANCELLED" if cancelled else _code(context)
+            given = status_of(context) or grpc.StatusCode.OK
+            code = "CANCELLED" if cancelled else given.name
             seconds = time.monotonic() - began
             _log.info("%s code=%s seconds=%.3f %s", name, code, seconds, noted())
 
     return call
-
-
-def _code(context: _Context) -> str:
-    """Return the name of the status that a call was given, which gRPC keeps as a number."""
-    number: Any = context.code()
-    return next(code.name for code in grpc.StatusCode if number in (code, code.value[0], None))

@@ -10,12 +10,12 @@ from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import grpc
 from google.rpc import error_details_pb2, status_pb2
 
-from sketchmatch.server.wrapping import WrappingInterceptor, kind_of
+from sketchmatch.server.wrapping import WrappingInterceptor, kind_of, status_of
 from sketchmatch_proto.v1.match_pb2 import MatchAccepted, MatchResult, Outcome
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
@@ -27,7 +27,6 @@ _OTHER = "other"
 # A caller's own clock may end a call a moment earlier than ours.
 _CLOCKS_APART = 0.1
 _STAGES = ("segment", "describe", "relate", "search")
-_CODES = {code.value[0]: code.name for code in grpc.StatusCode}
 _Labels = tuple[str, ...]
 _Handler = Any
 
@@ -249,7 +248,7 @@ class MetricsInterceptor(WrappingInterceptor):
                 code = _gone(context)
                 raise
             except BaseException:  # what aborts a call is no Exception
-                code = _CODES.get(_number(context.code()), "UNKNOWN")
+                code = (status_of(context) or grpc.StatusCode.UNKNOWN).name
                 raise
             finally:
                 seconds = time.monotonic() - began
@@ -262,11 +261,6 @@ def _gone(context: Any) -> str:
     """Return the status that the caller has, who waited no longer."""
     left = context.time_remaining()
     return "CANCELLED" if left is None or left > _CLOCKS_APART else "DEADLINE_EXCEEDED"
-
-
-def _number(code: Any) -> int:
-    """Return a status code's number, whichever way gRPC has it."""
-    return cast(int, code.value[0] if isinstance(code, grpc.StatusCode) else code)
 
 
 def _reason(trailer: Any) -> str:

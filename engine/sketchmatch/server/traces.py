@@ -14,7 +14,7 @@ import grpc
 from sketchmatch.app.tasks import Record, Task
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.server.calls import facts
-from sketchmatch.server.wrapping import WrappingInterceptor, kind_of
+from sketchmatch.server.wrapping import WrappingInterceptor, kind_of, status_of
 from sketchmatch_proto.v1.match_pb2 import MatchStatistics
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ class TracesInterceptor(WrappingInterceptor):
                 code = grpc.StatusCode.CANCELLED
                 raise
             except BaseException:  # what aborts a call is no Exception
-                code = _code(context)
+                code = status_of(context) or grpc.StatusCode.UNKNOWN
                 raise
             finally:
                 for fact, value in facts().items():
@@ -191,10 +191,3 @@ def _is_named() -> bool:
 def _wall(moment: float) -> int:
     """Return when it was by the clock of the wall, in nanoseconds."""
     return time.time_ns() - round((time.monotonic() - moment) * _NANOSECONDS)
-
-
-def _code(context: Any) -> grpc.StatusCode:
-    """Return the status that a call was given, which gRPC keeps as a number."""
-    number = context.code()
-    known = (code for code in grpc.StatusCode if number in (code, code.value[0]))
-    return next(known, grpc.StatusCode.UNKNOWN)

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import grpc
 
-__all__ = ["WrappingInterceptor", "kind_of"]
+__all__ = ["WrappingInterceptor", "kind_of", "status_of"]
 
 
 class WrappingInterceptor(grpc.aio.ServerInterceptor, ABC):
@@ -38,3 +38,9 @@ def kind_of(handler: Any) -> str:
     asked = "stream" if handler.request_streaming else "unary"
     answered = "stream" if handler.response_streaming else "unary"
     return f"{asked}_{answered}"
+
+
+def status_of(context: Any) -> grpc.StatusCode | None:
+    """Return the status that a call was given, which gRPC keeps as a number; None if none was."""
+    number = context.code()
+    return next((code for code in grpc.StatusCode if number in (code, code.value[0])), None)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from bisect import bisect_right
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from typing import Literal, TypeVar
 
 import numpy as np
@@ -38,7 +38,6 @@ __all__ = [
     "NnGrower",
     "Slices",
     "fit_membership",
-    "random_entries",
     "random_seed_point",
     "read_features",
     "reported",
@@ -119,9 +118,13 @@ class Found:
         del self._ranked[self._room :]
 
 
-def reported(work: Slices[Outcome], found: Found) -> Generator[SearchProgress, None, Outcome]:
-    """Run a search that fills ``found``, yielding its state now and then and at the end."""
-    yielded = -np.inf
+def reported(
+    problem: MatchProblem, rng: np.random.Generator, search: Callable[[Found], Slices[Outcome]]
+) -> Generator[SearchProgress, None, Outcome]:
+    """Run a search from a random FMAP on, yielding its state now and then and at the end."""
+    found = Found(problem)
+    found.offer(random_entries(problem.table, rng))
+    work, yielded = search(found), -np.inf
     while True:
         if time.monotonic() - yielded > _REPORT_EVERY:
             yielded = time.monotonic()

@@ -14,7 +14,6 @@ from sketchmatch_builtin.searchers._growers import (
     GrowthParams,
     NnGrower,
     Slices,
-    random_entries,
     random_seed_point,
     read_features,
     reported,
@@ -78,9 +77,7 @@ class Nn(Searcher):
         self, problem: MatchProblem, rng: np.random.Generator
     ) -> Generator[SearchProgress, None, Outcome]:
         """Grow an FMAP from each seed point."""
-        found = Found(problem)
-        found.offer(random_entries(problem.table, rng))
-        return (yield from reported(self._grow_all(problem, found, rng), found))
+        return reported(problem, rng, lambda found: self._grow_all(problem, found, rng))
 
     def _grow_all(
         self, problem: MatchProblem, found: Found, rng: np.random.Generator

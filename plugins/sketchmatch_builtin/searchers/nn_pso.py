@@ -12,7 +12,6 @@ from sketchmatch_builtin.searchers._growers import (
     Found,
     NnGrower,
     Slices,
-    random_entries,
     read_features,
     reported,
 )
@@ -67,9 +66,7 @@ class NnPso(Searcher):
         self, problem: MatchProblem, rng: np.random.Generator
     ) -> Generator[SearchProgress, None, Outcome]:
         """Move the swarm until nothing better was found for ``patience`` iterations."""
-        found = Found(problem)
-        found.offer(random_entries(problem.table, rng))
-        return (yield from reported(self._fly(problem, found, rng), found))
+        return reported(problem, rng, lambda found: self._fly(problem, found, rng))
 
     def _fly(
         self, problem: MatchProblem, found: Found, rng: np.random.Generator

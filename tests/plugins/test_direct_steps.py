@@ -1,0 +1,137 @@
+"""The steps of ``direct``'s evolution on their own: each against a slow and obvious one."""
+
+from collections import Counter
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sketchmatch.api.kernels import empty_map_state, place_map
+from sketchmatch.model import DILATION_SCALE, RelationTable, object_pairs
+from sketchmatch_builtin.searchers import _memetic as steps
+from sketchmatch_builtin.searchers._moves import (
+    empty_moves,
+    read_relations,
+    renew_moves,
+    weigh_moves,
+)
+from tests.oracle import maps as oracle
+from tests.searching import geometric_table
+from tests.strategies import random_table
+
+SEEDS = st.integers(0, 2**32)
+
+
+def read(table, weights=(1.0, 1.0, 1.0)):
+    """Return the state, the moves and the leanings that a search begins with."""
+    objects, others = table.template_objects, table.argument_objects
+    state = empty_map_state(table, weights)
+    moves = empty_moves(objects, others, table.evidence is not None)
+    leanings = np.zeros((objects, others, 3))
+    pairs = (object_pairs(objects), object_pairs(others))
+    read_relations(state, moves, *pairs, 0, table.similarity.size, leanings)
+    return state, moves, leanings
+
+
+def founded(table, weights, rotation, level, seed):
+    """Return a new map for a rotation and a level, of which chance decides the order alone."""
+    state, moves, leanings = read(table, weights)
+    child = np.full(table.template_objects, -1)
+    rng = np.random.default_rng(seed)
+    steps._found(state, moves, leanings, rotation, level, 0.0, child, rng)
+    return child.tolist()
+
+
+def test_every_order_is_as_likely():
+    rng = np.random.default_rng(0)
+    found = Counter(tuple(steps._shuffled(3, rng).tolist()) for _ in range(3000))
+    assert set(found) == set(permutations(range(3)))
+    assert all(420 < count < 580 for count in found.values())
+
+
+def test_the_best_of_a_tournament_is_chosen():
+    rng = np.random.default_rng(0)
+    found = Counter(steps._select(4, 2, rng) for _ in range(4000))
+    # The best of two out of four is the k-th of them with these chances, in sixteenths.
+    for k, sixteenths in enumerate((7, 5, 3, 1)):
+        assert found[k] / 250 == pytest.approx(sixteenths, abs=0.6)
+
+
+@pytest.mark.parametrize("weights", [(0.0, 1.0, 0.0), (0.0, 2.0, 1.0), (1.0, 1.0, 1.0)])
+@pytest.mark.parametrize("turn", [0.0, 1.0, 2.5, 4.0])
+def test_a_new_map_puts_a_turned_copy_upon_itself(turn, weights):
+    right = 0
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        points = rng.uniform(0.0, 1.0, (7, 2))
+        cosine, sine = 2.0 * np.cos(turn), 2.0 * np.sin(turn)
+        copy = points @ np.array([[cosine, sine], [-sine, cosine]])
+        table = geometric_table(points, copy, 0.0, rng)
+        found = founded(table, weights, turn, DILATION_SCALE * np.log(2.0), seed)
+        assert sorted(found) == list(range(7))
+        right += sum(a == c for a, c in enumerate(found))
+    assert right > 45  # of 70; by chance 10 would be
+
+
+def test_of_partners_that_suit_alike_the_first_is_taken():
+    same = np.full((3, 10), 0.5)
+    table = RelationTable(same, same, same, 3, 5)
+    for seed in range(5):
+        assert sorted(founded(table, (1.0, 0.0, 0.0), 0.0, 0.0, seed)) == [0, 1, 2]
+
+
+@st.composite
+def parents(draw):
+    """Return two object maps and the number of argument objects."""
+    objects = draw(st.integers(2, 7))
+    others = objects + draw(st.integers(0, 3))
+    one, other = (np.array(draw(st.permutations(range(others)))[:objects]) for _ in range(2))
+    return one, other, others
+
+
+@given(parents(), SEEDS, st.sampled_from([0.0, 0.5, 1.0]))
+def test_a_child_has_its_parents_partners_where_it_can(case, seed, rate):
+    one, other, others = case
+    child = np.empty(len(one), dtype=np.int64)
+    steps._cross(one, other, rate, child, others, np.random.default_rng(seed))
+    assert len(set(child.tolist())) == len(one)
+    assert set(child.tolist()) <= set(range(others))
+    assert (child == one)[one == other].all()
+    if rate != 0.5:
+        assert child.tolist() == (one if rate == 0.0 else other).tolist()
+    for a, c in enumerate(child.tolist()):
+        if c not in (one[a], other[a]):  # both were taken
+            assert {int(one[a]), int(other[a])} <= set(child.tolist())
+
+
+@given(SEEDS, st.integers(2, 6))
+def test_rotation_and_level_of_a_map_are_those_of_its_entries(seed, objects):
+    rng = np.random.default_rng(seed)
+    table = random_table(rng, objects, objects + 1)
+    partners = rng.permutation(objects + 1)[:objects]
+    entries = [
+        oracle.look_up(table, i, pair)
+        for i, pair in enumerate(oracle.induced(tuple(partners.tolist())))
+    ]
+    rotation, level = steps._rotation_and_level(read(table)[0], partners)
+    whole = sum(np.exp(1j * turn) for _, turn, _ in entries)
+    assert np.exp(1j * rotation) == pytest.approx(whole / abs(whole), abs=1e-9)
+    levels = [DILATION_SCALE * np.log(dilation) for _, _, dilation in entries]
+    assert level == pytest.approx(np.mean(levels), abs=1e-9)
+
+
+@pytest.mark.parametrize("weights", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (2.0, 1.0, 0.0)])
+def test_where_dilation_counts_for_nothing_only_moves_above_a_threshold_are_evaluated(weights):
+    evaluated = above = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        table = random_table(rng, 5, 6)
+        state, moves, _ = read(table, weights)
+        threshold = place_map(state, rng.permutation(6)[:5])
+        renew_moves(state, moves)
+        for a in range(5):
+            evaluated += weigh_moves(state, moves, a, threshold)
+            above += (moves.values >= 0.0).sum()
+    assert evaluated == above > 100
