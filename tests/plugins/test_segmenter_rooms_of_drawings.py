@@ -229,16 +229,22 @@ def test_a_drawing_is_cut_coarser_and_finer():
         (20, 205, 240, 185),
     ):
         cells[y : y + height, x : x + width] = 255
-    segmenter = RoomSegmenter()
-    cuts = [segmenter.segment(Image(cells)), *segmenter.other_cuts(Image(cells))]
+    cuts = RoomSegmenter().cuts(Image(cells))
     assert [len(each.scene) for each in cuts] == [3, 2, 4]
+
+
+def rooms_of_a_map():
+    """Two rooms of 3.6 × 3.6 m and a door of 0.8 m."""
+    cells = np.full((22, 40), 100, np.int8)
+    cells[2:20, 2:18] = cells[10:14, 18:20] = cells[2:20, 20:38] = 0
+    return OccupancyGrid(cells, 0.2)
 
 
 def test_there_is_one_cut_where_a_width_is_given_and_of_a_robots_map():
     path = RSI / "sketches" / "06.png"
     require(path.exists(), "the sketch 06")
-    assert RoomSegmenter(RoomSegmenter.Params(door_width=40.0)).other_cuts(read_source(path)) == ()
-    assert RoomSegmenter().other_cuts(OccupancyGrid(np.zeros((30, 30), np.int8), 0.1)) == ()
+    (_,) = RoomSegmenter(RoomSegmenter.Params(door_width=40.0)).cuts(read_source(path))
+    (_,) = RoomSegmenter().cuts(rooms_of_a_map())
 
 
 def test_drawn_rooms_open_into_each_other_at_their_doors_alone():

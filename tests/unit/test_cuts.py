@@ -19,7 +19,8 @@ from sketchmatch.pipeline.knowledge import Pin
 from sketchmatch.pipeline.match import run_match
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import ObjectMatch
-from sketchmatch.pipeline.selection import Choice
+from sketchmatch.pipeline.segment import cuts_of_side, segment_side
+from sketchmatch.pipeline.selection import Choice, resolve
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
 
@@ -239,9 +240,10 @@ class Cut(Segmenter):
         rings = [polygon.rings[0] for polygon in source.polygons]
         return Segmentation(Scene.from_polygons(rings), passages=self.passages)
 
-    def other_cuts(self, source):
+    def cuts(self, source):
+        yield self.segment(source)
         rings = [polygon.rings[0] for polygon in source.polygons[:-1]]
-        return (Segmentation(Scene.from_polygons(rings)),)
+        yield Segmentation(Scene.from_polygons(rings))
 
 
 def with_cuts():
@@ -265,12 +267,34 @@ def test_scenes_are_told_once_and_are_those_of_the_cut_that_fits():
     assert seen[-1].result.object_map == {k: k for k in range(len(NAMES))}
 
 
+def cut_once(segmenter, source):
+    yield segmenter.segment(source)
+    pytest.fail("it was asked for another cut")
+
+
 def test_with_little_time_no_other_cut_is_made(monkeypatch):
-    monkeypatch.setattr(Cut, "other_cuts", lambda *_: pytest.fail("it was asked"))
+    monkeypatch.setattr(Cut, "cuts", cut_once)
     monkeypatch.setattr("sketchmatch.pipeline.match._AMPLE", math.inf)
     sketch, _ = drawn()
     request = (source_of(sketch.scene), floor().scene, with_cuts())
     assert told(*request, selection=CUT, time_budget=60.0)[-1].result.object_map
+
+
+@pytest.mark.parametrize("given", [source_of, lambda scene: scene, Segmentation])
+def test_what_is_found_is_the_first_cut_and_what_is_given_as_a_scene_has_no_other(given):
+    scene, registry = floor().scene, with_cuts()
+    sketch = given(scene)
+    source = sketch if isinstance(sketch, PolygonSet) else None
+    pipeline = resolve(registry, CUT if source else {}, source)
+    cuts = [len(each.scene) for each in cuts_of_side("sketch", sketch, pipeline, registry)]
+    assert cuts == ([7, 6] if source else [7])
+    assert len(segment_side("sketch", sketch, pipeline, registry).scene) == 7
+
+
+def test_a_segmenter_without_any_cut_is_blamed(monkeypatch):
+    monkeypatch.setattr(Cut, "cuts", lambda *_: iter(()))
+    with pytest.raises(PluginError, match="it returned a NoneType, not a Segmentation"):
+        told(source_of(floor().scene), floor().scene, with_cuts(), selection=CUT)
 
 
 @pytest.mark.parametrize("passages", [((0, 0),), ((0, 7),), ((-1, 2),), ((0, 1, 2),)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -57,11 +58,17 @@ class Segmenter(Algorithm, ABC):
             With a path relative to the source, if nothing usable is in it.
         """
 
-    def other_cuts(self, source: Any) -> tuple[Segmentation, ...]:  # noqa: ARG002 (for others)
-        """Return what else the objects of ``source`` may be: cut coarser, or finer.
+    def cuts(self, source: Any) -> Iterator[Segmentation]:
+        """Yield what :meth:`segment` returns, then what else the objects may be.
 
-        Where one object ends and the next begins is not always plain, as in free space. A match
-        takes the cut of either side that fits the other best, and that of :meth:`segment` where
-        nothing speaks for another. There is no other by default.
+        Where one object ends and the next begins is not always plain, as in free space, which may
+        be cut coarser, or finer. A match takes the cut of either side that fits the other best, and
+        the first where nothing speaks for another; it asks for others only where there is time for
+        them. There is no other by default.
+
+        Raises
+        ------
+        InvalidInputError
+            As :meth:`segment` does, before the first; other cuts without use are left out.
         """
-        return ()
+        yield self.segment(source)

@@ -41,7 +41,7 @@ from sketchmatch.pipeline.request import (
 )
 from sketchmatch.pipeline.result import MatchResult, Statistics
 from sketchmatch.pipeline.search import Goal, Search, search
-from sketchmatch.pipeline.segment import other_cuts, segment_side
+from sketchmatch.pipeline.segment import cuts_of_side
 from sketchmatch.pipeline.selection import UNCONFIGURED, Defaults, Pipeline, resolve
 from sketchmatch.pipeline.slices import retold
 from sketchmatch.pipeline.warmup import loading_kernels
@@ -173,14 +173,17 @@ def _events(
     # have a partner, none is left that may be part of another.
     is_open = price is not None and not request.pins and request.former is None
     with clock.timing("segment"), limited_to(limits):
-        sketch = segment_side("sketch", request.sketch, pipeline, registry)
+        cuts = [
+            cuts_of_side("sketch", request.sketch, pipeline, registry),
+            cuts_of_side("map", request.map, pipeline, registry),
+        ]
+        sketch = next(cuts[0])
         clock.check(Phase.SEGMENT)
-        map_ = segment_side("map", request.map, pipeline, registry)
-        drawn: tuple[Segmentation, ...] = (sketch,)
-        mapped: tuple[Segmentation, ...] = (map_,)
+        map_ = next(cuts[1])
+        drawn, mapped = [sketch], [map_]
         if is_open and clock.left() > _AMPLE * clock.spent():
-            drawn += other_cuts("sketch", request.sketch, pipeline, registry)
-            mapped += other_cuts("map", request.map, pipeline, registry)
+            drawn += cuts[0]
+            mapped += cuts[1]
     remembered = Memory()
 
     def matched(sketch: Segmentation, map_: Segmentation) -> Generator[MatchEvent, None, None]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +18,7 @@ from sketchmatch.pipeline.guard import blaming, inspecting
 from sketchmatch.pipeline.selection import Pipeline
 from sketchmatch.registry import Registry
 
-__all__ = ["other_cuts", "segment", "segment_side"]
+__all__ = ["cuts_of_side", "segment", "segment_side"]
 
 _LONGEST = 400
 
@@ -31,20 +33,7 @@ def segment(source: Source, segmenter: Segmenter, registry: Registry, field: str
     PluginError
         If the segmenter breaks its contract.
     """
-    check_source(source, field)
-    read, place = _read_by(segmenter, source, field)
-    check_source(read, place)
-    with blaming(segmenter, registry):
-        try:
-            with inspecting(segmenter, registry, read):
-                found = segmenter.segment(read)
-        except InvalidInputError as error:
-            raise _with_reasons(error, read).within(place) from None
-        _check_contract(found)
-    if read is not source:
-        found = _with_notes(found, read)
-    check_objects(len(found.scene), field)
-    return _with_notes(found, source)
+    return next(_cuts(source, segmenter, registry, field))
 
 
 def segment_side(
@@ -57,35 +46,62 @@ def segment_side(
     InvalidInputError, PluginError
         As :func:`segment` does.
     """
-    if isinstance(given, Segmentation):
-        return given
-    if isinstance(given, Scene):
-        return Segmentation(given)
-    segmenter = pipeline.segmenter(side)
-    assert segmenter is not None
-    return segment(given, segmenter, registry, f"{side}.{given.field}")
+    return next(cuts_of_side(side, given, pipeline, registry))
 
 
-def other_cuts(
+def cuts_of_side(
     side: str, given: Source | Scene | Segmentation, pipeline: Pipeline, registry: Registry
-) -> tuple[Segmentation, ...]:
-    """Return what else the objects of one side of a match may be, for what is not segmented yet.
+) -> Iterator[Segmentation]:
+    """Yield the objects of one side of a match, then what else they may be.
+
+    What is segmented already, and what people mended, is what it is.
 
     Raises
     ------
-    PluginError
-        If the segmenter breaks its contract.
+    InvalidInputError, PluginError
+        As :func:`segment` does.
     """
-    segmenter = pipeline.segmenter(side)
-    if segmenter is None or isinstance(given, Scene | Segmentation):
-        return ()
-    if not isinstance(given, segmenter.sources):  # what people mended is as they want it
-        return ()
-    with blaming(segmenter, registry), inspecting(segmenter, registry, given):
-        cuts = tuple(segmenter.other_cuts(given))
-        for found in cuts:
+    if isinstance(given, Segmentation):
+        yield given
+    elif isinstance(given, Scene):
+        yield Segmentation(given)
+    else:
+        segmenter = pipeline.segmenter(side)
+        assert segmenter is not None
+        yield from _cuts(given, segmenter, registry, f"{side}.{given.field}")
+
+
+def _cuts(
+    source: Source, segmenter: Segmenter, registry: Registry, field: str
+) -> Iterator[Segmentation]:
+    check_source(source, field)
+    read, place = _read_by(segmenter, source, field)
+    check_source(read, place)
+    cuts = _checked(segmenter, read, registry)
+    try:
+        found = next(cuts)
+    except InvalidInputError as error:
+        raise _with_reasons(error, read).within(place) from None
+    if read is not source:
+        found = _with_notes(found, read)
+    check_objects(len(found.scene), field)
+    yield _with_notes(found, source)
+    if read is source:
+        yield from (_with_notes(other, source) for other in cuts)
+
+
+def _checked(segmenter: Segmenter, source: Source, registry: Registry) -> Iterator[Segmentation]:
+    """Yield what a segmenter finds, if it is what the contract says."""
+    with blaming(segmenter, registry):
+        cuts = iter(segmenter.cuts(source))
+    for number in itertools.count():
+        with blaming(segmenter, registry):
+            with inspecting(segmenter, registry, source):
+                found = next(cuts, None)
+            if found is None and number:
+                return
             _check_contract(found)
-    return tuple(_with_notes(found, given) for found in cuts)
+        yield found
 
 
 def _read_by(segmenter: Segmenter, source: Source, field: str) -> tuple[Source, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import cv2
@@ -37,6 +38,14 @@ _DOORWAY = 3.0
 _RAY = 0.1
 # What nothing leads into, and is nowhere this share of a doorway wide, is a cupboard or a shaft.
 _SHAFT = 0.5
+# By how many rows and columns a cell is beside another, and how long the way is to OpenCV, in whole
+# parts of 2¹⁶.
+_STEPS = [
+    (y, x, np.float32({1: 65536, 2: 91750, 5: 143976}[y * y + x * x] / 65536.0))
+    for y in range(-2, 3)
+    for x in range(-2, 3)
+    if y * y + x * x in (1, 2, 5)
+]
 # In cells from either side: how wide a cut may be, and a half of it at a corner.
 _BORDER = 2
 
@@ -118,33 +127,62 @@ def _covered(free: Mask, width: _Widths, radius: float) -> Labels:
     cores = (width > radius).astype(np.uint8)
     if not cores.any():
         return np.zeros(free.shape, np.int32)
-    distance = cv2.distanceTransform(1 - cores, cv2.DIST_L2, cv2.DIST_MASK_5)
-    nearest = _nearest(_numbered(cores, 8)[0])
+    labels, reach = _numbered(cores, 8)[0], math.floor(radius)
+    away = cv2.distanceTransform(1 - cores, cv2.DIST_L2, cv2.DIST_MASK_5)
+    nearest = _nearest(labels, reach) if labels.max() > 1 else np.ones_like(labels)
     # A core's disc is free, so that within it the nearest core lies on this side of all walls.
-    nearest[(distance > math.floor(radius)) | (free == 0)] = 0
+    nearest[(away > reach) | (free == 0)] = 0
     return nearest
 
 
-def _nearest(labels: Labels) -> Labels:
-    """Return for each cell the label of the nearest one that has one, of several the highest."""
-    found = np.zeros_like(labels)
-    # Which of several OpenCV takes depends on the direction, and so all four are asked.
-    for turns in range(4):
-        turned = np.ascontiguousarray(np.rot90(labels, turns))
-        rest = (turned == 0).astype(np.uint8)
-        _, regions = cv2.distanceTransformWithLabels(
-            rest, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
-        )
-        label_of = np.zeros(int(regions.max()) + 1, np.int32)
-        label_of[regions[rest == 0]] = turned[rest == 0]
-        np.maximum(found, np.rot90(label_of[regions], -turns), out=found)
-    return found
+def _nearest(labels: Labels, reach: int) -> Labels:
+    """Return for each cell within reach the label of the nearest that has one.
+
+    Of several that are as near it is the highest.
+    """
+    away, regions = cv2.distanceTransformWithLabels(
+        (labels == 0).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
+    )
+    cells = np.flatnonzero(labels)
+    label_of = np.zeros(int(labels.max()) + 1, np.int32)
+    label_of[regions.reshape(-1)[cells]] = labels.reshape(-1)[cells]
+    return _with_highest(label_of[regions], np.asarray(away, dtype=np.float32), reach + 1)
+
+
+def _with_highest(labels: Labels, away: _Widths, reach: int) -> Labels:
+    """Return labels of the nearest, of several as near the highest, for cells within reach.
+
+    Which of them OpenCV takes depends on how the map lies. A cell has the labels of all cells from
+    which the shortest ways to it come, so that what is to be changed begins where labels meet.
+    """
+    frame = np.full(tuple(side + 4 for side in labels.shape), np.inf, np.float32)
+    frame[2:-2, 2:-2] = away
+    found = np.pad(labels, 2)
+    # Labels are few, far below 2²⁴, and so exact as float32, which OpenCV can dilate.
+    own = found.astype(np.float32)
+    around = cv2.dilate(own, np.ones((5, 5), np.uint8))
+    rest = np.flatnonzero((around > own) & (frame <= reach))
+    columns, distances, flat = found.shape[1], frame.reshape(-1), found.reshape(-1)
+    steps = [(y * columns + x, away_of) for y, x, away_of in _STEPS]
+    while rest.size:
+        highest = flat[rest]
+        for step, length in steps:
+            nearer = distances[rest + step] + length == distances[rest]
+            np.maximum(highest, flat[rest + step], out=highest, where=nearer)
+        changed = highest > flat[rest]
+        rest, highest = rest[changed], highest[changed]
+        flat[rest] = highest
+        beside = np.unique(np.concatenate([rest + step for step, _ in steps]))
+        rest = beside[distances[beside] <= reach]
+    return np.ascontiguousarray(found[2:-2, 2:-2])
 
 
 def _with_narrow_rooms(free: Mask, labels: Labels, least: float) -> Labels:
     """Add as rooms what is free, without a label, and large: corridors as narrow as a door."""
-    rest = (free > 0) & (labels == 0)
-    parts, sizes = _numbered(rest.view(np.uint8), 4)
+    rest = ((free > 0) & (labels == 0)).view(np.uint8)
+    if cv2.countNonZero(rest) < least:
+        return labels
+    parts, sizes = _numbered(rest, 4)
     large = sizes >= least
     large[0] = False
     narrow = np.where(large, np.cumsum(large) + labels.max(), 0).astype(np.int32)
@@ -170,15 +208,15 @@ def _numbered(mask: Mask, connectivity: int) -> tuple[Labels, IntArray]:
     return numbers[parts], sizes[order]
 
 
-def grow(free: Mask, labels: Labels) -> None:
+def grow(free: Mask, labels: Labels, most: int | None = None) -> None:
     """Give free cells without a label that of the nearest, in steps from side to side.
 
-    Of several that are as near it is the highest.
+    Of several that are as near it is the highest. There are at most so many steps.
     """
     flat = labels.reshape(-1)
     rest = np.flatnonzero((free > 0) & (labels == 0))
     steps = (1, -1, labels.shape[1], -labels.shape[1])
-    while rest.size:
+    for _ in itertools.count() if most is None else range(most):
         found = np.max([flat[rest + step] for step in steps], axis=0)
         if not found.any():
             return
@@ -201,10 +239,12 @@ def passages(labels: Labels, width: _Widths) -> tuple[IntArray, FloatArray]:
     pairs: list[IntArray] = []
     widths: list[FloatArray] = []
     for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        a, b = labels[here], labels[there]
-        at = np.nonzero((a != b) & (a > 0) & (b > 0))
-        pairs.append(np.sort(np.stack([a[at], b[at]], axis=1), axis=1).astype(np.int64))
-        widths.append(np.minimum(width[here][at], width[there][at]).astype(np.float64))
+        at = np.nonzero(labels[here] != labels[there])
+        both = np.stack([labels[here][at], labels[there][at]], axis=1)
+        narrower = np.minimum(width[here][at], width[there][at])
+        labelled = both.all(axis=1)
+        pairs.append(np.sort(both[labelled], axis=1).astype(np.int64))
+        widths.append(narrower[labelled].astype(np.float64))
     found, number = np.unique(np.concatenate(pairs), axis=0, return_inverse=True)
     passage = np.zeros(len(found))
     np.maximum.at(passage, number.reshape(-1), np.concatenate(widths))
@@ -226,11 +266,8 @@ def parts_that_meet(free: Mask, parts: Labels) -> IntArray:
     ndarray
         Shape (k, 2), the smaller number first.
     """
-    framed, labels = np.pad(free, 1), np.pad(parts, 1)
-    sides = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
-    for _ in range(_BORDER):
-        around = cv2.dilate(labels.astype(np.float32), sides).astype(np.int32)
-        labels = np.where((labels == 0) & (framed > 0), around, labels)
+    labels = np.pad(parts, 1)
+    grow(np.pad(free, 1), labels, _BORDER)
     return passages(labels, np.zeros(labels.shape, np.float32))[0]
 
 
@@ -263,9 +300,8 @@ def without_borders(free: Mask, labels: Labels) -> Mask:
 def along_borders(labels: Labels) -> NDArray[np.bool_]:
     """Return the cells that touch, by a side or a corner, a cell of another room."""
     around = np.ones((3, 3), np.uint8)
-    # Labels are few, far below 2²⁴, and so exact as float32, which OpenCV can dilate.
     own = labels.astype(np.float32)
     highest = cv2.dilate(own, around)
-    own[labels == 0] = np.inf
+    np.putmask(own, labels == 0, np.inf)
     lowest = cv2.erode(own, around)
     return np.asarray((labels > 0) & (highest != lowest))

@@ -68,8 +68,8 @@ def _number_leaves(labels: Labels, door: float, least: float) -> None:
 
 def _leaves(room: Mask, door: float, least: float) -> Iterator[Mask]:
     """Yield the leaves of a room in a frame of cells that are not, each of what is left."""
+    width, cells = widths(room), cv2.countNonZero(room)
     for opening in door * _STEP ** np.arange(1, _STEPS + 1):
-        width = widths(room)
         if width.max() <= opening / 2.0 + 0.5:
             return
         parts = bodies(room, width, opening, least)
@@ -77,18 +77,29 @@ def _leaves(room: Mask, door: float, least: float) -> Iterator[Mask]:
         widest = np.zeros(count, np.float32)
         np.maximum.at(widest, parts.reshape(-1), width.reshape(-1))
         pairs, passage = passages(parts, width)
+        whole = room
         for k in range(1, count):
             joins = passage[(pairs == k).any(axis=1)].max(initial=0.0)
             if not 0.0 < joins < _OPEN * widest[k] or widest[k] <= opening / 2.0 + 0.5:
                 continue
             leaf = (parts == k).view(np.uint8)
+            size = cv2.countNonZero(leaf)
             rest = room & (1 - leaf)
-            _, _, statistics, _ = cv2.connectedComponentsWithStats(rest, connectivity=4)
-            sizes = statistics[1:, cv2.CC_STAT_AREA]
-            whole = np.count_nonzero(sizes >= least) == 1 and sizes.sum() >= leaf.sum() >= least
-            if whole and _filling(leaf) >= _WHOLE:
+            if (
+                least <= size <= cells - size
+                and _filling(leaf) >= _WHOLE
+                and _is_whole(rest, least)
+            ):
                 yield leaf
-                room = rest
+                room, cells = rest, cells - size
+        if room is not whole:
+            width = widths(room)
+
+
+def _is_whole(room: Mask, least: float) -> bool:
+    """Whether one piece alone of what is left of a room may be a room."""
+    _, _, statistics, _ = cv2.connectedComponentsWithStats(room, connectivity=4)
+    return int(np.count_nonzero(statistics[1:, cv2.CC_STAT_AREA] >= least)) == 1
 
 
 def _filling(mask: Mask) -> float:

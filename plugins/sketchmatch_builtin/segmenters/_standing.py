@@ -37,9 +37,10 @@ _HANGING, _JUTTING, _LEANING = 0.8, 0.7, 0.4
 _SEEN = 0.5
 # At least so sure is what has some width, and at most so sure what is thin and ragged.
 _COMPACT, _RAGGED = 0.3, 0.4
-# Where what the laser did not see begins near what is thin, that is as doubtful, and a speck, no
-# larger than such a square, even more so. Lengths are in what is thin: how near, how long an edge.
-_EDGE_SPECK, _SPECK, _NEAR, _EDGE = 0.2, 2.0, 2.5, 2.0
+# Where what the laser did not see begins near what is thin, that is as doubtful. Of a speck, no
+# larger than such a square, that is thin, is at such an edge, or was met by the laser on less than
+# that share, two are even more so. Lengths are in what is thin: how near, how long an edge.
+_SHADOW, _SPECK, _NEAR, _EDGE = 0.2, 2.0, 2.5, 2.0
 # The share of its hull that something straight fills.
 _STRAIGHT = 0.6
 # Legs, before they are merged to tables.
@@ -352,8 +353,8 @@ def _certainty(polygon: shapely.Polygon, room: Room) -> float:
     compact = not _is_thinner(polygon, room.small)
     speck = polygon.area < (_SPECK * room.small) ** 2
     at_edge = (speck or not compact) and _is_at_an_unseen_edge(polygon, room)
-    if at_edge and speck and not (compact and sure == 1.0):
-        return min(sure, _EDGE_SPECK)
+    if speck and [compact, not at_edge, sure == 1.0].count(False) > 1:
+        return min(sure, _SHADOW)
     if compact:
         return max(sure, _COMPACT)
     ragged = polygon.area < _STRAIGHT * polygon.convex_hull.area

@@ -117,12 +117,15 @@ class _Places:
         share: float,
     ) -> None:
         """Add cells of a width; ``way`` tells among which cells that a disc fits the nearest is."""
+        if not new.any():
+            return
         parts, ways = _parts(new, way)
         before = len(self.widest)
         parts[new] += before - 1
         cells = np.flatnonzero(fits)
-        known, first = np.unique(way.reshape(-1)[cells], return_index=True)
-        within = np.append(self.within, cells[first[np.searchsorted(known, ways)]])
+        cell_of = np.zeros(int(way.max()) + 1, np.int64)
+        cell_of[way.reshape(-1)[cells]] = cells
+        within = np.append(self.within, cell_of[ways])
         widest = np.append(self.widest, np.full(len(ways), width))
         reached = way.reshape(-1)[within]
         a, b = _touching(self.labels, parts)
@@ -147,10 +150,14 @@ def _parts(new: NDArray[np.bool_], way: _Labels) -> tuple[_Labels, IntArray]:
 
 def _touching(labels: _Labels, parts: _Labels) -> IntArray:
     """Return which labels and parts share a side or a corner, shape (2, k)."""
-    columns = labels.shape[1]
-    cells = np.flatnonzero(parts)
+    columns, sides = labels.shape[1], np.ones((3, 3), np.uint8)
+    near = cv2.dilate((labels > 0).view(np.uint8), sides)
+    cells = np.flatnonzero((near > 0) & (parts > 0))
     around = [row + column for row in (-columns, 0, columns) for column in (-1, 0, 1)]
     beside = labels.reshape(-1)[cells[:, None] + np.array(around)]
     known = beside > 0
-    pairs = np.stack([beside, np.broadcast_to(parts.reshape(-1)[cells, None], known.shape)])
-    return np.unique(pairs[:, known].astype(np.int64), axis=1)
+    parted = np.broadcast_to(parts.reshape(-1)[cells, None], known.shape)
+    most = int(parts.max()) + 1
+    return np.stack(
+        np.divmod(np.unique(beside[known].astype(np.int64) * most + parted[known]), most)
+    )

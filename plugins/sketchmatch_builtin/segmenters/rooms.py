@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import cast
@@ -186,8 +186,29 @@ class RoomSegmenter(Segmenter):
 
     def segment(self, source: OccupancyGrid | StrokeSet | PolygonSet | Image) -> Segmentation:
         """Return the rooms, in metres in the map's frame or in the drawing's unit and frame."""
-        if not isinstance(source, OccupancyGrid):
-            return self._of_drawing(source)
+        return next(self.cuts(source))
+
+    def cuts(
+        self, source: OccupancyGrid | StrokeSet | PolygonSet | Image
+    ) -> Iterator[Segmentation]:
+        """Yield the rooms, and of a drawing a coarser and a finer cut, where they have two rooms.
+
+        Where a width of doorways is given there is one cut.
+        """
+        if isinstance(source, OccupancyGrid):
+            yield self._of_map(source)
+            return
+        plan = self._plan(source)
+        if self.params.door_width is not None:
+            yield self._of_plan(source, plan, divided(plan.free, plan.door, self._cells(plan)))
+            return
+        (parts,) = self._by_width(plan, [_NARROW])
+        yield self._of_plan(source, plan, parts)
+        for parts in self._by_width(plan, _OTHERWISE_NARROW):
+            with suppress(InvalidInputError):
+                yield self._of_plan(source, plan, parts)
+
+    def _of_map(self, source: OccupancyGrid) -> Segmentation:
         params, cell = self.params, source.resolution
         free, corner = free_cells(source, params)
         widest = _WIDEST if params.door_width is None else params.door_width
@@ -214,22 +235,6 @@ class RoomSegmenter(Segmenter):
         objects = map(SceneObject.from_rings, rooms_in_map, labels)
         return Segmentation(Scene(tuple(objects)), unplaced, passages=passages)
 
-    def other_cuts(
-        self, source: OccupancyGrid | StrokeSet | PolygonSet | Image
-    ) -> tuple[Segmentation, ...]:
-        """Return a coarser and a finer cut of a drawing, where they have two rooms; none of a map.
-
-        Where a width of doorways is given there is one cut.
-        """
-        if isinstance(source, OccupancyGrid) or self.params.door_width is not None:
-            return ()
-        plan = self._plan(source)
-        cuts = []
-        for parts in self._by_width(plan, _OTHERWISE_NARROW):
-            with suppress(InvalidInputError):
-                cuts.append(self._of_plan(source, plan, parts))
-        return tuple(cuts)
-
     def _plan(self, source: StrokeSet | PolygonSet | Image) -> Plan:
         """Return the free cells of a drawing, furniture among them."""
         plan, furniture = drawn(source, self.params.door_width), self.params.furniture
@@ -237,23 +242,18 @@ class RoomSegmenter(Segmenter):
         return replace(plan, free=_furnished(plan.free, longest))
 
     def _by_width(self, plan: Plan, shares: Sequence[float]) -> list[Mask]:
-        least = max(self._least(plan) / plan.cell**2, 1.0)
-        return divided_by_width(plan.free, shares, _NARROWEST * max(plan.free.shape), least)
+        narrowest = _NARROWEST * max(plan.free.shape)
+        return divided_by_width(plan.free, shares, narrowest, self._cells(plan))
+
+    def _cells(self, plan: Plan) -> float:
+        """Return the area of the smallest room in a drawing, in cells."""
+        return max(self._least(plan) / plan.cell**2, 1.0)
 
     def _least(self, plan: Plan) -> float:
         """Return the area of the smallest room in a drawing."""
         if self.params.min_area is not None:
             return self.params.min_area
         return float(_SMALLEST_SHARE * np.count_nonzero(plan.free) * plan.cell**2)
-
-    def _of_drawing(self, source: StrokeSet | PolygonSet | Image) -> Segmentation:
-        plan = self._plan(source)
-        if self.params.door_width is None:
-            (parts,) = self._by_width(plan, [_NARROW])
-        else:
-            least = max(self._least(plan) / plan.cell**2, 1.0)
-            parts = divided(plan.free, plan.door, least)
-        return self._of_plan(source, plan, parts)
 
     def _of_plan(
         self, source: StrokeSet | PolygonSet | Image, plan: Plan, parts: Mask

@@ -45,10 +45,10 @@ def sources_are_known(algorithm: type[Any]) -> None:
 
 
 def scenes_are_found(algorithm: type[Any]) -> None:
-    """Return a Segmentation with a Scene, of a plain source of each type, and so each other cut."""
+    """Return a Segmentation with a Scene, of a plain source of each type, and yield such cuts."""
     for source in _samples(algorithm):
         segmenter = algorithm()
-        for found in (segmenter.segment(source), *segmenter.other_cuts(source)):
+        for found in (segmenter.segment(source), *segmenter.cuts(source)):
             fits = isinstance(found, Segmentation) and isinstance(found.scene, Scene)
             require(fits, f"of {source.field}, it returned a {type(found).__name__}")
             if found.route is not None:
