@@ -208,6 +208,56 @@ async def test_callers_take_turns_and_a_full_queue_loses_the_last_of_the_greedie
     assert order == ["flood 1", "polite", "flood 2"]
 
 
+def padded(size):
+    """Return a request of so many bytes, by a label as long as that takes."""
+    request = match_request(SCENE, SCENE)
+    label = request.map.polygon_set.polygons[0]
+    while (lacking := size - request.ByteSize()) != 0:
+        label.label = "x" * (len(label.label) + lacking)
+    return request.SerializeToString()
+
+
+@in_loop
+@limited(max_concurrent_matches=1, max_waiting_bytes=100_000)
+async def test_what_waits_is_bounded_in_bytes_and_the_greediest_by_bytes_loses_its_last(app, held):
+    large, polite = Caller("large", "1"), Caller("polite", "1")
+
+    def waiting(size, caller):
+        return app.running("MatchRequest", padded(size), caller)
+
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(begun(app, held, large))
+        first = stack.enter_context(waiting(50_000, large))
+        second = stack.enter_context(waiting(40_000, large))
+        with pytest.raises(TooBusyError, match="wait may have 100000 bytes together") as refused:
+            waiting(20_000, large).__enter__()
+        assert 1 <= refused.value.retry_seconds <= 60
+        for _ in range(20):  # by number this caller has most
+            stack.enter_context(waiting(600, polite))
+        with pytest.raises(TooBusyError, match="wait may have 100000 bytes together"):
+            second.log.check()
+        assert not first.log.ended
+        await until(lambda: app.load == (1, 21, 62_000, 0, 0), "the load is not told")
+        Held.go.set()
+        assert kinds(await ended(first))[-1] == "result"
+    await until(lambda: app.load == (0, 0, 0, 0, 0), "the load is not told")
+
+
+@in_loop
+@limited(max_concurrent_matches=1, max_waiting_bytes=100_000)
+async def test_what_would_not_even_fit_alone_waits_for_no_place_and_takes_one_that_is_free(
+    app, held
+):
+    with begun(app, held), begun(app, match_request(SCENE, SCENE)) as waiting:
+        with pytest.raises(TooBusyError, match="100000 bytes together"):
+            app.running("MatchRequest", padded(100_001)).__enter__()
+        Held.go.set()
+        assert kinds(await ended(waiting))[-1] == "result"
+    await until(lambda: app.idle, "the place is never given back")
+    with app.running("MatchRequest", padded(100_001)) as task:
+        assert kinds(await ended(task))[-1] == "result"
+
+
 @in_loop
 @limited(max_concurrent_matches=1, max_wait=0.2)
 async def test_who_waits_too_long_is_told_when_to_come_again(app, held):

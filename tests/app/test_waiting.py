@@ -80,6 +80,20 @@ def test_when_it_is_full_the_last_of_whoever_has_most_goes(waiting, newcomer, ou
     assert out not in emptied(queue)
 
 
+@pytest.mark.parametrize(
+    ("waiting", "newcomer", "out"),
+    [
+        ({"a": "111", "b": "4"}, Caller("a"), "b4"),
+        ({"a": "13", "b": "4"}, Caller("a"), "a3"),
+        ({"a": "13", "b": "4"}, Caller("b"), "b4"),
+        ({"a_x": "11", "a_y": "3", "b": "4"}, Caller("b"), "ay3"),
+    ],
+)
+def test_or_of_whoever_has_most_by_another_measure(waiting, newcomer, out):
+    item, _ = filled(**waiting).crowd_out(newcomer, lambda item: int(item[-1]))
+    assert item == out
+
+
 def test_nobody_is_crowded_out_of_an_empty_queue():
     assert FairQueue().crowd_out(Caller("a")) is None
 

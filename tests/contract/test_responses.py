@@ -111,7 +111,9 @@ def test_the_server_tells_versions_limits_and_its_age(monkeypatch):
     monkeypatch.setattr(responses, "API_VERSION", 3)
     engine = Engine(REGISTRY, limits=SourceLimits(max_objects=250))
     written = responses.server_info(
-        Setup(engine, RequestLimits(1_048_576, 12, 90.5, 40, 7.5)), 75.5, True
+        Setup(engine, RequestLimits(1_048_576, 12, 90.5, 40, 7.5, max_waiting_bytes=5_000_000_000)),
+        75.5,
+        True,
     )
     assert as_json(written) == as_written("GetServerInfoResponse")
 

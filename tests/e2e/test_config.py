@@ -98,7 +98,7 @@ def test_check_says_every_fault_in_a_line(command_line, mine):
     assert done.stderr.splitlines() == [
         f"sketchmatch: {mine}: server.max_matches is 0; it should be greater than or equal to 1",
         f"sketchmatch: {mine}: server.colour is no setting; server has: address, grace_seconds, "
-        "max_request_mib, max_matches, workers, max_waiting, max_wait_seconds, "
+        "max_request_mib, max_matches, workers, max_waiting, max_waiting_mib, max_wait_seconds, "
         "max_time_budget_seconds, default_time_budget_seconds, max_matches_per_caller, "
         "max_requests_per_minute, max_stored_mib_per_caller, max_comparisons, max_candidates, "
         "tls_certificate, tls_key, tls_client_ca, tokens, store, keep, keep_matches_days, "

@@ -22,7 +22,8 @@ from sketchmatch_client import (
     transfer_request,
 )
 from sketchmatch_proto.v1 import catalog_service_pb2, match_service_pb2, scene_service_pb2
-from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+from sketchmatch_proto.v1.match_service_pb2 import MATCH_STATE_QUEUED, MatchResponse
+from tests.pace import wait_until
 from tests.processes import server
 from tests.server.harness import ENDLESS, scene, serving
 
@@ -182,6 +183,37 @@ def test_nothing_is_inflated_for_which_there_is_no_place():
                 grpc.StatusCode.RESOURCE_EXHAUSTED
             )
         assert peak_mib(running.process.pid) - before < 40
+        events.close()
+
+
+@pytest.mark.slow
+def test_a_queue_takes_no_more_memory_than_it_may():
+    large = scene(8, labels=["x" * (5 * MIB // 8)] * 8)
+    request = match_request(large, large).SerializeToString()
+    assert len(request) > 10 * MIB
+    path = "/sketchmatch.v1.MatchService/Match"
+    with (
+        server("--max-matches", "1", "--max-waiting-mib", "32") as running,
+        Client(running.address) as client,
+        grpc.insecure_channel(running.address) as channel,
+    ):
+        events = client.events(scene(8), scene(8, 1), **ENDLESS, time_budget=60)
+        while not next(events).progress.HasField("confidence"):
+            pass
+        before = peak_mib(running.process.pid)
+        calls = [channel.unary_stream(path)(request, timeout=8) for _ in range(3)]
+        wait_until(
+            lambda: [each.state for each in client.matches()].count(MATCH_STATE_QUEUED) == 3,
+            "they do not wait",
+        )
+        for _ in range(20):
+            code, sentence, _ = refused(running.address, path, request)
+            assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
+            assert f"those that wait may have {32 * MIB} bytes together" in sentence
+        # What comes and goes beside what waits is little; what was refused must not stay.
+        assert peak_mib(running.process.pid) - before < 4 * 32
+        for call in calls:
+            call.cancel()
         events.close()
 
 

@@ -126,6 +126,8 @@ def test_matches_are_counted_by_searcher_and_outcome_and_their_stages_by_algorit
     assert metrics.matches.values() == {("exact", "optimal"): 1, ("easm", "time_budget"): 1}
     stages = metrics.stage_seconds.values()
     assert {labels: counts[-1] for labels, (counts, _) in stages.items()} == {
+        ("queue", "exact"): 1,
+        ("queue", "easm"): 1,
         ("segment", "polygons"): 2,
         ("describe", "constant"): 2,
         ("relate", "cross-correlation"): 2,
@@ -158,6 +160,8 @@ def test_it_is_told_how_things_are(monkeypatch, tmp_path):
         assert gauge(metrics, "sketchmatch_serving") == {(): 1.0}
         assert gauge(metrics, "sketchmatch_build_info") == {(sketchmatch.__version__,): 1.0}
         assert gauge(metrics, "sketchmatch_requests_limit") == {(): 3.0}
+        assert gauge(metrics, "sketchmatch_requests") == {("running",): 0.0, ("waiting",): 0.0}
+        assert gauge(metrics, "sketchmatch_waiting_bytes") == {(): 0.0}
         assert gauge(metrics, "sketchmatch_algorithm_ready")["searcher/align",] == 1.0
         (expires,) = gauge(metrics, "sketchmatch_certificate_expires_timestamp_seconds").values()
     assert expires == pytest.approx(time.time() + 30 * 86_400, abs=600)

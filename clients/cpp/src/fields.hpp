@@ -268,7 +268,8 @@ inline auto fields(Of<ServerLimits> /*type*/) {
                     FIELD(max_matches_per_caller),
                     FIELD(max_requests_per_minute),
                     FIELD(max_comparisons),
-                    FIELD(max_candidates)};
+                    FIELD(max_candidates),
+                    FIELD(max_waiting_bytes)};
 }
 
 inline auto fields(Of<ServerInfo> /*type*/) {

@@ -13,7 +13,7 @@ from collections.abc import AsyncIterator, Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, closing, contextmanager, suppress
 from dataclasses import replace
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 from google.protobuf.message import Message
 
@@ -56,7 +56,7 @@ from sketchmatch_proto.v1.catalog_service_pb2 import (
 )
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest, MatchResponse
 
-__all__ = ["Application", "Place"]
+__all__ = ["Application", "Load", "Place"]
 
 _log = logging.getLogger(__name__)
 _LOOK = 0.05
@@ -66,6 +66,24 @@ _FIRST_GUESS = 1.0
 _STOPS = "the server is about to stop"
 _Ended = Callable[[Task, BaseException | None], None]
 _Match = TypeVar("_Match", bound=Task | Record)
+
+
+class Load(NamedTuple):
+    """How busy an application is.
+
+    Attributes
+    ----------
+    running, waiting, waiting_bytes
+        Requests that run, those that wait, and how many bytes these have.
+    workers, busy_workers
+        Worker processes, and those that do something.
+    """
+
+    running: int = 0
+    waiting: int = 0
+    waiting_bytes: int = 0
+    workers: int = 0
+    busy_workers: int = 0
 
 
 class Place(Protocol):
@@ -147,7 +165,8 @@ class Application:
     scenes, archive
         Where scenes and matches are kept; None for nowhere.
     matched
-        Called when a match has ended that has a result, with its events but progress.
+        Called when a match has ended that has a result, with its events but progress, and the
+        seconds that it waited for its turn.
 
     Attributes
     ----------
@@ -165,7 +184,7 @@ class Application:
         workers: int = 0,
         scenes: SceneArchive | None = None,
         archive: Archive | None = None,
-        matched: Callable[[list[MatchResponse]], None] = lambda _: None,
+        matched: Callable[[list[MatchResponse], float], None] = lambda *_: None,
     ) -> None:
         self.scenes = Keeping(self, scenes)
         self.sketches = Sketches(self)
@@ -185,6 +204,8 @@ class Application:
         self._typical = _FIRST_GUESS
         self._stopping = False
         self._inflating = asyncio.Lock()
+        self._unread = 0
+        self._load = Load()
         self._looking: asyncio.Task[None] | None = None
         self._catalogue: tuple[Setup, ListAlgorithmsResponse] | None = None
 
@@ -203,6 +224,11 @@ class Application:
     def idle(self) -> bool:
         """Whether no task is under way."""
         return not (self._running or self._waiting)
+
+    @property
+    def load(self) -> Load:
+        """How busy it was a moment ago; from any thread."""
+        return self._load
 
     def answers(self, request: Message) -> Generator[Message, None, None]:
         """Do a request in this thread, yielding its responses; no admission, no limit of size.
@@ -427,10 +453,15 @@ class Application:
         limit = self._setup.limits.max_request_bytes
         if not order.is_large:
             return order.wish(limit)
-        if self._is_full and not self._has_room():
-            raise self._busy()  # before memory is spent on it
-        async with self._inflating:  # one at a time: a few bytes may become very many
-            return await asyncio.to_thread(order.wish, limit)
+        full = self._full(1, self._unread + order.size)
+        if full and (self._unread or not self._has_room()):
+            raise self._busy(full)  # before memory is spent on it
+        self._unread += order.size
+        try:
+            async with self._inflating:  # one at a time: a few bytes may become very many
+                return await asyncio.to_thread(order.wish, limit)
+        finally:
+            self._unread -= order.size
 
     def _begun(
         self,
@@ -469,33 +500,37 @@ class Application:
             return
         self.matches.end(task)
         if task.state is State.SUCCEEDED:
-            self._matched(task.events())
+            self._matched(task.events(), task.waited)
 
     def _admit(self, task: Task) -> None:
-        """Let a task begin or wait; if there is no room, it or the greediest one goes away."""
-        limits = self._setup.limits
+        """Let a task begin or wait; if there is no room, it or those of the greediest go away."""
         self._waiting.add(task, task.caller)
         self._dispatch()
-        if len(self._waiting) <= limits.max_waiting:
-            return
-        crowded = self._waiting.crowd_out(task.caller)
-        assert crowded is not None
-        error = self._busy()
-        if crowded[0] is task:
-            raise error
-        self._finish(crowded[0], error)
+        while full := self._full():
+            too_many = len(self._waiting) > self._setup.limits.max_waiting
+            crowded = self._waiting.crowd_out(task.caller, _one if too_many else _size)
+            assert crowded is not None
+            if crowded[0] is task:
+                raise self._busy(full)
+            self._finish(crowded[0], self._busy(full))
 
-    @property
-    def _is_full(self) -> bool:
-        """Whether no more may wait."""
-        return len(self._waiting) >= self._setup.limits.max_waiting
+    def _full(self, requests: int = 0, size: int = 0) -> str:
+        """Return which limit would be passed if so many more waited, of so many bytes."""
+        limits = self._setup.limits
+        if len(self._waiting) + requests > limits.max_waiting:
+            waiting = f" and {limits.max_waiting} wait" if limits.max_waiting else ""
+            return f"{waiting}, which is its limit"
+        if sum(map(_size, self._waiting)) + size > limits.max_waiting_bytes:
+            return (
+                f", and those that wait may have {limits.max_waiting_bytes} bytes together, which "
+                "they would pass"
+            )
+        return ""
 
-    def _busy(self) -> TooBusyError:
+    def _busy(self, full: str) -> TooBusyError:
         """Return the error of a request for which there is no room."""
-        most = self._setup.limits.max_waiting
         there_are = f"the server runs {len(self._running)} requests already"
-        waiting = f" and {most} wait" if most else ""
-        return TooBusyError(f"{there_are}{waiting}, which is its limit", self._retry_seconds())
+        return TooBusyError(f"{there_are}{full}", self._retry_seconds())
 
     def _dispatch(self) -> None:
         """Begin what waits, as far as there are places."""
@@ -568,6 +603,10 @@ class Application:
                 _log.exception("silence, or too long a wait, was not seen to")
 
     def _look_at_tasks(self) -> None:
+        size = sum(map(_size, self._waiting))
+        self._load = Load(
+            len(self._running), len(self._waiting), size, self._workers.count, self._workers.busy
+        )
         for task in self._running:
             if task.log.kept > task.noted:
                 task.noted = task.log.kept
@@ -583,6 +622,14 @@ def _name_of(caller: str, request_id: str) -> str:
     """Return the name of the match that a caller gave a name to."""
     named = json.dumps([caller, request_id]).encode()
     return hashlib.blake2b(named, digest_size=16).hexdigest()
+
+
+def _size(task: Task) -> int:
+    return task.order.size
+
+
+def _one(_: Task) -> int:
+    return 1
 
 
 def _job(task: Task) -> Job:

@@ -104,6 +104,11 @@ class Order:
         return self.kind == MatchRequest.DESCRIPTOR.name and not self.inner
 
     @property
+    def size(self) -> int:
+        """Bytes that it takes while it waits, with what comes with it."""
+        return len(self.data) + sum(map(len, (*self.brought, *(self.former or ()))))
+
+    @property
     def is_large(self) -> bool:
         """Whether it takes longer than a moment to look through it."""
         return is_compressed(self.data) or len(self.data) > _LARGE_BYTES

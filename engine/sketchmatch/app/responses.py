@@ -274,6 +274,7 @@ def server_info(
         max_concurrent_matches=given.max_concurrent_matches,
     )
     limits.max_waiting = given.max_waiting
+    limits.max_waiting_bytes = given.max_waiting_bytes
     limits.max_wait.FromMilliseconds(round(1e3 * given.max_wait))
     if given.max_time_budget is not None:
         limits.max_time_budget.FromMilliseconds(round(1e3 * given.max_time_budget))

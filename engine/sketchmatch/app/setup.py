@@ -55,6 +55,8 @@ class RequestLimits:
         Seconds that one may wait.
     default_time_budget
         Seconds for a match that does not say how long it may take, or None for the most.
+    max_waiting_bytes
+        Bytes that all requests have together that wait.
     max_per_caller
         Requests of one caller that run at the same time, or None for all that may.
     max_per_minute
@@ -74,7 +76,7 @@ class RequestLimits:
     max_request_bytes: int = 64 * 1024 * 1024
     max_concurrent_matches: int = 4 * (os.cpu_count() or 1)
     max_time_budget: float | None = None
-    max_waiting: int = 100
+    max_waiting: int = 500
     max_wait: float = 10.0
 
     @property
@@ -83,6 +85,7 @@ class RequestLimits:
         return max(1, self.max_concurrent_matches // 2)
 
     default_time_budget: float | None = None
+    max_waiting_bytes: int = 256 * 1024 * 1024
     max_per_caller: int | None = None
     max_per_minute: int | None = None
     max_stored_bytes: int | None = None

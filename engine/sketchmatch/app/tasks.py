@@ -328,6 +328,11 @@ class Task:
         """Where it is in its life."""
         return self._state
 
+    @property
+    def waited(self) -> float:
+        """Seconds that it waited for its turn; 0 for what has not had it yet."""
+        return 0.0 if self.begun is None else self.begun - self.asked
+
     def begin(self) -> None:
         """Have its turn."""
         self.begun = time.monotonic()

@@ -93,22 +93,27 @@ class FairQueue(Generic[_Item]):
             del self._lines[caller.name]
         return True
 
-    def crowd_out(self, newcomer: Caller) -> tuple[_Item, Caller] | None:
+    def crowd_out(
+        self, newcomer: Caller, size: Callable[[_Item], int] = lambda _: 1
+    ) -> tuple[_Item, Caller] | None:
         """Take out the last item of whoever has most, of the least priority there.
 
-        Of those who have as many, the newcomer is crowded out.
+        Of those who have as much, the newcomer is crowded out. ``size`` says how much an item is.
         """
         if not self._lines:
             return None
 
+        def much(line: deque[_Item]) -> int:
+            return sum(map(size, line))
+
         def crowd(name: str) -> tuple[int, bool]:
-            return sum(map(len, self._lines[name].values())), name == newcomer.name
+            return sum(map(much, self._lines[name].values())), name == newcomer.name
 
         name = max(self._lines, key=crowd)
         lines = self._lines[name]
 
         def length(connection: str) -> tuple[int, bool]:
-            return len(lines[connection]), Caller(name, connection) == newcomer
+            return much(lines[connection]), Caller(name, connection) == newcomer
 
         caller = Caller(name, max(lines, key=length))
         item = min(reversed(lines[caller.connection]), key=self._priority)

@@ -106,6 +106,16 @@ class Workers:
         self._background: set[asyncio.Task[None]] = set()
         self._closing = False
 
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self._all)
+
+    @property
+    def busy(self) -> int:
+        """How many of them do a request."""
+        return len(self._doing)
+
     async def start(self, setup: Setup) -> None:
         """Start the workers that are kept: two first, since they may have to compile kernels.
 

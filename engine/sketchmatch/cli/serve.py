@@ -50,7 +50,11 @@ def serve(
         ),
     ] = None,
     max_waiting: Annotated[
-        int | None, typer.Option(help="Requests that wait for their turn; 100 by default.")
+        int | None, typer.Option(help="Requests that wait for their turn; 500 by default.")
+    ] = None,
+    max_waiting_mib: Annotated[
+        int | None,
+        typer.Option(help="Most that these may have together, in MiB; 256 by default."),
     ] = None,
     max_wait: Annotated[
         float | None,
@@ -236,6 +240,7 @@ def serve(
         "server.max_matches": max_matches,
         "server.workers": workers,
         "server.max_waiting": max_waiting,
+        "server.max_waiting_mib": max_waiting_mib,
         "server.max_wait_seconds": max_wait,
         "server.max_time_budget_seconds": max_time_budget,
         "server.default_time_budget_seconds": default_time_budget,
@@ -359,6 +364,7 @@ def _setup(configuration: Configuration) -> Setup:
             max_request_bytes=server.max_request_mib * _MIB,
             max_concurrent_matches=server.max_matches or RequestLimits.max_concurrent_matches,
             max_waiting=server.max_waiting,
+            max_waiting_bytes=server.max_waiting_mib * _MIB,
             max_wait=server.max_wait_seconds,
             max_time_budget=server.max_time_budget_seconds,
             default_time_budget=server.default_time_budget_seconds,

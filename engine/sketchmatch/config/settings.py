@@ -167,10 +167,16 @@ class _Server(_Section):
         examples=[2],
     )
     max_waiting: int = Field(
-        100,
+        500,
         ge=0,
         le=100_000,
         description="Requests that wait for their turn.",
+    )
+    max_waiting_mib: int = Field(
+        256,
+        ge=1,
+        le=1_000_000,
+        description="Most that requests which wait may have together, in MiB.",
     )
     max_wait_seconds: float = Field(
         10.0, ge=0, description="How long a request may wait for its turn."

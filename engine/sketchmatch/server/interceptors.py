@@ -49,12 +49,40 @@ class OpeningInterceptor(WrappingInterceptor):
 
     def wrapped(self, handler: Any, path: str) -> Any:
         """Return the method's handler, with its requests opened by us."""
+        kind = kind_of(handler)
         if handler.request_deserializer is None:
-            return handler
-        kind, read = kind_of(handler), partial(Packed, read=handler.request_deserializer)
+            if handler.request_streaming:
+                return handler
+            return handler._replace(
+                request_deserializer=_Parcel, **{kind: _handing_over(getattr(handler, kind))}
+            )
+        read = partial(Packed, read=handler.request_deserializer)
         opening = _opening_each if handler.request_streaming else _opening
         method = opening(getattr(handler, kind), _LONGER.get(path, _SHORT_BYTES))
         return handler._replace(request_deserializer=read, **{kind: method})
+
+
+class _Parcel:
+    """A request that goes on as it came; who has handed it on does not have it any more.
+
+    gRPC keeps what a call was aborted with in a cycle, and by its traceback all who handed the
+    request on: the memory of large ones would be free only when the garbage collector comes round.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+
+    def taken(self) -> bytes:
+        """Return the request, once."""
+        data, self._data = self._data, b""
+        return data
+
+
+def _handing_over(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
+    async def call(parcel: _Parcel, context: _Context) -> Any:
+        return await method(parcel.taken(), context)
+
+    return call
 
 
 def _opening(method: Callable[[Any, _Context], Awaitable[Any]], most: int) -> Any:
@@ -90,6 +118,7 @@ def _caught(method: Callable[[Any, _Context], Awaitable[Any]]) -> Any:
             # Nobody is left to write to. To end as if all were well would be to write.
             raise asyncio.CancelledError from None
         except Exception as error:
+            del request  # as a parcel is emptied
             await _abort(context, error)
 
     return call
@@ -100,4 +129,5 @@ async def _abort(context: _Context, error: Exception) -> NoReturn:
         _log.error("%s: %s", noted(), told(error))
     status = refusal(error)
     note(reason=getattr(error, "reason", type(error).__name__))
+    error.__traceback__ = None
     await context.abort(status.code, status.message, status.trailing_metadata)

@@ -26,6 +26,7 @@ _HEALTH = "/grpc.health.v1.Health/"
 _OTHER = "other"
 # A caller's own clock may end a call a moment earlier than ours.
 _CLOCKS_APART = 0.1
+_QUEUE = "queue"
 _STAGES = ("segment", "describe", "relate", "search")
 _Labels = tuple[str, ...]
 _Handler = Any
@@ -157,7 +158,7 @@ class Metrics:
         self.stage_seconds = Histogram(
             Metric(
                 "sketchmatch_stage_seconds",
-                "How long stages of matches took; a scene's by its map.",
+                "How long stages of matches took, a scene's by its map, and the wait before them.",
                 ("stage", "algorithm"),
             )
         )
@@ -193,8 +194,8 @@ class Metrics:
         if reason:
             self.refusals.add(reason)
 
-    def matched(self, events: Iterable[MatchResponse]) -> None:
-        """Count a match with its outcome and its stages, by its events."""
+    def matched(self, events: Iterable[MatchResponse], waited: float) -> None:
+        """Count a match with its outcome and its stages, by its events and how long it waited."""
         accepted, result = MatchAccepted(), MatchResult()
         for event in events:
             accepted = event.accepted if event.HasField("accepted") else accepted
@@ -208,6 +209,7 @@ class Metrics:
             pipeline.similarity.name,
             pipeline.searcher.name,
         )
+        self.stage_seconds.add(_QUEUE, pipeline.searcher.name, seconds=waited)
         for stage, algorithm in zip(_STAGES, algorithms, strict=True):
             elapsed = getattr(statistics, f"{stage}_elapsed").ToTimedelta()
             self.stage_seconds.add(stage, algorithm, seconds=elapsed.total_seconds())

@@ -421,6 +421,24 @@ def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readine
         lambda: {(): float(app.setup.limits.max_concurrent_matches)},
     )
     metrics.watch(
+        Metric("sketchmatch_requests", "Requests that run, or wait for their turn.", ("state",)),
+        lambda: {
+            ("running",): float(app.load.running),
+            ("waiting",): float(app.load.waiting),
+        },
+    )
+    metrics.watch(
+        Metric("sketchmatch_waiting_bytes", "Bytes of the requests that wait for their turn."),
+        lambda: {(): float(app.load.waiting_bytes)},
+    )
+    metrics.watch(
+        Metric("sketchmatch_workers", "Worker processes.", ("state",)),
+        lambda: {
+            ("busy",): float(app.load.busy_workers),
+            ("idle",): float(app.load.workers - app.load.busy_workers),
+        },
+    )
+    metrics.watch(
         Metric("sketchmatch_certificate_expires_timestamp_seconds", "When the certificate does."),
         files.expiry,
     )

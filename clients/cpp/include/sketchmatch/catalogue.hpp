@@ -91,6 +91,7 @@ struct ServerLimits {
   std::optional<std::uint32_t> max_requests_per_minute;  ///< Most that one caller may send.
   std::optional<std::uint64_t> max_comparisons;          ///< Pairs × pairs × directions.
   std::optional<std::uint64_t> max_candidates;           ///< Population × generations.
+  std::optional<std::uint64_t> max_waiting_bytes;        ///< Most bytes of what waits.
 };
 
 /// What a server is.

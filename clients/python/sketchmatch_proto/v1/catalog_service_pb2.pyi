@@ -433,6 +433,7 @@ class ServerLimits(google.protobuf.message.Message):
     MAX_REQUESTS_PER_MINUTE_FIELD_NUMBER: builtins.int
     MAX_COMPARISONS_FIELD_NUMBER: builtins.int
     MAX_CANDIDATES_FIELD_NUMBER: builtins.int
+    MAX_WAITING_BYTES_FIELD_NUMBER: builtins.int
     max_request_bytes: builtins.int
     """Largest request in bytes."""
     max_objects: builtins.int
@@ -449,6 +450,8 @@ class ServerLimits(google.protobuf.message.Message):
     """Most comparisons of relations: pairs of sketched objects × pairs of mapped objects × directions."""
     max_candidates: builtins.int
     """Most maps that a search may weigh: population × generations of searchers that have both."""
+    max_waiting_bytes: builtins.int
+    """Most bytes that requests which wait may have together; more are RESOURCE_EXHAUSTED."""
     @property
     def max_time_budget(self) -> google.protobuf.duration_pb2.Duration:
         """Longest time budget; a longer one is cut to it."""
@@ -475,9 +478,10 @@ class ServerLimits(google.protobuf.message.Message):
         max_requests_per_minute: builtins.int | None = ...,
         max_comparisons: builtins.int | None = ...,
         max_candidates: builtins.int | None = ...,
+        max_waiting_bytes: builtins.int | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_max_candidates", b"_max_candidates", "_max_comparisons", b"_max_comparisons", "_max_concurrent_matches", b"_max_concurrent_matches", "_max_matches_per_caller", b"_max_matches_per_caller", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "_max_requests_per_minute", b"_max_requests_per_minute", "_max_waiting", b"_max_waiting", "default_time_budget", b"default_time_budget", "max_candidates", b"max_candidates", "max_comparisons", b"max_comparisons", "max_concurrent_matches", b"max_concurrent_matches", "max_matches_per_caller", b"max_matches_per_caller", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_requests_per_minute", b"max_requests_per_minute", "max_time_budget", b"max_time_budget", "max_wait", b"max_wait", "max_waiting", b"max_waiting"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_max_candidates", b"_max_candidates", "_max_comparisons", b"_max_comparisons", "_max_concurrent_matches", b"_max_concurrent_matches", "_max_matches_per_caller", b"_max_matches_per_caller", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "_max_requests_per_minute", b"_max_requests_per_minute", "_max_waiting", b"_max_waiting", "default_time_budget", b"default_time_budget", "max_candidates", b"max_candidates", "max_comparisons", b"max_comparisons", "max_concurrent_matches", b"max_concurrent_matches", "max_matches_per_caller", b"max_matches_per_caller", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_requests_per_minute", b"max_requests_per_minute", "max_time_budget", b"max_time_budget", "max_wait", b"max_wait", "max_waiting", b"max_waiting"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_max_candidates", b"_max_candidates", "_max_comparisons", b"_max_comparisons", "_max_concurrent_matches", b"_max_concurrent_matches", "_max_matches_per_caller", b"_max_matches_per_caller", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "_max_requests_per_minute", b"_max_requests_per_minute", "_max_waiting", b"_max_waiting", "_max_waiting_bytes", b"_max_waiting_bytes", "default_time_budget", b"default_time_budget", "max_candidates", b"max_candidates", "max_comparisons", b"max_comparisons", "max_concurrent_matches", b"max_concurrent_matches", "max_matches_per_caller", b"max_matches_per_caller", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_requests_per_minute", b"max_requests_per_minute", "max_time_budget", b"max_time_budget", "max_wait", b"max_wait", "max_waiting", b"max_waiting", "max_waiting_bytes", b"max_waiting_bytes"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_max_candidates", b"_max_candidates", "_max_comparisons", b"_max_comparisons", "_max_concurrent_matches", b"_max_concurrent_matches", "_max_matches_per_caller", b"_max_matches_per_caller", "_max_objects", b"_max_objects", "_max_request_bytes", b"_max_request_bytes", "_max_requests_per_minute", b"_max_requests_per_minute", "_max_waiting", b"_max_waiting", "_max_waiting_bytes", b"_max_waiting_bytes", "default_time_budget", b"default_time_budget", "max_candidates", b"max_candidates", "max_comparisons", b"max_comparisons", "max_concurrent_matches", b"max_concurrent_matches", "max_matches_per_caller", b"max_matches_per_caller", "max_objects", b"max_objects", "max_request_bytes", b"max_request_bytes", "max_requests_per_minute", b"max_requests_per_minute", "max_time_budget", b"max_time_budget", "max_wait", b"max_wait", "max_waiting", b"max_waiting", "max_waiting_bytes", b"max_waiting_bytes"]) -> None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_max_candidates", b"_max_candidates"]) -> typing.Literal["max_candidates"] | None: ...
     @typing.overload
@@ -494,5 +498,7 @@ class ServerLimits(google.protobuf.message.Message):
     def WhichOneof(self, oneof_group: typing.Literal["_max_requests_per_minute", b"_max_requests_per_minute"]) -> typing.Literal["max_requests_per_minute"] | None: ...
     @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_max_waiting", b"_max_waiting"]) -> typing.Literal["max_waiting"] | None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_max_waiting_bytes", b"_max_waiting_bytes"]) -> typing.Literal["max_waiting_bytes"] | None: ...
 
 global___ServerLimits = ServerLimits
