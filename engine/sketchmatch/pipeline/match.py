@@ -274,7 +274,7 @@ def _compared(
             described(scenes[1], histogram, registry, "map", memory), Phase.DESCRIBE, clock
         )
     with clock.timing("relate"):
-        work = compare(scenes, (drawn, mapped), pipeline.similarity, registry, weights)
+        work = compare(scenes, (drawn, mapped), pipeline.similarity, registry, weights, memory)
         return (yield from _watched(work, Phase.RELATE, clock))
 
 
