@@ -83,11 +83,23 @@ def test_nothing_is_computed_twice_for_the_same_scene(monkeypatch):
     assert asked == []
 
 
-def test_other_bounds_make_all_pairs_new(monkeypatch):
+def test_what_is_drawn_beyond_the_others_makes_its_own_pairs_new_alone(monkeypatch):
     memory, asked = Memory(), counted(monkeypatch)
-    describe(scene([(0, 1.0), (1, 1.0)]), memory)
+    describe(scene([(0, 1.0), (7, 1.0)]), memory)
     asked.clear()
-    describe(scene([(0, 1.0), (1, 1.0), (7, 1.0)]), memory)
+    beyond = scene([(0, 1.0), (7, 1.0), (2, 1.2), (3, 1.4)])
+    assert beyond.bounds != scene([(0, 1.0), (7, 1.0)]).bounds
+    describe(beyond, memory)
+    assert asked == [(0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
+
+
+def test_another_middle_makes_all_pairs_new(monkeypatch):
+    memory, asked = Memory(), counted(monkeypatch)
+    near, far = scene([(6, 1.0), (7, 1.0)]), scene([(6, 1.0), (7, 1.0), (0, 1.0)])
+    assert near.middle != far.middle
+    describe(near, memory)
+    asked.clear()
+    describe(far, memory)
     assert len(asked) == 3
 
 

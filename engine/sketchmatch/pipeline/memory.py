@@ -117,7 +117,7 @@ class Memory:
             recent = [each for each in self._recent if each[1].described_by == wanted]
         best: tuple[int, list[int], SceneDescriptor] | None = None
         for other, descriptor in recent:
-            if other.bounds != scene.bounds:
+            if other.middle != scene.middle:
                 continue
             places = {_outline(other, k): k for k in range(len(other))}
             former = [places.get(_outline(scene, k), -1) for k in range(len(scene))]
