@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sketchmatch.api import forces
 from sketchmatch.model import Scene
 from sketchmatch.pipeline.compare import compare
 from sketchmatch.pipeline.describe import described, in_directions
@@ -101,6 +102,30 @@ def test_another_middle_makes_all_pairs_new(monkeypatch):
     asked.clear()
     describe(far, memory)
     assert len(asked) == 3
+
+
+def test_objects_met_before_take_the_places_of_those_like_them(monkeypatch):
+    memory, counts, compute = Memory(), [], forces.force_histograms
+    first = memory.met(scene([(0, 1.0), (7, 1.0), (4, 1.0)]))
+    later = memory.met(scene([(4, 1.0), (0, 1.0), (7, 0.7)]))
+    assert later.objects[:2] == (first.objects[2], first.objects[0])
+    assert later.objects[2] is not first.objects[1]
+    assert memory.met(later) is later
+    named = memory.met(Scene.from_polygons([BOX, 2 * BOX + 9], ["desk", ""]))
+    assert named.labels == ("desk", "")
+    forces.own_histograms(first.objects)
+
+    def counting(edges, pairs, *rest):
+        counts.append(len(pairs))
+        return compute(edges, pairs, *rest)
+
+    monkeypatch.setattr(forces, "force_histograms", counting)
+    found = forces.own_histograms(later.objects)
+    assert counts == [1]
+    alone = [
+        forces.own_histograms([each])[0] for each in scene([(4, 1.0), (0, 1.0), (7, 0.7)]).objects
+    ]
+    assert found.tobytes() == np.array(alone).tobytes()
 
 
 def test_what_was_used_longest_ago_makes_room():

@@ -174,6 +174,8 @@ def _events(
     is_open = price is not None and not request.pins and request.former is None
     with clock.timing("segment"), limited_to(limits):
         sketch = segment_side("sketch", request.sketch, pipeline, registry)
+        if memory is not None and not isinstance(request.sketch, Scene | Segmentation):
+            sketch = replace(sketch, scene=memory.met(sketch.scene))
         clock.check(Phase.SEGMENT)
         map_ = segment_side("map", request.map, pipeline, registry)
         drawn: tuple[Segmentation, ...] = (sketch,)

@@ -6,6 +6,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Lock
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from sketchmatch.model import (
     RelationTable,
     Scene,
     SceneDescriptor,
+    SceneObject,
     object_pairs,
     pair_index,
 )
@@ -69,6 +71,20 @@ class Memory:
         self._known: OrderedDict[tuple[str, str], SceneDescriptor] = OrderedDict()
         self._recent: deque[tuple[Scene, SceneDescriptor]] = deque(maxlen=_RECENT)
         self._related: deque[_Related] = deque(maxlen=_RECENT)
+        self._objects: WeakValueDictionary[tuple[object, ...], SceneObject] = WeakValueDictionary()
+
+    def met(self, scene: Scene) -> Scene:
+        """Return a scene that was just found, with the objects that were met before in it.
+
+        They take the places of those like them, as what is measured of an object is kept with it.
+        """
+        with self._lock:
+            objects = tuple(
+                self._objects.setdefault((_outline(item), item.label, item.certainty), item)
+                for item in scene.objects
+            )
+        alike = all(one is other for one, other in zip(objects, scene.objects, strict=True))
+        return scene if alike else Scene(objects)
 
     def descriptor(self, scene: Scene, histogram: Histogram) -> SceneDescriptor | None:
         """Return the histograms of a scene, or None where they have to be computed."""
@@ -119,8 +135,8 @@ class Memory:
         for other, descriptor in recent:
             if other.middle != scene.middle:
                 continue
-            places = {_outline(other, k): k for k in range(len(other))}
-            former = [places.get(_outline(scene, k), -1) for k in range(len(scene))]
+            places = {_outline(item): k for k, item in enumerate(other.objects)}
+            former = [places.get(_outline(item), -1) for item in scene.objects]
             shared = sum(place >= 0 for place in former)
             if shared >= 2 and (best is None or shared > best[0]):
                 best = shared, former, descriptor
@@ -183,8 +199,8 @@ def _rows(
     return sigma, rotation, dilation
 
 
-def _outline(scene: Scene, k: int) -> bytes:
-    return b"|".join(ring.tobytes() for ring in scene.objects[k].rings)
+def _outline(item: SceneObject) -> bytes:
+    return b"|".join(ring.tobytes() for ring in item.rings)
 
 
 def _copied(former: list[int], descriptor: SceneDescriptor) -> tuple[BoolArray, FloatArray]:
