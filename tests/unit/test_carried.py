@@ -317,3 +317,42 @@ def test_what_is_carried_beyond_all_bounds_is_refused_with_its_name():
     with pytest.raises(InvalidInputError, match="a point 'far' that cannot be carried") as refused:
         finish(carried([feature], course_between(SCENE, TURNED, SAME, features=[feature])))
     assert refused.value.field == "features"
+
+
+def test_points_that_are_carried_at_once_come_as_each_would_alone():
+    rng = np.random.default_rng(0)
+    grid = floor(walls=[np.s_[20:60, 30:50], np.s_[70:72, :]])
+    features = [
+        Feature(FeatureKind.POINT, (place[None, :],), f"p{k}")
+        for k, place in enumerate(rng.uniform(-1.0, 11.0, (60, 2)))
+    ]
+    features.insert(7, route((1, 1), (8, 1), name="way"))
+    course = course_between(SCENE, SCENE, SAME, features=features)
+    obstacles = Obstacles.of_grid(grid, False)
+    found = finish(carried(features, course, obstacles, 0.3, "m"))
+    assert [each.name for each in found] == [each.name for each in features]
+    for each, feature in zip(found, features, strict=True):
+        (alone,) = finish(carried([feature], course, obstacles, 0.3, "m"))
+        assert each.changes == alone.changes
+        np.testing.assert_allclose(each.feature.points, alone.feature.points, rtol=1e-12)
+        np.testing.assert_allclose(each.deviations[0], alone.deviations[0], rtol=1e-9)
+    told = {reason for each in found for reason in reasons(each)}
+    assert told == {ChangeReason.BLOCKED, ChangeReason.OUTSIDE}
+
+
+@given(st.integers(0, 2**32), st.sampled_from([0.0, 0.15, 0.4]), st.floats(0.1, 6.0))
+@settings(max_examples=60)
+def test_the_nearest_clear_place_is_the_nearest(seed, radius, within):
+    rng = np.random.default_rng(seed)
+    cells = (rng.random((60, 50)) < rng.choice([0.002, 0.02, 0.3])).astype(np.int8) * 100
+    cells[10:40, 10:40] = 100
+    obstacles = Obstacles.of_grid(OccupancyGrid(cells, 0.1), False)
+    point = rng.uniform((0.0, 0.0), (5.0, 6.0))
+    middles = np.argwhere(cells > -1)
+    places = obstacles.places(middles)[obstacles.clear(obstacles.places(middles), radius)]
+    away = np.hypot(*(places - point).T) if len(places) else np.array([np.inf])
+    found = obstacles.nearest_clear(point, radius, within)
+    if away.min() > within:
+        assert found is None
+    else:
+        assert np.hypot(*(found - point)) == pytest.approx(away.min())

@@ -21,6 +21,7 @@ _NO_NEARER = 0.5
 _SAMPLES = 4.0
 _MOST_CELLS = 4_000_000
 _PER_SPACING = 24.0
+_FARTHEST_CELLS = 128
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,18 +122,26 @@ class Obstacles:
         return bool(self.clear(sampled(points, self.resolution / _SAMPLES), radius).all())
 
     def nearest_clear(self, point: FloatArray, radius: float, within: float) -> FloatArray | None:
-        """Return the nearest place to a point where a robot may be; None if none is near."""
-        (cell,) = self.cells(point[None, :])
-        reach = math.ceil(within / self.resolution)
-        window = Window.around(self, np.array([cell]), reach)
-        room = window.of(self.clearance) >= self.needed(radius)
-        free = np.argwhere(room) + window.low
-        if not len(free):
-            return None
-        places = self.places(free)
-        away = np.hypot(*(places - point).T)
-        best = int(np.argmin(away))
-        return places[best] if away[best] <= within else None
+        """Return the nearest place to a point where a robot may be; None if none is near.
+
+        It is looked for no farther than 128 cells away.
+        """
+        cell = self.cells(point[None, :])
+        farthest = min(math.ceil(within / self.resolution), _FARTHEST_CELLS)
+        reach = 0
+        while reach < farthest:
+            reach = min(4 * reach + 8, farthest)
+            window = Window.around(self, cell, reach)
+            free = np.argwhere(window.of(self.clearance) >= self.needed(radius))
+            if not len(free):
+                continue
+            places = self.places(free + window.low)
+            away = np.hypot(*(places - point).T)
+            best = int(np.argmin(away))
+            # What is nearer than the window's sides is the nearest of all.
+            if away[best] <= min(within, reach * self.resolution):
+                return places[best]
+        return None
 
 
 def sampled(points: FloatArray, step: float) -> FloatArray:
