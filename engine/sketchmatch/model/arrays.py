@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 __all__ = [
     "BoolArray",
     "ComplexArray",
+    "Float32Array",
     "FloatArray",
     "IntArray",
     "frozen",
@@ -26,6 +27,8 @@ ComplexArray = NDArray[np.complex128]
 """An array of complex128: points and vectors of the plane, x + iy."""
 FloatArray = NDArray[np.float64]
 """An array of float64."""
+Float32Array = NDArray[np.float32]
+"""An array of float32: what is large and need not be precise."""
 IntArray = NDArray[np.int64]
 """An array of int64."""
 
