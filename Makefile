@@ -12,7 +12,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 # What compares kernels with their definitions, and how much of the kernels it must go through.
 KERNEL_TESTS := engine/sketchmatch/kernels engine/sketchmatch/api/kernels.py \
   $(patsubst %,tests/unit/test_%.py,alignment confidence correspond constant_force force_histogram \
-  hybrid_force raster incremental evidence alternatives relations directions smoothing) tests/plugins/test_similarities.py
+  hybrid_force raster incremental evidence alternatives relations directions smoothing clearing) tests/plugins/test_similarities.py
 KERNEL_SHARE := 99
 says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 

@@ -301,6 +301,41 @@ class TestBrokenFiles:
             shelf.segmentation(name, "anna", "map")
         assert shelf.record(name) is None
 
+    @pytest.mark.parametrize("table", ["histograms", "scenes", "contents"])
+    def test_a_byte_that_changed_is_found(self, archive, shelf, name, table):
+        scene = shelf.segmentation(name, "anna", "map").scene
+        archive.keep(Described.within(scene))
+        assert len(shelf.own_histograms(scene)) == 2
+        archive.close()
+        column = {"histograms": "bytes", "scenes": "record", "contents": "source"}[table]
+        with closing(sqlite3.connect(archive.path)) as file, file:
+            ((kept,),) = file.execute(f"SELECT {column} FROM {table}").fetchall()
+            other = kept[:9] + bytes([kept[9] ^ 1]) + kept[10:]
+            file.execute(f"UPDATE {table} SET {column} = ?", (other,))
+        if table == "histograms":
+            assert shelf.own_histograms(scene) is None
+            archive.keep(Described.within(scene))
+            assert len(shelf.own_histograms(scene)) == 2
+            return
+        with pytest.raises(StoreError, match="is damaged; move it away"):
+            archive.get(name, "anna", include_source=True)
+        if table == "scenes":
+            assert shelf.record(name) is None
+            with pytest.raises(StoreError, match="is damaged; move it away"):
+                shelf.segmentation(name, "anna", "map")
+        else:
+            assert shelf.source(name) is None
+        assert not archive.put(found(), "anna")[1]
+        assert archive.get(name, "anna", include_source=True).source == SOURCE
+        assert archive.get(name, "anna").stored_scene == found().stored_scene
+
+    def test_a_damaged_scene_can_be_deleted(self, archive, name):
+        with closing(sqlite3.connect(archive.path)) as file, file:
+            file.execute("UPDATE scenes SET record = x'00'")
+        archive.delete(name, "anna")
+        with pytest.raises(NotFoundError):
+            archive.get(name, "anna")
+
     def test_a_file_that_is_gone_is_said_and_another_one_is_read(self, archive, shelf, name):
         shelf.segmentation(name, "anna", "map")
         for file in archive.path.parent.glob("scenes.sqlite*"):

@@ -5,11 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sketchmatch.api import forces
 from sketchmatch.model import Scene
+from sketchmatch.pipeline.compare import compare
 from sketchmatch.pipeline.describe import described, in_directions
 from sketchmatch.pipeline.memory import Memory
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.registry import Kind, default_registry
+from sketchmatch_builtin.similarities.circular_peak import CircularPeak
+from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+from sketchmatch_builtin.similarities.pappis import Pappis
 
 REGISTRY = default_registry()
 BOX = np.array([[0.0, 0.0], [1.0, 0.0], [1.3, 0.7], [0.0, 1.0]])
@@ -79,12 +84,48 @@ def test_nothing_is_computed_twice_for_the_same_scene(monkeypatch):
     assert asked == []
 
 
-def test_other_bounds_make_all_pairs_new(monkeypatch):
+def test_what_is_drawn_beyond_the_others_makes_its_own_pairs_new_alone(monkeypatch):
     memory, asked = Memory(), counted(monkeypatch)
-    describe(scene([(0, 1.0), (1, 1.0)]), memory)
+    describe(scene([(0, 1.0), (7, 1.0)]), memory)
     asked.clear()
-    describe(scene([(0, 1.0), (1, 1.0), (7, 1.0)]), memory)
+    beyond = scene([(0, 1.0), (7, 1.0), (2, 1.2), (3, 1.4)])
+    assert beyond.bounds != scene([(0, 1.0), (7, 1.0)]).bounds
+    describe(beyond, memory)
+    assert asked == [(0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
+
+
+def test_another_middle_makes_all_pairs_new(monkeypatch):
+    memory, asked = Memory(), counted(monkeypatch)
+    near, far = scene([(6, 1.0), (7, 1.0)]), scene([(6, 1.0), (7, 1.0), (0, 1.0)])
+    assert near.middle != far.middle
+    describe(near, memory)
+    asked.clear()
+    describe(far, memory)
     assert len(asked) == 3
+
+
+def test_objects_met_before_take_the_places_of_those_like_them(monkeypatch):
+    memory, counts, compute = Memory(), [], forces.force_histograms
+    first = memory.met(scene([(0, 1.0), (7, 1.0), (4, 1.0)]))
+    later = memory.met(scene([(4, 1.0), (0, 1.0), (7, 0.7)]))
+    assert later.objects[:2] == (first.objects[2], first.objects[0])
+    assert later.objects[2] is not first.objects[1]
+    assert memory.met(later) is later
+    named = memory.met(Scene.from_polygons([BOX, 2 * BOX + 9], ["desk", ""]))
+    assert named.labels == ("desk", "")
+    forces.own_histograms(first.objects)
+
+    def counting(edges, pairs, *rest):
+        counts.append(len(pairs))
+        return compute(edges, pairs, *rest)
+
+    monkeypatch.setattr(forces, "force_histograms", counting)
+    found = forces.own_histograms(later.objects)
+    assert counts == [1]
+    alone = [
+        forces.own_histograms([each])[0] for each in scene([(4, 1.0), (0, 1.0), (7, 0.7)]).objects
+    ]
+    assert found.tobytes() == np.array(alone).tobytes()
 
 
 def test_what_was_used_longest_ago_makes_room():
@@ -113,3 +154,103 @@ def test_what_is_kept_elsewhere_is_fetched_once_and_not_told():
     assert memory.descriptor(things, histogram()).scene == things.identity
     assert asked == [(things, "constant")]
     assert told == []
+
+
+MAP = scene([(k, size) for k, size in enumerate((1.0, 0.7, 1.2, 1.1, 0.9, 0.8, 1.3, 0.6))])
+
+
+def table(sketch, memory=None, measure=CrossCorrelation, map_=MAP):
+    """Return the relations of a sketch with a map of at least as many objects."""
+    described_ = (describe(sketch, memory), describe(map_))
+    return finish(compare((sketch, map_), described_, measure(), REGISTRY, memory=memory)).table
+
+
+def same(one, other):
+    """Whether two tables are the same to the last digit."""
+    return all(
+        getattr(one, name).tobytes() == getattr(other, name).tobytes()
+        for name in ("similarity", "rotation", "dilation")
+    )
+
+
+@st.composite
+def revisions(draw):
+    """Draw what a sketch is after each of some edits: something drawn, changed, erased, undone."""
+    sizes = st.sampled_from([0.7, 1.0, 1.2, 1.4])
+    drawn = [draw(THINGS)]
+    for edit in draw(st.lists(st.sampled_from(["draw", "change", "erase", "undo"]), max_size=6)):
+        now = dict(drawn[-1])
+        if edit == "draw" and len(now) < len(PLACES):
+            now[draw(st.sampled_from([k for k in range(len(PLACES)) if k not in now]))] = draw(
+                sizes
+            )
+        elif edit == "change":
+            now[draw(st.sampled_from(sorted(now)))] = draw(sizes)
+        elif edit == "erase" and len(now) > 2:
+            del now[draw(st.sampled_from(sorted(now)))]
+        elif edit == "undo":
+            now = dict(draw(st.sampled_from(drawn)))
+        drawn.append(list(now.items()))
+    return drawn
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("measure", [CrossCorrelation, CircularPeak, Pappis])
+@given(revisions())
+def test_a_sketch_in_progress_is_compared_as_if_it_were_new(measure, drawn):
+    memory = Memory()
+    for things in drawn:
+        assert same(table(scene(things), memory, measure), table(scene(things), measure=measure))
+
+
+class Counting(CrossCorrelation):
+    """The cross-correlation, which counts the rows that it compares."""
+
+    rows = 0
+
+    def combine(self, product, template_square, argument_square):
+        Counting.rows += len(product)
+        return super().combine(product, template_square, argument_square)
+
+
+def compared_rows(sketch, memory, map_=MAP):
+    """Return how many rows of a table are computed."""
+    Counting.rows = 0
+    table(sketch, memory, Counting, map_)
+    return Counting.rows
+
+
+FOUR = [(0, 1.0), (7, 1.0), (4, 1.0), (2, 1.0)]
+
+
+@pytest.mark.parametrize(
+    ("later", "rows"),
+    [
+        (FOUR, 0),
+        ([*FOUR[:3], (2, 0.7)], 3),
+        ([*FOUR, (3, 1.0)], 4),
+        ([(3, 1.0), *FOUR], 4),
+        ([*FOUR[:2], (2, 1.0)], 0),
+        ([FOUR[1], FOUR[0], *FOUR[2:]], 1),
+    ],
+    ids=["nothing", "changed", "drawn", "drawn first", "erased", "in another order"],
+)
+def test_only_rows_of_histograms_that_changed_are_computed(later, rows):
+    memory = Memory()
+    assert compared_rows(scene(FOUR), memory) == 6
+    assert compared_rows(scene(later), memory) == rows
+    assert compared_rows(scene(FOUR), memory) == 0  # undone
+
+
+def test_rows_of_another_map_or_measure_are_not_taken():
+    memory, sketch = Memory(), scene(FOUR)
+    table(sketch, memory, Pappis)
+    assert compared_rows(sketch, memory) == 6
+    assert compared_rows(sketch, memory, scene([*FOUR, (3, 1.0)])) == 6
+
+
+def test_tables_that_are_too_large_are_not_remembered(monkeypatch):
+    monkeypatch.setattr("sketchmatch.pipeline.memory._TABLE_BYTES", 6 * (36 + 3 * 28) * 8 - 1)
+    memory = Memory()
+    assert [compared_rows(scene(FOUR), memory) for _ in range(2)] == [6, 6]
+    assert [compared_rows(scene(FOUR[:3]), memory) for _ in range(2)] == [3, 0]

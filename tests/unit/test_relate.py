@@ -266,6 +266,34 @@ def test_a_table_in_panels_is_the_same_but_for_rounding(similarity, monkeypatch)
 
 @compiled_only
 @pytest.mark.parametrize("similarity", [CrossCorrelation, CircularPeak, Pappis])
+@pytest.mark.parametrize("directions", [36, 180, 240, 720])
+def test_a_row_is_the_same_to_the_last_digit_whichever_rows_come_with_it(directions, similarity):
+    rng = np.random.default_rng(directions)
+    argument = descriptor(rng.random((66, directions)) ** 3)
+    rows = rng.random((28, directions)) ** 3
+    whole = related(descriptor(rows), argument, similarity)
+    for count in (1, 3, 6, 10, 15, 21):
+        some = rng.permutation(28)[:count]
+        part = related(descriptor(rows[some]), argument, similarity)
+        for name in ("similarity", "rotation", "dilation"):
+            assert (getattr(part, name) == getattr(whole, name)[some]).all()
+
+
+@pytest.mark.parametrize("similarity", [CrossCorrelation, CircularPeak, Pappis])
+def test_known_rows_are_taken_as_they_are_and_the_others_computed(similarity):
+    rng = np.random.default_rng(5)
+    template, argument = (descriptor(rng.random((count, 36)) ** 3) for count in (10, 15))
+    expected = related(template, argument, similarity)
+    known = rng.random(10) < 0.5
+    entries = tuple(np.where(known[:, None], 0.5, np.nan) * np.ones((10, 15)) for _ in range(3))
+    found = finish(relate(template, argument, similarity(), (known, entries)))
+    for name in ("similarity", "rotation", "dilation"):
+        assert (getattr(found, name)[known] == 0.5).all()
+        assert (getattr(found, name)[~known] == getattr(expected, name)[~known]).all()
+
+
+@compiled_only
+@pytest.mark.parametrize("similarity", [CrossCorrelation, CircularPeak, Pappis])
 def test_large_tables_come_in_slices(similarity):
     rng = np.random.default_rng(3)
     wide = SceneDescriptor(rng.random((pair_count(200), 180)), 200, 0.0)

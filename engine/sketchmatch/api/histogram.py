@@ -52,7 +52,7 @@ class Histogram(_algorithm.Algorithm, ABC):
 
     @property
     def of_pairs(self) -> bool:
-        """Whether a pair's histogram follows from its two objects and the bounds of the scene.
+        """Whether a pair's histogram follows from its two objects and the scene's ``middle``.
 
         Then the host may keep it while other objects of the scene change.
         """

@@ -284,6 +284,7 @@ def _put_scene(request: PutSceneRequest, setup: Setup) -> Generator[Message, Non
     yield response
     if setup.shelf is not None:
         found = setup.shelf.decoded(name, record.SerializeToString())
+    yield BytesValue(value=Described.within(found.scene).packed())
     for each in _describe(found.scene, request.profile, setup):
         if each.histograms.nbytes <= LARGEST_KEPT:
             described = Described(each.scene, described_by(each.described_by), each.histograms)

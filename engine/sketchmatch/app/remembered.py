@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from sketchmatch.api import Histogram
+from sketchmatch.api.forces import hold_own_histogram
 from sketchmatch.app.scenes import LARGEST_KEPT, Described, Shelf, described_by
 from sketchmatch.app.setup import Setup
 from sketchmatch.model import FloatArray, Scene, SceneDescriptor
@@ -26,7 +27,7 @@ class Remembered:
 
     def __init__(self, path: Path | None) -> None:
         self.path = path
-        self._shelf = Shelf(path)
+        self._shelf = Shelf(path, self._met)
         self._hand_in: Callable[[Described], None] = lambda _: None
         self._memory = Memory(fetch=self._fetch, described=self._described)
 
@@ -39,6 +40,17 @@ class Remembered:
     def close(self) -> None:
         """Close the file, until it is read again."""
         self._shelf.close()
+
+    def _met(self, scene: Scene) -> None:
+        """Take what is kept of the objects of a scene that was decoded, or have it kept."""
+        if self.path is None:
+            return
+        kept = self._shelf.own_histograms(scene)
+        if kept is None:
+            self._hand_in(Described.within(scene))
+            return
+        for item, row in zip(scene.objects, kept, strict=True):
+            hold_own_histogram(item, row)
 
     def _fetch(self, scene: Scene, histogram: Histogram) -> FloatArray | None:
         return self._shelf.histograms(scene, histogram) if self._shelf.holds(scene) else None

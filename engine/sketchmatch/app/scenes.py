@@ -1,7 +1,9 @@
 """Scenes that a server keeps under the hash of what they are, written by one, read by its workers.
 
 A scene is a record, the message ``StoredScene``, that whoever matches with it decodes once. Beside
-it lie its source and the histograms of its pairs, which the worker that computed them hands in.
+it lie its source, and the histograms of its pairs and those within its objects, which the worker
+that computed them hands in. Each of these carries a checksum. What does not fit it is damaged:
+histograms are computed and kept again, and a scene is mended where it is put again.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import sqlite3
 import time
 import zlib
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -23,7 +25,8 @@ import numpy as np
 
 import sketchmatch
 from sketchmatch.api import Histogram, Segmentation, Segmenter
-from sketchmatch.app.store import Database, Reading, Store
+from sketchmatch.api.forces import OWN_DIRECTIONS, own_histograms
+from sketchmatch.app.store import DamagedError, Database, Reading, Store
 from sketchmatch.errors import (
     InvalidInputError,
     NotFoundError,
@@ -56,7 +59,7 @@ __all__ = [
     "without_store",
 ]
 
-_FILE, _VERSION = "scenes", 2
+_FILE, _VERSION = "scenes", 3
 _MIB = 1024 * 1024
 
 _SCHEMA = """
@@ -75,14 +78,18 @@ CREATE TABLE owners (
 ) WITHOUT ROWID;
 CREATE INDEX owners_by_name ON owners (name);
 CREATE TABLE histograms (
-    outlines TEXT NOT NULL, described_by TEXT NOT NULL, directions INTEGER NOT NULL,
-    bytes BLOB NOT NULL, PRIMARY KEY (outlines, described_by)
+    outlines TEXT NOT NULL, described_by TEXT NOT NULL, bytes BLOB NOT NULL,
+    PRIMARY KEY (outlines, described_by)
 )
 """
+_RECORD_OF = "SELECT record FROM scenes WHERE name = ?"
+_HISTOGRAMS_OF = "SELECT bytes FROM histograms WHERE outlines = ? AND described_by = ?"
 _SOURCE_OF = "SELECT source FROM contents JOIN scenes USING (content) WHERE name = ?"
 LARGEST_KEPT = 32 * 1024 * 1024
 """Bytes of the histograms of a scene above which these are computed again."""
 
+_OWN = f"within objects, {OWN_DIRECTIONS}"
+_SUM_BYTES = 4
 _PAGE, _LONGEST_PAGE = 100, 1000
 _A_NAME = re.compile(r"[0-9a-f]{64}")
 _HELD = 32
@@ -151,19 +158,24 @@ def without_store(field: str) -> StoreError:
 
 @dataclass(frozen=True)
 class Described:
-    """The histograms of a scene, as a worker hands them in.
+    """Histograms of a scene, as a worker hands them in.
 
     Attributes
     ----------
     outlines, described_by
         Identities of the scene and of the histogram.
     histograms
-        Shape (Q, n).
+        Shape (Q, n) of pairs, or (N, n) within objects.
     """
 
     outlines: str
     described_by: str
     histograms: FloatArray
+
+    @classmethod
+    def within(cls, scene: Scene) -> Described:
+        """Return the histograms within the objects of a scene."""
+        return cls(scene.identity, described_by(_OWN), own_histograms(scene.objects))
 
     def packed(self) -> bytes:
         """Return it as bytes."""
@@ -230,12 +242,12 @@ class SceneArchive:
             The scene, and whether the caller had not put it.
         """
         record = found.stored_scene
-        source = zlib.compress(found.source.SerializeToString(deterministic=True), 1)
+        source = _summed(zlib.compress(found.source.SerializeToString(deterministic=True), 1))
         labels = _labels_of(record)
 
         def job(connection: sqlite3.Connection) -> tuple[StoredScene, bool]:
             connection.execute(
-                "INSERT OR IGNORE INTO contents VALUES (?, ?, ?)",
+                "INSERT OR REPLACE INTO contents VALUES (?, ?, ?)",
                 (record.name, source, json.dumps(labels)),
             )
             created = _put(connection, record, record.name, caller, most)
@@ -260,13 +272,11 @@ class SceneArchive:
         """
 
         def job(connection: sqlite3.Connection) -> tuple[StoredScene, bool] | None:
-            found = connection.execute(
-                "SELECT record FROM scenes WHERE name = ?", (name,)
-            ).fetchone()
+            found = connection.execute(_RECORD_OF, (name,)).fetchone()
             if found is None:
                 return None
             created = _own(connection, name, caller, most)
-            record = StoredScene.FromString(found[0])
+            record = StoredScene.FromString(_unsummed(found[0]))
             return _titled(connection, record, caller, title or None), created
 
         return self._file.work(job)
@@ -286,7 +296,7 @@ class SceneArchive:
             record = _record(connection, name, caller, field)
             source = None
             if include_source:
-                source = _source(connection.execute(_SOURCE_OF, (name,)).fetchone())
+                source = _source(_unsummed(connection.execute(_SOURCE_OF, (name,)).fetchone()[0]))
             return GetSceneResponse(stored_scene=record, source=source)
 
         return self._file.work(job)
@@ -386,8 +396,11 @@ class SceneArchive:
         """
 
         def job(connection: sqlite3.Connection) -> None:
-            _record(connection, name, caller, "name")
-            connection.execute("DELETE FROM owners WHERE caller = ? AND name = ?", (caller, name))
+            gone = connection.execute(
+                "DELETE FROM owners WHERE caller = ? AND name = ?", (caller, name)
+            )
+            if not gone.rowcount:
+                raise _not_kept(name, "name")
             for statement in (
                 "DELETE FROM scenes WHERE name NOT IN (SELECT name FROM owners)",
                 "DELETE FROM contents WHERE content NOT IN (SELECT content FROM scenes)",
@@ -402,13 +415,12 @@ class SceneArchive:
 
         def job(connection: sqlite3.Connection) -> None:
             connection.execute(
-                "INSERT OR IGNORE INTO histograms SELECT ?, ?, ?, ? "
+                "INSERT OR REPLACE INTO histograms SELECT ?, ?, ? "
                 "WHERE EXISTS (SELECT 1 FROM scenes WHERE outlines = ?)",
                 (
                     described.outlines,
                     described.described_by,
-                    described.histograms.shape[1],
-                    np.ascontiguousarray(described.histograms, dtype="<f8").tobytes(),
+                    _summed(np.ascontiguousarray(described.histograms, dtype="<f8").tobytes()),
                     described.outlines,
                 ),
             )
@@ -430,10 +442,13 @@ class Shelf:
     ----------
     path
         The archive's file; None where none is kept, but for those that come with requests.
+    met
+        Told of each scene that was decoded.
     """
 
-    def __init__(self, path: Path | None) -> None:
+    def __init__(self, path: Path | None, met: Callable[[Scene], None] = lambda _: None) -> None:
         self._file = None if path is None else Reading(path)
+        self._met = met
         self._lock = Lock()
         self._held: OrderedDict[str, Segmentation] = OrderedDict()
 
@@ -468,12 +483,12 @@ class Shelf:
             self._held[name] = found
             while len(self._held) > _HELD:
                 self._held.popitem(last=False)
+        self._met(found.scene)
         return found
 
     def record(self, name: str) -> bytes | None:
         """Return the record of a scene that somebody has put, or None."""
-        found = self._found("SELECT record FROM scenes WHERE name = ?", name)
-        return None if found is None else bytes(found[0])
+        return self._found(_RECORD_OF, name)
 
     def source(self, name: str) -> source_pb2.Source | None:
         """Return what a scene was found in, or None where it is not kept."""
@@ -481,29 +496,32 @@ class Shelf:
         return None if found is None else _source(found)
 
     def histograms(self, scene: Scene, histogram: Histogram) -> FloatArray | None:
-        """Return the histograms of a scene, or None where they are not kept."""
-        found = self._found(
-            "SELECT bytes, directions FROM histograms WHERE outlines = ? AND described_by = ?",
-            scene.identity,
-            described_by(histogram.identity),
-        )
-        if found is None:
-            return None
-        table = _table(*found)
-        fits = table.shape == (pair_count(len(scene)), histogram.directions)
-        return table if fits else None
+        """Return the histograms of a scene, or None where they are not kept, or damaged."""
+        shape = pair_count(len(scene)), histogram.directions
+        return self._table(scene, histogram.identity, shape)
 
-    def _found(self, query: str, *keys: str) -> tuple[Any, ...] | None:
-        """Return a row, or None where there is none or it cannot be read: who writes is told."""
+    def own_histograms(self, scene: Scene) -> FloatArray | None:
+        """Return the histograms within the objects of a scene, or None as :meth:`histograms`."""
+        return self._table(scene, _OWN, (len(scene), OWN_DIRECTIONS // 2))
+
+    def _table(self, scene: Scene, identity: str, shape: tuple[int, int]) -> FloatArray | None:
+        found = self._found(_HISTOGRAMS_OF, scene.identity, described_by(identity))
+        fits = found is not None and len(found) == 8 * shape[0] * shape[1]
+        return _table(found, shape[1]) if found is not None and fits else None
+
+    def _found(self, query: str, *keys: str) -> bytes | None:
+        """Return what is kept, or None for nothing that can be read: who writes is told why."""
         if self._file is None:
             return None
+
+        def job(connection: sqlite3.Connection) -> bytes | None:
+            row = connection.execute(query, keys).fetchone()
+            return None if row is None else _unsummed(row[0])
+
         try:
-            row: tuple[Any, ...] | None = self._file.work(
-                lambda connection: connection.execute(query, keys).fetchone()
-            )
+            return self._file.work(job)
         except StoreError:
             return None
-        return row
 
     def holds(self, scene: Scene) -> bool:
         """Whether a scene came from here."""
@@ -526,12 +544,12 @@ def _put(
     """Write a scene and who has it; return whether that is new."""
     labels = _labels_of(record)
     connection.execute(
-        "INSERT OR IGNORE INTO scenes VALUES (?, ?, ?, ?, ?, ?)",
+        "INSERT OR REPLACE INTO scenes VALUES (?, ?, ?, ?, ?, ?)",
         (
             record.name,
             content,
             segmentation(record).scene.identity,
-            record.SerializeToString(deterministic=True),
+            _summed(record.SerializeToString(deterministic=True)),
             len(labels),
             json.dumps(labels),
         ),
@@ -591,13 +609,17 @@ def _kept(connection: sqlite3.Connection, name: str, caller: str, field: str) ->
         (name, caller),
     ).fetchone()
     if found is None:
-        shown = name if _A_NAME.fullmatch(name) else quoted(name)
-        raise NotFoundError(
-            f"{field} is {shown[:_NAMED]}, and you keep no scene of this name here; put it, or "
-            "list those there are"
-        )
+        raise _not_kept(name, field)
     record, title = found
-    return bytes(record), title
+    return _unsummed(record), title
+
+
+def _not_kept(name: str, field: str) -> NotFoundError:
+    shown = name if _A_NAME.fullmatch(name) else quoted(name)
+    return NotFoundError(
+        f"{field} is {shown[:_NAMED]}, and you keep no scene of this name here; put it, or "
+        "list those there are"
+    )
 
 
 def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) -> StoredScene:
@@ -631,9 +653,28 @@ def _place(page_token: str) -> tuple[int, str]:
     return min(int(time_), 2**63 - 1), name
 
 
-def _source(row: tuple[bytes]) -> source_pb2.Source:
-    """Return the source in a row, where it is compressed."""
-    return source_pb2.Source.FromString(zlib.decompress(row[0]))
+def _source(kept: bytes) -> source_pb2.Source:
+    """Return the source that is kept, compressed."""
+    return source_pb2.Source.FromString(zlib.decompress(kept))
+
+
+def _summed(data: bytes) -> bytes:
+    """Return bytes with their checksum before them."""
+    return zlib.crc32(data).to_bytes(_SUM_BYTES, "little") + data
+
+
+def _unsummed(kept: bytes) -> bytes:
+    """Return bytes without their checksum, if it fits.
+
+    Raises
+    ------
+    DamagedError
+        If it does not.
+    """
+    data = kept[_SUM_BYTES:]
+    if zlib.crc32(data).to_bytes(_SUM_BYTES, "little") != kept[:_SUM_BYTES]:
+        raise DamagedError
+    return data
 
 
 def _points(points: Any) -> FloatArray:

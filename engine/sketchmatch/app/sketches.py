@@ -4,7 +4,7 @@ Each sketch has one runner, which matches the latest revision there is as soon a
 done, by the same requests as ``MatchService.Match``; revisions that came in between are skipped.
 So an answer is that of a match of the same strokes, whatever was drawn and erased before. What
 workers remember of scenes makes it soon: the map is decoded and described once, and of the sketch
-only the relations of objects that changed are described anew.
+only the relations of objects that changed are described and compared with the map anew.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from sketchmatch.errors import StoreError
 
-__all__ = ["Database", "Reading", "Store"]
+__all__ = ["DamagedError", "Database", "Reading", "Store"]
 
 _Result = TypeVar("_Result")
 
@@ -22,6 +22,12 @@ _PATIENCE_SECONDS = 2.0
 _FULL = frozenset({sqlite3.SQLITE_FULL})
 _DAMAGED = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
 _TAKEN = frozenset({sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED})
+
+
+class DamagedError(sqlite3.DatabaseError):
+    """What was kept is not what is read: told as what SQLite itself finds damaged."""
+
+    sqlite_errorcode = sqlite3.SQLITE_CORRUPT
 
 
 class Store:

@@ -33,6 +33,9 @@ BLAS_MULTIPLICATIONS = 2**18
 That is 3 to 10 times slower here, and sums in another order on a machine of more cores.
 """
 
+_NO_DIRECTION = 1e-14
+"""Of all forces: what the mean of their directions comes to by rounding alone."""
+
 
 def main_directions(histograms: FloatArray) -> FloatArray:
     """Return the mean direction of each histogram, atan2(Σ h sin θ, Σ h cos θ).
@@ -54,15 +57,13 @@ def main_directions(histograms: FloatArray) -> FloatArray:
     >>> np.degrees(main_directions(np.array([[0.0, 3.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0]])))
     array([90., 45.])
     """
-    rows, bins = histograms.shape
+    bins = histograms.shape[1]
     angles = 2.0 * np.pi * np.arange(bins) / bins
     cosines, sines = np.cos(angles), np.sin(angles)
-    directions = np.empty(rows)
-    block = max(1, BLAS_MULTIPLICATIONS // bins)
-    for first in range(0, rows, block):
-        some = histograms[first : first + block]
-        directions[first : first + block] = np.arctan2(some @ sines, some @ cosines)
-    return directions
+    # Not as products of matrices, which sum a row otherwise in another place.
+    along, across = (np.einsum("kn,n->k", histograms, each) for each in (cosines, sines))
+    some = np.hypot(along, across) > _NO_DIRECTION * histograms.sum(axis=1)
+    return np.where(some, np.arctan2(across, along), 0.0)
 
 
 def split_turns(angles: FloatArray, bins: int) -> tuple[IntArray, FloatArray]:

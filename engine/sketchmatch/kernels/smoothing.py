@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 from sketchmatch.kernels._jit import kernel
-from sketchmatch.model.arrays import FloatArray
+from sketchmatch.model.arrays import Float32Array, FloatArray
 
 __all__ = ["pull_smooth"]
 
 
 @kernel
 def pull_smooth(
-    points: FloatArray, clearance: FloatArray, room: float, rounds: int, parts: int
+    points: FloatArray, clearance: Float32Array, room: float, rounds: int, parts: int
 ) -> None:
     """Move each point of a line towards the middle of its neighbours, again and again.
 
@@ -36,7 +36,7 @@ def pull_smooth(
     --------
     >>> import numpy as np
     >>> corner = np.array([[0.5, 0.5], [0.5, 2.5], [2.5, 2.5]])
-    >>> pull_smooth(corner, np.ones((3, 3)), 0.5, 1, 4)
+    >>> pull_smooth(corner, np.ones((3, 3), np.float32), 0.5, 1, 4)
     >>> corner.tolist()
     [[0.5, 0.5], [1.0, 2.0], [2.5, 2.5]]
     """

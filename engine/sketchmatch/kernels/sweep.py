@@ -42,7 +42,7 @@ from sketchmatch.kernels.projection import (
     project,
     separating_directions,
 )
-from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray, frozen
+from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray, frozen, settled_middle
 
 __all__ = ["pair_sweep", "sum_over_edges", "sweep_pairs"]
 
@@ -84,9 +84,9 @@ def sweep_pairs(
     >>> sweep_pairs(_sweep, starts, ends, np.array([0, 4, 8]), np.array([[1, 0]]), 4, None)
     array([[1., 0., 0., 0.]])
     """
-    # Floats are finest about the origin. The middle is that of all objects, so that a histogram
-    # does not depend on which others are asked for.
-    middle = 0.5 * (starts.min(axis=0) + starts.max(axis=0))
+    # Floats are finest about the origin. The middle is about that of all objects, so that a
+    # histogram does not depend on which others are asked for, nor mostly on which others there are.
+    middle = settled_middle(starts.min(axis=0), starts.max(axis=0))
     used = np.zeros(offsets.size - 1, dtype=np.bool_)
     used[pairs] = True
     # One type each, whoever gives them: the kernel is compiled once, by a warm-up, and not again by

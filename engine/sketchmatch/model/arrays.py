@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 __all__ = [
     "BoolArray",
     "ComplexArray",
+    "Float32Array",
     "FloatArray",
     "IntArray",
     "frozen",
     "frozen_floats",
     "sealed",
+    "settled_middle",
 ]
 
 _DType = TypeVar("_DType", bound=np.generic)
@@ -25,6 +27,8 @@ ComplexArray = NDArray[np.complex128]
 """An array of complex128: points and vectors of the plane, x + iy."""
 FloatArray = NDArray[np.float64]
 """An array of float64."""
+Float32Array = NDArray[np.float32]
+"""An array of float32: what is large and need not be precise."""
 IntArray = NDArray[np.int64]
 """An array of int64."""
 
@@ -41,6 +45,28 @@ def sealed(array: NDArray[_DType]) -> NDArray[_DType]:
     """Make an array read-only in place and return it; for its only owner, who saves a copy."""
     array.flags.writeable = False
     return array
+
+
+def settled_middle(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return a point near the middle of bounds, which few changes of the bounds move.
+
+    Its coordinates are multiples of the power of two that is as large as the bounds or less than
+    twice as large.
+
+    Parameters
+    ----------
+    low, high
+        Shape (2,).
+
+    Examples
+    --------
+    >>> settled_middle(np.array([1.0, 2.0]), np.array([8.0, 4.5]))
+    array([8., 0.])
+    >>> settled_middle(np.array([0.5, 2.0]), np.array([8.4, 4.9]))
+    array([8., 0.])
+    """
+    step = 2.0 ** np.ceil(np.log2((high - low).max()))
+    return np.asarray(step * np.round(0.5 * (low + high) / step), dtype=np.float64)
 
 
 def frozen_floats(values: Any) -> FloatArray:

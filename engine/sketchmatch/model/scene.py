@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.validation import explain_validity
 
 from sketchmatch.errors import InvalidInputError, Reason, quoted
-from sketchmatch.model.arrays import FloatArray, IntArray, frozen_floats, sealed
+from sketchmatch.model.arrays import FloatArray, IntArray, frozen_floats, sealed, settled_middle
 from sketchmatch.model.caching import cached_property
 from sketchmatch.model.labels import cleaned_label, label_from
 from sketchmatch.model.text import listed, name, shortened
@@ -308,12 +308,19 @@ class Scene:
         """The objects' names, empty where there is none."""
         return tuple(item.label for item in self.objects)
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
         """Smallest x, smallest y, largest x, largest y."""
         points = np.concatenate([item.rings[0] for item in self.objects])
         (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
         return (float(x0), float(y0), float(x1), float(y1))
+
+    @cached_property
+    def middle(self) -> tuple[float, float]:
+        """A point near the middle of the bounds, which most changes of the scene leave there."""
+        x0, y0, x1, y1 = self.bounds
+        x, y = settled_middle(np.array([x0, y0]), np.array([x1, y1]))
+        return (float(x), float(y))
 
 
 def _checked_certainty(value: Any) -> float:

@@ -26,6 +26,7 @@ from sketchmatch.model.text import Table, Tabular, name
 from sketchmatch.pipeline.describe import check_histograms
 from sketchmatch.pipeline.evidence import compare_objects, rotation_weights, weigh_objects
 from sketchmatch.pipeline.guard import blamed
+from sketchmatch.pipeline.memory import Memory
 from sketchmatch.pipeline.reading import half_turned
 from sketchmatch.pipeline.relate import relate
 from sketchmatch.pipeline.result import Correspondence
@@ -172,6 +173,7 @@ def compare(
     similarity: Similarity,
     registry: Registry,
     weights: ConfidenceWeights = ConfidenceWeights(),  # noqa: B008
+    memory: Memory | None = None,
 ) -> Generator[float, None, Comparison]:
     """Compare a sketch with a map, objects too where these have weight.
 
@@ -186,6 +188,8 @@ def compare(
         Where the measure comes from, to blame it by name.
     weights
         Of ζ: what objects count for, and distance, are part of the table.
+    memory
+        Which relations need not be computed again; None where nothing is remembered.
 
     Yields
     ------
@@ -203,8 +207,11 @@ def compare(
     if is_swapped(*scenes):
         (argument, template), related = scenes, (descriptors[1], descriptors[0])
     share = 0.4 if weights.of_objects else 1.0
-    work = blamed(relate(*related, similarity), similarity, registry)
+    known = None if memory is None else memory.rows(*related, similarity)
+    work = blamed(relate(*related, similarity, known), similarity, registry)
     table = yield from _part(work, 0.0, share)
+    if memory is not None:
+        memory.keep_rows(*related, similarity, table)
     if weights.distance:
         table = replace(table, rotation_weights=rotation_weights(template, weights.distance))
     own = None

@@ -145,4 +145,6 @@ class Engine:
             for side, scene in zip(SIDES, scenes, strict=True)
         )
         descriptors = ((yield from drawn), (yield from mapped))
-        return (yield from compare(scenes, descriptors, similarity, self.registry, weights))
+        return (
+            yield from compare(scenes, descriptors, similarity, self.registry, weights, self.memory)
+        )

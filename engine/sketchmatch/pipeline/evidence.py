@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sketchmatch.api.forces import OVERLAPPING, force_histograms
+from sketchmatch.api.forces import own_histograms
 from sketchmatch.kernels.evidence import SelfRelations, weigh_entries
 from sketchmatch.model import (
     DILATION_SCALE,
@@ -30,8 +30,6 @@ from sketchmatch.pipeline.relate import Histograms
 from sketchmatch.pipeline.slices import in_slices
 
 __all__ = ["compare_objects", "rotation_weights", "weigh_objects"]
-
-_EXPONENT = 0.0
 
 # Of the mean distance; objects that surround each other may have one centroid.
 _LEAST_DISTANCE = 0.01
@@ -66,7 +64,7 @@ def compare_objects(
 
     for share in in_slices(len(values), work):
         yield (2.0 + share) / 3.0
-    growth = (mapped.log_means - drawn.log_means[:, None]) / (3.0 - _EXPONENT)
+    growth = (mapped.log_means - drawn.log_means[:, None]) / 3.0  # forces of exponent r: 3 − r
     return SelfRelations(
         products=sealed(products),
         roughness=sealed(drawn.roughness / drawn.squares),
@@ -144,10 +142,7 @@ def _own_histograms(
     histograms = np.empty((len(scene), directions // 2))
 
     def work(first: int, last: int) -> None:
-        pairs = np.repeat(np.arange(first, last), 2).reshape(-1, 2)
-        overlapping = np.full(len(pairs), OVERLAPPING, dtype=np.int64)
-        found = force_histograms(scene.edges, pairs, directions, _EXPONENT, overlapping)
-        histograms[first:last] = found[:, : directions // 2]
+        histograms[first:last] = own_histograms(scene.objects[first:last], directions)
 
     for share in in_slices(len(scene), work):
         yield done + share / 3.0

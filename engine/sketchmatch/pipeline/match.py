@@ -178,6 +178,8 @@ def _events(
             cuts_of_side("map", request.map, pipeline, registry),
         ]
         sketch = next(cuts[0])
+        if memory is not None and not isinstance(request.sketch, Scene | Segmentation):
+            sketch = replace(sketch, scene=memory.met(sketch.scene))
         clock.check(Phase.SEGMENT)
         map_ = next(cuts[1])
         drawn, mapped = [sketch], [map_]
@@ -277,7 +279,7 @@ def _compared(
             described(scenes[1], histogram, registry, "map", memory), Phase.DESCRIBE, clock
         )
     with clock.timing("relate"):
-        work = compare(scenes, (drawn, mapped), pipeline.similarity, registry, weights)
+        work = compare(scenes, (drawn, mapped), pipeline.similarity, registry, weights, memory)
         return (yield from _watched(work, Phase.RELATE, clock))
 
 

@@ -1,19 +1,24 @@
-"""What was described before: whole scenes, and pairs of objects that a scene has kept."""
+"""What was described and compared before: scenes, their pairs of objects, rows of tables."""
 
 from __future__ import annotations
 
 from collections import OrderedDict, deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from threading import Lock
+from weakref import WeakValueDictionary
 
 import numpy as np
 
-from sketchmatch.api import Histogram
+from sketchmatch.api import Histogram, Similarity
 from sketchmatch.model import (
     BoolArray,
     FloatArray,
+    IntArray,
+    RelationTable,
     Scene,
     SceneDescriptor,
+    SceneObject,
     object_pairs,
     pair_index,
 )
@@ -22,10 +27,21 @@ __all__ = ["Memory"]
 
 _RECENT = 16
 _BYTES = 128 * 1024 * 1024
+_TABLE_BYTES = 4 * 1024 * 1024
+"""What a table of relations, and the histograms of its rows, may take to be remembered."""
+
+
+@dataclass(frozen=True)
+class _Related:
+    """A table of relations, with the place of each row by the histogram that it compares."""
+
+    key: tuple[str, ...]
+    places: dict[bytes, int]
+    table: RelationTable
 
 
 class Memory:
-    """Histograms that need not be computed again; several threads may use it.
+    """Histograms and relations that need not be computed again; several threads may use it.
 
     What it returns is what would be computed, to the last digit: whoever remembers answers like
     everybody else.
@@ -54,6 +70,21 @@ class Memory:
         self._bytes = 0
         self._known: OrderedDict[tuple[str, str], SceneDescriptor] = OrderedDict()
         self._recent: deque[tuple[Scene, SceneDescriptor]] = deque(maxlen=_RECENT)
+        self._related: deque[_Related] = deque(maxlen=_RECENT)
+        self._objects: WeakValueDictionary[tuple[object, ...], SceneObject] = WeakValueDictionary()
+
+    def met(self, scene: Scene) -> Scene:
+        """Return a scene that was just found, with the objects that were met before in it.
+
+        They take the places of those like them, as what is measured of an object is kept with it.
+        """
+        with self._lock:
+            objects = tuple(
+                self._objects.setdefault((_outline(item), item.label, item.certainty), item)
+                for item in scene.objects
+            )
+        alike = all(one is other for one, other in zip(objects, scene.objects, strict=True))
+        return scene if alike else Scene(objects)
 
     def descriptor(self, scene: Scene, histogram: Histogram) -> SceneDescriptor | None:
         """Return the histograms of a scene, or None where they have to be computed."""
@@ -102,18 +133,74 @@ class Memory:
             recent = [each for each in self._recent if each[1].described_by == wanted]
         best: tuple[int, list[int], SceneDescriptor] | None = None
         for other, descriptor in recent:
-            if other.bounds != scene.bounds:
+            if other.middle != scene.middle:
                 continue
-            places = {_outline(other, k): k for k in range(len(other))}
-            former = [places.get(_outline(scene, k), -1) for k in range(len(scene))]
+            places = {_outline(item): k for k, item in enumerate(other.objects)}
+            former = [places.get(_outline(item), -1) for item in scene.objects]
             shared = sum(place >= 0 for place in former)
             if shared >= 2 and (best is None or shared > best[0]):
                 best = shared, former, descriptor
         return None if best is None else _copied(best[1], best[2])
 
+    def rows(
+        self, template: SceneDescriptor, argument: SceneDescriptor, similarity: Similarity
+    ) -> tuple[BoolArray, tuple[FloatArray, FloatArray, FloatArray]] | None:
+        """Return which rows of a table are known from another one, and σ, R and L of them.
 
-def _outline(scene: Scene, k: int) -> bytes:
-    return b"|".join(ring.tobytes() for ring in scene.objects[k].rings)
+        Returns
+        -------
+        tuple or None
+            Shapes (Q,) and, three times, (Q, Q'/2), of which only known rows mean anything; None
+            where nothing is known.
+        """
+        key = _compared(template, argument, similarity)
+        with self._lock:
+            recent = [each for each in self._related if each.key == key]
+        if not recent:
+            return None
+        wanted = [row.tobytes() for row in template.histograms]
+        best = max(recent, key=lambda each: sum(row in each.places for row in wanted))
+        former = np.array([best.places.get(row, -1) for row in wanted])
+        known = former >= 0
+        return (known, _rows(best.table, former, known)) if known.any() else None
+
+    def keep_rows(
+        self,
+        template: SceneDescriptor,
+        argument: SceneDescriptor,
+        similarity: Similarity,
+        table: RelationTable,
+    ) -> None:
+        """Remember how the histograms of two scenes compare, unless that is too much."""
+        if template.histograms.nbytes + 3 * table.similarity.nbytes > _TABLE_BYTES:
+            return
+        places = {row.tobytes(): k for k, row in enumerate(template.histograms)}
+        related = _Related(_compared(template, argument, similarity), places, table)
+        with self._lock:
+            self._related.appendleft(related)
+
+
+def _compared(
+    template: SceneDescriptor, argument: SceneDescriptor, similarity: Similarity
+) -> tuple[str, ...]:
+    """Return what a row of a table depends on beside its own histogram."""
+    return template.described_by, argument.described_by, argument.scene, similarity.identity
+
+
+def _rows(
+    table: RelationTable, former: IntArray, known: BoolArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return σ, R and L with the known rows of a table in their new places."""
+    shape = (former.size, table.argument_pairs)
+    sigma, rotation, dilation = np.empty(shape), np.empty(shape), np.empty(shape)
+    sigma[known] = table.similarity[former[known]]
+    rotation[known] = table.rotation[former[known]]
+    dilation[known] = table.dilation[former[known]]
+    return sigma, rotation, dilation
+
+
+def _outline(item: SceneObject) -> bytes:
+    return b"|".join(ring.tobytes() for ring in item.rings)
 
 
 def _copied(former: list[int], descriptor: SceneDescriptor) -> tuple[BoolArray, FloatArray]:

@@ -24,21 +24,27 @@ from sketchmatch.kernels.alignment import (
     split_turns,
     turned_rows,
 )
-from sketchmatch.model import FloatArray, IntArray, RelationTable, SceneDescriptor
+from sketchmatch.model import BoolArray, FloatArray, IntArray, RelationTable, SceneDescriptor
 from sketchmatch.model.arrays import sealed
 from sketchmatch.model.caching import cached_property
 from sketchmatch.pipeline.guard import checked_array
 from sketchmatch.pipeline.slices import in_slices
 
 ComplexArray = np.ndarray[Any, np.dtype[np.complex128]]
+Entries = tuple[FloatArray, FloatArray, FloatArray]
+"""σ, R and L of some rows of a table."""
 
-__all__ = ["Histograms", "check_exponent", "relate"]
+__all__ = ["Entries", "Histograms", "check_exponent", "relate"]
 
 _LEAST_POWER = 0.5
 _MOST_LOG_DILATION = 700.0
 _PANEL_VALUES = 2**20
 _TILE_VALUES = 2**17
-_BLAS_ROWS = 16
+_BLAS_ROWS = 8
+"""Rows that one product of matrices takes.
+
+Products of this height sum a row alike in whichever place it stands; of fewer rows they do not.
+"""
 
 _MEASURED: WeakKeyDictionary[SceneDescriptor, Histograms] = WeakKeyDictionary()
 """What maps that are matched again and again would otherwise be measured for each time."""
@@ -62,7 +68,10 @@ def check_exponent(exponent: float) -> None:
 
 
 def relate(
-    template: SceneDescriptor, argument: SceneDescriptor, similarity: Similarity
+    template: SceneDescriptor,
+    argument: SceneDescriptor,
+    similarity: Similarity,
+    known: tuple[BoolArray, Entries] | None = None,
 ) -> Generator[float, None, RelationTable]:
     """Compare every template histogram with every argument histogram.
 
@@ -73,6 +82,14 @@ def relate(
 
     Numbers stay in double precision, because the proofs of ``exact`` compare ζ to 12 digits. Duals
     are not computed: they have the same σ and L, and R + π.
+
+    Parameters
+    ----------
+    template, argument, similarity
+        What is compared with what, and by which measure.
+    known
+        Which rows are known already, shape (Q,), and σ, R and L of these rows, as
+        :meth:`~sketchmatch.pipeline.memory.Memory.rows` returns them.
 
     Yields
     ------
@@ -92,20 +109,38 @@ def relate(
     """
     check_exponent(template.exponent)
     _check_alike(template, argument)
-    rows = _measured(template)
-    shape = (len(rows), len(argument.histograms))
-    sigma, rotation, dilation = (np.empty(shape) for _ in range(3))
-    panel = max(1, _PANEL_VALUES // rows.bins)
-    for first in range(0, shape[1], panel):
-        columns = slice(first, min(first + panel, shape[1]))
-        whole = columns == slice(0, shape[1])
-        others = _measured(argument) if whole else Histograms.of(argument.histograms[columns])
-        entries = tuple(array[:, columns] for array in (sigma, rotation, dilation))
-        for share in _fill(rows, others, similarity, template.exponent, *entries):
-            yield (first + share * len(others)) / shape[1]
-    return RelationTable(
-        sealed(sigma), sealed(rotation), sealed(dilation), template.objects, argument.objects
-    )
+    shape = (len(template.histograms), len(argument.histograms))
+    if known is None:
+        rows, entries = _measured(template), _empty(shape)
+        yield from _related(rows, argument, similarity, entries)
+    else:
+        missing, entries = np.flatnonzero(~known[0]), known[1]
+        rows, found = Histograms.of(template.histograms[missing]), _empty((missing.size, shape[1]))
+        yield from _related(rows, argument, similarity, found)
+        for whole, part in zip(entries, found, strict=True):
+            whole[missing] = part
+    sigma, rotation, dilation = map(sealed, entries)
+    return RelationTable(sigma, rotation, dilation, template.objects, argument.objects)
+
+
+def _related(
+    rows: Histograms, argument: SceneDescriptor, similarity: Similarity, entries: Entries
+) -> Generator[float, None, None]:
+    """Compare some template histograms with every argument histogram, panel by panel."""
+    columns = len(argument.histograms)
+    panel = max(1, _PANEL_VALUES // argument.directions)
+    for first in range(0, columns, panel):
+        some = slice(first, min(first + panel, columns))
+        whole = some == slice(0, columns)
+        others = _measured(argument) if whole else Histograms.of(argument.histograms[some])
+        parts = tuple(array[:, some] for array in entries)
+        for share in _fill(rows, others, similarity, argument.exponent, *parts):
+            yield (first + share * len(others)) / columns
+
+
+def _empty(shape: tuple[int, int]) -> Entries:
+    """Return room for σ, R and L."""
+    return np.empty(shape), np.empty(shape), np.empty(shape)
 
 
 def _measured(descriptor: SceneDescriptor) -> Histograms:
@@ -332,13 +367,17 @@ class _MainTurns:
         )
 
     def with_products(self, rows: slice, columns: slice) -> tuple[IntArray, FloatArray, FloatArray]:
-        ahead, block = self.template.ahead[rows], self.blocks.shape[1]
+        whole, rest = self.alone(rows, columns)
+        count, block = len(rest), self.blocks.shape[1]
+        ahead, rests = np.zeros((_BLAS_ROWS, self.template.bins)), np.zeros(_BLAS_ROWS)
+        ahead[:count] = self.template.ahead[rows]
+        rests[:count] = self.template.main_turns[1][rows]
         around = np.concatenate([ahead[:, -1:], ahead, ahead[:, :1]], axis=1)
         about = np.concatenate([around[:, 2:], ahead, around[:, :-2]])
         others = self.blocks[columns.start // block : math.ceil(columns.stop / block)]
-        rests = self.template.main_turns[1][rows], self.argument.main_turns[1][columns]
-        product = interpolated_products(about @ others.swapaxes(1, 2), *rests)
-        return (*self.alone(rows, columns), product)
+        products = about @ others.swapaxes(1, 2)
+        other_rests = self.argument.main_turns[1][columns]
+        return whole, rest, interpolated_products(products, rests, other_rests)[:count]
 
 
 class _PeakTurns:

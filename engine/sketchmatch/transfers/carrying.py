@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -113,9 +113,14 @@ def carried(
         Of the target, for sentences.
     """
     found: list[Carried] = []
+    points = _carried_points(features, course, obstacles, radius, unit)
     for k, feature in enumerate(features):
-        done = partial(_done, k / len(features))
-        found.append((yield from retold(_carried(feature, course, obstacles, radius, unit), done)))
+        if feature.kind is FeatureKind.POINT:
+            found.append(next(points))
+        else:
+            done = partial(_done, k / len(features))
+            work = _carried_line(feature, course, obstacles, radius, unit)
+            found.append((yield from retold(work, done)))
         yield (k + 1) / len(features)
     return tuple(found)
 
@@ -124,44 +129,61 @@ def _done(share: float, _: None) -> tuple[float]:
     return (share,)
 
 
-def _carried(
+def _carried_points(
+    features: Sequence[Feature],
+    course: Course,
+    obstacles: Obstacles | None,
+    radius: float,
+    unit: str,
+) -> Iterator[Carried]:
+    """Yield what becomes of each feature that is a point; they are carried all at once."""
+    points = [each for each in features if each.kind is FeatureKind.POINT]
+    if not points:
+        return
+    drawn = np.vstack([each.points for each in points])
+    places, deviations = course.warp(drawn), course.warp.deviations(drawn)
+    inside = clear = np.ones(len(points), dtype=bool)
+    if obstacles is not None:
+        inside, clear = obstacles.inside(places), obstacles.clear(places, radius)
+    for k, each in enumerate(points):
+        there = _there(each, (places[k : k + 1],))
+        found = Carried(each.kind, each.name, there, (deviations[k : k + 1],), (np.zeros(1),))
+        if not inside[k]:
+            found = found.changed(Change(ChangeReason.OUTSIDE, 0, 0, "It lies beyond the grid."))
+        elif obstacles is not None and not clear[k]:
+            found = found.changed(_blocked(places[k], obstacles, radius, unit))
+        yield found
+
+
+def _blocked(place: FloatArray, obstacles: Obstacles, radius: float, unit: str) -> Change:
+    """Return what is to be said of a point that is no place for a robot: it is not moved."""
+    near = obstacles.nearest_clear(place, radius, max(_FARTHEST_CLEAR, 10.0 * radius))
+    there = "" if near is None else f"; the nearest that is none is ({near[0]:.6g}, {near[1]:.6g})"
+    sentence = f"It lies in an obstacle, or less than {radius:g} {unit} from one{there}."
+    return Change(ChangeReason.BLOCKED, 0, 0, sentence)
+
+
+def _carried_line(
     feature: Feature, course: Course, obstacles: Obstacles | None, radius: float, unit: str
 ) -> Generator[None, None, Carried]:
     if feature.kind is FeatureKind.ROUTE:
         return (yield from _carried_route(feature, course, obstacles, radius, unit))
-    ways = [_dense(ring, course, feature.kind is FeatureKind.ZONE) for ring in feature.rings]
+    ways = [_dense(ring, course, closed=True) for ring in feature.rings]
     thin = [_thinned(way, course.extent * _COARSE) for way in ways]
-    if feature.kind is FeatureKind.ZONE and not _is_area(thin):
+    if not _is_area(thin):
         thin = ways  # as narrow as it was simplified by
     found = _result(feature, thin, course)
-    if obstacles is None:
+    assert found.feature is not None
+    outline = found.feature.points
+    if obstacles is None or obstacles.inside(outline).any():
         return found
-    return found.changed(*_noted(feature, found, obstacles, radius, unit))
+    last = len(outline) - 1
+    return found.changed(Change(ChangeReason.OUTSIDE, 0, last, "It lies beyond the grid."))
 
 
 def _is_area(ways: Sequence[Way]) -> bool:
     outline, *holes = (way.points for way in ways)
     return bool(shapely.Polygon(outline, holes).is_valid)
-
-
-def _noted(
-    feature: Feature, found: Carried, obstacles: Obstacles, radius: float, unit: str
-) -> list[Change]:
-    """Return what is to be said of a point or zone on a grid: nothing of it is moved."""
-    assert found.feature is not None
-    points = found.feature.points
-    if feature.kind is FeatureKind.ZONE:
-        if obstacles.inside(points).any():
-            return []
-        return [Change(ChangeReason.OUTSIDE, 0, len(points) - 1, "It lies beyond the grid.")]
-    if not obstacles.inside(points).all():
-        return [Change(ChangeReason.OUTSIDE, 0, 0, "It lies beyond the grid.")]
-    if obstacles.clear(points, radius).all():
-        return []
-    near = obstacles.nearest_clear(points[0], radius, max(_FARTHEST_CLEAR, 10.0 * radius))
-    there = "" if near is None else f"; the nearest that is none is ({near[0]:.6g}, {near[1]:.6g})"
-    sentence = f"It lies in an obstacle, or less than {radius:g} {unit} from one{there}."
-    return [Change(ChangeReason.BLOCKED, 0, 0, sentence)]
 
 
 def _carried_route(
@@ -264,15 +286,22 @@ def _result(feature: Feature, ways: Sequence[Way], course: Course) -> Carried:
     speeds = None
     if feature.speeds is not None:
         speeds = feature.speeds[np.floor(ways[0].sources).astype(int)]
-    try:
-        there = Feature(feature.kind, tuple(way.points for way in ways), feature.name, speeds)
-    except InvalidInputError as error:
-        problem = f"hold a {feature.kind} {quoted(feature.name)} that cannot be carried: there it "
-        raise InvalidInputError(error.reason, "features", problem + error.problem) from None
+    there = _there(feature, tuple(way.points for way in ways), speeds)
     deviations = tuple(course.warp.deviations(way.drawn) for way in ways)
     return Carried(
         feature.kind, feature.name, there, deviations, tuple(way.sources for way in ways)
     )
+
+
+def _there(
+    feature: Feature, rings: tuple[FloatArray, ...], speeds: FloatArray | None = None
+) -> Feature:
+    """Return a feature with other rings."""
+    try:
+        return Feature(feature.kind, rings, feature.name, speeds)
+    except InvalidInputError as error:
+        problem = f"hold a {feature.kind} {quoted(feature.name)} that cannot be carried: there it "
+        raise InvalidInputError(error.reason, "features", problem + error.problem) from None
 
 
 def _centres(scene: Scene, indices: Sequence[int]) -> FloatArray:

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from sketchmatch.kernels.clearing import legs_clear
 from sketchmatch.model import BoolArray, FloatArray, IntArray, OccupancyGrid, Scene
+from sketchmatch.model.arrays import Float32Array
 from sketchmatch.model.caching import cached_property
 
 __all__ = ["Obstacles", "Window", "sampled"]
@@ -18,9 +21,17 @@ _OCCUPIED = 65
 _CORNER = math.sqrt(0.5)
 _NO_NEARER = 0.5
 """In cells: how far from obstacles a way stays that need not keep away, lest it cut a corner."""
-_SAMPLES = 4.0
+_ROUNDING = 1e-9
+_ROUNDED = 1.0 - 1e-6
+"""Of distances in single precision, which must not be too large."""
 _MOST_CELLS = 4_000_000
 _PER_SPACING = 24.0
+_FARTHEST_CELLS = 128
+_UNSURE = 0.25
+"""In cells: what middles may have more room than is said."""
+_BESIDE = 4
+
+PixelsArray = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +80,25 @@ class Obstacles:
         return cls(picture.astype(bool), step, (float(low[0]), float(low[1]), 0.0))
 
     @cached_property
-    def clearance(self) -> FloatArray:
-        """How far the obstacles are at least from anywhere in each cell's middle."""
-        free = np.pad((~self.blocked).astype(np.uint8), 1)
-        away = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
-        clear: FloatArray = (away.astype(np.float64) - _CORNER) * self.resolution
-        return clear
+    def room(self) -> Float32Array:
+        """How far each cell is from the nearest obstacle's, square from square, in cells."""
+        wide = cv2.dilate(self._walled, np.ones((3, 3), dtype=np.uint8))
+        return _distances(wide.astype(np.uint8, copy=False))
+
+    @cached_property
+    def clearance(self) -> Float32Array:
+        """How far the middle of each cell is from obstacles, at least."""
+        found: Float32Array = np.maximum(
+            _distances(self._walled) - np.float32(_CORNER), self.room + np.float32(0.5)
+        )
+        found[self.blocked] = 0.0
+        found *= np.float32(self.resolution)
+        return found
+
+    @property
+    def _walled(self) -> PixelsArray:
+        """What is blocked, with a border of such cells around it."""
+        return np.pad(self.blocked.astype(np.uint8), 1, constant_values=1)
 
     def local(self, points: FloatArray) -> FloatArray:
         """Return points as row and column in units of cells, shape (m, 2)."""
@@ -104,35 +128,84 @@ class Obstacles:
         cells = self.cells(points)
         return np.asarray(((cells >= 0) & (cells < self.blocked.shape)).all(axis=1))
 
+    def kept(self, radius: float) -> float:
+        """Return how far from obstacles a robot of a radius is kept."""
+        return max(radius, _NO_NEARER * self.resolution)
+
     def needed(self, radius: float) -> float:
-        """Return how much room a robot of a radius needs in the middle of a cell."""
-        return max(radius, _NO_NEARER * self.resolution - 1e-9)
+        """Return how much room it needs in the middles of cells, to go straight between two next.
+
+        Where both are so far from a point, all between them is as far as is to be kept.
+        """
+        return math.hypot(self.kept(radius), _CORNER * self.resolution) * _ROUNDED
 
     def clear(self, points: FloatArray, radius: float) -> BoolArray:
         """Return at which points a robot of a radius may be; nowhere beyond the grid."""
-        found = np.zeros(len(points), dtype=bool)
-        within = self.inside(points)
-        rows, columns = self.cells(points[within]).T
-        found[within] = self.clearance[rows, columns] >= self.needed(radius)
-        return found
+        return self.legs_clear(np.repeat(points, 2, axis=0), radius)[::2]
+
+    def legs_clear(self, points: FloatArray, radius: float) -> BoolArray:
+        """Return on which legs between points, of k − 1, a robot of a radius may be all along."""
+        kept = self.kept(radius) / self.resolution - _ROUNDING
+        return np.asarray(legs_clear(self.local(points), self.blocked, self.room, kept))
 
     def line_is_clear(self, points: FloatArray, radius: float) -> bool:
         """Whether a line through points stays clear all along."""
-        return bool(self.clear(sampled(points, self.resolution / _SAMPLES), radius).all())
+        return bool(self.legs_clear(points, radius).all())
+
+    def beside(
+        self, point: FloatArray, radius: float, open_: BoolArray, low: IntArray
+    ) -> IntArray | None:
+        """Return the nearest open cell to which a robot may go straight from a point, or None.
+
+        Parameters
+        ----------
+        point, radius
+            Where it is, and how large.
+        open_, low
+            Shape (rows, columns): which cells are open, from row and column ``low`` on.
+        """
+        (cell,) = self.cells(point[None, :]) - low
+        first = np.clip(cell - _BESIDE, 0, open_.shape)
+        last = np.clip(cell + _BESIDE + 1, 0, open_.shape)
+        cells = np.argwhere(open_[first[0] : last[0], first[1] : last[1]]) + first
+        if not len(cells):
+            return None
+        places = self.places(cells + low)
+        legs = np.stack([np.broadcast_to(point, places.shape), places], axis=1).reshape(-1, 2)
+        away = np.hypot(*(places - point).T)
+        away[~self.legs_clear(legs, radius)[::2]] = np.inf
+        best = int(np.argmin(away))
+        return cells[best] if np.isfinite(away[best]) else None
 
     def nearest_clear(self, point: FloatArray, radius: float, within: float) -> FloatArray | None:
-        """Return the nearest place to a point where a robot may be; None if none is near."""
-        (cell,) = self.cells(point[None, :])
-        reach = math.ceil(within / self.resolution)
-        window = Window.around(self, np.array([cell]), reach)
-        room = window.of(self.clearance) >= self.needed(radius)
-        free = np.argwhere(room) + window.low
-        if not len(free):
-            return None
-        places = self.places(free)
-        away = np.hypot(*(places - point).T)
-        best = int(np.argmin(away))
-        return places[best] if away[best] <= within else None
+        """Return the nearest place to a point where a robot may be; None if none is near.
+
+        It is looked for no farther than 128 cells away.
+        """
+        cell = self.cells(point[None, :])
+        farthest = min(math.ceil(within / self.resolution), _FARTHEST_CELLS)
+        reach = 0
+        while reach < farthest:
+            reach = min(4 * reach + 8, farthest)
+            window = Window.around(self, cell, reach)
+            likely = window.of(self.clearance) >= self.kept(radius) - _UNSURE * self.resolution
+            places = self.places(np.argwhere(likely) + window.low)
+            places = places[self.clear(places, radius)]
+            if not len(places):
+                continue
+            away = np.hypot(*(places - point).T)
+            best = int(np.argmin(away))
+            # What is nearer than the window's sides is the nearest of all.
+            if away[best] <= min(within, reach * self.resolution):
+                found: FloatArray = places[best]
+                return found
+        return None
+
+
+def _distances(walled: PixelsArray) -> Float32Array:
+    """Return how far the cells within the border are from the nearest that is blocked."""
+    away = cv2.distanceTransform(1 - walled, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.asarray(away[1:-1, 1:-1] * np.float32(_ROUNDED), dtype=np.float32)
 
 
 def sampled(points: FloatArray, step: float) -> FloatArray:
@@ -171,6 +244,6 @@ class Window:
         """Whether it is the whole grid."""
         return not self.low.any() and tuple(self.high) == obstacles.blocked.shape
 
-    def of(self, array: FloatArray) -> FloatArray:
+    def of(self, array: Float32Array) -> Float32Array:
         """Return that part of an array of the whole grid."""
         return array[self.low[0] : self.high[0], self.low[1] : self.high[1]]

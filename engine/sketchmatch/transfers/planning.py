@@ -20,6 +20,7 @@ import shapely
 
 from sketchmatch.kernels.smoothing import pull_smooth
 from sketchmatch.model import BoolArray, FloatArray, IntArray
+from sketchmatch.model.arrays import Float32Array
 from sketchmatch.transfers.features import Change, ChangeReason
 from sketchmatch.transfers.obstacles import Obstacles, Window, sampled
 
@@ -34,8 +35,8 @@ _HUG = 0.5
 _SMOOTHINGS = 40
 _SLACK = 0.5
 """In cells: how much farther away a line stays that is pulled smooth, to be simplified."""
-_SHARES = np.arange(1, 17)[:, None, None] / 16.0
-"""Where a leg is looked at."""
+_PARTS = 16
+"""Into how many parts a leg is cut where it is pulled smooth."""
 _MOST_BARRIERS = 6
 _MOST_STRETCHES = 8
 _MANY_CELLS = 400_000
@@ -180,9 +181,7 @@ def _finished(done: Way, changes: list[Change]) -> tuple[Way | None, tuple[Chang
 def _clear_stretches(way: Way, obstacles: Obstacles, radius: float) -> BoolArray:
     """Return which points are clear; a point after a leg that is not clear counts as none."""
     clear = obstacles.clear(way.points, radius)
-    legs = way.points[:-1] + _SHARES * (way.points[1:] - way.points[:-1])
-    passed = obstacles.clear(legs.reshape(-1, 2), radius).reshape(legs.shape[:2]).all(axis=0)
-    clear[1:] &= passed | ~clear[:-1]
+    clear[1:] &= obstacles.legs_clear(way.points, radius) | ~clear[:-1]
     return clear
 
 
@@ -278,15 +277,14 @@ def _planned(
         open_ = window.of(obstacles.clearance) >= obstacles.needed(radius)
         for barrier in barriers:
             open_ &= ~_drawn(obstacles.cells(barrier) - window.low, open_.shape)
-        ends = cells[[0, -1]] - window.low
-        open_[tuple(ends.T)] = True
+        first, last = carried.points[[0, -1]]
+        begin = obstacles.beside(first, radius, open_, window.low)
+        end = obstacles.beside(last, radius, open_, window.low)
         yield
-        if _joined(open_, ends):
+        if begin is not None and end is not None and _joined(open_, ends := np.stack([begin, end])):
             ground = _Ground(open_, window, cells - window.low, obstacles, radius)
             path = yield from _path(ground, ends)
-            points = obstacles.places(path + window.low)
-            points[0], points[-1] = carried.points[0], carried.points[-1]
-            return points if len(points) > 1 else carried.points[[0, -1]]
+            return np.vstack([first, obstacles.places(path + window.low), last])
         if window.is_all_of(obstacles):
             return None
         margin *= 4
@@ -341,7 +339,7 @@ class _Ground:
     def _unit(self) -> float:
         return max(self.radius, 2.0 * self.obstacles.resolution)
 
-    def _priced(self, away: FloatArray, room: FloatArray) -> FloatArray:
+    def _priced(self, away: FloatArray, room: Float32Array) -> FloatArray:
         stray = away * (self.obstacles.resolution / self._unit)
         costs: FloatArray = np.minimum(stray, _FARTHEST_STRAY) ** 2
         costs *= _STRAY / _FARTHEST_STRAY
@@ -378,9 +376,11 @@ def _path_by_blocks(
     costs = ground.blocks(size)
     whole = costs > 0.0
     over = ends // size
-    for end in over:
-        near = costs[max(0, end[0] - 1) : end[0] + 2, max(0, end[1] - 1) : end[1] + 2]
-        near[near < 0.0] = costs.max()
+    dearest = costs.max()
+    for end in ends:
+        for block in _blocks_beside(ground.open, end, size):
+            if costs[block] < 0.0:
+                costs[block] = dearest
     yield
     if not _joined(costs > 0.0, over):
         return None
@@ -396,6 +396,16 @@ def _path_by_blocks(
         found.append(piece if not k else piece[1:])
         yield
     return np.vstack(found)
+
+
+def _blocks_beside(open_: BoolArray, end: IntArray, size: int) -> list[tuple[int, int]]:
+    """Return the block of a cell, and of those next to it which it leads to without others."""
+    low = np.maximum(end // size - 1, 0) * size
+    high = np.minimum((end // size + 2) * size, open_.shape)
+    part = np.ascontiguousarray(open_[_part(low, high)]).astype(np.uint8)
+    _, labels = cv2.connectedComponents(part, connectivity=8)
+    reached = np.argwhere(labels == labels[tuple(end - low)]) + low
+    return [(int(row), int(column)) for row, column in np.unique(reached // size, axis=0)]
 
 
 def _piece(ground: _Ground, blocks: IntArray, size: int, ends: IntArray) -> IntArray | None:
@@ -446,10 +456,12 @@ def _drawn(line: IntArray, shape: tuple[int, ...]) -> BoolArray:
 
 def _smoothed(line: FloatArray, obstacles: Obstacles, radius: float) -> FloatArray:
     """Return a line pulled smooth between its ends, as far as it stays clear."""
-    room = obstacles.needed(radius) + _SLACK * obstacles.resolution
+    # Half a part of a leg is less than the slack: between the places that are looked at, too, it
+    # stays clear.
+    room = obstacles.kept(radius) / obstacles.resolution + _SLACK
     points = sampled(line, 2.0 * obstacles.resolution)
     found = obstacles.local(points)
-    pull_smooth(found, obstacles.clearance, room, _SMOOTHINGS, len(_SHARES))
+    pull_smooth(found, obstacles.room, room, _SMOOTHINGS, _PARTS)
     smooth = obstacles.placed(found)
     smooth[[0, -1]] = points[[0, -1]]
     return smooth

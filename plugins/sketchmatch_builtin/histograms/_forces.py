@@ -25,7 +25,7 @@ class ForceHistogram(Histogram):
 
     @property
     def of_pairs(self) -> bool:
-        """The objects are measured from the middle of the bounds, and nothing else counts."""
+        """The objects are measured from the scene's middle, and nothing else counts."""
         return True
 
     @classmethod

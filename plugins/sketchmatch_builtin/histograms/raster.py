@@ -65,6 +65,11 @@ class RasterForce(ForceHistogram):
     params: Params
 
     @property
+    def of_pairs(self) -> bool:
+        """Pixels are as large as the bounds of the scene make them."""
+        return False
+
+    @property
     def exponent(self) -> float:
         """r."""
         return self.params.r

@@ -32,6 +32,7 @@ __all__ = [
     "place_numbers",
     "scaled_lines",
     "scene_numbers",
+    "settled",
     "weighed",
     "within",
     "worths",
@@ -58,6 +59,7 @@ _MOST_BESIDE = 9.0
 """What others deviate at most, where deviations are compared with theirs."""
 
 _NONE = -30.0
+_DIGITS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,10 +109,17 @@ class Weighed:
 
 
 def best_first(measured: Measured) -> IntArray:
-    """Return the order of maps by how well they fit at first sight."""
+    """Return the order of maps by how well they fit at first sight; of equal ones as they come."""
     labels = measured.wholes[:, Whole.ALIKE] - measured.wholes[:, Whole.UNLIKE]
-    order: IntArray = np.argsort(-measured.wholes[:, Whole.SCORE] - _LABEL * labels, kind="stable")
+    worth = settled(measured.wholes[:, Whole.SCORE] + _LABEL * labels)
+    order: IntArray = np.argsort(-worth, kind="stable")
     return order
+
+
+def settled(values: FloatArray) -> FloatArray:
+    """Return values without the digits that rounding leaves, so that equal ones are equal."""
+    mantissas, exponents = np.frexp(values)
+    return np.asarray(np.ldexp(np.round(mantissas, _DIGITS), exponents))
 
 
 def line_numbers(measured: Measured, related: bool) -> FloatArray:

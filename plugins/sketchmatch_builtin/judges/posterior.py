@@ -10,7 +10,7 @@ from sketchmatch.api import Judge, JudgedMap, Judgement, JudgeProblem
 from sketchmatch.model import FloatArray, IntArray, RelationTable, Scene
 from sketchmatch_builtin.alignment import sides_of
 from sketchmatch_builtin.judges._described import described
-from sketchmatch_builtin.judges._evidence import weighed
+from sketchmatch_builtin.judges._evidence import settled, weighed
 from sketchmatch_builtin.judges.calibration import POSTERIOR
 
 __all__ = ["Posterior"]
@@ -87,7 +87,8 @@ class Posterior(Judge):
         )
         found = weighed(known, POSTERIOR, problem.elsewhere)
         mapped = problem.template if problem.swapped else problem.argument
-        shares = _as_certain(found.shares, known.maps, mapped)
+        # Of maps that are as likely, the first is what the search puts first.
+        shares = settled(_as_certain(found.shares, known.maps, mapped))
         order = np.argsort(-shares, kind="stable")
         maps = [sides.template_partners(each) for each in known.maps[order]]
         told = problem.alternatives + 1

@@ -156,8 +156,10 @@ class TransferRequest(google.protobuf.message.Message):
     """Which way y grows in `features`. In the response it always grows upwards."""
     radius: builtins.float
     """How far routes are kept away from obstacles: half the width of the robot, in metres, or the
-    units of a side that is no grid, to within a cell. On a grid obstacles are what is occupied or unknown, and absent
-    means 0; elsewhere they are the objects, and absent means that routes are not kept out of them.
+    units of a side that is no grid. On a grid obstacles are the squares of the cells that are occupied
+    or unknown and all beyond the grid, half a cell is kept at least, and absent means 0; elsewhere they
+    are the objects, to within the cells on which these are drawn for that, and absent means that
+    routes are not kept out of them.
     """
     allow_unknown: builtins.bool
     """Whether cells that nobody has seen are no obstacles."""
