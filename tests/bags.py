@@ -2,13 +2,16 @@
 
 import math
 
-ROS1, MCAP, SQLITE = "ros1", "mcap", "sqlite"
+ROS1, MCAP, SQLITE = KINDS = "ros1", "mcap", "sqlite"
 
 
-def write(folder, kind, *messages):
-    """Write (topic, cells, yaw) messages, or strings for other topics, and return the bag."""
+def write(folder, kind, *messages, packing=""):
+    """Write (topic, cells, yaw) messages, or strings for other topics, and return the bag.
+
+    ``packing`` is ``"bz2"`` or ``"lz4"`` for ROS 1, anything for MCAP, which has zstd.
+    """
     from rosbags.rosbag1 import Writer as Writer1
-    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
     from rosbags.rosbag2 import Writer as Writer2
     from rosbags.typesys import Stores, get_typestore
 
@@ -20,6 +23,10 @@ def write(folder, kind, *messages):
     else:
         plugin = StoragePlugin.MCAP if kind == MCAP else StoragePlugin.SQLITE3
         writer = Writer2(path, version=9, storage_plugin=plugin)
+    if packing and kind == ROS1:
+        writer.set_compression(Writer1.CompressionFormat[packing.upper()])
+    elif packing:
+        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
     with writer:
         connections = {}
         for k, (topic, cells, yaw) in enumerate(messages):
@@ -31,6 +38,11 @@ def write(folder, kind, *messages):
             data = serialize(message, message.__msgtype__)
             writer.write(connections[topic], 10**9 * (k + 1), data)
     return path
+
+
+def file_of(bag):
+    """Return the file of a bag that holds its messages; of ROS 2 the bag is a folder."""
+    return next(bag.glob("*.[md][cb]*")) if bag.is_dir() else bag
 
 
 def grid(types, kind, cells, yaw):

@@ -20,8 +20,15 @@ def finished(*events) -> Match:
 
 
 @pytest.fixture
-def match() -> Match:
+def grouped() -> Match:
     return finished(*map(deepcopy, STREAM))
+
+
+@pytest.fixture
+def match(grouped) -> Match:
+    """Return the same match with objects one by one."""
+    grouped.result.ClearField("object_groups")
+    return grouped
 
 
 def test_a_match_shows_itself_in_a_line(match):
@@ -62,6 +69,18 @@ def test_a_match_prints_a_small_table(match):
     assert rows[2].split() == ["0", "bed", "no", "partner", "0.575"]
     match.result.ClearField("unmatched_sketch_probabilities")
     assert str(match).splitlines()[-1].split() == ["0", "bed", "no", "partner"]
+
+
+def test_objects_that_are_one_together_are_said_to_be_and_not_without_partner(grouped):
+    headline, _, *rows = str(grouped).splitlines()
+    assert headline.startswith("3 of 3 sketched objects matched, ")
+    assert "no partner" not in str(grouped)
+    assert [row.split("  ")[0] for row in rows[2:]] == ["0 bed + 1 desk", "2 shelf"]
+    assert rows[2].split()[-5:] == ["3", "rack", "as", "one", "0.735"]
+    assert rows[3].endswith("0 table + 1 bar + 2 bunk      as one")
+    grouped.result.object_groups[0].sketch_objects[:] = [1]
+    assert str(grouped).startswith("2 of 3 sketched objects matched, ")
+    assert str(grouped).splitlines()[4].split()[:4] == ["0", "bed", "no", "partner"]
 
 
 def test_a_result_without_its_scenes_names_objects_by_number(match):

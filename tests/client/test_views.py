@@ -118,6 +118,7 @@ def test_geojson_has_every_mapped_object_once_and_is_read_as_a_map(match):
 
 
 def test_a_picture_has_every_object_with_partners_in_one_colour(match):
+    match.result.ClearField("object_groups")
     paths, texts = drawn(match._view().svg())
     assert texts[0] == "sketch"
     assert {"0 bed", "1 desk", "2 shelf", "0 table", "1 bar", "2 bunk", "3 rack"} < set(texts)
@@ -127,6 +128,19 @@ def test_a_picture_has_every_object_with_partners_in_one_colour(match):
     assert [colours[0], *colours[4:6]] == [grey] * 3  # the bed, the bar and the bunk
     assert colours[1] == colours[6] == "rgb({},{},{})".format(*PAIR_COLOURS[0])
     assert colours[2] == colours[3] == "rgb({},{},{})".format(*PAIR_COLOURS[1])
+
+
+def test_a_picture_has_what_is_one_together_in_one_colour(match):
+    # The desk is the rack by a line of its own, as is the bar then; bed and bunk have no line.
+    match.result.ClearField("object_groups")
+    match.result.object_groups.add(sketch_objects=[1], map_objects=[3, 1])
+    match.result.object_groups.add(sketch_objects=[0], map_objects=[2])
+    paths, _ = drawn(match._view().svg())
+    colours = [path.get("fill") for path in paths if path.get("fill") != "none"]
+    desk, shelf, bed = (
+        "rgb({},{},{})".format(*colour) for colour in PAIR_COLOURS[:2] + PAIR_COLOURS[3:4]
+    )
+    assert colours == [bed, desk, shelf, shelf, desk, bed, desk]
 
 
 def test_a_picture_is_upright_and_fills_its_half():

@@ -123,14 +123,18 @@ func block{}(
 }}
 """
 _RUST_BLOCK = """
-#[allow(dead_code)]
-async fn block(request: MatchRequest) -> Result<(), Box<dyn Error>> {{
+#[allow(dead_code, unused)]
+async fn block{}(request: MatchRequest, token: &str) -> Result<(), Box<dyn Error>> {{
 {}Ok(()) }}
 """
 
 
+def text(page):
+    return (ROOT / page).read_text("utf-8")
+
+
 def blocks(page, language):
-    return re.findall(rf"```{language}\n(.*?)```", (ROOT / page).read_text("utf-8"), re.S)
+    return re.findall(rf"```{language}\n(.*?)```", text(page), re.S)
 
 
 def go(folder):
@@ -146,10 +150,17 @@ def rust(folder):
     protoc = folder / "protoc"
     protoc.write_text(f'#!/bin/sh\nexec {tool("python")} -m grpc_tools.protoc "$@"\n')
     protoc.chmod(0o755)
-    # The last block, on encryption, wants a feature of tonic that takes minutes to build.
-    _, call, _ = blocks("clients/rust/README.md", "rust")
+    _, *found = blocks("clients/rust/README.md", "rust")
     code = (ROOT / "clients" / "rust" / "src" / "main.rs").read_text("utf-8")
-    files = {"src/main.rs": code + _RUST_BLOCK.format(call)}
+    code += "".join(_RUST_BLOCK.format(k, block) for k, block in enumerate(found))
+    cargo = (ROOT / "clients" / "rust" / "Cargo.toml").read_text("utf-8")
+    feature = re.search(r"With the feature `([\w-]+)` of tonic", text("clients/rust/README.md"))
+    files = {
+        "src/main.rs": code,
+        "Cargo.toml": cargo.replace(
+            '"channel", "codegen"', f'"channel", "codegen", "{feature[1]}"'
+        ),
+    }
     return Program(folder, "clients/rust", files, PROTOC=str(protoc), CARGO_BUILD_JOBS="1")
 
 

@@ -1,6 +1,7 @@
 """The sketch pad in a real browser, against a real server."""
 
 import base64
+import importlib.util
 import json
 import math
 import re
@@ -18,6 +19,7 @@ from PIL import Image, ImageColor
 
 from sketchmatch.examples import LIVING_ROOM_MAP
 from tests import processes
+from tests.bags import MCAP, ROS1, file_of, write
 from tests.pace import wait_until
 from tests.rosbridge import rosbridge
 from tests.tools import require
@@ -826,6 +828,7 @@ def test_a_file_that_no_request_can_hold_is_refused_by_its_size(visit, tmp_path)
         ("plan.dxf", b"no drawing", "plan.dxf"),
         ("map.yaml", b"image: office.pgm\n", "The map's picture office.pgm is missing"),
         ("photo.png", b"\x89PNG broken", "picture"),
+        ("office.mcap", b"\x89MCAP0\r\n", "no ROS bag, or a damaged one"),
     ],
 )
 def test_a_broken_map_is_refused_in_words_and_the_map_stays(
@@ -874,6 +877,52 @@ def test_a_map_of_ones_own_is_shown_and_its_things_are_found_otherwise_by_a_slid
     slider.fill("1.0")
     things = page.locator(".floor .thing")
     wait_until(lambda: 2 <= things.count() < before, "the slider changes nothing")
+
+
+@pytest.mark.parametrize("kind", [ROS1, MCAP])
+def test_a_bag_that_is_dropped_is_shown_and_what_is_drawn_of_it_is_found(
+    pad, visit, tmp_path, kind
+):
+    require(importlib.util.find_spec("rosbags"), "rosbags (`pip install 'sketchmatch[rosbag]'`)")
+    boxes = {"bed": (20, 20, 40, 60), "desk": (120, 30, 50, 20), "sofa": (60, 140, 70, 30)}
+    cells = np.zeros((200, 240), np.int8)
+    for x, y, width, height in boxes.values():
+        cells[y : y + height, x : x + width] = 100
+    bag = write(tmp_path, kind, ("/map", cells, 0.0), ("/talk", "hi", 0))
+    file = file_of(bag)
+    page = visit(pad)
+    page.get_by_test_id("map-file").set_input_files(
+        [bag / "metadata.yaml", file] if bag.is_dir() else file
+    )
+    page.locator(".map-pane .title", has_text=file.name).wait_for()
+    things = page.locator(".floor .thing")
+    wait_until(lambda: things.count() == 3, "not all things of the bag are shown")
+    hand = Hand(page)
+    for x, y, width, height in boxes.values():  # y up in the map, down on paper
+        hand.box(x + width / 2 - 120, 100 - y - height / 2, width, height)
+    wait_for_answer(page, 3)
+    found = page.evaluate(
+        """() => [...document.querySelectorAll('.floor .thing')].map((thing) => {
+          const { width, height } = thing.querySelector('path').getBBox();
+          return [Number(thing.querySelector('.badge text').textContent), width, height];
+        })"""
+    )
+    (_, scale, _), *_ = sorted(found)
+    for (_, *seen), (_, _, *size) in zip(sorted(found), boxes.values(), strict=True):
+        assert seen == pytest.approx([scale / boxes["bed"][2] * cells for cells in size], rel=0.08)
+
+
+def test_several_bags_at_once_are_refused_in_words(pad, visit, tmp_path):
+    files = [tmp_path / f"office_{k}.db3" for k in (0, 1)]
+    for file in files:
+        file.write_bytes(b"SQLite format 3")
+    page = visit(pad)
+    page.get_by_test_id("map-file").set_input_files(files)
+    notice = page.get_by_test_id("notice")
+    notice.get_by_text("These are several bags").wait_for()
+    notice.get_by_role("button").click()
+    page.get_by_test_id("map-file").set_input_files(files[0])
+    notice.get_by_text("no ROS bag, or a damaged one").wait_for()
 
 
 def test_another_place_is_said_to_be_probably_another(pad, visit):

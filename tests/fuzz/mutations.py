@@ -104,6 +104,24 @@ TOKENS["dxf"] = [
     b"44\n1e300\n|8\n\xff\xfe\n|$INSUNITS|1\nAC1032\n|AutoCAD Binary DXF\r\n\x1a\0|999\n|\r\n|\0|"
     b"40\n0\n|40\n-1\n|0\nELLIPSE\n11\n0\n21\n0\n|0\nTEXT\n".split(b"|"),
 ]
+TOKENS["bag"] = [
+    *b"op=\x02|op=\x04|op=\x05|op=\x06|op=\x07|compression=lz4|compression=bz2|compression=none|"
+    b"conn=\0\0\0\0|topic=/map|nav_msgs/OccupancyGrid|count=\xff\xff\xff\x7f|BZh9|"
+    b"\x04\x22\x4d\x18|#ROSBAG V2.0\n|\xff\xff\xff\xff|\0\0\0\0|chunk_pos=|index_pos=".split(b"|"),
+]
+TOKENS["mcap"] = [
+    *b"\x89MCAP0\r\n|zstd|lz4|ros2msg|ros2idl|cdr|/map|nav_msgs/msg/OccupancyGrid|\x28\xb5\x2f\xfd|"
+    b"\xff\xff\xff\xff\xff\xff\xff\xff|\xff\xff\xff\xff\xff\xff\xff\x7f|\0\0\0\0\0\0\0\0".split(
+        b"|"
+    ),
+    *(bytes([record]) + size.to_bytes(8, "little") for record in range(16) for size in (0, 40)),
+]
+TOKENS["db3"] = [
+    *b"SQLite format 3\0|CREATE TABLE |CREATE VIEW |messages|topics|/map|"
+    b"nav_msgs/msg/OccupancyGrid|\x0d\0\0\0|\x05\0\0\0|\x02\0\0\0|\x0a\0\0\0|\xff\xff\xff\xff|\0\0\0\0".split(
+        b"|"
+    ),
+]
 _WORDS = [0, 1, 255, 65535, 65536, 2**31 - 1, 2**31, 2**32 - 1]
 _NUMBER = re.compile(rb"-?\d+(\.\d+)?")
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.io import read_source
+from sketchmatch.io.files import decode_file
+from sketchmatch.io.ros_bag import SUFFIXES
 from sketchmatch.pipeline.segment import segment
 from sketchmatch.pipeline.selection import Choice, resolve_segmenter
 from sketchmatch.registry import default_registry
@@ -47,7 +49,8 @@ def check(kind: str, data: bytes, folder: Path, *, segmenting: bool = True) -> b
     stage = "reading"
     try:
         signal.setitimer(signal.ITIMER_REAL, 20.0)
-        source = read_source(path)
+        # A bag is read from its file as its owner may, and from bytes as those of strangers are.
+        source = decode_file(path.name, data) if path.suffix in SUFFIXES else read_source(path)
         stage = "segmenting"
         if segmenting:
             segmenter = resolve_segmenter(default_registry(), Choice(), source)

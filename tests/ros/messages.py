@@ -26,6 +26,13 @@ string filter_mask_topic
 float32 base
 float32 multiplier
 """
+# https://docs.ros.org/en/jazzy/p/nav2_msgs/action/FollowPath.html
+_FOLLOW_PATH = """\
+nav_msgs/Path path
+string controller_id
+string goal_checker_id
+string progress_checker_id
+"""
 
 
 @cache
@@ -43,6 +50,7 @@ def store():
         for part, text in zip(names, parts, strict=True):
             texts[f"sketchmatch_msgs/msg/{file.stem}{part}"] = text
     texts["nav2_msgs/msg/CostmapFilterInfo"] = _FILTER_INFO
+    texts["nav2_msgs/msg/FollowPathGoal"] = _FOLLOW_PATH
     types = {}
     for name, text in texts.items():
         types.update(get_types_from_msg(text, name))
@@ -101,6 +109,8 @@ def modules() -> dict[str, ModuleType]:
         parts = {part: message(f"sketchmatch_msgs/msg/{file.stem}{part}") for part in names}
         module = found.setdefault(kind, ModuleType(kind))
         module.__dict__[file.stem] = SimpleNamespace(**parts)
+    follow = found["nav2_msgs.action"] = ModuleType("nav2_msgs.action")
+    follow.FollowPath = SimpleNamespace(Goal=message("nav2_msgs/msg/FollowPathGoal"))
     return found
 
 

@@ -4,6 +4,7 @@ import ast
 import json
 import re
 import subprocess
+import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -118,7 +119,7 @@ def test_the_parameters_file_has_every_parameter_with_its_default(ros):
 
 
 def test_everything_that_setup_installs_is_there():
-    listed = re.findall(r'\["([^"]+)"\]', (PACKAGE / "setup.py").read_text("utf-8"))
+    listed = re.findall(r', \["([^"]+)"\]\)', (PACKAGE / "setup.py").read_text("utf-8"))
     for name in listed:
         assert (PACKAGE / name.replace("{PACKAGE}", "sketchmatch_ros")).exists(), name
     assert {"package.xml", "launch/sketchmatch.launch.py"} < set(listed)
@@ -135,9 +136,76 @@ def test_rviz_shows_the_topics_that_the_node_has():
         assert f"`~/{name}`" in README
 
 
-@pytest.mark.parametrize("word", ["COPY", "RUN"])
-def test_the_recipe_copies_what_there_is(word):
-    text = (ROS / "Dockerfile").read_text("utf-8")
-    assert f"{word} " in text
-    for source in re.findall(r"^COPY (\S+) ", text, re.M):
-        assert (ROOT / source).is_dir()
+RECIPE = (ROS / "Dockerfile").read_text("utf-8")
+STEPS = [
+    (word, rest.split())
+    for word, _, rest in (
+        line.partition(" ")
+        for line in re.sub(r"^#.*\n|\\\n", "", RECIPE, flags=re.M).splitlines()
+        if line
+    )
+]
+# https://github.com/ros2/variants: what the image has of what the packages depend on.
+ROS_BASE = {
+    "action_msgs",
+    "ament_cmake",
+    "ament_index_python",
+    "geometry_msgs",
+    "launch",
+    "launch_ros",
+    "lifecycle_msgs",
+    "nav_msgs",
+    "rclpy",
+    "ros2launch",
+    "rosidl_default_generators",
+    "rosidl_default_runtime",
+    "std_msgs",
+}
+
+
+def test_the_recipe_is_made_of_steps_that_refer_to_each_other_and_to_what_there_is():
+    assert {word for word, _ in STEPS} == {"FROM", "RUN", "WORKDIR", "COPY", "ENV", "CMD"}
+    stages = {"ros:jazzy-ros-base"}
+    for word, parts in STEPS:
+        if word == "FROM":
+            assert parts[0] in stages
+            stages |= set(parts[2:])
+        if word == "COPY":
+            for source in parts[:-1]:
+                assert (ROOT / source).exists(), source
+        if word == "RUN" and "apt-get" in parts:
+            assert {"update", "--yes", "--no-install-recommends"} <= set(parts)
+            assert parts[-2:] == ["-rf", "/var/lib/apt/lists/*"]
+    assert "--target test" in RECIPE
+    assert "test" in stages
+
+
+def test_the_recipe_installs_what_the_packages_depend_on():
+    installed = {part for word, parts in STEPS if word == "RUN" for part in parts}
+    wanted = depends(PACKAGE) | depends(OURS)
+    for name in wanted - ROS_BASE - {"sketchmatch_msgs"}:
+        ros = f"ros-jazzy-{name.replace('_', '-')}"
+        assert {name, ros} & installed, name
+    copied = {Path(parts[-1]).name for word, parts in STEPS if word == "COPY"}
+    assert {"sketchmatch_msgs", "sketchmatch_ros"} <= copied
+    named = {ElementTree.parse(each / "package.xml").findtext("name") for each in (PACKAGE, OURS)}
+    assert named == {"sketchmatch_msgs", "sketchmatch_ros"}
+    assert ("RUN", "test") in {(word, parts[4]) for word, parts in STEPS if "colcon" in parts[3:4]}
+
+
+def test_the_recipe_copies_all_that_the_server_is_built_of():
+    copied = {
+        source
+        for word, parts in STEPS
+        if word == "COPY" and parts[-1].startswith("/sketchmatch/")
+        for source in parts[:-1]
+    }
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    wanted = [
+        "pyproject.toml",
+        project["project"]["readme"],
+        *project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"],
+        *project["tool"]["hatch"]["build"]["targets"]["sdist"]["include"],
+    ]
+    for path in wanted:
+        assert any(Path(path).is_relative_to(source) for source in copied), path

@@ -83,7 +83,7 @@ def test_a_fault_of_the_file_has_its_path_in_the_request(client, file):
     with pytest.raises(InvalidRequestError, match=r"map\.file is of no known kind; give a file"):
         client.match(sources.file(file), sources.file(b"?", name="x.unknown"))
     with pytest.raises(
-        InvalidRequestError, match=r"source\.file is a map that is more than one file"
+        InvalidRequestError, match=r"source\.file is a map, or a bag, that is more than one file"
     ):
         client.segment(sources.file(b"image: x.pgm", name="room.yaml"))
     with pytest.raises(InvalidRequestError, match=r"source\.file\.data "):

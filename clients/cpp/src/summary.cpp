@@ -108,12 +108,32 @@ std::string table(const std::string& title, const std::vector<Row>& rows, std::s
   return text;
 }
 
+/// Whether a sketched object is something together with others, or several things.
+bool grouped(const MatchResult& result, std::uint32_t object) {
+  return std::any_of(result.object_groups.begin(), result.object_groups.end(),
+                     [object](const ObjectGroup& group) {
+                       const auto& members = group.sketch_objects;
+                       return std::find(members.begin(), members.end(), object) != members.end();
+                     });
+}
+
+/// Returns the names of several objects.
+std::string named(const std::vector<std::uint32_t>& objects, const Scene& scene) {
+  std::string names;
+  for (const auto object : objects) {
+    names += (names.empty() ? "" : " + ") + named(object, scene);
+  }
+  return names;
+}
+
 /// Returns what came out of a match as a whole.
 std::string headline(const Match& match) {
   const auto& result = match.result;
-  const auto matched = result.object_matches.size();
-  std::string line = std::to_string(matched) + " of " +
-                     std::to_string(matched + result.unmatched_sketch_objects.size()) +
+  const auto& alone = result.unmatched_sketch_objects;
+  const auto drawn = result.object_matches.size() + alone.size();
+  const auto left = static_cast<std::size_t>(std::count_if(
+      alone.begin(), alone.end(), [&result](auto object) { return !grouped(result, object); }));
+  std::string line = std::to_string(drawn - left) + " of " + std::to_string(drawn) +
                      " sketched objects matched, FMAP confidence " +
                      fixed(result.fmap_confidence.total, 3) + ", OMAP confidence " +
                      fixed(result.omap_confidence, 3);
@@ -168,8 +188,15 @@ std::string summary(const Match& match) {
   const auto& unmatched = match.result.unmatched_sketch_objects;
   const auto& likely = match.result.unmatched_sketch_probabilities;
   for (std::size_t k = 0; k < unmatched.size(); ++k) {
-    rows.push_back({named(unmatched[k], match.scenes.sketch), "no partner", "",
-                    k < likely.size() ? likelihood(likely[k]) : "", ""});
+    if (!grouped(match.result, unmatched[k])) {
+      rows.push_back({named(unmatched[k], match.scenes.sketch), "no partner", "",
+                      k < likely.size() ? likelihood(likely[k]) : "", ""});
+    }
+  }
+  for (const auto& group : match.result.object_groups) {
+    rows.push_back({named(group.sketch_objects, match.scenes.sketch),
+                    named(group.map_objects, match.scenes.map), "as one",
+                    group.probability ? likelihood(*group.probability) : "", ""});
   }
   return table(headline(match), rows, 2);
 }

@@ -30,14 +30,35 @@ TEST(Summary, OfAMatchIsASmallTable) {
     progress = printed(seen);
   });
   EXPECT_EQ(printed(match),
-            "2 of 3 sketched objects matched, FMAP confidence 0.910, OMAP confidence 0.820, "
+            "3 of 3 sketched objects matched, FMAP confidence 0.910, OMAP confidence 0.820, "
             "probability 0.365, this place 0.905, 2 maps about as likely, ask what 0 bed is, "
             "ITERATION_LIMIT\n"
-            "in the sketch  on the map  confidence  probability  margin\n"
-            "1 desk         3 rack           0.810        0.770   0.120\n"
-            "2 shelf        0 table          0.830        0.690  -0.020\n"
-            "0 bed          no partner                    0.575");
+            "in the sketch   on the map                confidence  probability  margin\n"
+            "1 desk          3 rack                         0.810        0.770   0.120\n"
+            "2 shelf         0 table                        0.830        0.690  -0.020\n"
+            "0 bed + 1 desk  3 rack                        as one        0.735\n"
+            "2 shelf         0 table + 1 bar + 2 bunk      as one");
   EXPECT_EQ(progress, "SEARCH, 1.25 s, 62%, confidence 0.710, 1300 evaluations, at most 0.930");
+}
+
+TEST(Summary, OfObjectsThatAreOneTogetherSaysSo) {
+  Match match;
+  match.scenes.sketch.objects.resize(3);
+  match.scenes.map.objects.resize(2);
+  match.scenes.sketch.objects[2].label = "hall";
+  match.scenes.map.objects[1].label = "foyer";
+  match.result.object_matches.resize(1);
+  match.result.object_matches[0].map_object = 1;
+  match.result.unmatched_sketch_objects = {1, 2};
+  match.result.unmatched_sketch_probabilities = {0.5, 0.75};
+  match.result.object_groups = {{{0, 2}, {1}, 0.875}};
+  EXPECT_EQ(printed(match),
+            "2 of 3 sketched objects matched, FMAP confidence 0.000, OMAP confidence 0.000, "
+            "UNSPECIFIED\n"
+            "in the sketch  on the map  confidence  probability  margin\n"
+            "0              1                0.000\n"
+            "1              no partner                    0.500\n"
+            "0 + 2 hall     1 foyer         as one        0.875");
 }
 
 TEST(Summary, OfAnotherPlaceSaysSo) {

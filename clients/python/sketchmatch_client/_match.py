@@ -171,7 +171,7 @@ class Match:
 
     def __str__(self) -> str:
         """Return which object is which, for a terminal; objects count from 0."""
-        return match_table(self.result, self.scenes.sketch)
+        return match_table(self.result, self.scenes.sketch, self.scenes.map)
 
     def rows(self) -> list[MatchRow]:
         """Return a plain dict for each sketched object, in their order, as data frames take them.
@@ -207,6 +207,7 @@ class Match:
             [_line(line) for line in result.object_matches],
             alone,
             [(point.x, point.y) for point in self.scenes.sketch_route],
+            [(group.sketch_objects, group.map_objects) for group in result.object_groups],
         )
 
 

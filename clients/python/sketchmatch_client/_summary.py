@@ -60,9 +60,10 @@ def summary(answer: Message) -> str:
 
 def match_headline(result: MatchResult, sketch: Scene = _UNKNOWN) -> str:
     """Return what came out of a match as a whole; the sketch has the labels of its objects."""
-    matched = len(result.object_matches)
+    drawn = len(result.object_matches) + len(result.unmatched_sketch_objects)
+    alone = [k for k in result.unmatched_sketch_objects if k not in _grouped(result)]
     facts = [
-        f"{matched} of {matched + len(result.unmatched_sketch_objects)} sketched objects matched",
+        f"{drawn - len(alone)} of {drawn} sketched objects matched",
         f"FMAP confidence {result.fmap_confidence.total:.3f}",
         f"OMAP confidence {result.omap_confidence:.3f}",
         enum_name(Outcome, "OUTCOME_", result.outcome),
@@ -81,7 +82,7 @@ def match_headline(result: MatchResult, sketch: Scene = _UNKNOWN) -> str:
     return ", ".join(facts)
 
 
-def match_table(result: MatchResult, sketch: Scene = _UNKNOWN) -> str:
+def match_table(result: MatchResult, sketch: Scene = _UNKNOWN, map_: Scene = _UNKNOWN) -> str:
     """Return which sketched object is which mapped object, counted from 0."""
     heads = ("in the sketch", "on the map", "confidence", "probability", "margin")
     rows = [
@@ -97,8 +98,28 @@ def match_table(result: MatchResult, sketch: Scene = _UNKNOWN) -> str:
     unmatched = zip_longest(
         result.unmatched_sketch_objects, map(_likelihood, result.unmatched_sketch_probabilities)
     )
-    rows += [(_object(k, sketch), "no partner", "", likely or "", "") for k, likely in unmatched]
+    grouped = _grouped(result)
+    rows += [
+        (_object(k, sketch), "no partner", "", likely or "", "")
+        for k, likely in unmatched
+        if k not in grouped
+    ]
+    rows += [
+        (
+            " + ".join(_object(k, sketch) for k in group.sketch_objects),
+            " + ".join(_object(k, map_) for k in group.map_objects),
+            "as one",
+            _likelihood(group.probability) if group.HasField("probability") else "",
+            "",
+        )
+        for group in result.object_groups
+    ]
     return _table(match_headline(result, sketch), heads, rows, names=2)
+
+
+def _grouped(result: MatchResult) -> set[int]:
+    """Return the sketched objects that are something together with others, or several things."""
+    return {k for group in result.object_groups for k in group.sketch_objects}
 
 
 def progress_line(progress: MatchProgress) -> str:

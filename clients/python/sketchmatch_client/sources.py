@@ -268,11 +268,13 @@ def file(
     Parameters
     ----------
     file
-        The file, or its bytes. :meth:`Client.algorithms` lists under ``readers`` what there is.
+        The file, such as a ROS bag, or its bytes. :meth:`Client.algorithms` lists under
+        ``readers`` what else there is.
     name
         Its name, of which the ending tells what it is; for bytes, or in place of the file's own.
     part
-        Which part of it to read, such as layers of a drawing or one picture of many.
+        Which part of it to read, such as layers of a drawing, one picture of many or the topic
+        of a bag.
 
     Raises
     ------

@@ -102,6 +102,8 @@ class MatchView:
         The sketched objects without partner, and how likely each has none, or None.
     route
         The way drawn through the sketch, or nothing.
+    groups
+        Objects of the sketch, and of the map, that are one place together.
 
     Examples
     --------
@@ -117,6 +119,7 @@ class MatchView:
     lines: Sequence[Line]
     alone: Mapping[int, float | None] = field(default_factory=dict)
     route: Sequence[Point] = ()
+    groups: Sequence[tuple[Sequence[int], Sequence[int]]] = ()
 
     def rows(self) -> list[MatchRow]:
         """Return a row for each sketched object, in the order of the sketch."""
@@ -150,10 +153,16 @@ class MatchView:
     def svg(self) -> str:
         """Return a picture: the sketch at the left, the map at the right, partners in one colour.
 
-        Objects have their index, from 0, and their label; what has no partner is grey.
+        Objects have their index, from 0, and their label; what has no partner, and is nothing
+        together with others, is grey.
         """
         sketched = {line.sketch_object: k for k, line in enumerate(self.lines)}
         mapped = {line.map_object: k for k, line in enumerate(self.lines)}
+        for n, members in enumerate(self.groups, len(self.lines)):
+            sides = tuple(zip((sketched, mapped), members, strict=True))
+            colour = min((known[k] for known, some in sides for k in some if k in known), default=n)
+            for known, some in sides:
+                known.update({k: colour for k in some if k not in known})
         return drawn(
             Panel("sketch", _drawing(self.sketch), sketched, self.route),
             Panel("map", _drawing(self.map), mapped),

@@ -16,6 +16,7 @@ setup(
         (f"share/{PACKAGE}/rviz", ["rviz/sketchmatch.rviz"]),
     ],
     install_requires=["setuptools", "sketchmatch-client"],
+    extras_require={"test": ["pytest"]},  # where colcon test finds this it runs pytest
     description="A lifecycle node that matches sketches with the robot's map.",
     license="Apache-2.0",
     entry_points={"console_scripts": [f"sketchmatch = {PACKAGE}.node:main"]},

@@ -6,11 +6,11 @@
  * Each line is a list of points in pixels from the middle of the paper.
  */
 
-import { readFileSync } from "node:fs";
+import { json } from "node:stream/consumers";
 import puppeteer from "puppeteer-core";
 
 const [program, url, place] = process.argv.slice(2);
-const lines = JSON.parse(readFileSync(0, "utf8"));
+const lines = await json(process.stdin);
 const PATIENCE_MS = 60_000;
 
 const browser = await puppeteer.launch({

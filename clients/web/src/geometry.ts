@@ -104,14 +104,6 @@ export function fromScreen(view: View, [x, y]: Xy): Xy {
   return [(x - view.x) / view.scale, (y - view.y) / view.scale];
 }
 
-const SMALL = 30;
-
-/** Return where the number of a thing stands on the screen: beside what it would hide. */
-export function badgePlace(ring: readonly Xy[], centre: Xy): Xy {
-  const { x0, y0, x1, y1 } = boxOf(ring);
-  return Math.min(x1 - x0, y1 - y0) < SMALL ? [x1 + 3, y0 - 3] : centre;
-}
-
 /** Return the view with one point of the screen kept, and all else grown by a factor. */
 export function zoomed(view: View, [x, y]: Xy, factor: number): View {
   const scale = Math.min(40, Math.max(0.05, view.scale * factor));

@@ -1,14 +1,15 @@
 /** The robot's side: its map, the things on it, and the route as it would drive. */
 
 import { signal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
+import { useEffect, useMemo } from "preact/hooks";
 
 import type { Carried } from "./carry";
 import { colourOf } from "./colours";
-import { badgePlace, boxOf, distance, toScreen, type View, type Xy, zoomed } from "./geometry";
-import { boxOfMap, type Underlay } from "./maps";
+import { distance, toScreen, type View, type Xy, zoomed } from "./geometry";
+import { boxOfMap, type Thing, type Underlay } from "./maps";
 import { toggled } from "./mending";
 import { useSize, useView } from "./pane";
+import { placed, type Signed, type Signs, widthOf } from "./signs";
 import { Badge } from "./sketch";
 import {
   answered,
@@ -47,6 +48,13 @@ export function MapPane() {
   const map = place.value;
   const view = useView(size, () => flippedBox(), 44);
   const t = texts.value;
+  const { scale, x, y } = view.value;
+  const numbered = map?.things.map((_, k) => !!numberOf(k)) ?? [];
+  // Where they stand beside each other is the same wherever the map is moved to.
+  const signs = useMemo(
+    () => placed(signedOf(map?.things ?? [], numbered, { scale, x: 0, y: 0 })),
+    [map?.things, numbered.join(), scale],
+  );
 
   useEffect(() => {
     let wanted = true;
@@ -99,23 +107,49 @@ export function MapPane() {
           <Way key={way.id} way={way} view={view.value} />
         ))}
         {map?.things.map((thing, k) => (
-          <MapThing key={thing.id} index={k} view={view.value} />
+          <MapThing
+            key={thing.id}
+            index={k}
+            view={view.value}
+            badge={movedBy(signs[k]?.badge, x, y)}
+            label={movedBy(signs[k]?.label, x, y)}
+          />
         ))}
       </svg>
     </div>
   );
 }
 
-function MapThing({ index, view }: { index: number; view: View }) {
+/** Return the number that a thing of the map has by its pair, or 0. */
+function numberOf(index: number): number {
+  const pair = answered.value ? pairOf({ side: "map", index }) : undefined;
+  return pair ? pair.sketch + 1 : 0;
+}
+
+/** Return what the things of a map want to be told by. */
+export function signedOf(
+  things: readonly Thing[],
+  numbered: readonly boolean[],
+  view: View,
+): Signed[] {
+  return things.map(({ rings, centroid, label }, k) => ({
+    outline: (rings[0] ?? []).map((point) => shown(view, point)),
+    centre: shown(view, centroid),
+    numbered: numbered[k] ?? false,
+    nameWidth: label ? widthOf(label) : 0,
+  }));
+}
+
+function movedBy(place: Xy | null | undefined, x: number, y: number): Xy | null {
+  return place ? [place[0] + x, place[1] + y] : null;
+}
+
+function MapThing({ index, view, badge, label }: { index: number; view: View } & Signs) {
   const thing = place.value?.things[index];
   if (!thing) return null;
   const pair = answered.value ? pairOf({ side: "map", index }) : undefined;
   const candidate = asking.value === null && question.value?.candidates.includes(index);
   const d = thing.rings.map((ring) => pathThrough(ring, view)).join("");
-  const outline = (thing.rings[0] ?? []).map((point) => shown(view, point));
-  const [cx, cy] = shown(view, thing.centroid);
-  const [x, y] = badgePlace(outline, [cx, cy]);
-  const below = x === cx && pair ? cy + 27 : x === cx ? cy + 4 : boxOf(outline).y1 + 16;
   const colour = pair ? colourOf(pair.sketch) : null;
   const state = `${isLit("map", index) ? " lit" : ""}${pair ? "" : " alone"}${candidate ? " candidate" : ""}${mending.value?.has(index) ? " chosen" : ""}`;
   const tapped = () => {
@@ -137,9 +171,9 @@ function MapThing({ index, view }: { index: number; view: View }) {
     >
       <title>{texts.value.objectOnMap(mapName(index), pair ? sketchName(pair.sketch) : "")}</title>
       <path d={d} fill={colour ?? "currentColor"} stroke={colour ?? "currentColor"} />
-      {pair && <Badge x={x} y={y} number={pair.sketch + 1} colour={colour} />}
-      {thing.label && (
-        <text class="label" x={cx} y={below} text-anchor="middle">
+      {pair && badge && <Badge at={badge} number={pair.sketch + 1} colour={colour} />}
+      {label && (
+        <text class="label" x={label[0]} y={label[1]} text-anchor="middle">
           {thing.label}
         </text>
       )}

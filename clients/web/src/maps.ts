@@ -86,21 +86,27 @@ export async function sampleSketch(place: Place): Promise<string> {
 /**
  * Load a map from files: a yaml with its picture, or any one file that the server reads.
  *
+ * What else lies in the folder of a bag may come along.
+ *
  * @throws RequestFailed, with a sentence for people.
  */
 export async function openMap(
   client: SketchmatchClient,
   files: readonly File[],
-  lacking: (picture: string) => string,
+  words: { pictureLacking: (picture: string) => string; manyBags: string },
 ): Promise<PlaceMap> {
+  const bags = files.filter(({ name }) => /\.(bag|mcap|db3)$/i.test(name));
+  if (bags.length > 1) throw new RequestFailed(words.manyBags, "invalid", "", "map", undefined);
   const yaml = files.find(({ name }) => /\.ya?ml$/i.test(name));
-  const [first] = files;
-  if (yaml) {
+  const first = bags[0] ?? files[0];
+  if (yaml && !bags.length) {
     const text = await yaml.text();
     const named = /^\s*image\s*:\s*["']?([^"'\n#]+)/m.exec(text)?.[1]?.trim() ?? "";
     const base = named.split(/[\\/]/).at(-1) ?? "";
     const picture = files.find(({ name }) => name === base) ?? files.find((file) => file !== yaml);
-    if (!picture) throw new RequestFailed(lacking(base), "invalid", "", "map", undefined);
+    if (!picture) {
+      throw new RequestFailed(words.pictureLacking(base), "invalid", "", "map", undefined);
+    }
     const source = sources.mapServerMap(text, await bytesOf(client, picture));
     const seen = await shownPixels(picture);
     return {
@@ -110,7 +116,9 @@ export async function openMap(
       underlay: seen && gridOf(text, seen),
     };
   }
-  if (!first) throw new RequestFailed(lacking(""), "invalid", "", "map", undefined);
+  if (!first) {
+    throw new RequestFailed(words.pictureLacking(""), "invalid", "", "map", undefined);
+  }
   const source = sources.file(first.name, await bytesOf(client, first));
   return {
     ...(await found(client, source, first.name)),

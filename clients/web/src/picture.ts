@@ -4,7 +4,7 @@ import type { Carried } from "./carry";
 import { colourOf } from "./colours";
 import { drawing, type Stroke } from "./document";
 import { escaped, inkOutline, pathOf } from "./files";
-import { badgePlace, boxOf, fitting, toScreen, type View, type Xy } from "./geometry";
+import { fitting, type View, type Xy } from "./geometry";
 import {
   ARROW,
   arrowOf,
@@ -15,9 +15,11 @@ import {
   pathThrough,
   placing,
   shown,
+  signedOf,
 } from "./map";
 import type { Underlay } from "./maps";
-import { paperBox, paperPath } from "./sketch";
+import { placed } from "./signs";
+import { paperBox, paperPath, signedOfSketch } from "./sketch";
 import { answered, carried, dark, mapName, pairOf, place } from "./state";
 import { texts } from "./texts";
 
@@ -69,12 +71,13 @@ function sketchParts(): string[] {
   const box = paperBox();
   if (!box) return [];
   const view = fitting(box, WIDTH, HEIGHT, 44);
-  const things = (answered.peek()?.sketched ?? []).map(({ rings, centroid }, k) => {
+  const sketched = answered.peek()?.sketched ?? [];
+  const signs = placed(signedOfSketch(sketched, view));
+  const things = sketched.map(({ rings }, k) => {
     const painted = pairOf({ side: "sketch", index: k }) ? colourOf(k) : null;
-    const outline = (rings[0] ?? []).map(([x, y]) => toScreen(view, [x, -y]));
     const area = `<path d="${rings.map((ring) => paperPath(ring, view)).join("")}" fill="${painted ?? colour("--muted")}" fill-opacity="${painted ? 0.17 : 0.07}"/>`;
-    const at = badgePlace(outline, toScreen(view, [centroid[0], -centroid[1]]));
-    return area + badge(at, k + 1, painted);
+    const at = signs[k]?.badge;
+    return at ? area + badge(at, k + 1, painted) : area;
   });
   return [
     `<g transform="${moved(view)}">`,
@@ -96,22 +99,26 @@ async function mapParts(): Promise<string[]> {
   const [map, box] = [place.peek(), flippedBox()];
   if (!map || !box) return [];
   const view = fitting(box, WIDTH, HEIGHT, 30);
-  const things = map.things.map(({ rings, centroid, label }, k) => {
-    const pair = pairOf({ side: "map", index: k });
+  const pairs = map.things.map((_, index) => pairOf({ side: "map", index }));
+  const signs = placed(
+    signedOf(
+      map.things,
+      pairs.map((pair) => !!pair),
+      view,
+    ),
+  );
+  const things = map.things.map(({ rings }, k) => {
+    const [pair, { badge: at, label } = { badge: null, label: null }] = [pairs[k], signs[k]];
     const painted = pair ? colourOf(pair.sketch) : null;
     const line = painted ?? colour("--muted");
-    const outline = (rings[0] ?? []).map((point) => shown(view, point));
-    const [cx, cy] = shown(view, centroid);
-    const at = badgePlace(outline, [cx, cy]);
-    const below = at[0] !== cx ? boxOf(outline).y1 + 16 : cy + (pair ? 27 : 4);
     const look = painted
       ? `fill-opacity="0.36" stroke-opacity="0.9"`
       : `fill-opacity="0.12" stroke-opacity="0.9" stroke-dasharray="4 4"`;
     return [
       `<path d="${rings.map((ring) => pathThrough(ring, view)).join("")}" fill="${line}" stroke="${line}" stroke-width="1.6" stroke-linejoin="round" ${look}/>`,
-      pair ? badge(at, pair.sketch + 1, painted) : "",
+      pair && at ? badge(at, pair.sketch + 1, painted) : "",
       label
-        ? `<text x="${fixed(cx)}" y="${fixed(below)}" text-anchor="middle" font-size="12.5" font-weight="550" paint-order="stroke" stroke="${colour("--floor")}" stroke-width="4" stroke-linejoin="round">${escaped(mapName(k))}</text>`
+        ? `<text x="${fixed(label[0])}" y="${fixed(label[1])}" text-anchor="middle" font-size="12.5" font-weight="550" paint-order="stroke" stroke="${colour("--floor")}" stroke-width="4" stroke-linejoin="round">${escaped(mapName(k))}</text>`
         : "",
     ].join("");
   });

@@ -16,7 +16,6 @@ import {
 } from "./document";
 import { ink, inkOutline, traced } from "./files";
 import {
-  badgePlace,
   boxOf,
   distance,
   distanceToLine,
@@ -28,7 +27,8 @@ import {
   zoomed,
 } from "./geometry";
 import { useSize, useView } from "./pane";
-import { isPlace } from "./maps";
+import { placed, type Signed } from "./signs";
+import { isPlace, type Thing } from "./maps";
 import {
   answered,
   asking,
@@ -153,14 +153,14 @@ function Things({ view }: { view: View }) {
   const found = answered.value;
   if (!found) return null;
   const moved = offset.value;
+  const signs = placed(signedOfSketch(found.sketched, view));
   return (
     <svg class="overlay" aria-hidden="true">
-      {found.sketched.map(({ rings, centroid }, k) => {
+      {found.sketched.map(({ rings }, k) => {
         if (found.strokesOf[k]?.some((id) => moved?.ids.has(id))) return null;
         const pair = pairOf({ side: "sketch", index: k });
         const d = rings.map((ring) => paperPath(ring, view)).join("");
-        const outline = (rings[0] ?? []).map(([x, y]) => toScreen(view, [x, -y]));
-        const [x, y] = badgePlace(outline, toScreen(view, [centroid[0], -centroid[1]]));
+        const badge = signs[k]?.badge;
         const state = `${isLit("sketch", k) || asking.value === k ? " lit" : ""}${pair ? "" : " alone"}`;
         return (
           <g key={k} class={`thing${state}`} data-testid={`sketch-thing-${k}`}>
@@ -169,7 +169,7 @@ function Things({ view }: { view: View }) {
               fill={pair ? colourOf(k) : "currentColor"}
               stroke={pair ? colourOf(k) : "currentColor"}
             />
-            <Badge x={x} y={y} number={k + 1} colour={pair ? colourOf(k) : null} />
+            {badge && <Badge at={badge} number={k + 1} colour={pair ? colourOf(k) : null} />}
           </g>
         );
       })}
@@ -177,8 +177,25 @@ function Things({ view }: { view: View }) {
   );
 }
 
-export function Badge(props: { x: number; y: number; number: number; colour: string | null }) {
-  const { x, y, number, colour } = props;
+/** Return what the things of a sketch want to be told by: their numbers. */
+export function signedOfSketch(
+  things: readonly Pick<Thing, "rings" | "centroid">[],
+  view: View,
+): Signed[] {
+  return things.map(({ rings, centroid: [x, y] }) => ({
+    outline: (rings[0] ?? []).map(([px, py]) => toScreen(view, [px, -py])),
+    centre: toScreen(view, [x, -y]),
+    numbered: true,
+    nameWidth: 0,
+  }));
+}
+
+export function Badge(props: { at: Xy; number: number; colour: string | null }) {
+  const {
+    at: [x, y],
+    number,
+    colour,
+  } = props;
   return (
     <g class={`badge${colour ? "" : " hollow"}`} transform={`translate(${x} ${y})`}>
       <circle r="11" {...(colour ? { fill: colour } : {})} />

@@ -392,7 +392,7 @@ export async function choosePlace(name: Place): Promise<void> {
 
 export async function bringMap(files: readonly File[]): Promise<void> {
   await telling(async () => {
-    const map = await openMap(client, files, texts.peek().pictureLacking);
+    const map = await openMap(client, files, texts.peek());
     show(map);
     forget();
     notice.value = map.warnings.join(" ");

@@ -116,6 +116,7 @@ const en = {
     picture
       ? `The map's picture ${picture} is missing; drop it together with the .yaml file.`
       : "There is no file; drop a map.",
+  manyBags: "These are several bags, or one of several files; drop the one file with the map.",
   onTheMap: "On the robot's map",
   withBand: (what: string) => `${what}, and how far off it may be`,
   within: (metres: string) => `within ${metres}`,
@@ -264,6 +265,7 @@ const de: Texts = {
     picture
       ? `Das Bild der Karte ${picture} fehlt; lege es zusammen mit der .yaml-Datei ab.`
       : "Da ist keine Datei; lege eine Karte ab.",
+  manyBags: "Das sind mehrere Bags, oder eines in mehreren Dateien; lege nur die mit der Karte ab.",
   onTheMap: "Auf der Karte des Roboters",
   withBand: (what) => `${what}, und wie weit das daneben liegen kann`,
   within: (metres) => `auf ${metres} genau`,

@@ -490,13 +490,17 @@ def _partners(lines: Iterable[match_pb2.ObjectMatch]) -> dict[int, int]:
 
 def _headline(match: Match) -> str:
     result, total = match.result, len(match.scenes.sketch.objects)
-    left = []
-    if result.unmatched_sketch_objects:
-        left.append(f"{len(result.unmatched_sketch_objects)} in the sketch")
-    if result.unmatched_map_objects:
-        left.append(f"{len(result.unmatched_map_objects)} on the map")
+    groups = result.object_groups
+    drawn, there = (
+        len(set(alone).difference(*members))
+        for alone, members in (
+            (result.unmatched_sketch_objects, [group.sketch_objects for group in groups]),
+            (result.unmatched_map_objects, [group.map_objects for group in groups]),
+        )
+    )
+    left = [f"{drawn} in the sketch"] * (drawn > 0) + [f"{there} on the map"] * (there > 0)
     without = f", {' and '.join(left)} without partner" if left else ""
-    return f"{len(result.object_matches)} of {total} sketched objects matched{without}"
+    return f"{total - drawn} of {total} sketched objects matched{without}"
 
 
 def _effort(result: match_pb2.MatchResult) -> str:

@@ -13,9 +13,9 @@ from sketchmatch.api.documents import decode_text, listed, no_parts
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io.geojson import is_geojson, load_sequence, polygons_of
 from sketchmatch.io.map_files import MapFiles, map_files
-from sketchmatch.io.ros_bag import SUFFIXES, bag_and_topic, is_bag, read_bag
+from sketchmatch.io.ros_bag import SUFFIXES, bag_and_topic, decode_bag, is_bag, read_bag
 from sketchmatch.io.stroke_json import strokes_of
-from sketchmatch.model import Image, PolygonSet, Source, StrokeSet
+from sketchmatch.model import Image, OccupancyGrid, PolygonSet, Source, StrokeSet
 from sketchmatch.model.limits import check_bytes, check_source, source_limits
 from sketchmatch.registry import (
     RegisteredReader,
@@ -109,6 +109,8 @@ def kind_of_file(name: str, data: bytes, readers: _Readers | None = None) -> Fil
     suffix = Path(name).suffix.lower()
     if suffix in _KINDS:
         return FileKind(_KINDS[suffix][0])
+    if suffix in SUFFIXES:
+        return FileKind(OccupancyGrid)
     if readers is None:
         readers = default_registry().readers
     named = reader_by_name(readers, name)
@@ -116,11 +118,11 @@ def kind_of_file(name: str, data: bytes, readers: _Readers | None = None) -> Fil
         return FileKind(named.reader.source, named)
     if suffix in _JSON_SUFFIXES:
         return _kind_of_document(load_sequence(decode_text(data)), readers)
-    if suffix in YAML_SUFFIXES or suffix in SUFFIXES:
+    if suffix in YAML_SUFFIXES:
         raise _invalid(
             "",
-            "is a map that is more than one file, or a bag; give its path, or send it as "
-            "map_server_map or occupancy_grid",
+            "is a map, or a bag, that is more than one file; give its path, or send a map as "
+            "map_server_map and a bag as its .mcap or .db3 alone",
         )
     raise _invalid("", f"is of no known kind; give a file that ends in one of {_suffixes(readers)}")
 
@@ -151,7 +153,7 @@ def decode_file(name: str, data: bytes, part: str = "", readers: _Readers | None
     name, data, readers
         As in :func:`kind_of_file`.
     part
-        Which part of it, for kinds that have some; empty for all.
+        Which part of it, for kinds that have some, such as the topic of a bag; empty for all.
 
     Raises
     ------
@@ -164,6 +166,8 @@ def decode_file(name: str, data: bytes, part: str = "", readers: _Readers | None
     kind = kind_of_file(name, data, readers)
     if kind.reader is not None:
         source: Source = kind.reader.read(data, part)
+    elif kind.source is OccupancyGrid:
+        source = decode_bag(Path(name).suffix.lower(), data, part)
     else:
         no_parts(part)
         if kind.document is None:

@@ -100,8 +100,8 @@ def limited_to(limits: SourceLimits) -> Iterator[None]:
         _in_force.reset(token)
 
 
-def check_bytes(size: int, field: str) -> None:
-    """Refuse a file, or a part of a request, of too many bytes.
+def check_bytes(size: int, field: str, given: str = "") -> None:
+    """Refuse a file, or a part of a request, of too many bytes; ``given`` as below.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def check_bytes(size: int, field: str) -> None:
     limit = source_limits().max_bytes
     if size > limit:
         shown = f"{limit // _MIB} MiB" if limit % _MIB == 0 else f"{limit} bytes"
-        raise _beyond(field, f"has {size} bytes", shown, "max_bytes", "reduce it")
+        raise _beyond(field, given or f"has {size} bytes", shown, "max_bytes", "reduce it")
 
 
 def check_pixels(width: int, height: int, field: str) -> None:

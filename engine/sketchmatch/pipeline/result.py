@@ -337,11 +337,14 @@ class MatchResult(Tabular):
             [_line(match) for match in self.matches],
             {k: likely.get(k) for k in self.unmatched_sketch_objects},
             [] if self.sketch_route is None else self.sketch_route.tolist(),
+            [(group.sketch_objects, group.map_objects) for group in self.groups],
         )
 
     def _headline(self) -> str:
+        grouped = {k for group in self.groups for k in group.sketch_objects}
+        left = sum(k not in grouped for k in self.unmatched_sketch_objects)
         facts = [
-            f"{len(self.matches)} of {len(self.sketch)} sketched objects matched",
+            f"{len(self.sketch) - left} of {len(self.sketch)} sketched objects matched",
             _confidences(self.fmap_confidence, self.omap_confidence) + _likely(self.probability),
         ]
         if self.place_probability is not None:

@@ -117,9 +117,9 @@ Source image(const std::filesystem::path& path);
 Source image_of(const std::string& bytes);
 
 /// Returns a file that the server reads: a drawing in SVG, strokes in JSON, polygons in GeoJSON, a
-/// picture, or one of another tool; `Client::algorithms` lists under `readers` what there is.
+/// picture, a ROS bag, or one of another tool, as `Client::algorithms` lists them under `readers`.
 /// @param path The file.
-/// @param part Which part of it to read, such as layers of a drawing.
+/// @param part Which part of it to read, such as layers of a drawing or the topic of a bag.
 /// @param name Its name, of which the ending tells what it is, in place of the file's own.
 /// @throws InvalidRequestError If the file cannot be read.
 Source file(const std::filesystem::path& path, const std::string& part = {},

@@ -411,8 +411,9 @@ global___EncodedImage = EncodedImage
 
 @typing.final
 class EncodedFile(google.protobuf.message.Message):
-    """A file that the server reads: with one of its readers, or as SVG, GeoJSON, strokes in JSON or a
-    picture.
+    """A file that the server reads: with one of its readers, or as SVG, GeoJSON, strokes in JSON, a
+    picture, or a ROS bag (.bag of ROS 1, .mcap or .db3 of ROS 2), of which the last
+    nav_msgs/OccupancyGrid counts.
     """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
@@ -426,7 +427,9 @@ class EncodedFile(google.protobuf.message.Message):
     """Its bytes."""
     part: builtins.str
     """Which part of it to read, where it has several: layers of a drawing, one picture of many.
-    `FileReader.summary` says what there is. Empty: all of it, or the only one.
+    `FileReader.summary` says what there is. Of a bag it is the topic of the maps, "/robot1/map".
+    Empty: all of it, or the only one; of a bag /map, or else the first topic by name with maps,
+    with a warning if there are several.
     """
     def __init__(
         self,
