@@ -98,8 +98,8 @@ def decode_svg(data: bytes) -> StrokeSet:
     ------
     InvalidInputError
         If it is not SVG, defines entities that are no words, is too large or nested too deeply,
-        has nothing drawn in it, uses what cannot be followed, or a shape cannot be read; then its path is
-        ``shapes[k]``, counted from 0. What is too large
+        has nothing drawn in it, uses what cannot be followed, or a shape cannot be read; then its
+        path is ``shapes[k]``, counted from 0. What is too large
         :func:`sketchmatch.model.limits.source_limits` says.
 
     Examples
