@@ -2,7 +2,9 @@
 
 Of each group of modules a sample is tried, the same each time: ``--sample 60``. What came of each
 mutant is kept in ``mutation-results.jsonl``, so that a run that was stopped goes on; a mutant is
-tried again once its module or a test of it has changed.
+tried again once its module or a test of it has changed. Searchers are first put to their quick
+tests, with nothing compiled, and to whole searches only where those find nothing: ``--quick``
+leaves these out, a minute or more a mutant.
 """
 
 from __future__ import annotations

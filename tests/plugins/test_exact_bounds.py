@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from sketchmatch.api import MatchProblem, Outcome
 from sketchmatch.pipeline.slices import finish
-from sketchmatch_builtin.searchers import _branch, _cells, _fixed, _residual
+from sketchmatch_builtin.searchers import _backtrack, _branch, _cells, _fixed, _residual
 from sketchmatch_builtin.searchers import exact as module
 from sketchmatch_builtin.searchers._assignment import FORBIDDEN, reduce_by_assignment
 from sketchmatch_builtin.searchers._ranking import Ranking
@@ -472,3 +472,21 @@ def test_no_map_of_a_cell_loses_less_than_its_costs():
                 loss = terms.base + sum(_costs(relations, terms, partners))
                 assert 1.0 - value >= loss - 1e-12, seed
     assert belonging > 20
+
+
+def test_the_levels_of_a_path_are_those_of_its_entries_in_order():
+    table = random_table(np.random.default_rng(3), 4, 5)
+    relations, _ = relations_of(table, (0.0, 0.0, 1.0))
+    every = every_confidence(table, (0.0, 0.0, 1.0))
+    worst = min(every, key=every.get)
+    found = Ranking(np.array([worst]), np.array([every[worst]]))
+    path = _backtrack.first_path(relations, 5, 0)
+    looked_at = 0
+    while path.place[_backtrack.DEPTH] >= 0:
+        _backtrack.backtrack(relations, found, path, 1)
+        for depth in range(2, path.place[_backtrack.DEPTH] + 1):
+            levels = path.levels[depth, : depth * (depth - 1) // 2].tolist()
+            assert levels == sorted(levels)
+            looked_at += len(levels) > 1
+    assert looked_at > 20
+    assert found.values[0] == pytest.approx(max(every.values()), abs=TRUE)
