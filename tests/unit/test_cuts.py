@@ -297,6 +297,17 @@ def test_what_is_found_is_the_first_cut_and_what_is_given_as_a_scene_has_no_othe
     assert len(segment_side("sketch", sketch, pipeline, registry).scene) == 7
 
 
+def test_a_cut_that_cannot_be_made_ends_them(monkeypatch):
+    def cuts(segmenter, source):
+        yield segmenter.segment(source)
+        raise REFUSED
+
+    monkeypatch.setattr(Cut, "cuts", cuts)
+    pipeline = resolve(with_cuts(), CUT, source_of(floor().scene))
+    found = cuts_of_side("sketch", source_of(floor().scene), pipeline, with_cuts())
+    assert [len(each.scene) for each in found] == [7]
+
+
 def test_a_segmenter_without_any_cut_is_blamed(monkeypatch):
     monkeypatch.setattr(Cut, "cuts", lambda *_: iter(()))
     with pytest.raises(PluginError, match="it returned a NoneType, not a Segmentation"):
