@@ -2,7 +2,8 @@
 
 ``things_by_eye.json`` has a box around each thing, in metres, set while looking at the maps at
 their full size; where a thing was found whole, the box is that of what was found. Numbers of the
-segmenter were chosen on ``LOOKED_AT`` alone.
+segmenter were chosen on ``LOOKED_AT`` alone; that a thin speck which the laser hardly met is none,
+without a number of its own, was seen on ``josefgst-ros-map12``.
 """
 
 import contextlib
@@ -41,7 +42,7 @@ FOUND = {
     "tb4-warehouse": (28, 0, 0, 0, 0),
     "turtlebot3": (9, 0, 0, 0, 0),
     "husky-playpen": (18, 0, 0, 1, 1),
-    "josefgst-ros-map12": (18, 5, 0, 11, 6),
+    "josefgst-ros-map12": (18, 5, 0, 9, 5),
     "marrtino-montreal": (8, 1, 0, 1, 1),
     "nav2-depot": (18, 0, 0, 0, 0),
     "pmb2-small-office": (17, 0, 0, 0, 0),
@@ -97,8 +98,8 @@ def test_most_of_what_a_person_sees_is_found_whole(names, share):
 
 def test_little_is_invented_and_less_without_doubt():
     whole, doubted, pieces, invented, doubtful = map(sum, zip(*FOUND.values(), strict=True))
-    assert invented <= 0.105 * (whole + pieces + invented)
-    assert invented - doubtful <= 0.06 * (whole - doubted + pieces + invented - doubtful)
+    assert invented <= 0.1 * (whole + pieces + invented)
+    assert invented - doubtful <= 0.05 * (whole - doubted + pieces + invented - doubtful)
 
 
 @pytest.mark.parametrize("name", THINGS)
@@ -154,18 +155,19 @@ def lost(before, after):
     return len(before) - len(kept)
 
 
-# Of what was found without doubt: lost on cells of half the size, and turned by 37°. Where two
-# things are a cell apart, turned cells join them: the bed of the small house joins its wall.
+# Of what was found without doubt: lost on cells of half the size, turned by 37° on these, and
+# turned by 37° on cells as large as they were. On the last, a gap one or two cells wide closes here
+# and there: the bed of the small house, a cell off its wall, joins it.
 LOST = {
-    "aws-small-house": (0, 4),
-    "elsabot-downstairs": (0, 2),
-    "tb4-warehouse": (0, 0),
-    "turtlebot3": (0, 0),
-    "husky-playpen": (0, 0),
-    "josefgst-ros-map12": (1, 1),
-    "marrtino-montreal": (0, 2),
-    "nav2-depot": (0, 1),
-    "pmb2-small-office": (0, 0),
+    "aws-small-house": (0, 0, 4),
+    "elsabot-downstairs": (0, 0, 1),
+    "tb4-warehouse": (0, 1, 0),
+    "turtlebot3": (0, 0, 0),
+    "husky-playpen": (0, 0, 0),
+    "josefgst-ros-map12": (1, 0, 1),
+    "marrtino-montreal": (0, 0, 2),
+    "nav2-depot": (0, 0, 1),
+    "pmb2-small-office": (0, 0, 0),
 }
 
 
@@ -174,10 +176,11 @@ LOST = {
 def test_neither_turning_a_map_nor_smaller_cells_lose_what_is_found(name):
     grid = plain(grid_of(name))
     sure = [item.polygon for item in found(grid) if not item.doubtful]
-    for change, most in zip((doubled, turned), LOST[name], strict=True):
-        moved, back = change(grid)
+    fine, _ = doubled(grid)
+    changes = (doubled(grid), turned(fine), turned(grid))
+    for (moved, back), most in zip(changes, LOST[name], strict=True):
         again = [back(item.polygon) for item in found(moved)]
-        assert lost(sure, again) <= most, change.__name__
+        assert lost(sure, again) <= most
 
 
 def room(*boxes, shape=(80, 120), cell=0.05):

@@ -213,10 +213,14 @@ def test_regions_that_people_drew_find_those_that_they_are_on_the_plan(half):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "right"), [("01", 8), ("02", 6)])
-def test_regions_of_a_robots_map_find_those_of_the_layout(name, right):
+@pytest.mark.parametrize(("name", "wrong"), [("01", 0), ("02", 1)])
+def test_regions_of_a_robots_map_find_those_of_the_layout(name, wrong):
+    # In the second map the hall is two regions. The annotator has its upper part in that of the
+    # lower one, and not, as the answer, in the region which lies there.
     require(RSI.exists(), "the maps of a flat")
-    assert robot_map(name).matched >= right
+    counted = robot_map(name)
+    assert counted.agreed >= 7
+    assert counted.matched >= counted.agreed - wrong
 
 
 def test_a_drawing_is_cut_coarser_and_finer():
@@ -272,6 +276,13 @@ def places(cells):
 def test_where_a_corridor_opens_into_a_hall_it_ends():
     cells = free_cells((10, 10, 90, 90), (100, 40, 80, 20))
     assert places(cells) == pytest.approx([8100, 1600], rel=0.08)
+
+
+@pytest.mark.parametrize("width", [20, 30, 40])
+def test_places_end_straight_across(width):
+    # A disc of the hall reaches into the nook by up to a fifth of it.
+    cells = free_cells((10, 10, 110, 90), (120, 30, 40, width))
+    assert places(cells) == pytest.approx([110 * 90, 39 * width], rel=0.03)
 
 
 def test_a_corridor_nearly_as_wide_is_of_the_hall():

@@ -141,7 +141,7 @@ def test_nothing_is_tried_where_cuts_are_settled(settings):
     assert matched(sketch, floor(), **settings).groups == ()
 
 
-def stand_in(shares, asked=None, errors=None, seconds=0.0, clock=None):
+def stand_in(shares, asked=None, errors=None, seconds=0.0, clock=None, place=None):
     """A match whose lines are right with the probability of its pair of cuts."""
 
     def trial(sketch, map_):
@@ -155,7 +155,7 @@ def stand_in(shares, asked=None, errors=None, seconds=0.0, clock=None):
             clock.now += seconds
         yield Progress(Phase.SEARCH, 0.0, confidence=0.5)
         line = ObjectMatch(0, 0, 0.5, probability=shares[pair])
-        yield Finished(SimpleNamespace(matches=(line,)))
+        yield Finished(SimpleNamespace(matches=(line,), place_probability=place))
 
     return trial
 
@@ -183,6 +183,12 @@ def test_of_cuts_that_fit_alike_the_first_is_taken_and_each_is_tried_once():
     sides = ([boxes(3), boxes(4), boxes(3)], [boxes(3), boxes(3)])
     assert chosen(finish(fitting_cut(*sides, stand_in(shares, asked), Clock()))) == (3, 3)
     assert asked == [(3, 3), (4, 3)]
+
+
+@pytest.mark.parametrize(("place", "taken"), [(0.09, (3, 3)), (0.1, (2, 3))])
+def test_how_well_another_place_fits_speaks_for_no_cut(place, taken):
+    shares, sides = {(3, 3): 0.01, (2, 3): 0.05}, ([boxes(3), boxes(2)], [boxes(3)])
+    assert chosen(finish(fitting_cut(*sides, stand_in(shares, place=place), Clock()))) == taken
 
 
 def test_without_probabilities_the_first_cut_is_taken_at_once():
@@ -289,6 +295,17 @@ def test_what_is_found_is_the_first_cut_and_what_is_given_as_a_scene_has_no_othe
     cuts = [len(each.scene) for each in cuts_of_side("sketch", sketch, pipeline, registry)]
     assert cuts == ([7, 6] if source else [7])
     assert len(segment_side("sketch", sketch, pipeline, registry).scene) == 7
+
+
+def test_a_cut_that_cannot_be_made_ends_them(monkeypatch):
+    def cuts(segmenter, source):
+        yield segmenter.segment(source)
+        raise REFUSED
+
+    monkeypatch.setattr(Cut, "cuts", cuts)
+    pipeline = resolve(with_cuts(), CUT, source_of(floor().scene))
+    found = cuts_of_side("sketch", source_of(floor().scene), pipeline, with_cuts())
+    assert [len(each.scene) for each in found] == [7]
 
 
 def test_a_segmenter_without_any_cut_is_blamed(monkeypatch):

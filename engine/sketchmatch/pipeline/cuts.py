@@ -36,6 +36,9 @@ _LARGEST = 24
 _MOST = 60
 """Trials of a match."""
 
+_CHANCE = 0.1
+"""How likely it is this place from which on a fit says something."""
+
 _CLOSED = 1.5
 """How far regions that are one grow towards each other, by their distance."""
 
@@ -70,6 +73,12 @@ class Fit:
         """How much of both sides is expected to be matched right."""
         return 2.0 * (self.expected or 0.0) / (len(self.sketch.scene) + len(self.map.scene))
 
+    @property
+    def speaks(self) -> bool:
+        """Whether it may be this place at all; how well another place fits is chance."""
+        place = self.result.place_probability
+        return place is None or place >= _CHANCE
+
 
 def fitting_cut(
     sketches: Sequence[Segmentation], maps: Sequence[Segmentation], trial: Trial, clock: Clock
@@ -77,7 +86,8 @@ def fitting_cut(
     """Match each cut of the sketch with each of the map, and return what fits best.
 
     That is where the largest share of both sides is expected to be matched right; of several the
-    first. Where the judge knows no probabilities it is the first of all.
+    first. Where the judge knows no probabilities, or takes it for another place with each of the
+    others, it is the first of all.
 
     Raises
     ------
@@ -89,7 +99,7 @@ def fitting_cut(
     best = yield from trials.matched(*first)
     for sketch, map_ in others if best.expected is not None else ():
         found = yield from trials.tried(sketch, map_)
-        if found is not None and found.share > best.share:
+        if found is not None and found.speaks and found.share > best.share:
             best = found
     return best
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -87,7 +88,10 @@ def _cuts(
     check_objects(len(found.scene), field)
     yield _with_notes(found, source)
     if read is source:
-        yield from (_with_notes(other, source) for other in cuts)
+        with suppress(InvalidInputError):  # the first is there, whatever else it may be
+            for other in cuts:
+                check_objects(len(other.scene), field)
+                yield _with_notes(other, source)
 
 
 def _checked(segmenter: Segmenter, source: Source, registry: Registry) -> Iterator[Segmentation]:
@@ -97,7 +101,7 @@ def _checked(segmenter: Segmenter, source: Source, registry: Registry) -> Iterat
     for number in itertools.count():
         with blaming(segmenter, registry):
             with inspecting(segmenter, registry, source):
-                found = next(cuts, None)
+                found: Any = next(cuts, None)
             if found is None and number:
                 return
             _check_contract(found)

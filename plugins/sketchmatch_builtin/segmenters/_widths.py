@@ -23,6 +23,8 @@ _Widths = NDArray[np.float32]
 _STEP = 1.16
 # Of the square of its greatest half width: what has a smaller area is a doorway, or a corner.
 _SMALLEST = 2.0
+# Of the square of its chord: what a half disc covers at most.
+_SEGMENT = 0.4
 
 
 def divided_by_width(
@@ -33,7 +35,7 @@ def divided_by_width(
     How wide free space is at a cell is the widest disc within it that covers the cell. From the
     widest cells down, each joins the places that it touches, that a disc of this width can be moved
     to, and that are nowhere more than 1 / share times as wide: these become one by that. It
-    begins a new one where there are none.
+    begins a new one where there are none. Between two places the border runs straight.
 
     Parameters
     ----------
@@ -87,7 +89,28 @@ def _without_borders(free: Mask, places: _Places, least: float) -> Mask:
     large[0] = False
     labels = np.where(large, np.arange(len(large)), 0).astype(np.int32)[labels]
     grow(free, labels)
+    _straighten(labels, widest)
     return np.asarray(free & (labels > 0) & ~along_borders(labels), dtype=np.uint8)
+
+
+def _straighten(labels: _Labels, widest: FloatArray) -> None:
+    """Let places end straight across, where discs of the wider one bulge into the narrower."""
+    meeting = along_borders(labels).view(np.uint8)
+    _, pieces, boxes, _ = cv2.connectedComponentsWithStats(meeting, connectivity=8)
+    for k, (x, y, columns, rows, _) in enumerate(boxes[1:].tolist(), start=1):
+        window = labels[y : y + rows, x : x + columns]
+        border = pieces[y : y + rows, x : x + columns] == k
+        both = np.unique(window[border])
+        if len(both) != 2:
+            continue
+        narrow, wide = both[np.argsort(widest[both], kind="stable")]
+        hull = cv2.convexHull(cv2.findNonZero(border.view(np.uint8)))
+        across = np.zeros(window.shape, np.uint8)
+        cv2.fillConvexPoly(across, hull, (1,))
+        chord = float(np.hypot(columns, rows))
+        bulge = (across > 0) & (window == wide)
+        if bulge.sum() <= _SEGMENT * chord**2:
+            window[bulge] = narrow
 
 
 @dataclass

@@ -67,8 +67,8 @@ class OccupancyGridSegmenter(Segmenter):
     The certainty of an object says how likely it is one thing. What the laser met all around, and
     no thin and ragged thing, is certain; four legs are .9, feet and crowds .6; what hangs on a wall
     is .8, what juts far out of it .7, and what leans against it .4, as the wall's own bumps do; an
-    outline that the laser did not meet is .3. Edges of shadows, and specks where what was seen
-    ends, are left out.
+    outline that the laser did not meet is .3. Edges of shadows, specks where what was seen ends,
+    and thin specks that the laser hardly met are left out.
 
     Objects come in reading order: by their highest point from the top down, then from the left.
     What the map's file names, other than rooms, gives its name to the object that stands there.
