@@ -1,4 +1,4 @@
-"""How soon a map follows the pen, and what a stored map saves a match.
+"""How soon a map follows the pen, and what a stored map and former revisions save a match.
 
 Run it with ``make bench-sketches``. The server is a process of its own; the client shares the
 machine with it. Look at what the server spends where the machine is busy otherwise: waiting counts
@@ -28,13 +28,19 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from sketchmatch.api.forces import own_histograms
 from sketchmatch.app.jobs import answers
 from sketchmatch.app.orders import Order
 from sketchmatch.app.remembered import Remembered
 from sketchmatch.app.setup import RequestLimits, Setup
+from sketchmatch.model import Scene
 from sketchmatch.pipeline.clock import Clock
+from sketchmatch.pipeline.compare import compare
+from sketchmatch.pipeline.describe import described, in_directions
 from sketchmatch.pipeline.engine import Engine
-from sketchmatch.registry import default_registry
+from sketchmatch.pipeline.memory import Memory
+from sketchmatch.pipeline.slices import finish
+from sketchmatch.registry import Kind, default_registry
 from sketchmatch_client import Client, NotFoundError, match_request, sources
 from sketchmatch_proto.v1.source_pb2 import Source
 from tests.benchmarks.server import processor_seconds
@@ -59,6 +65,7 @@ def main() -> None:
         Client(running.address, timeout=120) as client,
     ):
         Console().print(_live(client, running.process.pid, given.updates))
+        Console().print(_revised(given.updates))
         Console().print(_stored(client, running.process.pid, Path(folder), given.matches))
 
 
@@ -84,6 +91,36 @@ def _live(client: Client, pid: int, updates: int) -> Table:
         figures = [median(waits), quantiles(waits, n=20)[-1], max(waits)]
         row = [f"{figure:.1f}" for figure in figures]
         table.add_row(name, *row, share, f"{1e3 * spent / updates:.1f}")
+    return table
+
+
+def _revised(updates: int) -> Table:
+    """Measure what a worker computes of a sketch of which one object was drawn anew."""
+    table = Table("", "describe", "relate", "within objects")
+    table.title = f"one of {len(_DRAWN)} objects changed, processor time in ms"
+    registry = default_registry()
+    histogram = in_directions(registry.find(Kind.HISTOGRAM, "constant").algorithm(), 180)
+    similarity = registry.find(Kind.SIMILARITY, "cross-correlation").algorithm()
+    map_ = Scene.from_polygons(shapes(_MAPPED, 1))
+    mapped = finish(described(map_, histogram, registry, "map"))
+    for name, memory in (("anew", None), ("what changed", Memory())):
+        rows = []
+        for k in range(updates + 5):
+            outlines = list(_OUTLINES)
+            outlines[3] = outlines[3] + 0.001 * k
+            sketch = Scene.from_polygons(outlines)
+            sketch = sketch if memory is None else memory.met(sketch)
+            began = time.process_time()
+            drawn = finish(described(sketch, histogram, registry, "sketch", memory))
+            described_ = time.process_time()
+            pair = (sketch, map_), (drawn, mapped)
+            finish(compare(*pair, similarity, registry, memory=memory))
+            related = time.process_time()
+            own_histograms(sketch.objects)
+            ended = time.process_time()
+            rows.append((described_ - began, related - described_, ended - related))
+        figures = [median(column) for column in zip(*rows[5:], strict=True)]
+        table.add_row(name, *(f"{1e3 * figure:.2f}" for figure in figures))
     return table
 
 

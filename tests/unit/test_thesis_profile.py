@@ -60,12 +60,19 @@ def answered(result):
 
 
 def ordered(answer):
-    """Return an answer with its alternatives that are equally good in an order of their own."""
+    """Return an answer with its alternatives that are equally good in an order of their own.
+
+    Where the best is not better than the next, rounding says how many steps the search takes.
+    """
     alternatives = sorted(
         answer["alternatives"],
         key=lambda each: (-round(each[1][0], 12), [line[1] for line in each[0]]),
     )
-    return answer | {"alternatives": alternatives}
+    answer = answer | {"alternatives": alternatives}
+    best = round(answer["confidence"][0], 12)
+    if alternatives and round(alternatives[0][1][0], 12) >= best:
+        answer |= {"evaluations": None, "iterations": None}
+    return answer
 
 
 def differences(found, pinned, where="answer"):

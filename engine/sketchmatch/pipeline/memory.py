@@ -32,6 +32,15 @@ _TABLE_BYTES = 4 * 1024 * 1024
 
 
 @dataclass(frozen=True)
+class _Described:
+    """A scene and its histograms, with the place of each object by its outline."""
+
+    scene: Scene
+    places: dict[bytes, int]
+    descriptor: SceneDescriptor
+
+
+@dataclass(frozen=True)
 class _Related:
     """A table of relations, with the place of each row by the histogram that it compares."""
 
@@ -69,7 +78,7 @@ class Memory:
         self._lock = Lock()
         self._bytes = 0
         self._known: OrderedDict[tuple[str, str], SceneDescriptor] = OrderedDict()
-        self._recent: deque[tuple[Scene, SceneDescriptor]] = deque(maxlen=_RECENT)
+        self._recent: deque[_Described] = deque(maxlen=_RECENT)
         self._related: deque[_Related] = deque(maxlen=_RECENT)
         self._objects: WeakValueDictionary[tuple[object, ...], SceneObject] = WeakValueDictionary()
 
@@ -107,8 +116,9 @@ class Memory:
 
     def _hold(self, scene: Scene, descriptor: SceneDescriptor) -> None:
         key, size = (descriptor.scene, descriptor.described_by), descriptor.histograms.nbytes
+        places = {_outline(item): k for k, item in enumerate(scene.objects)}
         with self._lock:
-            self._recent.appendleft((scene, descriptor))
+            self._recent.appendleft(_Described(scene, places, descriptor))
             if key in self._known or size > self._max_bytes:
                 return
             self._known[key] = descriptor
@@ -130,17 +140,18 @@ class Memory:
             return None
         wanted = histogram.identity
         with self._lock:
-            recent = [each for each in self._recent if each[1].described_by == wanted]
-        best: tuple[int, list[int], SceneDescriptor] | None = None
-        for other, descriptor in recent:
-            if other.middle != scene.middle:
-                continue
-            places = {_outline(item): k for k, item in enumerate(other.objects)}
-            former = [places.get(_outline(item), -1) for item in scene.objects]
-            shared = sum(place >= 0 for place in former)
-            if shared >= 2 and (best is None or shared > best[0]):
-                best = shared, former, descriptor
-        return None if best is None else _copied(best[1], best[2])
+            recent = [each for each in self._recent if each.descriptor.described_by == wanted]
+        outlines = [_outline(item) for item in scene.objects]
+        best: tuple[int, _Described] | None = None
+        for each in recent:
+            if each.scene.middle == scene.middle:
+                shared = sum(outline in each.places for outline in outlines)
+                if shared >= 2 and (best is None or shared > best[0]):
+                    best = shared, each
+        if best is None:
+            return None
+        former = [best[1].places.get(outline, -1) for outline in outlines]
+        return _copied(former, best[1].descriptor)
 
     def rows(
         self, template: SceneDescriptor, argument: SceneDescriptor, similarity: Similarity

@@ -159,7 +159,8 @@ def _blocked(place: FloatArray, obstacles: Obstacles, radius: float, unit: str) 
     """Return what is to be said of a point that is no place for a robot: it is not moved."""
     near = obstacles.nearest_clear(place, radius, max(_FARTHEST_CLEAR, 10.0 * radius))
     there = "" if near is None else f"; the nearest that is none is ({near[0]:.6g}, {near[1]:.6g})"
-    sentence = f"It lies in an obstacle, or less than {radius:g} {unit} from one{there}."
+    kept = obstacles.kept(radius)
+    sentence = f"It lies in an obstacle, or less than {kept:.6g} {unit} from one{there}."
     return Change(ChangeReason.BLOCKED, 0, 0, sentence)
 
 

@@ -129,6 +129,7 @@ def kept_clear(
         return None, (Change(ChangeReason.UNREACHABLE, 0, 0, f"All of it {where}."),)
     first, last = (int(k) for k in np.flatnonzero(clear)[[0, -1]])
     changes: list[Change] = []
+    kept = obstacles.kept(radius)
     if first > 0:
         changes.append(_moved(way, 0, first, ChangeReason.MOVED_START, "begins", unit))
     done = way.part(first, first)
@@ -147,7 +148,7 @@ def kept_clear(
         if found is None:
             sentence = (
                 f"What comes after point {len(done.points)} cannot be reached: obstacles leave no "
-                f"way of {radius:g} {unit} to each side; the route ends there."
+                f"way of {kept:.6g} {unit} to each side; the route ends there."
             )
             end = len(done.points) - 1
             changes.append(Change(ChangeReason.UNREACHABLE, end, end, sentence))
@@ -155,7 +156,7 @@ def kept_clear(
         begin = len(done.points) - 1
         done = done + found
         named = _named(way.part(at, beyond), landmarks)
-        sentence = f"Led around{named}, to stay {radius:g} {unit} away from obstacles."
+        sentence = f"Led around{named}, to stay {kept:.6g} {unit} away from obstacles."
         changes.append(Change(ChangeReason.OBSTACLE, begin, len(done.points) - 1, sentence))
         changes += [replace(each, first=begin, last=len(done.points) - 1) for each in sides]
         at = beyond
