@@ -7,6 +7,7 @@ import pickle
 import re
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -229,6 +230,29 @@ print(*names)
             [sys.executable, "-c", code], check=True, capture_output=True, text=True
         )
     assert done.stdout.split() == []
+
+
+@pytest.mark.slow
+@compiled_only
+def test_what_a_server_waits_for_is_compiled_once(tmp_path):
+    code = """
+from collections import Counter
+from sketchmatch.kernels._jit import on_compile
+from sketchmatch.pipeline.warmup import warm_up
+from sketchmatch.registry import default_registry
+names = []
+with on_compile(names.append):
+    warm_up(default_registry())
+print(Counter(names))
+"""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
+    count = eval(done.stdout, {"Counter": Counter})
+    kernels = {"fmap_confidence", "fmap_confidence_above", "mean_parts", "measure", "project"}
+    assert {name: count[name] for name in kernels} == dict.fromkeys(kernels, 1)
+    # What numba brings for these compiles a dozen functions more: sorting, and assigning arrays.
+    assert count.keys() & {"run_quicksort", "raise_impl", "concat_impl"} == set()
 
 
 @pytest.mark.slow

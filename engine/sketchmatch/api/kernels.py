@@ -12,6 +12,7 @@
   :func:`mean_absolute_difference` (ζL).
 - Rows of a relation table by objects: :func:`pair_index`.
 - Rows of histograms: :func:`contrast_rows`, :func:`overlap_rows`.
+- Sorting, for which numba's own takes long to compile: :func:`sort_values`.
 
 Evidence is what an entry counts for beside rotation and dilation: σ, or more where a request weighs
 the shapes and sizes of objects. A searcher that reads the table itself takes it, as these do, from
@@ -58,6 +59,7 @@ from sketchmatch.kernels.incremental import (
 )
 from sketchmatch.kernels.pairs import pair_index
 from sketchmatch.kernels.similarity import contrast_rows, overlap_rows
+from sketchmatch.kernels.sorting import sort_values
 
 __all__ = [
     "MapState",
@@ -75,5 +77,6 @@ __all__ = [
     "overlap_rows",
     "pair_index",
     "place_map",
+    "sort_values",
     "total_distance",
 ]

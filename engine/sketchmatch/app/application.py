@@ -13,6 +13,7 @@ from collections.abc import AsyncIterator, Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, closing, contextmanager, suppress
 from dataclasses import replace
+from operator import attrgetter
 from typing import NamedTuple, Protocol, TypeVar
 
 from google.protobuf.message import Message
@@ -624,8 +625,7 @@ def _name_of(caller: str, request_id: str) -> str:
     return hashlib.blake2b(named, digest_size=16).hexdigest()
 
 
-def _size(task: Task) -> int:
-    return task.order.size
+_size = attrgetter("size")
 
 
 def _one(_: Task) -> int:

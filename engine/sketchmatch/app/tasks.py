@@ -267,6 +267,8 @@ class Task:
     ----------
     strangers
         The algorithms and readers it asks for that run in a process of their own.
+    size
+        Bytes of the request, with what comes with it.
     log
         Its responses, as bytes.
     stopping
@@ -292,6 +294,7 @@ class Task:
         former: Record | None = None,
     ) -> None:
         self.order = order
+        self.size = order.size
         self.setup = setup
         self.caller = caller
         self.wish = wish

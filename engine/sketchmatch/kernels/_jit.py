@@ -21,17 +21,21 @@ from typing import Any, TypeVar
 from uuid import uuid4
 
 import numba
-from numba.core import entrypoints, event
+from numba.core import entrypoints, event, types
 from numba.core.caching import FunctionCache
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
+from numba.core.imputils import impl_ret_borrowed
 from numba.core.serialize import dumps
+from numba.extending import lower_builtin, type_callable
+from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
-__all__ = ["kernel", "on_compile"]
+__all__ = ["kernel", "on_compile", "read_only"]
 
 _log = logging.getLogger(__name__)
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+_Item = TypeVar("_Item", bound=Any)
 
 # Before numba compiles it reads what each installed distribution says of itself, and raises what
 # a broken one makes of that; but only once.
@@ -61,10 +65,31 @@ def kernel(function: _Function) -> _Function:
     >>> kernel(pair_count)(8)
     28
     """
-    compiled: Any = numba.njit(function, nogil=True, error_model="numpy")
+    compiled: Any = numba.njit(function, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
     if isinstance(compiled, Dispatcher):
         compiled._cache = _Cache(function)  # type: ignore[attr-defined]
     return compiled  # type: ignore[no-any-return]
+
+
+def read_only(array: NDArray[_Item]) -> NDArray[_Item]:
+    """Return an array, in kernels as one that is not written to, as values of the model have them.
+
+    A kernel is compiled anew where an array may be written to, though it does not write to it.
+    """
+    return array
+
+
+@type_callable(read_only)
+def _type_of_read_only(_: Any) -> Any:
+    def typed(array: Any) -> Any:
+        return array.copy(readonly=True) if isinstance(array, types.Array) else None
+
+    return typed
+
+
+@lower_builtin(read_only, types.Array)
+def _lower_read_only(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    return impl_ret_borrowed(context, builder, signature.return_type, arguments[0])
 
 
 @contextmanager

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from sketchmatch.kernels._jit import kernel
+from sketchmatch.kernels.sorting import sort_values
 from sketchmatch.model.arrays import FloatArray, IntArray
 
 __all__ = ["fmap_confidence", "fmap_confidence_above", "mean_absolute_difference"]
-
-_INSERTION_LIMIT = 64
 
 
 @kernel
@@ -150,16 +149,7 @@ def mean_absolute_difference(values: FloatArray) -> float:
     count = values.size
     if count < 2:
         return 0.0
-    if count <= _INSERTION_LIMIT:
-        for k in range(1, count):
-            value = values[k]
-            place = k
-            while place > 0 and values[place - 1] > value:
-                values[place] = values[place - 1]
-                place -= 1
-            values[place] = value
-    else:
-        values.sort()
+    sort_values(values)
     total = 0.0
     for k in range(count):
         total += (2 * k - count + 1) * values[k]

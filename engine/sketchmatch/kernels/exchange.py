@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sketchmatch.kernels._jit import kernel
+from sketchmatch.kernels._jit import kernel, read_only
 from sketchmatch.kernels.confidence import fmap_confidence
 from sketchmatch.model.arrays import FloatArray, IntArray
 
@@ -70,7 +70,7 @@ def exchange_confidences(
                 changed[k] = partners[g]
             for i in range(entries.size):
                 entries[i] = columns[changed[pairs[i, 0]], changed[pairs[i, 1]]]
-            result[g, h] = fmap_confidence(entries, scratch, *relations)[0]
+            result[g, h] = fmap_confidence(read_only(entries), scratch, *relations)[0]
             changed[g] = partners[g]
             if k >= 0:
                 changed[k] = h
@@ -141,7 +141,16 @@ def omission_confidences(
             levels[k, 0] = normalized_dilation[i, column]
             total += rotation_weights[i]
             k += 1
-        x *= count / total
-        y *= count / total
-        result[g] = fmap_confidence(first, scratch, similar, x, y, levels, weights)[0]
+        for k in range(count):
+            x[k, 0] *= count / total
+            y[k, 0] *= count / total
+        result[g] = fmap_confidence(
+            read_only(first),
+            scratch,
+            read_only(similar),
+            read_only(x),
+            read_only(y),
+            read_only(levels),
+            weights,
+        )[0]
     return result

@@ -16,6 +16,7 @@ import numpy as np
 
 from sketchmatch.kernels._jit import kernel
 from sketchmatch.kernels.pairs import pair_index
+from sketchmatch.kernels.sorting import sort_values
 from sketchmatch.model.arrays import FloatArray, IntArray
 from sketchmatch.model.maps import Weights
 from sketchmatch.model.relations import DILATION_SCALE, RelationTable
@@ -143,7 +144,7 @@ def place_map(state: MapState, partners: IntArray) -> float:
             _set_entry(state, a, b)
             state.levels[count] = state.entries[a, b, DILATION]
             count += 1
-    _sort(state.levels, count)
+    sort_values(state.levels[:count])
     return _settle(state)
 
 
@@ -228,8 +229,8 @@ def confidence_after(state: MapState, a: int, c: int) -> float:
         similar += entries[a, b, TURNED] - entries[a, b, EVIDENCE]
         x -= 2.0 * entries[a, b, COSINE]
         y -= 2.0 * entries[a, b, SINE]
-    _sort(leaving, count)
-    _sort(coming, count)
+    sort_values(leaving[:count])
+    sort_values(coming[:count])
     spread -= _imbalance(leaving, coming, count)
     return _confidence(state.weights, state.levels.size, similar, x, y, spread)
 
@@ -447,8 +448,8 @@ def _imbalance(leaving: FloatArray, coming: FloatArray, count: int) -> float:
 @kernel
 def _replace(levels: FloatArray, leaving: FloatArray, coming: FloatArray, count: int) -> None:
     """Take ``count`` leaving values out of the sorted levels and put the coming ones in."""
-    _sort(leaving, count)
-    _sort(coming, count)
+    sort_values(leaving[:count])
+    sort_values(coming[:count])
     gone = 0
     for k in range(levels.size):
         if gone < count and leaving[gone] == levels[k]:
@@ -465,23 +466,6 @@ def _replace(levels: FloatArray, leaving: FloatArray, coming: FloatArray, count:
         else:
             left -= 1
             levels[place] = levels[left]
-
-
-@kernel
-def _sort(values: FloatArray, count: int) -> None:
-    """Sort the first values by Shell's method, fast enough for what a move changes."""
-    gap = 1
-    while gap < count // 3:
-        gap = 3 * gap + 1
-    while gap > 0:
-        for k in range(gap, count):
-            value = values[k]
-            place = k
-            while place >= gap and values[place - gap] > value:
-                values[place] = values[place - gap]
-                place -= gap
-            values[place] = value
-        gap //= 3
 
 
 @kernel

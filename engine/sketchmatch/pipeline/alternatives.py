@@ -112,7 +112,7 @@ def other_maps(
                 partners = _exchange(mapped.partners, g, h)
                 fmaps.append(Fmap.from_object_map(partners, table.argument_objects))
     found: dict[tuple[int, ...], Alternative] = {}
-    for fmap in fmaps:
+    for fmap in {fmap.entries.tobytes(): fmap for fmap in fmaps}.values():
         confidence = fmap_confidence(fmap, table, weights, own)
         other = Alternative(object_map(occm(fmap, table)), confidence)
         key = tuple(other.mapped.partners.tolist())

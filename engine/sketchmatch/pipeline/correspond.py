@@ -20,6 +20,7 @@ from sketchmatch.model import (
     object_pairs,
     pair_index,
 )
+from sketchmatch.model.arrays import sealed
 
 __all__ = [
     "confidence_relations",
@@ -142,20 +143,23 @@ def map_confidence(
     evidence = table.entry_evidence[rows, columns if table.evidence is None else entries]
     first, scratch = np.zeros(len(rows), dtype=np.int64), np.empty(len(rows))
     total, similarity, rotation, dilation = kernels.fmap_confidence(
-        first,  # each row is of its entry alone
+        sealed(first),  # each row is of its entry alone
         scratch,
-        evidence[:, None],
-        (turned * table.cosine[rows, columns])[:, None],
-        (turned * table.sine[rows, columns])[:, None],
-        table.normalized_dilation[rows, columns][:, None],
+        sealed(evidence[:, None]),
+        sealed((turned * table.cosine[rows, columns])[:, None]),
+        sealed((turned * table.sine[rows, columns])[:, None]),
+        sealed(table.normalized_dilation[rows, columns][:, None]),
         np.array(weights, dtype=np.float64),
     )
     if table.evidence is not None:
         similarity = table.similarity[rows, columns].mean()
     shape = size = None
     if own is not None:
-        pairs = object_pairs(table.template_objects)[rows], object_pairs(table.argument_objects)
-        turns, growth = table.rotation[rows], table.dilation[rows]
+        pairs = (
+            sealed(object_pairs(table.template_objects)[rows]),
+            object_pairs(table.argument_objects),
+        )
+        turns, growth = sealed(table.rotation[rows]), sealed(table.dilation[rows])
         shape, size = map(float, mean_parts(entries, pairs, turns, growth, own))
     return Confidence(
         float(total), float(similarity), float(rotation), float(dilation), shape, size

@@ -291,7 +291,7 @@ def part_of(whole: Part, kept: Iterable[int]) -> Generator[float, None, Part]:
         table.rotation_weights[rows],
     )
     if own is not None:
-        own = SelfRelations(own.products[chosen], own.roughness[chosen], own.levels[chosen])
+        own = SelfRelations(*(sealed(each[chosen]) for each in own))
     return Part(chosen, whole.objects, part, own)
 
 

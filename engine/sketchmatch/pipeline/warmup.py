@@ -37,7 +37,7 @@ __all__ = [
 
 _log = logging.getLogger(__name__)
 
-COMPILING = "compiling the kernels: this happens once after an installation and takes 20 to 80 s"
+COMPILING = "compiling the kernels: this happens once after an installation and takes 15 to 60 s"
 
 
 @contextmanager

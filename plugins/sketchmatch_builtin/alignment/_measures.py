@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sketchmatch.api.kernels import kernel, pair_index
+from sketchmatch.api.kernels import kernel, pair_index, sort_values
 from sketchmatch.model import BoolArray, FloatArray, IntArray, RelationTable, Scene
-from sketchmatch.model.arrays import frozen
+from sketchmatch.model.arrays import frozen, sealed
 from sketchmatch_builtin.alignment._poses import (
     TOLERANCES,
     Tolerances,
@@ -146,11 +146,10 @@ def measure(
     tolerances
         How far sketches leave the truth.
     lines, wholes
-        As of :class:`Measured`, written.
+        As of :class:`Measured`, all 0, written.
     """
     n, m = drawn.places.size, mapped.places.size
     used, room = np.empty(m, dtype=np.bool_), _rooms(mapped)
-    lines[:], wholes[:] = 0.0, 0.0
     for x in range(maps.shape[0]):
         partners, row = maps[x], wholes[x]
         u, t, growth, count = fit_map(partners, drawn, mapped, tolerances)
@@ -159,7 +158,8 @@ def measure(
         if count < 2:
             row[Whole.SCORE] = -tolerances.omission * n
             continue
-        used[:] = False
+        for j in range(m):
+            used[j] = False
         for i in range(n):
             j = partners[i]
             if j >= 0:
@@ -284,7 +284,7 @@ def _rooms(mapped: Things) -> FloatArray:
 @kernel
 def _bin_of(u: complex, bins: int) -> tuple[int, int, float]:
     """Return the bins between which the turn of a pose lies, and how far between."""
-    turn = np.angle(u) % np.pi * bins / np.pi
+    turn = np.arctan2(u.imag, u.real) % np.pi * bins / np.pi
     whole = int(turn)
     rest = turn - whole
     whole %= bins
@@ -336,7 +336,10 @@ def _bend(
         normal[p, p] += 1e-6 if p < 2 else 1e-6 + (0.2 / (_PAGE * ratio)) ** 2
     found = _solve(normal, right)
     _straighten(partners, drawn, mapped, u, t, middle, extent, found, lines)
-    return float(min((found[2:] ** 2).sum() / (_PAGE * ratio) ** 2, 9.0))
+    bent = 0.0
+    for p in range(2, _BENDS):
+        bent += found[p] ** 2
+    return float(min(bent / (_PAGE * ratio) ** 2, 9.0))
 
 
 @kernel
@@ -389,8 +392,7 @@ def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
 
 @kernel
 def _write_effects(z: complex, effects: FloatArray) -> None:
-    """Write what each unknown of a bend does to x and to y of a place."""
-    effects[:] = 0.0
+    """Write what each unknown of a bend does to x and to y of a place; the rest is 0 already."""
     effects[0, 0] = effects[1, 1] = 1.0
     effects[0, 2], effects[1, 2] = z.real, -z.imag
     effects[0, 3], effects[1, 3] = z.imag, z.real
@@ -416,12 +418,13 @@ def _surround(
             if partners[i] >= 0:
                 way = mapped.places[partners[i]] - mapped.places[j]
                 close += square(way) < near
-                angles[count] = np.angle(way)
+                angles[count] = np.arctan2(way.imag, way.real)
                 count += 1
         row[Whole.CROWD] += close >= _FEWEST_AROUND
         if count < _FEWEST_AROUND:
             continue
-        around = np.sort(angles[:count])
+        around = angles[:count]
+        sort_values(around)
         gap = around[0] + 2.0 * np.pi - around[count - 1]
         for i in range(1, count):
             gap = max(gap, around[i] - around[i - 1])
@@ -468,7 +471,7 @@ def measured(
     maps: IntArray, drawn: Things, mapped: Things, relations: Relations | None = None
 ) -> Measured:
     """Return what speaks for maps; without relations nothing of these."""
-    lines, wholes = np.empty((*maps.shape, len(Line))), np.empty((len(maps), len(Whole)))
+    lines, wholes = np.zeros((*maps.shape, len(Line))), np.zeros((len(maps), len(Whole)))
     measure(maps, drawn, mapped, relations or _UNRELATED, TOLERANCES, lines, wholes)
     return Measured(lines, wholes, maps >= 0)
 
@@ -492,8 +495,8 @@ def relations_of(
         alike[:] = names.T if swapped else names
     return Relations(
         table.similarity,
-        self_similarities(*scenes),
-        alike,
+        sealed(self_similarities(*scenes)),
+        sealed(alike),
         swapped,
     )
 

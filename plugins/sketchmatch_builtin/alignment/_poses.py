@@ -197,8 +197,9 @@ def guess_poses(
     """
     m = mapped.places.size
     free = np.empty((drawn.places.size, m), dtype=np.bool_)
-    for x in range(m):
-        free[:, x] = allowed[:, grid.order[x]] > 0.0
+    for i in range(drawn.places.size):
+        for x in range(m):
+            free[i, x] = allowed[i, grid.order[x]] > 0.0
     wide, limit = _REACH * tolerances.size, (_REACH * tolerances.shape) ** 2
     until, end = guesses.state[1] + most, guesses.state[2] + max(1, _LOOKS * most // m)
     while guesses.state[2] < min(pairs.shape[0] * m, end) and guesses.state[1] < until:
@@ -450,13 +451,17 @@ def refine_pose(
     for x in range(_ROUNDS):
         weigh_pairings(u, t, growth, drawn, mapped, bonus, tolerances, costs, candidates, sizes)
         total = -reduce_by_assignment(costs, candidates, sizes, holders)
-        partners[:] = -1
+        for i in range(n):
+            partners[i] = -1
         for j in range(m):
             if holders[j] >= 0:
                 partners[holders[j]] = j
-        if x > 0 and (partners == former).all():
+        changed = x == 0
+        for i in range(n):
+            changed |= partners[i] != former[i]
+            former[i] = partners[i]
+        if not changed:
             break
-        former[:] = partners
         v, s = fitted_pose(u, t, drawn, mapped, tolerances, partners)
         if v == 0.0:
             break
@@ -606,8 +611,8 @@ def vary(
             k = holders[j] if j >= 0 else -1
             if k < 0:
                 if change >= -loss:
-                    maps[count], losses[count] = partners, -change
-                    maps[count, i] = j
+                    _write(maps[count], partners, i, j)
+                    losses[count] = -change
                     count += 1
                 continue
             change -= worths[k, j]
@@ -620,7 +625,15 @@ def vary(
                     continue
                 whole = change + (worths[k, g] if g >= 0 else -omission)
                 if whole >= -loss:
-                    maps[count], losses[count] = partners, -whole
-                    maps[count, i], maps[count, k] = j, g
+                    _write(maps[count], partners, i, j)
+                    maps[count, k], losses[count] = g, -whole
                     count += 1
     return count
+
+
+@kernel
+def _write(changed: IntArray, partners: IntArray, i: int, j: int) -> None:
+    """Write a map in which object i has partner j."""
+    for x in range(partners.size):
+        changed[x] = partners[x]
+    changed[i] = j
