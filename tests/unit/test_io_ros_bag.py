@@ -159,6 +159,17 @@ def test_what_is_packed_in_a_bag_of_bytes_keeps_to_the_limit(tmp_path, kind, pac
         assert read_source(path).cells.shape == (400, 500)
 
 
+@pytest.mark.parametrize("kind", [ROS1, MCAP])
+def test_of_many_maps_only_the_last_is_unpacked(tmp_path, kind):
+    """A chunk of each, as both kinds close one that has a megabyte."""
+    maps = [np.full((1200, 1000), k, np.int8) for k in range(6)]
+    packing = "bz2" if kind == ROS1 else "zstd"
+    bag = write(tmp_path, kind, *(("/map", cells, 0.0) for cells in maps), packing=packing)
+    with limited_to(SourceLimits(max_bytes=2_500_000)):
+        assert (decoded(file_of(bag)).cells == maps[-1]).all()
+    assert (read_source(bag).cells == maps[-1]).all()
+
+
 @pytest.mark.parametrize("packing", ["bz2", "lz4", "zstd"])
 def test_what_is_packed_and_cut_is_refused(tmp_path, packing):
     kind = MCAP if packing == "zstd" else ROS1
