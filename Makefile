@@ -162,7 +162,7 @@ $(VENV)/dev: $(VENV)/runtime
 	@touch $@
 
 $(VENV)/web: $(VENV)/runtime
-	@$(BIN)/python $(PIP) --editable '.[web]'
+	@$(BIN)/python $(PIP) --editable '.[dxf,rosbag,web]'
 	@touch $@
 
 # Without a wheel for this Python the benchmark leaves the peers out and says so.

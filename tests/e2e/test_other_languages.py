@@ -86,6 +86,17 @@ class Program:
         done = self._bash(f"{step.command.replace('localhost:50051', address)} {file}")
         return done.returncode, done.stdout.splitlines()
 
+    def generated_otherwise(self):
+        """Generate by the page's other commands, compile it, and return the files of both ways."""
+        (commands,) = blocks(f"{self.page}/README.md", "sh")
+        folder = self.folder / "sketchmatch" / "v1"
+        first = {file.name for file in folder.iterdir()}
+        shutil.rmtree(folder)
+        for command in (commands, self._build[-1].command):
+            done = self._bash(f"set -eu\n{command}")
+            assert done.returncode == 0, done.stderr
+        return first, {file.name for file in folder.iterdir()}
+
     def _bash(self, command):
         return subprocess.run(
             ["bash", "-c", command],
@@ -176,6 +187,13 @@ def program(request, tmp_path_factory):
 
 def test_the_pages_example_has_the_answer_that_it_shows(program, address):
     program.example(address)
+
+
+@pytest.mark.parametrize("program", [go], indirect=True, ids=["go"])
+def test_protoc_makes_of_the_contract_what_buf_makes(program):
+    require(shutil.which("protoc"), "protoc")
+    by_buf, by_protoc = program.generated_otherwise()
+    assert by_buf == by_protoc > {"match_service.pb.go", "match_service_grpc.pb.go"}
 
 
 def test_the_pages_first_program_finds_all_that_is_sketched(program, address):

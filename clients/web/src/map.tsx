@@ -6,7 +6,7 @@ import { useEffect, useMemo } from "preact/hooks";
 import type { Carried } from "./carry";
 import { colourOf } from "./colours";
 import { distance, toScreen, type View, type Xy, zoomed } from "./geometry";
-import { boxOfMap, type Thing, type Underlay } from "./maps";
+import { boxOfMap, droppedFiles, type Thing, type Underlay } from "./maps";
 import { toggled } from "./mending";
 import { useSize, useView } from "./pane";
 import { placed, type Signed, type Signs, widthOf } from "./signs";
@@ -78,8 +78,7 @@ export function MapPane() {
   const drop = (event: DragEvent) => {
     event.preventDefault();
     over.value = false;
-    const files = [...(event.dataTransfer?.files ?? [])];
-    if (files.length) void bringMap(files);
+    if (event.dataTransfer?.files.length) void bringMap(droppedFiles(event.dataTransfer));
   };
   return (
     <div

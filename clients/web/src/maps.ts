@@ -83,6 +83,41 @@ export async function sampleSketch(place: Place): Promise<string> {
   return (await fetched(`places/${place}/sketch.json`)).text();
 }
 
+const BAG = /\.(bag|mcap|db3)$/i;
+
+/** Whether a map's units are metres, as those of a robot's map are. */
+export function isMetric({ underlay, found: { source } }: PlaceMap): boolean {
+  const { kind } = source;
+  return underlay?.grid || (kind.case === "file" && BAG.test(kind.value.name));
+}
+
+/** Return the files that were dropped; of a folder, such as a bag or a map is, those in it. */
+export async function droppedFiles(transfer: DataTransfer | null): Promise<File[]> {
+  // Both are gone once anything was waited for.
+  const files = [...(transfer?.files ?? [])];
+  const entries = [...(transfer?.items ?? [])].map((item) => item.webkitGetAsEntry());
+  const folders = entries.filter((entry) => entry?.isDirectory) as FileSystemDirectoryEntry[];
+  if (!folders.length) return files;
+  const names = new Set(folders.map(({ name }) => name));
+  const inside = await Promise.all(folders.map(filesIn));
+  return [...files.filter(({ name }) => !names.has(name)), ...inside.flat()];
+}
+
+async function filesIn(folder: FileSystemDirectoryEntry): Promise<File[]> {
+  const reader = folder.createReader();
+  const files: File[] = [];
+  for (;;) {
+    const some = await new Promise<FileSystemEntry[]>((done, failed) =>
+      reader.readEntries(done, failed),
+    );
+    if (!some.length) return files;
+    for (const entry of some.filter(({ isFile }) => isFile)) {
+      const file = entry as FileSystemFileEntry;
+      files.push(await new Promise<File>((done, failed) => file.file(done, failed)));
+    }
+  }
+}
+
 /**
  * Load a map from files: a yaml with its picture, or any one file that the server reads.
  *
@@ -95,7 +130,7 @@ export async function openMap(
   files: readonly File[],
   words: { pictureLacking: (picture: string) => string; manyBags: string },
 ): Promise<PlaceMap> {
-  const bags = files.filter(({ name }) => /\.(bag|mcap|db3)$/i.test(name));
+  const bags = files.filter(({ name }) => BAG.test(name));
   if (bags.length > 1) throw new RequestFailed(words.manyBags, "invalid", "", "map", undefined);
   const yaml = files.find(({ name }) => /\.ya?ml$/i.test(name));
   const first = bags[0] ?? files[0];

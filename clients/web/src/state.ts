@@ -23,6 +23,7 @@ import { keepDrawing, keepMap, restored } from "./keep";
 import {
   foundOtherwise,
   isPlace,
+  isMetric,
   openMap,
   openOutlines,
   keepOnServer,
@@ -376,7 +377,7 @@ export function resize(sketch: number, [width, height]: readonly [number, number
 }
 
 /** Return what the map's units are called; empty where nobody knows. */
-export const unit = computed(() => (place.value?.underlay?.grid ? "m" : ""));
+export const unit = computed(() => (place.value && isMetric(place.value) ? "m" : ""));
 
 export function newSheet(): void {
   change((now) => (now.strokes.length ? EMPTY : now));
@@ -390,9 +391,9 @@ export async function choosePlace(name: Place): Promise<void> {
   });
 }
 
-export async function bringMap(files: readonly File[]): Promise<void> {
+export async function bringMap(files: readonly File[] | Promise<File[]>): Promise<void> {
   await telling(async () => {
-    const map = await openMap(client, files, texts.peek());
+    const map = await openMap(client, await files, texts.peek());
     show(map);
     forget();
     notice.value = map.warnings.join(" ");

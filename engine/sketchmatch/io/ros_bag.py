@@ -249,10 +249,24 @@ def _ros_2(bag: Any, topic: str) -> _Recorded:
     with Reader(bag) as reader:
         topic, notes = _chosen({item.topic for item in _of_maps(reader)}, topic)
         connections = [item for item in _of_maps(reader) if item.topic == topic]
-        last = deque(reader.messages(connections), maxlen=1)
+        storage: Any = reader.storage
+        chunks = getattr(storage, "chunks", [])
+        last = deque(() if chunks else reader.messages(connections), maxlen=1)
+        # Of chunks, whose times are known, only those are unpacked that may hold the last message.
+        for chunk in sorted(chunks, key=_end, reverse=True):
+            if last and _end(chunk) < last[0][1]:
+                break
+            storage.chunks = [chunk]
+            found = deque(reader.messages(connections), maxlen=1)
+            if found and (not last or found[0][1] > last[0][1]):
+                last = found
         if not last:
             raise _empty(topic)
         return _Recorded(last[0][2], notes)
+
+
+def _end(chunk: Any) -> int:
+    return int(chunk.message_end_time)
 
 
 def _of_maps(reader: Any) -> list[Any]:

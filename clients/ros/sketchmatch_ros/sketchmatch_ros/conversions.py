@@ -11,7 +11,7 @@ from geometry_msgs.msg import Point, Point32, Polygon, Pose, PoseStamped, Quater
 from nav2_msgs.msg import CostmapFilterInfo
 from nav_msgs.msg import MapMetaData, OccupancyGrid, Path
 from sketchmatch_msgs.action import MatchSketch
-from sketchmatch_msgs.msg import MatchedObject, ObjectMap, Sketch, Stroke
+from sketchmatch_msgs.msg import MatchedObject, ObjectGroup, ObjectMap, Sketch, Stroke
 from sketchmatch_msgs.srv import Carry
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
@@ -104,6 +104,7 @@ def failure(error: SketchmatchError, answer: ObjectMap) -> MatchSketch.Result:
 def object_map(match: Match, header: Header) -> ObjectMap:
     """Return an answer in the map's frame."""
     result = match.result
+    grouped = {k for group in result.object_groups for k in group.sketch_objects}
     return ObjectMap(
         header=header,
         match_id=result.match_id,
@@ -121,7 +122,15 @@ def object_map(match: Match, header: Header) -> ObjectMap:
             for row in match.rows()
             if row["map_object"] is not None
         ],
-        unmatched_sketch_objects=list(result.unmatched_sketch_objects),
+        groups=[
+            ObjectGroup(
+                sketch_objects=list(group.sketch_objects),
+                map_objects=list(group.map_objects),
+                probability=group.probability if group.HasField("probability") else _NAN,
+            )
+            for group in result.object_groups
+        ],
+        unmatched_sketch_objects=[k for k in result.unmatched_sketch_objects if k not in grouped],
         probability=_known(match.probability),
         place_probability=_known(match.place_probability),
         ask_about=list(result.ambiguity.deciding_sketch_objects),
