@@ -22,7 +22,6 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
-import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
@@ -38,7 +37,7 @@ from tests.experiments.posterior import (
     doubting,
     gone_on,
     judged_errors,
-    known_of,
+    known_sketches,
     learned_posterior,
     posterior_text,
 )
@@ -87,8 +86,6 @@ _OF_PLACES = ("training", "many", "strangers")
 
 _FEWEST = 4
 """How many objects a sketch has at least that is gone on with."""
-
-_AT_ONCE = 200
 
 THESIS = (1.0, 1.0, 1.0)
 """The weights of the thesis."""
@@ -144,24 +141,7 @@ def _posterior(counts: dict[str, int], kept: Path | None) -> tuple[str, dict[str
 
 
 def _known(kind: str, numbers: range, kept: Path | None) -> list[Known]:
-    """Return sketches in numbers, showing progress."""
-    parts = [numbers[k : k + _AT_ONCE] for k in range(0, len(numbers), _AT_ONCE)]
-    title = f"{kind}, {_AT_ONCE} at once"
-    return list(itertools.chain.from_iterable(each_of(partial(_some, kind, kept), parts, title)))
-
-
-def _some(kind: str, kept: Path | None, numbers: range) -> list[Known]:
-    """Return some sketches in numbers; those that are kept are read."""
-    file = kept / f"{kind}-{numbers.start}-{numbers.stop}.pickle" if kept else None
-    if file and file.exists():
-        found: list[Known] = pickle.loads(file.read_bytes())
-        return found
-    chance = kind in _OF_PLACES
-    every = [known_of(number, _KINDS[kind], chance) for number in numbers]
-    found = list(itertools.chain.from_iterable(every))
-    if file:
-        file.write_bytes(pickle.dumps(found))
-    return found
+    return known_sketches(kind, _KINDS[kind], numbers, kept, kind in _OF_PLACES)
 
 
 def _all_of(do: Callable[[int], list[_Case]], part: str, count: int) -> list[_Case]:

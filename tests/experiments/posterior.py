@@ -7,10 +7,14 @@ on their own, so what they count for is learned from labels put on the same sket
 
 from __future__ import annotations
 
+import itertools
 import json
+import pickle
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
@@ -40,6 +44,7 @@ from tests.experiments.drawings import Drawing
 from tests.experiments.logits import significant
 from tests.experiments.networks import Case, fitted_maps, fitted_place
 from tests.experiments.reliability import reliability
+from tests.experiments.runs import each_of
 from tests.experiments.training import training_drawing
 
 __all__ = [
@@ -47,7 +52,9 @@ __all__ = [
     "doubting",
     "gone_on",
     "judged_errors",
+    "knowing",
     "known_of",
+    "known_sketches",
     "learned_posterior",
     "posterior_text",
 ]
@@ -60,6 +67,9 @@ _UNRELATED = 0.3
 
 _OTHER_PLACES = 6.0
 """What a sketch of another place counts for: taking it for this one is the worse mistake."""
+
+_AT_ONCE = 200
+"""Sketches that one process brings into numbers, and keeps, at once."""
 
 _SHIFTS = -4.0, 4.0
 """How far the odds of the right map's not being known may be shifted."""
@@ -116,6 +126,46 @@ def known_of(
     right = np.flatnonzero((found.maps == drawn.truth).all(axis=1))
     elsewhere = bool((drawn.truth < 0).all())
     return [Known(found, int(right[0]) if len(right) else -1, elsewhere, drawn.truth)]
+
+
+def known_sketches(
+    name: str,
+    draw: Callable[[int], Drawing],
+    numbers: range,
+    kept: Path | None = None,
+    chance: bool = True,
+) -> list[Known]:
+    """Return sketches of a kind in numbers, showing progress.
+
+    Parameters
+    ----------
+    name
+        Of the kind.
+    draw, chance
+        As for :func:`known_of`.
+    numbers
+        Which ones.
+    kept
+        A folder for them: those that are there are read.
+    """
+    parts = [numbers[k : k + _AT_ONCE] for k in range(0, len(numbers), _AT_ONCE)]
+    do = partial(_some, name, draw, kept, chance)
+    return list(itertools.chain.from_iterable(each_of(do, parts, f"{name}, {_AT_ONCE} at once")))
+
+
+def _some(
+    name: str, draw: Callable[[int], Drawing], kept: Path | None, chance: bool, numbers: range
+) -> list[Known]:
+    """Return some sketches in numbers; those that are kept are read."""
+    file = kept / f"{name}-{numbers.start}-{numbers.stop}.pickle" if kept else None
+    if file and file.exists():
+        found: list[Known] = pickle.loads(file.read_bytes())
+        return found
+    every = [known_of(number, draw, chance) for number in numbers]
+    found = list(itertools.chain.from_iterable(every))
+    if file:
+        file.write_bytes(pickle.dumps(found))
+    return found
 
 
 def _in_half_the_room(measured: Measured) -> Measured:
@@ -189,6 +239,31 @@ def doubting(learned: Posterior, cases: Sequence[Known], others: Sequence[Known]
 
     lost[0] += minimize_scalar(loss, bounds=_SHIFTS, method="bounded").x
     return learned._replace(lost=_rounded(lost))
+
+
+def knowing(first: Posterior, cases: Sequence[Known]) -> Posterior:
+    """Return what was learned first, gone on with until nothing of it need be left.
+
+    Parameters
+    ----------
+    first
+        What to go on from.
+    cases
+        Sketches of this place and of others, of the kinds that are to be judged.
+    """
+    here = [each for each in cases if not each.elsewhere]
+    found = [_case(each, True) for each in here if each.right >= 0]
+    maps = fitted_maps(found, start=first.maps, kept=0.0)
+    place = fitted_place(
+        np.array([place_numbers(each.described, first.bare) for each in cases]),
+        np.array([not each.elsewhere for each in cases]),
+        np.ones(len(cases)),
+        start=first.place,
+    )
+    lost = _logit(
+        _lost_numbers(here, {True: maps, False: first.bare}), _unknown(here), np.ones(len(here))
+    )
+    return first._replace(maps=maps, place=place, lost=lost)
 
 
 def judged_errors(cases: Sequence[Known], learned: Posterior) -> dict[str, float]:
