@@ -5,11 +5,11 @@ per cent of its sketches:
 
 - how often the right map is among those that the judge weighs, which no judge of these exceeds;
 - how often the judge answers it, and how often one that knows the generator does: the same networks
-  with the same numbers of each map, gone on with from other sketches of all arms of that generator.
-  Where that one fails, too, the evidence is alike for several maps, and no other sketches to learn
-  from would help; what would is other evidence, or fewer arms to expect;
-- how often either takes the right place for another one, or another one for this;
-- the expected calibration error of what either says of the map, and what chance alone makes of it
+  with the same numbers of each map, gone on with from other sketches of all arms of that generator;
+  where that one fails, too, other sketches to learn from would hardly help, but other evidence;
+- how often one answers it that knows the other generator in the same way;
+- how often the first two take the right place for another one, or another one for this;
+- the expected calibration error of what these say of the map, and what chance alone makes of it
   with so many sketches, were each probability what the one that knows says.
 
 A judge that knows has seen ``--learned`` sketches of each arm; with more it gets a little better.
@@ -34,11 +34,12 @@ from tests.experiments.judging import drawing_of
 from tests.experiments.people import Shapes
 from tests.experiments.posterior import Known, knowing, known_sketches
 from tests.experiments.reliability import by_chance, reliability
+from tests.experiments.runs import each_of
 
 __all__ = ["Tally", "ceilings", "table"]
 
-_FIRST, _LEARNED_FROM = 5000, 100_000
-_SKETCHES, _LEARNED = 150, 150
+_FIRST, _LEARNED_FROM = 9000, 100_000
+_SKETCHES, _LEARNED = 120, 150
 _LIKELY, _SURE = 0.5, 0.95
 _WANTED = {
     "8 of 8": 99,
@@ -96,8 +97,10 @@ def ceilings(
     sketches: range,
     learned: range,
     kept: Path | None = None,
-) -> dict[tuple[Arm, str], tuple[Tally, Tally]]:
-    """Return what the judge, and one that knows the generator, say of each arm of each generator.
+) -> dict[tuple[Arm, str], tuple[Tally, ...]]:
+    """Return what the judge says of each arm of each generator, and what those say that know.
+
+    First the one that knows the generator, then those that know another one.
 
     Parameters
     ----------
@@ -108,32 +111,40 @@ def ceilings(
     kept
         A folder for sketches in numbers.
     """
+    judges = {}
+    for kind in kinds:
+        seen = _of_arms(kind, learned, kept).values()
+        judges[kind] = knowing(POSTERIOR, [case for cases in seen for case in cases])
     found = {}
     for kind in kinds:
-        seen, judged = (
-            {arm: _known(kind, arm, numbers, kept) for arm in _ARMS}
-            for numbers in (learned, sketches)
-        )
-        judge = knowing(POSTERIOR, [case for cases in seen.values() for case in cases])
-        for arm, cases in judged.items():
-            both = (Tally.of(cases, each, len(sketches)) for each in (POSTERIOR, judge))
-            found[arm, kind] = tuple(both)
+        others = [judge for other, judge in judges.items() if other != kind]
+        for arm, cases in _of_arms(kind, sketches, kept).items():
+            found[arm, kind] = tuple(
+                Tally.of(cases, each, len(sketches)) for each in (POSTERIOR, judges[kind], *others)
+            )
     return found
 
 
-def _known(kind: str, arm: Arm, numbers: range, kept: Path | None) -> list[Known]:
+def _of_arms(kind: str, numbers: range, kept: Path | None) -> dict[Arm, list[Known]]:
+    """Return sketches of each arm in numbers, showing progress."""
+    every = each_of(partial(_known, kind, numbers, kept), _ARMS, f"{kind}, {len(numbers)} at once")
+    return dict(zip(_ARMS, every, strict=True))
+
+
+def _known(kind: str, numbers: range, kept: Path | None, arm: Arm) -> list[Known]:
     name = f"{kind}, {arm.name}"
     return known_sketches(name, partial(drawing_of, arm, kind), numbers, kept)
 
 
-def table(found: dict[tuple[Arm, str], tuple[Tally, Tally]]) -> Table:
+def table(found: dict[tuple[Arm, str], tuple[Tally, ...]]) -> Table:
     """Return a line for each arm and generator."""
     rows = []
     for arm in _ARMS:
         for kind in KINDS:
             if (arm, kind) in found:
-                now, judge = found[arm, kind]
-                rows.append((arm.name, kind, f"{now.sketches}", *_cells(arm, now, judge)))
+                now, judge, *others = found[arm, kind]
+                cells = _cells(arm, (now, judge), others)
+                rows.append((arm.name, kind, f"{now.sketches}", *cells))
     return Table(
         "What is right, and what could be",
         (
@@ -144,6 +155,7 @@ def table(found: dict[tuple[Arm, str], tuple[Tally, Tally]]) -> Table:
             "weighed, %",
             "right, %",
             "who knows",
+            "another",
             "place, %",
             "who knows",
             f"above {_SURE:g}, %",
@@ -155,20 +167,27 @@ def table(found: dict[tuple[Arm, str], tuple[Tally, Tally]]) -> Table:
         tuple(rows),
         left=2,
         note="wanted: what is to be right at least. weighed: the right map is among those that "
-        "are weighed. right: the answer of the judge, then of one that knows the generator. place: "
+        "are weighed. right: the answer of the judge, then of one that knows the generator, and of "
+        "one that knows the other generator. place: "
         f"the right one has a probability below {_LIKELY:g}, or a wrong one above it, and then how "
         f"many wrong ones are above {_SURE:g}; wanted are below 2, 1 and .1 %. error: expected "
         "calibration error of the map, wanted below .02, and what chance makes of it where all "
         "probabilities of the one that knows are true. Where that judge fails, too, the evidence "
-        "is alike for several maps, or it has seen too few sketches.",
+        "is alike for several maps, or it has seen too few sketches. Where one that knows another "
+        "generator fails more often than the judge, it takes these people for others: who draws, "
+        "and how, is what would have to be known.",
     )
 
 
-def _cells(arm: Arm, *both: Tally) -> list[str]:
+def _cells(arm: Arm, both: tuple[Tally, Tally], others: Sequence[Tally]) -> list[str]:
     wanted, sketches = _WANTED.get(arm.name), both[0].sketches
     parts = [f"{wanted}" if wanted else "–"]
-    parts.append("–" if arm.wrong_place else f"{100 * both[0].among / sketches:.1f}")
-    parts += ["–" if arm.wrong_place else f"{100 * e.right / e.sketches:.1f}" for e in both]
+    if arm.wrong_place:
+        parts += ["–"] * 4
+    else:
+        rights = [both[0].among, *(each.right for each in (*both, *others[:1]))]
+        parts += [f"{100 * right / sketches:.1f}" for right in rights]
+        parts += ["–"] * (not others)
     for each in both:
         wrong = [(place > _LIKELY) == arm.wrong_place for place in each.places]
         parts.append(f"{100 * sum(wrong) / each.sketches:.1f}")
@@ -200,9 +219,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         ),
         table(ceilings(given.kinds, sketches, learned, given.kept)),
     )
-    print(found)
+    print(found, end="")
     if given.out:
-        given.out.write_text(found + "\n", encoding="utf-8")
+        given.out.write_text(found, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -87,6 +87,8 @@ _OF_PLACES = ("training", "many", "strangers")
 _FEWEST = 4
 """How many objects a sketch has at least that is gone on with."""
 
+_AT_ONCE = 200
+
 THESIS = (1.0, 1.0, 1.0)
 """The weights of the thesis."""
 
@@ -141,6 +143,13 @@ def _posterior(counts: dict[str, int], kept: Path | None) -> tuple[str, dict[str
 
 
 def _known(kind: str, numbers: range, kept: Path | None) -> list[Known]:
+    """Return sketches in numbers, showing progress."""
+    parts = [numbers[k : k + _AT_ONCE] for k in range(0, len(numbers), _AT_ONCE)]
+    title = f"{kind}, {_AT_ONCE} at once"
+    return list(itertools.chain.from_iterable(each_of(partial(_some, kind, kept), parts, title)))
+
+
+def _some(kind: str, kept: Path | None, numbers: range) -> list[Known]:
     return known_sketches(kind, _KINDS[kind], numbers, kept, kind in _OF_PLACES)
 
 

@@ -13,7 +13,6 @@ import pickle
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +43,6 @@ from tests.experiments.drawings import Drawing
 from tests.experiments.logits import significant
 from tests.experiments.networks import Case, fitted_maps, fitted_place
 from tests.experiments.reliability import reliability
-from tests.experiments.runs import each_of
 from tests.experiments.training import training_drawing
 
 __all__ = [
@@ -67,9 +65,6 @@ _UNRELATED = 0.3
 
 _OTHER_PLACES = 6.0
 """What a sketch of another place counts for: taking it for this one is the worse mistake."""
-
-_AT_ONCE = 200
-"""Sketches that one process brings into numbers, and keeps, at once."""
 
 _SHIFTS = -4.0, 4.0
 """How far the odds of the right map's not being known may be shifted."""
@@ -135,7 +130,7 @@ def known_sketches(
     kept: Path | None = None,
     chance: bool = True,
 ) -> list[Known]:
-    """Return sketches of a kind in numbers, showing progress.
+    """Return sketches of a kind in numbers.
 
     Parameters
     ----------
@@ -148,15 +143,6 @@ def known_sketches(
     kept
         A folder for them: those that are there are read.
     """
-    parts = [numbers[k : k + _AT_ONCE] for k in range(0, len(numbers), _AT_ONCE)]
-    do = partial(_some, name, draw, kept, chance)
-    return list(itertools.chain.from_iterable(each_of(do, parts, f"{name}, {_AT_ONCE} at once")))
-
-
-def _some(
-    name: str, draw: Callable[[int], Drawing], kept: Path | None, chance: bool, numbers: range
-) -> list[Known]:
-    """Return some sketches in numbers; those that are kept are read."""
     file = kept / f"{name}-{numbers.start}-{numbers.stop}.pickle" if kept else None
     if file and file.exists():
         found: list[Known] = pickle.loads(file.read_bytes())

@@ -427,8 +427,7 @@ def test_how_often_the_right_map_is_unknown_follows_from_what_the_best_is_worth(
 @pytest.mark.slow
 def test_learning_runs_from_start_to_end_and_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr(networks, "_EPOCHS", 2)
-    for module in (learn, posterior):
-        monkeypatch.setattr(module, "each_of", partial(each_of, processes=1))
+    monkeypatch.setattr(learn, "each_of", partial(each_of, processes=1))
     found = []
     for into in ("one", "two"):
         (tmp_path / into).mkdir()
