@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Block", "Bullets", "Heading", "Paragraph", "Picture", "Table", "save"]
+__all__ = ["Block", "Bullets", "Heading", "Paragraph", "Picture", "Table", "markdown", "save"]
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,12 @@ def save(folder: Path, blocks: Sequence[Block]) -> None:
     for block in blocks:
         if isinstance(block, Picture):
             (folder / block.name).write_bytes(block.png)
-    (folder / "report.md").write_text(_markdown(blocks), encoding="utf-8")
+    (folder / "report.md").write_text(markdown(*blocks), encoding="utf-8")
     (folder / "report.html").write_text(_html(blocks), encoding="utf-8")
 
 
-def _markdown(blocks: Sequence[Block]) -> str:
+def markdown(*blocks: Block) -> str:
+    """Return blocks as Markdown."""
     return "\n\n".join(_markdown_of(block) for block in blocks) + "\n"
 
 

@@ -22,7 +22,6 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
-import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
@@ -38,7 +37,7 @@ from tests.experiments.posterior import (
     doubting,
     gone_on,
     judged_errors,
-    known_of,
+    known_sketches,
     learned_posterior,
     posterior_text,
 )
@@ -151,17 +150,7 @@ def _known(kind: str, numbers: range, kept: Path | None) -> list[Known]:
 
 
 def _some(kind: str, kept: Path | None, numbers: range) -> list[Known]:
-    """Return some sketches in numbers; those that are kept are read."""
-    file = kept / f"{kind}-{numbers.start}-{numbers.stop}.pickle" if kept else None
-    if file and file.exists():
-        found: list[Known] = pickle.loads(file.read_bytes())
-        return found
-    chance = kind in _OF_PLACES
-    every = [known_of(number, _KINDS[kind], chance) for number in numbers]
-    found = list(itertools.chain.from_iterable(every))
-    if file:
-        file.write_bytes(pickle.dumps(found))
-    return found
+    return known_sketches(kind, _KINDS[kind], numbers, kept, kind in _OF_PLACES)
 
 
 def _all_of(do: Callable[[int], list[_Case]], part: str, count: int) -> list[_Case]:

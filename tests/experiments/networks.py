@@ -67,7 +67,9 @@ class Case(NamedTuple):
     right: int
 
 
-def fitted_maps(cases: Sequence[Case], seed: int = 0, start: Layers | None = None) -> Layers:
+def fitted_maps(
+    cases: Sequence[Case], seed: int = 0, start: Layers | None = None, kept: float = _KEPT
+) -> Layers:
     """Return the layers under which the right maps are likeliest.
 
     Parameters
@@ -79,6 +81,8 @@ def fitted_maps(cases: Sequence[Case], seed: int = 0, start: Layers | None = Non
     start
         Layers to go on from, which may know fewer numbers of a line: the first ones of them. What
         comes of it is a mean of both, which forgets less of what is not among the cases.
+    kept
+        The share of these in the mean.
     """
     rng = np.random.default_rng(seed)
     some = [cases[k] for k in rng.permutation(len(cases))[:_SCALED_BY]]
@@ -100,7 +104,7 @@ def fitted_maps(cases: Sequence[Case], seed: int = 0, start: Layers | None = Non
         "score": np.ones(1),
     }
     if start is not None:
-        parameters = _grown(parameters, start)
+        parameters = _begun(parameters, start)
     begun = {name: each.copy() for name, each in parameters.items()}
 
     def slopes(at: _Parameters, chosen: IntArray) -> _Parameters:
@@ -109,17 +113,21 @@ def fitted_maps(cases: Sequence[Case], seed: int = 0, start: Layers | None = Non
 
     _descend(parameters, slopes, len(cases), rng, keep=("score",))
     if start is not None:
-        parameters = {
-            name: each + _KEPT * (begun[name] - each) for name, each in parameters.items()
-        }
+        parameters = {name: each + kept * (begun[name] - each) for name, each in parameters.items()}
     score = float(parameters.pop("score")[0])
     return Layers(of_lines, of_maps, of_scenes, score=score, **parameters)
 
 
-def _grown(fresh: _Parameters, start: Layers) -> _Parameters:
-    """Return what layers know, with as many hidden ones again of lines that know nothing yet."""
-    more = fresh["first"].shape[1]
+def _begun(fresh: _Parameters, start: Layers) -> _Parameters:
+    """Return what layers know, with more hidden ones of lines where these have more numbers.
+
+    They are as many as fresh ones have, and know nothing yet.
+    """
     known, scenes = start.of_lines.shape[1], start.of_scenes.shape[1]
+    if known + scenes == len(fresh["first"]):
+        same = {name: getattr(start, name).copy() for name in fresh if name != "score"}
+        return {**same, "score": np.array([start.score])}
+    more = fresh["first"].shape[1]
     old = np.zeros((len(fresh["first"]), start.first.shape[1]))
     old[:known], old[-scenes:] = start.first[:known], start.first[known:]
     nothing = np.zeros((more, start.second.shape[1]))
@@ -135,7 +143,11 @@ def _grown(fresh: _Parameters, start: Layers) -> _Parameters:
 
 
 def fitted_place(
-    rows: FloatArray, here: BoolArray, counts: FloatArray, seed: int = 0
+    rows: FloatArray,
+    here: BoolArray,
+    counts: FloatArray,
+    seed: int = 0,
+    start: PlaceLayers | None = None,
 ) -> PlaceLayers:
     """Return the layers under which it is likeliest which sketches show their place.
 
@@ -147,9 +159,11 @@ def fitted_place(
         Shape (c,).
     counts
         Shape (c,): what each sketch counts for.
+    start
+        Layers to go on from, of which nothing need be left.
     """
     rng = np.random.default_rng(seed)
-    of_places = _scaling(rows)
+    of_places = _scaling(rows) if start is None else start.of_places
     x, counts = within(rows, of_places), counts / counts.mean()
     parameters = {
         "first": _random(rng, x.shape[1], _PLACE_WIDTH),
@@ -158,6 +172,8 @@ def fitted_place(
         "direct": np.zeros(x.shape[1]),
         "constant": np.zeros(1),
     }
+    if start is not None:
+        parameters = {name: np.array(getattr(start, name), ndmin=1) for name in parameters}
 
     def slopes(at: _Parameters, chosen: IntArray) -> _Parameters:
         z = x[chosen]

@@ -7,10 +7,13 @@ on their own, so what they count for is learned from labels put on the same sket
 
 from __future__ import annotations
 
+import itertools
 import json
+import pickle
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
@@ -47,7 +50,9 @@ __all__ = [
     "doubting",
     "gone_on",
     "judged_errors",
+    "knowing",
     "known_of",
+    "known_sketches",
     "learned_posterior",
     "posterior_text",
 ]
@@ -116,6 +121,37 @@ def known_of(
     right = np.flatnonzero((found.maps == drawn.truth).all(axis=1))
     elsewhere = bool((drawn.truth < 0).all())
     return [Known(found, int(right[0]) if len(right) else -1, elsewhere, drawn.truth)]
+
+
+def known_sketches(
+    name: str,
+    draw: Callable[[int], Drawing],
+    numbers: range,
+    kept: Path | None = None,
+    chance: bool = True,
+) -> list[Known]:
+    """Return sketches of a kind in numbers.
+
+    Parameters
+    ----------
+    name
+        Of the kind.
+    draw, chance
+        As for :func:`known_of`.
+    numbers
+        Which ones.
+    kept
+        A folder for them: those that are there are read.
+    """
+    file = kept / f"{name}-{numbers.start}-{numbers.stop}.pickle" if kept else None
+    if file and file.exists():
+        found: list[Known] = pickle.loads(file.read_bytes())
+        return found
+    every = [known_of(number, draw, chance) for number in numbers]
+    found = list(itertools.chain.from_iterable(every))
+    if file:
+        file.write_bytes(pickle.dumps(found))
+    return found
 
 
 def _in_half_the_room(measured: Measured) -> Measured:
@@ -189,6 +225,31 @@ def doubting(learned: Posterior, cases: Sequence[Known], others: Sequence[Known]
 
     lost[0] += minimize_scalar(loss, bounds=_SHIFTS, method="bounded").x
     return learned._replace(lost=_rounded(lost))
+
+
+def knowing(first: Posterior, cases: Sequence[Known]) -> Posterior:
+    """Return what was learned first, gone on with until nothing of it need be left.
+
+    Parameters
+    ----------
+    first
+        What to go on from.
+    cases
+        Sketches of this place and of others, of the kinds that are to be judged.
+    """
+    here = [each for each in cases if not each.elsewhere]
+    found = [_case(each, True) for each in here if each.right >= 0]
+    maps = fitted_maps(found, start=first.maps, kept=0.0)
+    place = fitted_place(
+        np.array([place_numbers(each.described, first.bare) for each in cases]),
+        np.array([not each.elsewhere for each in cases]),
+        np.ones(len(cases)),
+        start=first.place,
+    )
+    lost = _logit(
+        _lost_numbers(here, {True: maps, False: first.bare}), _unknown(here), np.ones(len(here))
+    )
+    return first._replace(maps=maps, place=place, lost=lost)
 
 
 def judged_errors(cases: Sequence[Known], learned: Posterior) -> dict[str, float]:

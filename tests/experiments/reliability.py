@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Reliability", "reliability"]
+__all__ = ["Reliability", "by_chance", "reliability"]
+
+_TIMES = 200
 
 
 @dataclass(frozen=True)
@@ -67,3 +69,16 @@ def reliability(answers: Iterable[tuple[float, bool]], bins: int = 10) -> Reliab
     )
     error = sum(count * abs(said - true) for said, true, count in found) / len(given)
     return Reliability(found, error)
+
+
+def by_chance(given: Sequence[float]) -> float:
+    """Return the expected calibration error, in the mean, of probabilities that are true.
+
+    With few answers it is far from 0: no more can be asked of those that were given.
+    """
+    rng, said = np.random.default_rng(0), np.asarray(given, dtype=float)
+    errors = [
+        reliability(zip(said.tolist(), (rng.random(len(said)) < said).tolist(), strict=True)).error
+        for _ in range(_TIMES)
+    ]
+    return float(np.mean(errors))

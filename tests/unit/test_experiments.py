@@ -34,7 +34,7 @@ from tests.experiments.intervals import wilson
 from tests.experiments.methods import METHODS, Method
 from tests.experiments.people import EXTRA, Person, Shapes, draw, with_extras
 from tests.experiments.records import Results, chosen, interval_by_sketch, share
-from tests.experiments.reliability import reliability
+from tests.experiments.reliability import by_chance, reliability
 from tests.experiments.report import report
 from tests.experiments.runs import Work, run
 from tests.experiments.scenes import PLACES, charted, place_named, truth_by_overlap
@@ -623,6 +623,15 @@ def test_reliability_finds_what_is_too_sure():
     for bad in ([], [(1.2, True)], [(math.nan, True)]):
         with pytest.raises(ValueError, match="probability"):
             reliability(bad)
+
+
+def test_by_chance_true_probabilities_err_the_more_the_fewer_there_are():
+    assert by_chance([1.0, 0.0, 1.0]) == 0.0
+    assert by_chance([0.5]) == 0.5
+    few, many = (by_chance([0.9] * count) for count in (100, 10_000))
+    # The mean of |share − .9|, which is about normal.
+    assert few == pytest.approx(0.03 * math.sqrt(2.0 / math.pi), rel=0.15)
+    assert many == pytest.approx(0.1 * few, rel=0.2)
 
 
 def test_probabilities_are_drawn_once_records_carry_them():

@@ -19,6 +19,7 @@ from tests.experiments.posterior import (
     Known,
     doubting,
     gone_on,
+    knowing,
     known_of,
     learned_posterior,
     posterior_text,
@@ -342,6 +343,31 @@ def test_who_goes_on_begins_with_what_is_known(monkeypatch):
     for kept, before in ((found.bare, first.bare), (found.place, first.place)):
         for one, other in zip(kept, before, strict=True):
             np.testing.assert_array_equal(one, other)
+    # Who goes on once more has as many layers as before.
+    for one, other in zip(gone_on(found, cases).maps, found.maps, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9)
+
+
+def test_who_knows_what_is_judged_leaves_nothing_of_what_was_known():
+    rng = np.random.default_rng(0)
+    first = gone_on(learned_posterior(made_up(rng, 60)), made_up(rng, 50, elsewhere=0.0))
+    seen, checked = made_up(rng, 1200), made_up(rng, 300)
+    judge = knowing(first, seen)
+    for part in ("maps", "place", "lost"):
+        assert repr(getattr(judge, part)) != repr(getattr(first, part))
+    assert judge.bare is first.bare
+
+    def told(learned):
+        return np.mean(
+            [(weighed(c.described, learned).elsewhere > 0.5) == c.elsewhere for c in checked]
+        )
+
+    def right(learned):
+        here = [c for c in checked if c.right >= 0]
+        return np.mean([weighed(c.described, learned).shares[c.right] for c in here])
+
+    assert told(judge) > 0.97
+    assert right(judge) > right(first) + 0.02
 
 
 @pytest.mark.slow
