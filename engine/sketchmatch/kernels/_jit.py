@@ -1,6 +1,6 @@
 """The one place that says how kernels are compiled and where the machine code is kept."""
 
-# mypy: disallow-untyped-calls=False
+# mypy: disallow-untyped-calls=False, disallow-untyped-decorators=False
 # (much of numba has no types)
 
 from __future__ import annotations
@@ -65,7 +65,8 @@ def kernel(function: _Function) -> _Function:
     >>> kernel(pair_count)(8)
     28
     """
-    compiled: Any = numba.njit(function, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
+    options: Any = {"no_cfunc_wrapper": True}  # nothing but Python and kernels calls them
+    compiled: Any = numba.njit(function, nogil=True, error_model="numpy", **options)
     if isinstance(compiled, Dispatcher):
         compiled._cache = _Cache(function)  # type: ignore[attr-defined]
     return compiled  # type: ignore[no-any-return]
