@@ -34,7 +34,7 @@ def found(source=SOURCE, labels=("bed", ""), shift=0.0):
     made = segmenter()
     name, _ = name_of(source, made, REGISTRY)
     route = np.array([[0.5, 0.25], [1.5, 2.5]])
-    segmentation = Segmentation(scene, ("one was left out",), route)
+    segmentation = Segmentation(scene, ("one was left out",), route, ((0, 1),))
     return GetSceneResponse(
         stored_scene=responses.stored_scene(name, segmentation, made), source=source
     )
@@ -199,6 +199,7 @@ class TestShelf:
         assert read.scene.labels == ("bed", "")
         assert read.warnings == ("one was left out",)
         assert read.route.tolist() == [[0.5, 0.25], [1.5, 2.5]]
+        assert read.passages == ((0, 1),)
         assert shelf.segmentation(name, "anna", "map.stored_scene") is read
         assert shelf.holds(read.scene)
         assert not shelf.holds(Scene.from_polygons(BOXES))

@@ -442,6 +442,7 @@ SEGMENTATION = Segmentation(
     Scene((SceneObject.from_polygon(BAR, "bar"), SceneObject.from_rings([RACK], certainty=0.625))),
     ("2 specks were left out", "a doorway was closed"),
     ROUTE[:2],
+    ((0, 1),),
 )
 REGISTRY = Registry(
     [

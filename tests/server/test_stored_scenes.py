@@ -66,6 +66,28 @@ def test_a_match_with_a_stored_scene_is_that_with_its_source(client, name):
     assert answer(both) == expected
 
 
+def test_rooms_of_a_stored_scene_that_a_person_drew_as_one_are_told_as_one(client):
+    rooms = [(0, 0, 90, 30), (0, 32, 40, 90), (42, 32, 64, 60), (42, 62, 64, 90), (66, 32, 90, 90)]
+    doors = [(10, 30, 19, 32), (48, 30, 57, 32), (48, 60, 57, 62), (74, 30, 83, 32)]
+    cells = np.full((94, 94), 100)
+    for x, y, u, v in (*rooms, *doors):
+        cells[2 + y : 2 + v, 2 + x : 2 + u] = 0
+    map_ = sources.occupancy_grid(cells, 0.1)
+    kept = client.put_scene(map_, segmenter="rooms").stored_scene
+    ways = {(passage.first, passage.second) for passage in kept.passages}
+    assert len(ways) == 4
+    (merged,) = (
+        pair for pair in ways if all(20 < kept.scene.objects[k].area * 4 < 27 for k in pair)
+    )
+    drawn = [(0, 0, 90, 30), (0, 32, 40, 90), (42, 32, 64, 90), (66, 32, 90, 90)]
+    sketch = sources.polygons([[(x, y), (u, y), (u, v), (x, v)] for x, y, u, v in drawn])
+    result = client.match(sketch, sources.stored_scene(kept.name)).result
+    (group,) = result.object_groups
+    assert ([*group.sketch_objects], {*group.map_objects}) == ([2], {*merged})
+    sent = client.match(sketch, map_, map_segmenter="rooms").result
+    assert [*sent.object_groups] == [group]
+
+
 def test_to_put_a_scene_again_changes_nothing(client, name):
     again = client.put_scene(MAP)
     assert (again.stored_scene.name, again.created) == (name, False)

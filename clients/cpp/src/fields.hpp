@@ -166,13 +166,15 @@ inline auto fields(Of<MatchSummary> /*type*/) {
                     FIELD(last_event), FIELD(error_message), FIELD(error_reason)};
 }
 
+inline auto fields(Of<Passage> /*type*/) { return std::tuple{FIELD(first), FIELD(second)}; }
+
 inline auto fields(Of<Segmentation> /*type*/) {
-  return std::tuple{FIELD(scene), FIELD(warnings), FIELD(segmenter), FIELD(route)};
+  return std::tuple{FIELD(scene), FIELD(warnings), FIELD(segmenter), FIELD(route), FIELD(passages)};
 }
 
 inline auto fields(Of<StoredScene> /*type*/) {
-  return std::tuple{FIELD(name),      FIELD(scene), FIELD(warnings),
-                    FIELD(segmenter), FIELD(route), FIELD(title)};
+  return std::tuple{FIELD(name),  FIELD(scene), FIELD(warnings), FIELD(segmenter),
+                    FIELD(route), FIELD(title), FIELD(passages)};
 }
 
 inline auto fields(Of<PutScene> /*type*/) {

@@ -229,6 +229,7 @@ def segmented(found: Segmentation, segmenter: Segmenter) -> scene_service_pb2.Se
         warnings=found.warnings,
         segmenter=selection(segmenter),
         route=_points(found.route),
+        passages=_passages(found),
     )
 
 
@@ -242,7 +243,12 @@ def stored_scene(
         warnings=found.warnings,
         segmenter=None if segmenter is None else selection(segmenter),
         route=_points(found.route),
+        passages=_passages(found),
     )
+
+
+def _passages(found: Segmentation) -> list[scene_service_pb2.Passage]:
+    return [scene_service_pb2.Passage(first=a, second=b) for a, b in found.passages]
 
 
 def catalogue(

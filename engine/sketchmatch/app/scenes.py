@@ -145,7 +145,8 @@ def segmentation(record: StoredScene) -> Segmentation:
         for item in record.scene.objects
     )
     route = frozen_floats(_points(record.route)) if record.route else None
-    return Segmentation(Scene(objects), tuple(record.warnings), route)
+    passages = tuple((passage.first, passage.second) for passage in record.passages)
+    return Segmentation(Scene(objects), tuple(record.warnings), route, passages)
 
 
 def without_store(field: str) -> StoreError:

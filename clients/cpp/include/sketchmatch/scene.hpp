@@ -2,6 +2,7 @@
 /// Scenes: what segmenters make of sketches and maps.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <sketchmatch/value.hpp>
 #include <string>
@@ -38,12 +39,19 @@ struct AlgorithmSelection {
   Parameters parameters;  ///< The value of every parameter.
 };
 
+/// Two objects that open into each other, as rooms do.
+struct Passage {
+  std::uint32_t first = 0;   ///< One of them, by its index.
+  std::uint32_t second = 0;  ///< The other one.
+};
+
 /// What a segmenter found in one source.
 struct Segmentation {
   Scene scene;                        ///< The objects.
   std::vector<std::string> warnings;  ///< What it left out or decided on its own, in sentences.
   AlgorithmSelection segmenter;       ///< The segmenter as it ran.
   std::vector<Point> route;           ///< The way that the person drew through the scene.
+  std::vector<Passage> passages;      ///< Which objects open into each other: rooms do.
 };
 
 }  // namespace sketchmatch

@@ -22,6 +22,7 @@ struct StoredScene {
   AlgorithmSelection segmenter;       ///< The segmenter that found the objects, as it ran.
   std::vector<Point> route;           ///< As in `Segmentation`.
   std::string title;                  ///< What you call it; empty if nothing.
+  std::vector<Passage> passages;      ///< As in `Segmentation`.
 };
 
 /// How to find the objects of a scene that is put, and what to call it.

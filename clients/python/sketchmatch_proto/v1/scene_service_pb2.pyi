@@ -59,6 +59,7 @@ class SegmentResponse(google.protobuf.message.Message):
     WARNINGS_FIELD_NUMBER: builtins.int
     SEGMENTER_FIELD_NUMBER: builtins.int
     ROUTE_FIELD_NUMBER: builtins.int
+    PASSAGES_FIELD_NUMBER: builtins.int
     @property
     def scene(self) -> sketchmatch_proto.v1.scene_pb2.Scene:
         """The objects, two or more."""
@@ -77,6 +78,12 @@ class SegmentResponse(google.protobuf.message.Message):
         coordinates of `scene`; empty if there is none. It is not among the objects.
         """
 
+    @property
+    def passages(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Passage]:
+        """Which objects open into each other, as rooms do: people may take two such for one, which a match
+        then says. Empty where objects are things.
+        """
+
     def __init__(
         self,
         *,
@@ -84,11 +91,34 @@ class SegmentResponse(google.protobuf.message.Message):
         warnings: collections.abc.Iterable[builtins.str] | None = ...,
         segmenter: sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection | None = ...,
         route: collections.abc.Iterable[sketchmatch_proto.v1.source_pb2.Point] | None = ...,
+        passages: collections.abc.Iterable[global___Passage] | None = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["scene", b"scene", "segmenter", b"segmenter"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["route", b"route", "scene", b"scene", "segmenter", b"segmenter", "warnings", b"warnings"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["passages", b"passages", "route", b"route", "scene", b"scene", "segmenter", b"segmenter", "warnings", b"warnings"]) -> None: ...
 
 global___SegmentResponse = SegmentResponse
+
+@typing.final
+class Passage(google.protobuf.message.Message):
+    """Two objects that open into each other."""
+
+    DESCRIPTOR: google.protobuf.descriptor.Descriptor
+
+    FIRST_FIELD_NUMBER: builtins.int
+    SECOND_FIELD_NUMBER: builtins.int
+    first: builtins.int
+    """One of them, by its index from 0."""
+    second: builtins.int
+    """The other one."""
+    def __init__(
+        self,
+        *,
+        first: builtins.int = ...,
+        second: builtins.int = ...,
+    ) -> None: ...
+    def ClearField(self, field_name: typing.Literal["first", b"first", "second", b"second"]) -> None: ...
+
+global___Passage = Passage
 
 @typing.final
 class PutSceneRequest(google.protobuf.message.Message):
@@ -164,6 +194,7 @@ class StoredScene(google.protobuf.message.Message):
     SEGMENTER_FIELD_NUMBER: builtins.int
     ROUTE_FIELD_NUMBER: builtins.int
     TITLE_FIELD_NUMBER: builtins.int
+    PASSAGES_FIELD_NUMBER: builtins.int
     name: builtins.str
     """The hash of what it is, in hexadecimal: 64 digits. `Source.stored_scene` takes it."""
     title: builtins.str
@@ -184,6 +215,10 @@ class StoredScene(google.protobuf.message.Message):
     def route(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[sketchmatch_proto.v1.source_pb2.Point]:
         """As in `SegmentResponse`."""
 
+    @property
+    def passages(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Passage]:
+        """As in `SegmentResponse`."""
+
     def __init__(
         self,
         *,
@@ -193,9 +228,10 @@ class StoredScene(google.protobuf.message.Message):
         segmenter: sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection | None = ...,
         route: collections.abc.Iterable[sketchmatch_proto.v1.source_pb2.Point] | None = ...,
         title: builtins.str = ...,
+        passages: collections.abc.Iterable[global___Passage] | None = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["scene", b"scene", "segmenter", b"segmenter"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["name", b"name", "route", b"route", "scene", b"scene", "segmenter", b"segmenter", "title", b"title", "warnings", b"warnings"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["name", b"name", "passages", b"passages", "route", b"route", "scene", b"scene", "segmenter", b"segmenter", "title", b"title", "warnings", b"warnings"]) -> None: ...
 
 global___StoredScene = StoredScene
 
