@@ -23,7 +23,7 @@ from sketchmatch.server import monitor, serve
 from sketchmatch.server.metrics import Counter, Histogram, Metric, Metrics
 from sketchmatch.server.tls import Pems, TlsFiles, watched_pems
 from sketchmatch.server.tokens import new_token
-from sketchmatch_client import Client, InvalidRequestError, SketchmatchError
+from sketchmatch_client import Client, InvalidRequestError, SketchmatchError, sources
 from tests.certificates import Authority
 from tests.pace import wait_until
 from tests.server.harness import ENDLESS, hosting, in_loop, registry_with, scene
@@ -117,6 +117,32 @@ def test_calls_are_counted_by_method_and_by_what_came_of_them(monkeypatch):
     counts, total = metrics.call_seconds.values()["Match",]
     assert counts[-1] == 6
     assert total > 0.4
+
+
+@pytest.mark.parametrize("workers", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_scenes_are_counted_by_where_their_histograms_came_from(monkeypatch, tmp_path, workers):
+    def described(*asked):
+        with (
+            watched(monkeypatch, store=tmp_path, workers=workers) as (host, metrics),
+            Client(host.address) as client,
+        ):
+            for ask in asked:
+                ask(client)
+        return {labels[0]: count for labels, count in metrics.scenes.values().items()}
+
+    kept = []
+
+    def put(client):
+        kept.append(sources.stored_scene(client.put_scene(scene(4)).stored_scene.name))
+
+    def match(client):
+        client.match(scene(3), kept[0], seed=1)
+
+    # To put a scene is to describe it in as many directions as set and as chosen, here the same.
+    assert described(put) == {"computed": 1, "held": 1, "kept": 0}
+    assert described(put, match, match) == {"computed": 1, "held": 2, "kept": 1}
+    # Another process knows the stored scene from the store, and the sketch not at all.
+    assert described(match) == {"computed": 1, "held": 0, "kept": 1}
 
 
 def test_matches_are_counted_by_searcher_and_outcome_and_their_stages_by_algorithm(monkeypatch):

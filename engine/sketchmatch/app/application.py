@@ -43,6 +43,7 @@ from sketchmatch.errors import (
     WorkerLostError,
 )
 from sketchmatch.pipeline.clock import Clock
+from sketchmatch.pipeline.memory import Lookups
 from sketchmatch.pipeline.warmup import (
     COMPILING,
     announcing_compilation,
@@ -168,6 +169,8 @@ class Application:
     matched
         Called when a match has ended that has a result, with its events but progress, and the
         seconds that it waited for its turn.
+    looked_up
+        Told, whenever a request has ended, where the histograms of scenes came from.
 
     Attributes
     ----------
@@ -186,6 +189,7 @@ class Application:
         scenes: SceneArchive | None = None,
         archive: Archive | None = None,
         matched: Callable[[list[MatchResponse], float], None] = lambda *_: None,
+        looked_up: Callable[[Lookups], None] = lambda _: None,
     ) -> None:
         self.scenes = Keeping(self, scenes)
         self.sketches = Sketches(self)
@@ -194,10 +198,12 @@ class Application:
         self._kept = workers
         self.matches = Matches(archive)
         self._matched = matched
+        self._looked_up = looked_up
         self._began = time.monotonic()
         self._workers = Workers(workers, self._ended, self._dispatch)
         self._workers.scenes = self.scenes.path
         self._workers.described = self.scenes.keep
+        self._workers.looked_up = looked_up
         self._here = Here(self._ended)
         self._running: set[Task] = set()
         self._waiting = FairQueue[Task](lambda task: task.wish.priority)
@@ -581,6 +587,7 @@ class Application:
             self._workers.begin(task)
             return
         self._running.discard(task)
+        self._looked_up(self._remembered.take_lookups())
         taken = time.monotonic() - task.asked
         self._typical += 0.1 * (min(taken, _LONGEST_RETRY) - self._typical)
         self._finish(task, error)

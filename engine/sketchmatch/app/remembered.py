@@ -11,7 +11,7 @@ from sketchmatch.api.forces import hold_own_histogram
 from sketchmatch.app.scenes import LARGEST_KEPT, Described, Shelf, described_by
 from sketchmatch.app.setup import Setup
 from sketchmatch.model import FloatArray, Scene, SceneDescriptor
-from sketchmatch.pipeline.memory import Memory
+from sketchmatch.pipeline.memory import Lookups, Memory
 
 __all__ = ["Remembered"]
 
@@ -36,6 +36,10 @@ class Remembered:
         self._hand_in = hand_in
         engine = replace(setup.engine, memory=self._memory)
         return replace(setup, engine=engine, shelf=self._shelf)
+
+    def take_lookups(self) -> Lookups:
+        """Return how often histograms were needed since this was asked last."""
+        return self._memory.take_lookups()
 
     def close(self) -> None:
         """Close the file, until it is read again."""

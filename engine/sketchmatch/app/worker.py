@@ -34,6 +34,7 @@ from sketchmatch_proto.v1 import match_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
 __all__ = [
+    "LOOKUPS",
     "SECONDS",
     "WorkerSetup",
     "flags",
@@ -44,6 +45,9 @@ __all__ = [
 
 SECONDS = struct.Struct("!d")
 """How it is told what is left of a match."""
+
+LOOKUPS = struct.Struct("!3I")
+"""How a worker tells, at the end of each request, how often histograms were needed."""
 
 _LOADING = 120.0
 _POLITE = 10
@@ -153,7 +157,7 @@ class _Worker:
                 _, _, where = told(error).partition("\n")
                 self.say(Says.FAILED, failure(error, where))
             else:
-                self.say(Says.ENDED)
+                self.say(Says.ENDED, LOOKUPS.pack(*self._remembered.take_lookups()))
 
     def _hear(self, kind: int, content: bytes) -> None:
         match kind:

@@ -34,8 +34,9 @@ from sketchmatch.app.jobs import time_budget
 from sketchmatch.app.lengths import Lengths
 from sketchmatch.app.setup import Setup
 from sketchmatch.app.tasks import Task
-from sketchmatch.app.worker import SECONDS, WorkerSetup, live
+from sketchmatch.app.worker import LOOKUPS, SECONDS, WorkerSetup, live
 from sketchmatch.errors import InvalidInputError, PluginError, WorkerLostError
+from sketchmatch.pipeline.memory import Lookups
 from sketchmatch.registry import OWN_DISTRIBUTION, Registered, RegisteredReader
 from sketchmatch.registry.distributions import canonical
 
@@ -92,6 +93,7 @@ class Workers:
         self.compiling: Callable[[], None] = lambda: None
         """Called whenever a worker has to compile a kernel."""
         self.described: Callable[[bytes], None] = lambda _: None
+        self.looked_up: Callable[[Lookups], None] = lambda _: None
         """Called with what a worker that needs no stranger's plugin hands in to be kept."""
         self.scenes: Path | None = None
         """The file of the scenes that are kept."""
@@ -441,6 +443,8 @@ class _Worker(asyncio.Protocol):
             case Says.READY:
                 self._answer(None)
             case Says.ENDED:
+                if not self._strangers:
+                    self._workers.looked_up(Lookups(*LOOKUPS.unpack(content)))
                 self._end(None)
             case Says.FAILED:
                 error, log = failure_of(content)

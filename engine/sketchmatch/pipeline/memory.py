@@ -6,6 +6,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Lock
+from typing import NamedTuple
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -23,7 +24,7 @@ from sketchmatch.model import (
     pair_index,
 )
 
-__all__ = ["Memory"]
+__all__ = ["Lookups", "Memory"]
 
 _RECENT = 16
 _BYTES = 128 * 1024 * 1024
@@ -47,6 +48,24 @@ class _Related:
     key: tuple[str, ...]
     places: dict[bytes, int]
     table: RelationTable
+
+
+class Lookups(NamedTuple):
+    """How often the histograms of a scene were needed, by where they came from.
+
+    Attributes
+    ----------
+    held
+        They were in memory.
+    kept
+        They were kept elsewhere, and read.
+    computed
+        They had to be computed.
+    """
+
+    held: int = 0
+    kept: int = 0
+    computed: int = 0
 
 
 class Memory:
@@ -77,6 +96,7 @@ class Memory:
         self._described = described
         self._lock = Lock()
         self._bytes = 0
+        self._lookups = Lookups()
         self._known: OrderedDict[tuple[str, str], SceneDescriptor] = OrderedDict()
         self._recent: deque[_Described] = deque(maxlen=_RECENT)
         self._related: deque[_Related] = deque(maxlen=_RECENT)
@@ -101,18 +121,33 @@ class Memory:
         with self._lock:
             if (known := self._known.get(key)) is not None:
                 self._known.move_to_end(key)
+                self._count(held=1)
                 return known
         found = self._fetch(scene, histogram)
         if found is None:
             return None
         known = SceneDescriptor(found, len(scene), histogram.exponent, key[1], key[0])
+        with self._lock:
+            self._count(kept=1)
         self._hold(scene, known)
         return known
 
     def keep(self, scene: Scene, descriptor: SceneDescriptor) -> None:
         """Remember the histograms of a scene, which had to be computed."""
+        with self._lock:
+            self._count(computed=1)
         self._hold(scene, descriptor)
         self._described(scene, descriptor)
+
+    def take_lookups(self) -> Lookups:
+        """Return how often histograms were needed since this was asked last."""
+        with self._lock:
+            taken, self._lookups = self._lookups, Lookups()
+        return taken
+
+    def _count(self, held: int = 0, kept: int = 0, computed: int = 0) -> None:
+        before = self._lookups
+        self._lookups = Lookups(before.held + held, before.kept + kept, before.computed + computed)
 
     def _hold(self, scene: Scene, descriptor: SceneDescriptor) -> None:
         key, size = (descriptor.scene, descriptor.described_by), descriptor.histograms.nbytes

@@ -15,6 +15,7 @@ from typing import Any
 import grpc
 from google.rpc import error_details_pb2, status_pb2
 
+from sketchmatch.pipeline.memory import Lookups
 from sketchmatch.server.wrapping import WrappingInterceptor, kind_of, status_of
 from sketchmatch_proto.v1.match_pb2 import MatchAccepted, MatchResult, Outcome
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
@@ -155,6 +156,13 @@ class Metrics:
         self.unkept = Counter(
             Metric("sketchmatch_matches_not_kept_total", "Matches that the store failed to keep.")
         )
+        self.scenes = Counter(
+            Metric(
+                "sketchmatch_described_scenes_total",
+                "Scenes whose histograms were needed: held in memory, kept in the store, computed.",
+                ("histograms",),
+            )
+        )
         self.stage_seconds = Histogram(
             Metric(
                 "sketchmatch_stage_seconds",
@@ -174,7 +182,7 @@ class Metrics:
         self._gauges.append(Gauge(metric, read))
 
     def __iter__(self) -> Iterator[Counter | Histogram | Gauge]:
-        yield from (self.calls, self.refusals, self.matches, self.unkept)
+        yield from (self.calls, self.refusals, self.matches, self.unkept, self.scenes)
         yield from (self.call_seconds, self.stage_seconds)
         yield from self._gauges
 
@@ -213,6 +221,11 @@ class Metrics:
         for stage, algorithm in zip(_STAGES, algorithms, strict=True):
             elapsed = getattr(statistics, f"{stage}_elapsed").ToTimedelta()
             self.stage_seconds.add(stage, algorithm, seconds=elapsed.total_seconds())
+
+    def looked_up(self, lookups: Lookups) -> None:
+        """Count where the histograms of scenes came from."""
+        for source, count in lookups._asdict().items():
+            self.scenes.add(source, count=count)
 
 
 class MetricsInterceptor(WrappingInterceptor):

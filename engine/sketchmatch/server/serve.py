@@ -180,7 +180,7 @@ async def serve(
     metrics, setup = Metrics(_METHODS), load()
     store = _opened(settings, say)
     scenes, matches = _archives(store, settings, metrics)
-    app = Application(setup, settings.workers, scenes, matches, metrics.matched)
+    app = Application(setup, settings.workers, scenes, matches, metrics.matched, metrics.looked_up)
     traces = Traces.sent_to(settings.traces_endpoint)
     interceptors = [
         *traces.interceptors,
