@@ -165,6 +165,32 @@ def test_every_number_is_that_of_the_object_in_its_own_scene(drawn):
     assert drawn.legend() == [1, 4, 3, 2]
 
 
+def test_what_is_one_together_has_one_colour_and_is_not_alone(drawn):
+    scene, map_ = row([0, 1]), row([0, 1, 2])
+    matches = [OverlayMatch(0, 1, 0.9)]
+    alone = draw_overlay(scene, map_, matches)
+    drawn.texts.clear()
+    image = draw_overlay(scene, map_, matches, groups=[([0], [1, 2])])
+    texts = [text for text, _ in drawn.texts]
+    assert "with 3 mapped" in texts
+    assert "no partner: 1 sketched and 1 mapped" in texts
+    assert "1 of 2 objects matched" in texts
+    tint = mixed(WHITE, pair_colour(1), 0.42)
+    filled = [
+        (np.abs(pixels(each, "right").astype(int) - tint).max(axis=2) < 7).sum()
+        for each in (alone, image)
+    ]
+    assert 1.8 < filled[1] / filled[0] < 2.4  # squares of sides 2.2 and 2.4
+
+
+@pytest.mark.parametrize("group", [([2], [0]), ([0], [5]), ([0], [])])
+def test_a_group_of_what_is_not_there_is_refused(group):
+    with pytest.raises(InvalidInputError, match=r"the (sketch|map) has objects") as caught:
+        draw_overlay(row([0, 1]), row([0, 1]), pairs([0, 1]), groups=[group])
+    side = "sketch" if group[0] == [2] else "map"
+    assert caught.value.field == f"groups[0].{side}_objects"
+
+
 def test_confidences_are_written_as_the_table_beside_writes_them(drawn):
     draw_overlay(row([0, 1]), row([0, 1]), [OverlayMatch(0, 0, 0.9954), OverlayMatch(1, 1, 0.8)])
     shares = [text for text, _ in drawn.texts if text.startswith("0.") or text.endswith("%")]

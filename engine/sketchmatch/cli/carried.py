@@ -13,7 +13,7 @@ import numpy as np
 from sketchmatch.cli import output
 from sketchmatch.cli.display import doubt, say_notes
 from sketchmatch.cli.options import say
-from sketchmatch.cli.pictures import grid_in, matched_pairs, scene_of
+from sketchmatch.cli.pictures import grid_in, grouped, matched_pairs, scene_of
 from sketchmatch.cli.tables import Column, Rows, plain
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import FloatArray
@@ -182,6 +182,7 @@ def draw(found: Carriage, names: tuple[str, str], paths: tuple[Path, Path], targ
         scene_of(answer.scenes.sketch),
         scene_of(answer.scenes.map),
         matched_pairs(answer.match) or _pairs(answer),
+        groups=grouped(answer.match),
         facts=[
             ("Carried", f"{len(after)} of {len(found.carried)}"),
             ("Median deviation", _median(found)),

@@ -52,6 +52,7 @@ def draw_match(match: Match, map_path: Path, target: Path, metres: bool) -> None
         scene_of(match.scenes.sketch),
         scene_of(match.scenes.map),
         matched_pairs(match.result),
+        groups=grouped(match.result),
         facts=facts(match.result, metres),
         alert=doubt(match),
         footnote=_meaning(match.result),
@@ -71,6 +72,11 @@ def matched_pairs(result: match_pb2.MatchResult) -> list[OverlayMatch]:
         else OverlayMatch(line.sketch_object, line.map_object, line.confidence)
         for line in result.object_matches
     ]
+
+
+def grouped(result: match_pb2.MatchResult) -> list[tuple[list[int], list[int]]]:
+    """Return which objects are together one, as pictures show it."""
+    return [([*each.sketch_objects], [*each.map_objects]) for each in result.object_groups]
 
 
 def draw_segmentation(response: SegmentResponse, source: Path, target: Path, pen: bool) -> None:

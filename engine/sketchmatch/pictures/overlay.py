@@ -92,6 +92,7 @@ def draw_overlay(
     map: Scene,  # noqa: A002
     matches: Sequence[OverlayMatch],
     *,
+    groups: Sequence[tuple[Sequence[int], Sequence[int]]] = (),
     title: str | None = None,
     caption: str = "",
     facts: Sequence[tuple[str, str]] = (),
@@ -114,6 +115,8 @@ def draw_overlay(
     matches
         The pairs of the object map, in any order. Objects are numbered from 1, as their scenes
         count them, and those without a partner are grey and hatched.
+    groups
+        Which objects of the sketch are, together, which of the map: they have one colour.
     title, caption
         The headline, which counts the matches when left out, and a line below it.
     facts
@@ -146,14 +149,20 @@ def draw_overlay(
     Raises
     ------
     InvalidInputError
-        If a pair names an object that is not there or twice, or the width is out of range.
+        If a pair names an object that is not there or twice, a group one that is not there, or the
+        width is out of range.
     """
     _check_width(width)
     _check_matches(sketch, map, matches)
+    _check_groups((sketch, map), groups)
     matches = sorted(matches, key=lambda match: match.sketch_object)
     colours = [pair_colour(match.sketch_object + 1) for match in matches]
     drawn = {match.sketch_object: colour for match, colour in zip(matches, colours, strict=True)}
     mapped = {match.map_object: colour for match, colour in zip(matches, colours, strict=True)}
+    for ours, theirs in groups:
+        colour = next((drawn[k] for k in ours if k in drawn), pair_colour(min(ours) + 1))
+        drawn |= dict.fromkeys(ours, colour)
+        mapped |= dict.fromkeys(theirs, colour)
     badge = badge_size(max(len(sketch), len(map)))
     panels = [
         Panel(
@@ -180,14 +189,14 @@ def draw_overlay(
         Entry(
             (match.sketch_object + 1, match.map_object + 1),
             drawn[match.sketch_object],
-            _name(match, sketch, map),
+            _name(match, sketch, map, groups),
             match.confidence,
             match.said,
         )
         for match in matches
     ]
     if title is None:
-        title = f"{len(matches)} of {len(sketch)} objects matched"
+        title = f"{len(drawn)} of {len(sketch)} objects matched"
     page = Page(_OVERLAY, panels, entries, _note(panels), alert, footnote)
     return page.drawn(title, caption, facts, width)
 
@@ -362,6 +371,18 @@ def _check_matches(sketch: Scene, map: Scene, matches: Sequence[OverlayMatch]) -
             )
 
 
+def _check_groups(
+    scenes: tuple[Scene, Scene], groups: Sequence[tuple[Sequence[int], Sequence[int]]]
+) -> None:
+    for k, group in enumerate(groups):
+        for side, scene, indices in zip(("sketch", "map"), scenes, group, strict=True):
+            wrong = [index for index in indices if not 0 <= index < len(scene)]
+            if wrong or not indices:
+                problem = f"are {[*indices]}; the {side} has objects 0 … {len(scene) - 1}"
+                field = f"groups[{k}].{side}_objects"
+                raise InvalidInputError(Reason.INVALID_FIELD, field, problem)
+
+
 def _check_relations(scene: Scene, relations: Sequence[OverlayRelation]) -> None:
     if not 1 <= len(relations) <= MOST_PLOTS:
         raise InvalidInputError(
@@ -406,9 +427,21 @@ def _labelled(scene: Scene) -> list[Entry]:
     return [Entry((k + 1,), pair_colour(k + 1), name) for k, name in names if name]
 
 
-def _name(match: OverlayMatch, sketch: Scene, map: Scene) -> str:  # noqa: A002
+def _name(
+    match: OverlayMatch,
+    sketch: Scene,
+    map: Scene,  # noqa: A002
+    groups: Sequence[tuple[Sequence[int], Sequence[int]]],
+) -> str:
     names = (sketch.labels[match.sketch_object], map.labels[match.map_object])
-    return " · ".join(dict.fromkeys(printable(name) for name in names if name.strip()))
+    said = [printable(name) for name in names if name.strip()]
+    for ours, theirs in groups:
+        if match.sketch_object in ours:
+            others = [(ours, match.sketch_object, "sketched"), (theirs, match.map_object, "mapped")]
+            for indices, own, word in others:
+                if rest := [str(k + 1) for k in indices if k != own]:
+                    said.append(f"with {' and '.join(rest)} {word}")
+    return " · ".join(dict.fromkeys(said))
 
 
 def _note(panels: Sequence[Panel]) -> str:
