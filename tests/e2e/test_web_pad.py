@@ -879,6 +879,101 @@ def test_a_map_of_ones_own_is_shown_and_its_things_are_found_otherwise_by_a_slid
     wait_until(lambda: 2 <= things.count() < before, "the slider changes nothing")
 
 
+ROOMS = [(0, 0, 90, 30), (0, 32, 40, 90), (42, 32, 64, 60), (42, 62, 64, 90), (66, 32, 90, 90)]
+DOORS = [(10, 30, 19, 32), (48, 30, 57, 32), (48, 60, 57, 62), (74, 30, 83, 32)]
+"""A floor, each by two corners in cells: the third and the fourth room open into each other."""
+
+
+def floor_plan(folder):
+    """Write the floor as an occupancy grid without a thing in it, and return yaml and picture."""
+    cells = np.zeros((94, 94), np.uint8)
+    for x, y, u, v in (*ROOMS, *DOORS):
+        cells[2 + y : 2 + v, 2 + x : 2 + u] = 254
+    picture, yaml_file = folder / "floor.png", folder / "floor.yaml"
+    Image.fromarray(cells[::-1]).save(picture)
+    head = {"image": picture.name, "resolution": 0.1, "origin": [0, 0, 0], "negate": 0}
+    thresholds = {"occupied_thresh": 0.65, "free_thresh": 0.196}
+    yaml_file.write_text(yaml.safe_dump(head | thresholds), encoding="utf-8")
+    return yaml_file, picture
+
+
+def open_floor_as_rooms(page, folder):
+    page.get_by_test_id("map-file").set_input_files(floor_plan(folder))
+    page.locator(".map-pane .title", has_text="floor.yaml").wait_for()
+    page.get_by_test_id("notice").get_by_text("choose the segmenter rooms").wait_for()
+    page.get_by_test_id("headline").get_by_text("Nothing is found on this map").wait_for()
+    page.locator("image.grid").wait_for(state="attached")
+    page.get_by_test_id("open-tuning").click()
+    page.get_by_role("radio", name="occupancy-grid").wait_for()
+    assert page.get_by_role("radio", name="occupancy-grid").is_checked()
+    slider = page.locator("#tuning input[name=min_size]")
+    assert slider.count() == 1
+    page.get_by_role("radio", name="occupancy-grid").press("ArrowDown")
+    things = page.locator(".floor .thing")
+    wait_until(lambda: things.count() == len(ROOMS), "not all rooms are found")
+    assert slider.count() == 0
+
+
+def draw_floor(page):
+    """Draw the floor, the third and the fourth room as one."""
+    hand = Hand(page)
+    merged = (*ROOMS[2][:2], *ROOMS[3][2:])
+    for x, y, u, v in (*ROOMS[:2], merged, ROOMS[4]):  # y up in the map, down on paper
+        width, height = 3 * (u - x), 3 * (v - y)
+        hand.box(3 * (x - 45) + width / 2, 3 * (45 - y) - height / 2, width, height)
+
+
+def test_a_floor_is_opened_as_rooms_and_two_that_are_drawn_as_one_are_told_so(visit, tmp_path):
+    with serving_pad("--store", str(tmp_path / "store")) as (_, url):
+        page = visit(url)
+        open_floor_as_rooms(page, tmp_path)
+        page.keyboard.press("Escape")
+        draw_floor(page)
+        assert_two_rooms_are_one(page)
+        page.reload()
+        assert_two_rooms_are_one(page)
+        page.get_by_test_id("open-tuning").click()
+        radio = page.get_by_role("radio", name="rooms")
+        radio.wait_for()
+        assert radio.is_checked()
+        page.keyboard.press("Escape")
+        page.get_by_test_id("open-places").click()
+        page.get_by_label("Keep it as").fill("ground floor")
+        page.get_by_test_id("keep-map").click()
+        page.get_by_test_id("notice").get_by_text("ground floor").wait_for()
+        other = visit(url)
+        other.get_by_test_id("open-places").click()
+        other.get_by_test_id("stored-map").get_by_text("ground floor").click()
+        other.locator(".map-pane .title", has_text="ground floor").wait_for()
+        other.get_by_test_id("open-tuning").click()
+        other.get_by_role("radio", name="rooms").wait_for()
+        assert other.get_by_role("radio", name="rooms").is_checked()
+        other.keyboard.press("Escape")
+        draw_floor(other)
+        assert_two_rooms_are_one(other)
+
+
+def assert_two_rooms_are_one(page):
+    page.locator("[data-testid=pairs] .partner", has_text="as one").wait_for()
+    wait_for_answer(page, 4)
+    assert page.get_by_test_id("headline").get_by_text("All 4 things found").count()
+    assert page.get_by_test_id("not-drawn").count() == 0
+    rooms = page.evaluate(
+        """() => [...document.querySelectorAll('.floor .thing')].map((thing) => {
+          const path = thing.querySelector('path');
+          const { width, height } = path.getBBox();
+          const number = Number(thing.querySelector('.badge text').textContent);
+          return [number, path.getAttribute('fill'), width * height];
+        })"""
+    )
+    assert sorted(number for number, *_ in rooms) == [1, 2, 3, 3, 4]
+    (one, size), (other, other_size) = [each[1:] for each in rooms if each[0] == 3]
+    assert one == other
+    assert len({colour for _, colour, _ in rooms}) == 4
+    # The two that are drawn as one are the smallest.
+    assert sorted(area for *_, area in rooms)[:2] == sorted([size, other_size])
+
+
 @pytest.mark.parametrize("kind", [ROS1, MCAP])
 def test_a_bag_that_is_dropped_is_shown_and_what_is_drawn_of_it_is_found(
     pad, visit, tmp_path, kind
@@ -941,6 +1036,11 @@ def test_a_bags_folder_that_is_dropped_is_opened(pad, visit, tmp_path):
     page.get_by_test_id("map").dispatch_event("drop", {"dataTransfer": carried})
     page.locator(".map-pane .title", has_text="office.mcap").wait_for()
     wait_until(lambda: page.locator(".floor .thing").count() == 2, "its things are not shown")
+    page.get_by_test_id("open-tuning").click()
+    page.get_by_role("radio", name="rooms").wait_for()
+    offered = page.locator("#tuning input[name=segmenter]")
+    values = offered.evaluate_all("all => all.map(({ value }) => value)")
+    assert values == ["occupancy-grid", "rooms"]
 
 
 def test_several_bags_at_once_are_refused_in_words(pad, visit, tmp_path):
@@ -1139,7 +1239,7 @@ def test_once_a_pen_has_drawn_a_palm_does_nothing_and_fingers_move_the_paper(pad
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
-def test_axe_finds_nothing_that_keeps_anybody_out(pad, visit, scheme, size):
+def test_axe_finds_nothing_that_keeps_anybody_out(pad, visit, tmp_path, scheme, size):
     axe = CLIENTS / "node_modules" / "axe-core" / "axe.min.js"
     require(axe.exists(), "axe-core (npm ci in clients)")
     width, height = size
@@ -1158,6 +1258,8 @@ def test_axe_finds_nothing_that_keeps_anybody_out(pad, visit, scheme, size):
     page.get_by_test_id("mend").click()
     page.get_by_test_id("mend-0").click()
     assert page.evaluate(look) == [], "mending"
+    open_floor_as_rooms(page, tmp_path)
+    assert page.evaluate(look) == [], "tuning"
 
 
 def test_it_speaks_german_to_who_asks_for_it(pad, visit):

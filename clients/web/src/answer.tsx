@@ -105,7 +105,10 @@ function Headline() {
       ) : found ? (
         <Verdict />
       ) : (
-        !running.value && !cancelled.value && <p class="muted">{t.begin}</p>
+        !running.value &&
+        !cancelled.value && (
+          <p class="muted">{place.value?.things.length === 0 ? t.emptyMap : t.begin}</p>
+        )
       )}
     </div>
   );
@@ -137,7 +140,8 @@ function Verdict() {
       </div>
     );
   }
-  const [n, of] = [pairs.value.length, found.sketched.length];
+  const of = found.sketched.length;
+  const n = of - alone.value.sketch.length;
   const { probability } =
     reading.value === 0
       ? found.result
@@ -325,8 +329,11 @@ function Chooser({ index }: { index: number }) {
 
 function Line({ pair }: { pair: Pair }) {
   const t = texts.value;
-  const name = sketchName(pair.sketch);
-  const partner = mapName(pair.map);
+  const name = pair.all.sketch.map(sketchName).join(" + ");
+  const mapped = pair.all.map.map(mapName).join(" + ");
+  const isGroup = pair.all.sketch.length + pair.all.map.length > 2;
+  const partner = isGroup ? t.asOne(mapped) : mapped;
+  const isNamed = pair.all.sketch.some((k) => answered.value?.sketched[k]?.label);
   const light = () => (lit.value = { side: "sketch", index: pair.sketch });
   const sure = pair.probability === undefined ? null : surenessOf(pair.probability);
   const words = pair.pinned ? t.pinned : sure ? t.words[sure] : "";
@@ -350,7 +357,7 @@ function Line({ pair }: { pair: Pair }) {
         </span>
         <span class="names">
           <span class="partner">{partner}</span>
-          {answered.value?.sketched[pair.sketch]?.label && <span class="muted">{name}</span>}
+          {(isNamed || pair.all.sketch.length > 1) && <span class="muted">{name}</span>}
         </span>
         <span class="sure">
           {pair.pinned ? <Icon name="pin" /> : null}

@@ -108,7 +108,7 @@ export function App() {
                 <Icon name="mend" />
               </button>
             )}
-            {place.value?.found.segmenter && !isPlace(place.value.place) && (
+            {canBeFoundOtherwise() && (
               <Menu id="tuning" icon="settings" label={t.tuning}>
                 <Tuning />
               </Menu>
@@ -236,6 +236,12 @@ function Menu(props: {
       </div>
     </div>
   );
+}
+
+/** Of the gallery, and where somebody has put right what was found, things stay as they are. */
+function canBeFoundOtherwise(): boolean {
+  const { place: name, found, things } = place.value ?? {};
+  return !isPlace(name ?? "") && (!!found?.segmenter || things?.length === 0);
 }
 
 function shut(id: string): void {

@@ -12,7 +12,7 @@ import {
 
 import type { Stroke, StrokeKind } from "./document";
 import type { Xy } from "./geometry";
-import { parametersOf } from "./maps";
+import { asFound } from "./maps";
 import type { Answered } from "./session";
 
 /** A line of points, and the standard deviation of each, in units of the map. */
@@ -50,19 +50,11 @@ export async function carry(
   { strokes, found, lines, radius }: ToCarry,
   signal: AbortSignal,
 ): Promise<Carried[]> {
-  const { source, stored, segmenter } = found.map.found;
   const { features } = await client.transfers.transfer(
     {
       sketch: sources.polygons(found.sketched),
       // The map as it was found, for its walls are no things.
-      map: stored ? { kind: { case: "storedScene", value: stored } } : source,
-      ...(stored
-        ? {}
-        : {
-            pipeline: {
-              mapSegmenter: { name: segmenter, parameters: parametersOf(found.map.found) },
-            },
-          }),
+      ...asFound(found.map.found),
       // Things that are left out of the map are still in its source.
       objectMap: lines.map(({ sketchObject, mapObject }) => ({
         sketchObject,

@@ -5,7 +5,7 @@ import { useEffect, useMemo } from "preact/hooks";
 
 import type { Carried } from "./carry";
 import { colourOf } from "./colours";
-import { distance, toScreen, type View, type Xy, zoomed } from "./geometry";
+import { type Box, boxOf, distance, toScreen, type View, type Xy, zoomed } from "./geometry";
 import { boxOfMap, droppedFiles, type Thing, type Underlay } from "./maps";
 import { toggled } from "./mending";
 import { useSize, useView } from "./pane";
@@ -26,6 +26,7 @@ import {
   pin,
   place,
   question,
+  refit,
   sketchName,
 } from "./state";
 import { texts } from "./texts";
@@ -63,8 +64,10 @@ export function MapPane() {
     else
       void paint(underlay, dark.value).then((done) => {
         const url = done.picture ? URL.createObjectURL(done.picture) : "";
-        if (wanted) painted.value = { ...done, url };
-        else URL.revokeObjectURL(url);
+        if (wanted) {
+          painted.value = { ...done, url };
+          if (!map.things.length) refit.value++; // the picture is all that there is to see
+        } else URL.revokeObjectURL(url);
       });
     return () => {
       wanted = false;
@@ -228,12 +231,22 @@ export function listed(points: readonly Xy[]): string {
   return points.map((point) => point.map((n) => n.toFixed(1)).join(",")).join(" ");
 }
 
+/** Return where a picture lies, in units of the map. */
+function boxOfPicture(
+  { origin: [x, y, yaw], resolution }: Underlay,
+  { width, height }: Painting,
+): Box {
+  const [u, v] = [resolution * Math.cos(yaw), resolution * Math.sin(yaw)];
+  const corner = (i: number, j: number): Xy => [x + i * u - j * v, y + i * v + j * u];
+  return boxOf([corner(0, 0), corner(width, 0), corner(width, height), corner(0, height)]);
+}
+
 /** The map's y grows up, the screen's down: views are of the map turned over. */
 export function flippedBox() {
-  const map = place.peek();
-  if (!map?.things.length) return null;
-  const { x0, y0, x1, y1 } = boxOfMap(map);
-  return { x0, y0: -y1, x1, y1: -y0 };
+  const [map, seen] = [place.peek(), painted.peek()];
+  const around = map?.underlay && seen ? boxOfPicture(map.underlay, seen) : null;
+  const box = map?.things.length ? boxOfMap(map) : around;
+  return box && { x0: box.x0, y0: -box.y1, x1: box.x1, y1: -box.y0 };
 }
 
 export function shown(view: View, [x, y]: Xy): Xy {

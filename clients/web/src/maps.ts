@@ -47,6 +47,8 @@ export interface Found {
   readonly stored: string;
   readonly segmenter: string;
   readonly parameters: Readonly<Record<string, unknown>>;
+  /** Whether some of them open into each other, as rooms do: a person may draw two such as one. */
+  readonly passages: boolean;
 }
 
 /** The bundled places, as folders and as keys of their titles. */
@@ -145,7 +147,7 @@ export async function openMap(
     const source = sources.mapServerMap(text, await bytesOf(client, picture));
     const seen = await shownPixels(picture);
     return {
-      ...(await found(client, source, yaml.name)),
+      ...(await sought(client, source, yaml.name)),
       place: "",
       title: yaml.name,
       underlay: seen && gridOf(text, seen),
@@ -156,7 +158,7 @@ export async function openMap(
   }
   const source = sources.file(first.name, await bytesOf(client, first));
   return {
-    ...(await found(client, source, first.name)),
+    ...(await sought(client, source, first.name)),
     place: "",
     title: first.name,
     underlay: await pictureOf(first),
@@ -243,7 +245,7 @@ function titleOf(name: string, title: string, labels: readonly string[]): string
 export async function openStored(client: SketchmatchClient, name: string): Promise<PlaceMap> {
   const { storedScene, source } = await client.scenes.getScene({ name, includeSource: true });
   const kind = source?.kind;
-  const { scene, warnings, segmenter, title = "" } = storedScene ?? {};
+  const { scene, warnings, segmenter, passages, title = "" } = storedScene ?? {};
   const things = thingsOf(scene);
   const labels = things.flatMap(({ label }) => (label ? [label] : []));
   return {
@@ -257,6 +259,7 @@ export async function openStored(client: SketchmatchClient, name: string): Promi
       stored: name,
       segmenter: segmenter?.name ?? "",
       parameters: segmenter?.parameters ?? {},
+      passages: !!passages?.length,
     },
   };
 }
@@ -321,13 +324,51 @@ async function found(
   client: SketchmatchClient,
   source: Source,
   name = "",
-  chosen: { name?: string; parameters?: Tuned } = {},
+  chosen?: Chosen,
 ): Promise<Pick<PlaceMap, "things" | "warnings" | "found">> {
-  const { scene, warnings, segmenter } = await naming(name, () =>
-    client.segment(source, { segmenter: chosen }),
+  const { scene, warnings, segmenter, passages } = await naming(name, () =>
+    client.segment(source, { segmenter: { ...chosen } }),
   );
   const how = { segmenter: segmenter?.name ?? "", parameters: segmenter?.parameters ?? {} };
-  return { things: thingsOf(scene), warnings, found: { source, stored: "", ...how } };
+  return {
+    things: thingsOf(scene),
+    warnings,
+    found: { source, stored: "", passages: passages.length > 0, ...how },
+  };
+}
+
+/** As `found`; where there is nothing to find, other ways of looking may find something. */
+async function sought(
+  client: SketchmatchClient,
+  source: Source,
+  name: string,
+  chosen: Chosen = { name: "", parameters: {} },
+): ReturnType<typeof found> {
+  try {
+    return await found(client, source, name, chosen);
+  } catch (thrown) {
+    const { reason, message } = RequestFailed.from(thrown);
+    if (reason !== "TOO_FEW_OBJECTS") throw thrown;
+    const how = { segmenter: chosen.name, parameters: chosen.parameters };
+    return {
+      things: [],
+      warnings: [message],
+      found: { source, stored: "", passages: false, ...how },
+    };
+  }
+}
+
+/** Return what a sketch is matched with: the things as they are shown. */
+export function matchedWith({ things, found }: PlaceMap) {
+  // Polygons alone do not tell which of them open into each other.
+  return found.passages ? asFound(found) : { map: sources.polygons(things) };
+}
+
+/** Return a map as it was found, walls and all, as requests have it. */
+export function asFound(found: Found) {
+  const { source, stored, segmenter: name } = found;
+  if (stored) return { map: sources.storedScene(stored) };
+  return { map: source, pipeline: { mapSegmenter: { name, parameters: parametersOf(found) } } };
 }
 
 /** Return the parameters by which things were found, without those that stand for none. */
@@ -340,14 +381,19 @@ export function parametersOf({ parameters }: Found): Tuned {
 /** What of a segmenter's parameters a person sets. */
 export type Tuned = Record<string, number | boolean | string>;
 
-/** Look for the things of a map again, with other parameters. */
+/** A segmenter as a person chose it; without a name, the server's default. */
+export interface Chosen {
+  readonly name: string;
+  readonly parameters: Tuned;
+}
+
+/** Look for the things of a map again, with another segmenter or other parameters. */
 export async function foundOtherwise(
   client: SketchmatchClient,
   map: PlaceMap,
-  parameters: Tuned,
+  chosen: Chosen,
 ): Promise<PlaceMap> {
-  const { source, segmenter } = map.found;
-  return { ...map, ...(await found(client, source, map.title, { name: segmenter, parameters })) };
+  return { ...map, ...(await sought(client, map.found.source, map.title, chosen)) };
 }
 
 /** Have errors name the file that a person knows, not the field that it travels in. */

@@ -74,10 +74,11 @@ function sketchParts(): string[] {
   const sketched = answered.peek()?.sketched ?? [];
   const signs = placed(signedOfSketch(sketched, view));
   const things = sketched.map(({ rings }, k) => {
-    const painted = pairOf({ side: "sketch", index: k }) ? colourOf(k) : null;
+    const pair = pairOf({ side: "sketch", index: k });
+    const painted = pair ? colourOf(pair.sketch) : null;
     const area = `<path d="${rings.map((ring) => paperPath(ring, view)).join("")}" fill="${painted ?? colour("--muted")}" fill-opacity="${painted ? 0.17 : 0.07}"/>`;
     const at = signs[k]?.badge;
-    return at ? area + badge(at, k + 1, painted) : area;
+    return at ? area + badge(at, (pair?.sketch ?? k) + 1, painted) : area;
   });
   return [
     `<g transform="${moved(view)}">`,

@@ -6,14 +6,14 @@
  * This is all that knows how sketches travel.
  */
 
-import { RequestFailed, sources, type SketchmatchClient } from "@sketchmatch/client";
+import { RequestFailed, type SketchmatchClient } from "@sketchmatch/client";
 import type { MatchProgress, MatchResult } from "@sketchmatch/client/v1/match";
 import type { SketchQuestion, WatchSketchResponse } from "@sketchmatch/client/v1/sketch_service";
 import { YAxis } from "@sketchmatch/client/v1/source";
 
 import type { Pin, Stroke } from "./document";
 import { areaOf, boxOf } from "./geometry";
-import { thingsOf, type PlaceMap, type Thing } from "./maps";
+import { matchedWith, thingsOf, type PlaceMap, type Thing } from "./maps";
 
 export interface Progress {
   readonly compiling: boolean;
@@ -143,7 +143,7 @@ export class Session {
 
   async #begin(map: PlaceMap): Promise<void> {
     this.#tell({ kind: "running" });
-    const match = { map: sources.polygons(map.things) };
+    const match = matchedWith(map);
     const { sketchId } = await this.#client.sketches.createSketch({ match, yAxis: YAxis.DOWN });
     this.#sketch = {
       id: sketchId,

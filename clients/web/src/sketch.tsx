@@ -161,15 +161,12 @@ function Things({ view }: { view: View }) {
         const pair = pairOf({ side: "sketch", index: k });
         const d = rings.map((ring) => paperPath(ring, view)).join("");
         const badge = signs[k]?.badge;
+        const colour = pair ? colourOf(pair.sketch) : null;
         const state = `${isLit("sketch", k) || asking.value === k ? " lit" : ""}${pair ? "" : " alone"}`;
         return (
           <g key={k} class={`thing${state}`} data-testid={`sketch-thing-${k}`}>
-            <path
-              d={d}
-              fill={pair ? colourOf(k) : "currentColor"}
-              stroke={pair ? colourOf(k) : "currentColor"}
-            />
-            {badge && <Badge at={badge} number={k + 1} colour={pair ? colourOf(k) : null} />}
+            <path d={d} fill={colour ?? "currentColor"} stroke={colour ?? "currentColor"} />
+            {badge && <Badge at={badge} number={(pair?.sketch ?? k) + 1} colour={colour} />}
           </g>
         );
       })}

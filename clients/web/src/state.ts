@@ -21,6 +21,7 @@ import { ink, inkOf, packed, parseStrokes, unpacked } from "./files";
 import { boxOf, isInside, outlineAround, type Xy } from "./geometry";
 import { keepDrawing, keepMap, restored } from "./keep";
 import {
+  type Chosen,
   foundOtherwise,
   isPlace,
   isMetric,
@@ -36,7 +37,6 @@ import {
   sampleSketch,
   type StoredMap,
   type Thing,
-  type Tuned,
 } from "./maps";
 import { NotSent, type Robot, robots, send } from "./robot";
 import { type Answered, type Progress, Session } from "./session";
@@ -57,6 +57,8 @@ export interface Lit {
 export interface Pair {
   readonly sketch: number;
   readonly map: number;
+  /** All that is one here: where several are one of the other side, more than the one above. */
+  readonly all: { readonly sketch: readonly number[]; readonly map: readonly number[] };
   readonly probability: number | undefined;
   readonly pinned: boolean;
 }
@@ -135,12 +137,25 @@ const lines = computed<readonly ObjectMatch[]>(() => {
 export const pairs = computed<readonly Pair[]>(() => {
   const found = answered.value;
   if (!found) return [];
-  return lines.value.map((line) => ({
-    sketch: line.sketchObject,
-    map: line.mapObject,
-    probability: line.probability,
-    pinned: pinOf(found, line.sketchObject) === found.map.things[line.mapObject]?.id,
-  }));
+  const groups = reading.value === 0 ? found.result.objectGroups : [];
+  const grouped = new Set(groups.flatMap(({ sketchObjects }) => sketchObjects));
+  const single = lines.value.filter(({ sketchObject }) => !grouped.has(sketchObject));
+  return [
+    ...single.map(({ sketchObject, mapObject, probability }) => ({
+      all: { sketch: [sketchObject], map: [mapObject] },
+      probability,
+    })),
+    ...groups.map(({ sketchObjects, mapObjects, probability }) => ({
+      all: { sketch: sketchObjects, map: mapObjects },
+      probability,
+    })),
+  ]
+    .map(({ all, probability }) => {
+      const [sketch = 0, map = 0] = [all.sketch[0], all.map[0]];
+      const pinned = pinOf(found, sketch) === found.map.things[map]?.id;
+      return { sketch, map, all, probability, pinned };
+    })
+    .sort((one, other) => one.sketch - other.sketch);
 });
 
 export const elsewhere = computed(
@@ -150,8 +165,8 @@ export const elsewhere = computed(
 /** Sketched and mapped things without partner in the reading that is shown. */
 export const alone = computed(() => {
   const found = answered.value;
-  const drawn = new Set(pairs.value.map(({ sketch }) => sketch));
-  const mapped = new Set(pairs.value.map(({ map }) => map));
+  const drawn = new Set(pairs.value.flatMap(({ all }) => all.sketch));
+  const mapped = new Set(pairs.value.flatMap(({ all }) => all.map));
   return {
     sketch: (found?.sketched ?? []).map((_, k) => k).filter((k) => !drawn.has(k)),
     map: (found?.map.things ?? []).map((_, k) => k).filter((k) => !mapped.has(k)),
@@ -261,14 +276,14 @@ export async function sendRoutes(to: Robot): Promise<void> {
 /** Return the pair of a thing, if it has one. */
 export function pairOf(thing: Lit | null): Pair | undefined {
   if (!thing) return undefined;
-  return pairs.value.find((pair) => pair[thing.side] === thing.index);
+  return pairs.value.find(({ all }) => all[thing.side].includes(thing.index));
 }
 
 export function isLit(side: Side, index: number): boolean {
   const thing = lit.value;
   if (!thing) return false;
-  if (thing.side === side) return thing.index === index;
-  return pairOf(thing)?.[side] === index;
+  if (thing.side === side && thing.index === index) return true;
+  return pairOf(thing)?.all[side].includes(index) ?? false;
 }
 
 export function sketchName(index: number): string {
@@ -321,7 +336,7 @@ export function matchNow(): void {
   cancelled.value = false;
   trouble.value = null;
   asking.value = null;
-  if (map && strokes.length) session.update(strokes, pins.peek(), map);
+  if (map?.things.length && strokes.length) session.update(strokes, pins.peek(), map);
   else {
     session.cancel();
     running.value = false;
@@ -452,15 +467,21 @@ export async function bringSketch(file: File): Promise<void> {
   });
 }
 
-/** Look for the things of the map again, with other parameters. */
-export async function findOtherwise(parameters: Tuned): Promise<void> {
+let finding = 0;
+
+/** Look for the things of the map again, with another segmenter or other parameters. */
+export async function findOtherwise(chosen: Chosen): Promise<void> {
   const map = place.peek();
   if (!map) return;
   await telling(async () => {
-    const other = await foundOtherwise(client, map, parameters);
-    if (place.peek() !== map) return; // another one was chosen meanwhile
+    const asked = ++finding;
+    const other = await foundOtherwise(client, map, chosen);
+    // Another map, or another way of looking, was chosen meanwhile.
+    if (place.peek() !== map || asked !== finding) return;
     show(other);
     forget();
+    if (!other.things.length) notice.value = other.warnings.join(" ");
+    if (other.found.segmenter !== map.found.segmenter) refit.value++;
   });
 }
 

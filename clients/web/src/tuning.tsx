@@ -1,9 +1,10 @@
-/** The parameters by which things are found on a map, as the server's catalogue describes them. */
+/** How things are found on a map: what does it, and by which parameters, as the catalogue has it. */
 
+import { type FileReader as Reader, SourceKind } from "@sketchmatch/client/v1/catalog_service";
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 
-import { parametersOf } from "./maps";
+import { type Chosen, type Found, parametersOf } from "./maps";
 import { client, findOtherwise, place } from "./state";
 import { texts } from "./texts";
 
@@ -19,27 +20,64 @@ interface Property {
   readonly enum?: readonly string[];
 }
 
-const schemas = signal<ReadonlyMap<string, Readonly<Record<string, Property>>>>(new Map());
+interface Segmenter {
+  readonly name: string;
+  readonly summary: string;
+  readonly isDefault: boolean;
+  readonly sourceKinds: readonly SourceKind[];
+  readonly properties: Readonly<Record<string, Property>>;
+}
+
+const segmenters = signal<readonly Segmenter[]>([]);
+let readers: readonly Reader[] = [];
 let waiting: ReturnType<typeof setTimeout> | undefined;
 
 export function Tuning() {
   useEffect(() => {
-    if (!schemas.peek().size) void load();
+    if (!segmenters.peek().length) void load();
   }, []);
   const found = place.value?.found;
-  const properties = schemas.value.get(found?.segmenter ?? "");
-  if (!found || !properties) return null;
-  const change = (name: string, value: number | boolean | string) => {
+  if (!found) return null;
+  const choices = choicesFor(found);
+  const used = choices.find(({ name, isDefault }) =>
+    found.segmenter ? name === found.segmenter : isDefault,
+  );
+  const find = (chosen: Chosen) => {
     clearTimeout(waiting);
-    const tuned = { ...parametersOf(found), [name]: value };
-    waiting = setTimeout(() => void findOtherwise(tuned), 120);
+    waiting = setTimeout(() => void findOtherwise(chosen), 120);
+  };
+  const change = (name: string, value: number | boolean | string) => {
+    const parameters = { ...parametersOf(found), [name]: value };
+    find({ name: used?.name ?? "", parameters });
   };
   return (
     <>
       <h2>{texts.value.tuning}</h2>
-      {Object.entries(properties).map(([name, property]) => (
+      {choices.length > 1 && (
+        <fieldset class="segmenters">
+          <legend>{texts.value.segmenter}</legend>
+          {choices.map(({ name, summary, isDefault }) => (
+            <label key={name} class="tuning">
+              <span class="row">
+                <span>
+                  {name} {isDefault && `(${texts.value.usual})`}
+                </span>
+                <input
+                  type="radio"
+                  name="segmenter"
+                  value={name}
+                  checked={name === used?.name}
+                  onChange={() => find({ name, parameters: {} })}
+                />
+              </span>
+              <span class="muted">{summary}</span>
+            </label>
+          ))}
+        </fieldset>
+      )}
+      {Object.entries(used?.properties ?? {}).map(([name, property]) => (
         <Control
-          key={name}
+          key={`${used?.name} ${name}`}
           name={name}
           property={property}
           value={found.parameters[name] ?? property.default}
@@ -119,17 +157,42 @@ function Control(props: {
   );
 }
 
+const KINDS = {
+  strokeSet: SourceKind.STROKE_SET,
+  polygonSet: SourceKind.POLYGON_SET,
+  occupancyGrid: SourceKind.OCCUPANCY_GRID,
+  mapServerMap: SourceKind.MAP_SERVER_MAP,
+  image: SourceKind.IMAGE,
+} as const;
+
+/** Return the segmenters that read what a map was found in. */
+function choicesFor({ source: { kind }, segmenter }: Found): readonly Segmenter[] {
+  const all = segmenters.value;
+  const isKnown = kind.case !== undefined && kind.case !== "file" && kind.case !== "storedScene";
+  const form = isKnown ? KINDS[kind.case] : formOfFile(kind.case === "file" ? kind.value.name : "");
+  const forms = form ? [form] : all.find(({ name }) => name === segmenter)?.sourceKinds;
+  // What a file holds may be known to the server alone, which then refuses what does not read it.
+  return forms
+    ? all.filter(({ sourceKinds }) => sourceKinds.some((each) => forms.includes(each)))
+    : all;
+}
+
+function formOfFile(name: string): SourceKind | undefined {
+  const isOf = (suffix: string) => name.toLowerCase().endsWith(suffix);
+  if ([".png", ".jpg", ".jpeg", ".bmp", ".pgm"].some(isOf)) return SourceKind.IMAGE;
+  return readers.find(({ suffixes }) => suffixes.some(isOf))?.sourceKind;
+}
+
 async function load(): Promise<void> {
   try {
-    const { algorithms } = await client.algorithms();
-    schemas.value = new Map(
-      algorithms
-        .filter(({ sourceKinds }) => sourceKinds.length)
-        .map(({ name, parametersSchema }) => [
-          name,
-          (parametersSchema?.["properties"] ?? {}) as unknown as Record<string, Property>,
-        ]),
-    );
+    const catalogue = await client.algorithms();
+    readers = catalogue.readers;
+    segmenters.value = catalogue.algorithms
+      .filter(({ sourceKinds }) => sourceKinds.length)
+      .map(({ parametersSchema, ...rest }) => ({
+        ...rest,
+        properties: (parametersSchema?.["properties"] ?? {}) as unknown as Segmenter["properties"],
+      }));
   } catch {
     // The pane tells that the server is away.
   }
