@@ -14,7 +14,7 @@ import random
 import struct
 import sys
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,10 +24,14 @@ from google.protobuf import message_factory
 from google.protobuf.descriptor import FieldDescriptor, MethodDescriptor
 from google.protobuf.message import Message
 
-from sketchmatch_client import Client, sources
+from sketchmatch_client import Client, Sketch, sources
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from sketchmatch_proto.v1.scene_service_pb2 import PutSceneRequest, SegmentRequest
-from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest, UpdateSketchRequest
+from sketchmatch_proto.v1.sketch_service_pb2 import (
+    CreateSketchRequest,
+    CreateSketchResponse,
+    UpdateSketchRequest,
+)
 from sketchmatch_proto.v1.source_pb2 import Source
 from sketchmatch_proto.v1.transfer_service_pb2 import TransferRequest
 from tests.contract.golden import FILES, NAMES, golden
@@ -127,11 +131,16 @@ def _sides() -> tuple[Source, Source]:
     return sources.polygons(turned(outlines)), sources.polygons(outlines, ["bed", "", "a", ""])
 
 
-def _named(client: Client, seeds: dict[MethodDescriptor, list[Message]]) -> None:
-    """Let requests name what there is: a scene, a sketch in progress and a match."""
+def _named(
+    client: Client, seeds: dict[MethodDescriptor, list[Message]], sketches: list[str]
+) -> None:
+    """Let requests name what there is: a scene, the only sketch in progress, and a match."""
     drawn, mapped = _sides()
     scene = client.put_scene(mapped).stored_scene.name
+    while sketches:
+        Sketch(client, sketches.pop()).delete()
     sketch = client.sketch(sources.stored_scene(scene)).id
+    sketches.append(sketch)
     match = client.match(drawn, sources.stored_scene(scene)).result.match_id
     for messages in seeds.values():
         for message in messages:
@@ -218,18 +227,21 @@ def fuzzed(seconds: float, seed: int) -> Report:
         with grpc.insecure_channel(running.address) as channel, Client(running.address) as client:
             calls = {each: _call(channel, each) for each in METHODS}
             seeds = {each: requests_of(each) for each in METHODS}
+            sketches: list[str] = []
             end = time.monotonic() + seconds
             for turn in itertools.count():
                 if time.monotonic() >= end or running.process.poll() is not None:
                     break
                 if turn % _NAMED_EVERY == 0:  # some requests delete what there is
-                    _named(client, seeds)
+                    _named(client, seeds, sketches)
                 for method, call in calls.items():
                     data = broken(rng, rng.choice(seeds[method]))
                     began = time.monotonic()
                     code, said = _ended(call, data, _ENDLESS.get(method.name, _PATIENCE))
+                    if method.name == "CreateSketch" and code is grpc.StatusCode.OK:
+                        sketches.append(CreateSketchResponse.FromString(said).sketch_id)
                     report.codes[method.name, code.name] += 1
-                    problem = "" if code in _REFUSALS else f"it is {code.name} ({said})"
+                    problem = "" if code in _REFUSALS else f"it is {code.name} ({said!r})"
                     if time.monotonic() - began > _PATIENCE + _OVERTIME:
                         problem = "it hangs beyond its deadline"
                     if problem:
@@ -258,17 +270,20 @@ def _call(channel: grpc.Channel, method: MethodDescriptor) -> grpc.UnaryStreamMu
 
 def _ended(
     call: grpc.UnaryStreamMultiCallable, data: bytes, patience: float
-) -> tuple[grpc.StatusCode, str]:
-    """Return how a call ended, of which not all is read where it never ends by itself."""
+) -> tuple[grpc.StatusCode, bytes]:
+    """Return how a call ended, and what was answered or said at last.
+
+    Not all is read of what never ends by itself.
+    """
+    last: deque[bytes] = deque(maxlen=1)
     try:
         answers = call(data, timeout=patience)
-        for _ in zip(range(_READ), answers, strict=False):
-            pass
+        last.extend(itertools.islice(answers, _READ))
         if hasattr(answers, "cancel"):
             answers.cancel()
     except grpc.RpcError as error:
-        return error.code(), error.details()
-    return grpc.StatusCode.OK, ""
+        return error.code(), error.details().encode()
+    return grpc.StatusCode.OK, last[0] if last else b""
 
 
 def _mebibytes(running: Server) -> float:
