@@ -3,9 +3,9 @@
 import grpc
 import pytest
 
-from sketchmatch_client import Client, ServerFailedError
-from tests.server.harness import scene, serving
-from tests.server.misbehaving import BROKEN, EmptySegmenter, RaisingSegmenter
+from sketchmatch_client import Client, ServerFailedError, sources
+from tests.server.harness import hosting, scene, serving, serving_setup
+from tests.server.misbehaving import BROKEN, EmptySegmenter, RaisingSegmenter, ScribblingHistogram
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +33,19 @@ def test_a_broken_plugin_is_named_with_its_distribution_and_the_server_goes_on(
     assert "\n" not in sentence
     assert plugin.name in caplog.text, "the operator's log says so as well"
     assert client.match(scene(4), scene(4)).object_map == {k: k for k in range(4)}
+
+
+def test_what_a_plugin_wrote_into_its_input_is_given_to_nobody_else(tmp_path):
+    setup = serving_setup(ScribblingHistogram)
+    with hosting(setup, store=tmp_path) as host, Client(host.address) as client:
+        name = client.put_scene(scene(5)).stored_scene.name
+        sides = [(scene(5), scene(5)), (scene(5), sources.stored_scene(name))]
+        for sketch, map_ in sides:
+            with pytest.raises(ServerFailedError, match="it changed its input"):
+                client.match(sketch, map_, histogram=ScribblingHistogram.name)
+            for again in sides:
+                match = client.match(*again, searcher="exact", judge="confidence")
+                assert match.result.omap_confidence == pytest.approx(1.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("plugin", [RaisingSegmenter, EmptySegmenter], ids=["raises", "rubbish"])

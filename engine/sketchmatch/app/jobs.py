@@ -26,6 +26,7 @@ from sketchmatch.app.setup import Setup
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
+    PluginError,
     Reason,
     ServerStoppingError,
     StoreError,
@@ -93,6 +94,20 @@ def answers(
     SketchmatchError
         As the engine does, with paths of the request.
     """
+    try:
+        yield from _answers(job, setup, begun)
+    except PluginError:
+        # Who broke its contract may have written into what others would be given next.
+        if setup.engine.memory is not None:
+            setup.engine.memory.forget()
+        if setup.shelf is not None:
+            setup.shelf.forget()
+        raise
+
+
+def _answers(
+    job: Job, setup: Setup, begun: Callable[[Clock], None]
+) -> Generator[Message, None, None]:
     match job.request:
         case MatchRequest():
             return _match(job, job.request, setup, begun)

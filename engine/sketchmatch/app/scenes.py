@@ -458,6 +458,11 @@ class Shelf:
         if self._file is not None:
             self._file.close()
 
+    def forget(self) -> None:
+        """Decode all scenes anew."""
+        with self._lock:
+            self._held.clear()
+
     def segmentation(self, name: str, caller: str, field: str) -> Segmentation:
         """Return a scene of a caller as it was found.
 

@@ -102,6 +102,13 @@ class Memory:
         self._related: deque[_Related] = deque(maxlen=_RECENT)
         self._objects: WeakValueDictionary[tuple[object, ...], SceneObject] = WeakValueDictionary()
 
+    def forget(self) -> None:
+        """Compute everything anew."""
+        with self._lock:
+            self._bytes = 0
+            for held in (self._known, self._recent, self._related, self._objects):
+                held.clear()
+
     def met(self, scene: Scene) -> Scene:
         """Return a scene that was just found, with the objects that were met before in it.
 
