@@ -3,10 +3,10 @@
 import time
 
 import grpc
-import numpy as np
 import pytest
 
-from sketchmatch_client import Client, match_request, sources, transfer_request
+from sketchmatch_builtin.segmenters.polygons import PolygonSegmenter
+from sketchmatch_client import Client, match_request, transfer_request
 from sketchmatch_client.features import point
 from sketchmatch_proto.v1.scene_service_pb2 import PutSceneRequest, SegmentRequest
 from sketchmatch_proto.v1.sketch_service_pb2 import (
@@ -21,19 +21,22 @@ from tests.server.harness import ENDLESS, hosting, scene, serving_setup, when_th
 SCENE = scene(4)
 
 
-def large():
-    """Return a grid that takes a second to be segmented."""
-    rng = np.random.default_rng(0)
-    cells = np.zeros((3000, 3000), dtype=np.int8)
-    for row, column in rng.integers(0, 2900, (60, 2)):
-        cells[row : row + 60, column : column + 40] = 100
-    return sources.occupancy_grid(cells, 0.05)
+class PonderingSegmenter(PolygonSegmenter):
+    """Takes its time, however fast the machine is."""
+
+    name = "pondering"
+
+    def segment(self, source):
+        time.sleep(1.0)
+        return super().segment(source)
 
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
     """The address of a server with one place, which keeps scenes."""
-    setup = serving_setup(max_concurrent_matches=1, max_waiting=0, max_time_budget=600.0)
+    setup = serving_setup(
+        PonderingSegmenter, max_concurrent_matches=1, max_waiting=0, max_time_budget=600.0
+    )
     with hosting(setup, store=tmp_path_factory.mktemp("state") / "store") as host:
         yield host.address
 
@@ -46,11 +49,12 @@ def long(method):
             return "/sketchmatch.v1.TransferService/Transfer", asked
         case "CreateSketch":
             asked = CreateSketchRequest()
-            asked.match.map.CopyFrom(large())
+            asked.match.map.CopyFrom(SCENE)
+            asked.match.pipeline.map_segmenter.name = "pondering"
             return "/sketchmatch.v1.SketchService/CreateSketch", asked
-        case "PutScene":
-            return "/sketchmatch.v1.SceneService/PutScene", PutSceneRequest(source=large())
-    return "/sketchmatch.v1.SceneService/Segment", SegmentRequest(source=large())
+    kind = PutSceneRequest if method == "PutScene" else SegmentRequest
+    asked = kind(source=SCENE, segmenter={"name": "pondering"})
+    return f"/sketchmatch.v1.SceneService/{method}", asked
 
 
 def assert_there_is_room(address):
