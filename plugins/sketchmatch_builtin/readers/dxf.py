@@ -193,10 +193,11 @@ def _shapes(drawing: Any, entities: Iterable[Any], left_out: Counter[str]) -> It
                 else:
                     yield _Shape(area, _block_name(each), layer, False)
         elif kind in _HATCHES or kind in _CLOSED or kind in _PIECES:
-            area = _area(each)
+            points = np.empty((0, 2)) if kind in _HATCHES else _points(each)
+            area = _area(each, points)
             if area is not None:
                 yield _Shape(area, "", layer, kind in _HATCHES)
-            elif kind in _HATCHES or not len(points := _points(each)):
+            elif not len(points):
                 left_out["open or empty lines"] += 1
             else:
                 pieces.setdefault(layer, []).append(points)
@@ -284,10 +285,10 @@ def _block_area(insert: Any) -> Any | None:
     for each in islice(recursive_decompose([insert]), source_limits().max_elements):
         kind = each.dxftype()
         if kind in _HATCHES or kind in _LINES_OF_BLOCKS:
-            area = _area(each)
+            points.append(_points(each))
+            area = _area(each, points[-1])
             if area is not None:
                 closed.append(area)
-            points.append(_points(each))
     drawn = np.concatenate(points) if points else np.empty((0, 2))
     hull = shapely.MultiPoint(within_reach(drawn)).convex_hull
     if hull.area <= 0.0:
@@ -302,12 +303,11 @@ def _polygons(areas: Iterable[Any]) -> Iterator[shapely.Polygon]:
         yield from (part for part in shapely.get_parts(area) if part.geom_type == "Polygon")
 
 
-def _area(each: Any) -> Any | None:
-    """Return the area of an element; None if it has none."""
+def _area(each: Any, points: FloatArray) -> Any | None:
+    """Return the area of an element, of which these are the points; None if it has none."""
     if each.dxftype() in _HATCHES:
         area = _alternating([area_within(points) for points in _paths(each)])
         return area if area.area > 0.0 else None
-    points = _points(each)
     if len(points) < 3 or not _is_closed(each, points):
         return None
     area = area_within(points)
