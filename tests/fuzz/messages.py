@@ -15,7 +15,6 @@ import struct
 import sys
 import time
 from collections import Counter, deque
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -35,7 +34,7 @@ from sketchmatch_proto.v1.sketch_service_pb2 import (
 from sketchmatch_proto.v1.source_pb2 import Source
 from sketchmatch_proto.v1.transfer_service_pb2 import TransferRequest
 from tests.contract.golden import FILES, NAMES, golden
-from tests.processes import Server
+from tests.processes import Server, children_of
 from tests.server.harness import shapes, turned
 
 METHODS: tuple[MethodDescriptor, ...] = tuple(
@@ -288,22 +287,15 @@ def _ended(
 
 def _mebibytes(running: Server) -> float:
     """Return the resident memory of a server and of all that it has started."""
-    pids = [running.process.pid, *_below(running.process.pid)]
-    pages = 0
+    pids = [running.process.pid, *children_of(running.process.pid)]
+    kibibytes = 0
     for pid in pids:
         try:
             status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
         except OSError:
             continue
-        pages += sum(int(line.split()[1]) for line in status.splitlines() if "VmRSS" in line)
-    return pages / 1024
-
-
-def _below(pid: int) -> Iterator[int]:
-    for children in Path(f"/proc/{pid}/task").glob("*/children"):
-        for child in map(int, children.read_text(encoding="utf-8").split()):
-            yield child
-            yield from _below(child)
+        kibibytes += sum(int(line.split()[1]) for line in status.splitlines() if "VmRSS" in line)
+    return kibibytes / 1024
 
 
 def main() -> int:
