@@ -234,3 +234,27 @@ def test_what_holds_up_the_interpreter_ends_pytest_and_is_shown(tmp_path):
     assert ran.returncode not in (0, 1, 2)
     assert re.search(r"test_matching\.py\", line \d+ in compare", ran.stderr)
     assert "in similarity_is_within_0_and_1" in ran.stderr
+
+
+COUNTED = """
+import faulthandler, signal, time
+import sketchmatch.testing.conformance.time_limit as time_limit
+
+faulthandler.enable()
+signals = []
+signal.signal(signal.SIGABRT, lambda *_: signals.append(time.monotonic()))
+begun = time.monotonic()
+with time_limit._ended_when_held_up(0.3):
+    while time.monotonic() < begun + 1.0:
+        time.sleep(0.05)
+with time_limit._ended_when_held_up(0.3):
+    pass
+time.sleep(0.5)
+assert len(signals) == 1, signals
+assert 0.3 <= signals[0] - begun < 0.9, signals[0] - begun
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a timer of Linux")
+def test_one_signal_alone_ends_what_is_held_up_since_a_second_would_hide_the_stacks():
+    subprocess.run([sys.executable, "-c", COUNTED], check=True, timeout=60)

@@ -3,7 +3,8 @@
 It runs in a thread of its own. A loop in Python is ended by an exception that is raised in that
 thread from outside. What waits or computes elsewhere, without holding up the interpreter, is left
 behind as a daemon. Where the interpreter itself is held up, so that the thread that waits for it
-can do nothing, faulthandler, whose clock needs none, ends the process and shows every stack.
+can do nothing, a timer that needs no interpreter ends the process, and faulthandler shows every
+stack.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import os
 import signal
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -142,15 +144,14 @@ def _end(before: set[_Worker]) -> bool:
 
 @contextmanager
 def _ended_when_held_up(seconds: float) -> Iterator[None]:
-    """End the process, and show where every thread is, if the block takes longer."""
+    """End the process, and show where every thread is, if the block takes longer.
+
+    What faulthandler's own timer writes is lost where standard error is captured. Whoever enabled
+    faulthandler, as pytest does, shows the stacks where they are seen when the process is aborted.
+    """
     if faulthandler.is_enabled() and sys.platform == "linux":
-        whole = math.ceil(seconds)
-        with _aborting_pipe(whole) as pipe:
-            faulthandler.dump_traceback_later(whole, file=pipe)
-            try:
-                yield
-            finally:
-                faulthandler.cancel_dump_traceback_later()
+        with _aborted_after(seconds):
+            yield
         return
     with suppress(AttributeError, RuntimeError, OSError):  # where there is no standard error
         faulthandler.dump_traceback_later(seconds, exit=True)
@@ -160,26 +161,45 @@ def _ended_when_held_up(seconds: float) -> Iterator[None]:
         faulthandler.cancel_dump_traceback_later()
 
 
+class _SignalEvent(ctypes.Structure):
+    """What a timer does when it fires: ``struct sigevent``, 64 bytes long."""
+
+    _fields_ = (
+        ("value", ctypes.c_void_p),
+        ("signal", ctypes.c_int),
+        ("notify", ctypes.c_int),  # 0: by that signal
+        ("unused", ctypes.c_byte * (64 - ctypes.sizeof(ctypes.c_void_p) - 8)),
+    )
+
+
+class _TimerSpan(ctypes.Structure):
+    """``struct itimerspec``."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_long) for name in ("interval_s", "interval_ns", "after_s", "after_ns")
+    )
+
+
 @contextmanager
-def _aborting_pipe(seconds: int) -> Iterator[int]:
-    """Yield a file that aborts the process once faulthandler writes its first line into it.
+def _aborted_after(seconds: float) -> Iterator[None]:
+    """Send the process one SIGABRT, by a timer of the kernel, if the block takes longer.
 
-    Whoever enabled faulthandler, as pytest does, shows the stacks then. What faulthandler writes
-    to standard error by itself is lost where that is captured. There is room for the first line
-    alone: a second signal would end the process before the stacks are shown.
+    A second signal would end it before the first has shown the stacks.
     """
-    import fcntl
-
-    first_line = f"Timeout ({seconds // 3600}:{seconds // 60 % 60:02}:{seconds % 60:02})!\n"
-    reading, writing = os.pipe()
+    libc = ctypes.CDLL(None, use_errno=True)
+    timer = ctypes.c_void_p()
+    event = _SignalEvent(signal=signal.SIGABRT)
+    _checked(libc.timer_create(time.CLOCK_MONOTONIC, ctypes.byref(event), ctypes.byref(timer)))
     try:
-        size = fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
-        os.set_blocking(writing, False)
-        os.write(writing, bytes(size - len(first_line)))
-        fcntl.fcntl(reading, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(reading, fcntl.F_SETSIG, signal.SIGABRT)
-        fcntl.fcntl(reading, fcntl.F_SETFL, os.O_ASYNC | os.O_NONBLOCK)
-        yield writing
+        part, whole = math.modf(seconds)
+        span = _TimerSpan(after_s=int(whole), after_ns=int(part * 1e9))
+        _checked(libc.timer_settime(timer, 0, ctypes.byref(span), None))
+        yield
     finally:
-        os.close(reading)
-        os.close(writing)
+        libc.timer_delete(timer)
+
+
+def _checked(failed: int) -> None:
+    if failed:
+        code = ctypes.get_errno()
+        raise OSError(code, os.strerror(code))
