@@ -178,6 +178,7 @@ class TestRequests:
             segmenter="tracing",
             params=params,
             profile="careful",
+            include_map=True,
         )
         assert server.requests == [golden("SegmentRequest")]
 

@@ -25,6 +25,7 @@ from sketchmatch.errors import (
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.events import Phase, Progress
+from sketchmatch_proto.v1.source_pb2 import MapServerMap
 from tests.contract.conversions import responses, status
 from tests.contract.golden import NAMES, as_json, as_written, golden
 from tests.contract.values import (
@@ -97,7 +98,13 @@ def test_what_nobody_knows_yet_is_absent_from_progress():
 
 
 def test_what_a_segmenter_found_is_written():
-    written = responses.segmented(SEGMENTATION, TRACING)
+    yaml = (
+        "image: room.pgm\nresolution: 0.25\norigin: [-1.5, 2.25, 0.75]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    pgm = b"P2\n3 2\n255\n0 254 128\n254 0 254\n"
+    map_ = MapServerMap(yaml=yaml, image=pgm, objects="{}", own_objects=True)
+    written = responses.segmented(SEGMENTATION, TRACING, map_)
     assert as_json(written) == as_written("SegmentResponse")
 
 

@@ -221,7 +221,8 @@ def test_each_form_of_source_is_sent():
             const segmenter = {{ name: "tracing", parameters: {{ closing: 0.125, mode: "neat" }} }};
             for (const [name, source] of Object.entries(segmentations)) {{
               const whole = name === "SegmentRequest";
-              await client.segment(source, whole ? {{ segmenter, profile: "careful" }} : {{}});
+              const asked = {{ segmenter, profile: "careful", includeMap: true }};
+              await client.segment(source, whole ? asked : {{}});
               console.log(name);
             }}
             const mended = sources.mapServerMap(yaml, pgm, {json.dumps(mended)});

@@ -983,6 +983,7 @@ def test_a_bag_that_is_dropped_is_shown_and_what_is_drawn_of_it_is_found(
     cells = np.zeros((200, 240), np.int8)
     for x, y, width, height in boxes.values():
         cells[y : y + height, x : x + width] = 100
+    cells[:, :10] = -1
     bag = write(tmp_path, kind, ("/map", cells, 0.0), ("/talk", "hi", 0))
     file = file_of(bag)
     page = visit(pad)
@@ -992,6 +993,7 @@ def test_a_bag_that_is_dropped_is_shown_and_what_is_drawn_of_it_is_found(
     page.locator(".map-pane .title", has_text=file.name).wait_for()
     things = page.locator(".floor .thing")
     wait_until(lambda: things.count() == 3, "not all things of the bag are shown")
+    assert shades_of_the_grid(page) == {"wall", "floor", "unknown"}
     hand = Hand(page)
     for x, y, width, height in boxes.values():  # y up in the map, down on paper
         hand.box(x + width / 2 - 120, 100 - y - height / 2, width, height)
@@ -1005,6 +1007,48 @@ def test_a_bag_that_is_dropped_is_shown_and_what_is_drawn_of_it_is_found(
     (_, scale, _), *_ = sorted(found)
     for (_, *seen), (_, _, *size) in zip(sorted(found), boxes.values(), strict=True):
         assert seen == pytest.approx([scale / boxes["bed"][2] * cells for cells in size], rel=0.08)
+
+
+def shades_of_the_grid(page):
+    """Return what is painted under the things of the map."""
+    page.locator(".map-pane image.grid").wait_for()
+    alphas = page.evaluate(
+        """async () => {
+          const image = new Image();
+          image.src = document.querySelector('.map-pane image.grid').getAttribute('href');
+          await image.decode();
+          const canvas = new OffscreenCanvas(image.width, image.height);
+          const context = canvas.getContext('2d');
+          context.drawImage(image, 0, 0);
+          const { data } = context.getImageData(0, 0, image.width, image.height);
+          const seen = new Set();
+          for (let k = 0; k < data.length; k += 4) {
+            seen.add(data[k + 3] === 0 ? 'unknown' : data[k] < 200 ? 'wall' : 'floor');
+          }
+          return [...seen];
+        }"""
+    )
+    return set(alphas)
+
+
+def test_what_is_mended_of_a_bag_keeps_its_walls(pad, visit, tmp_path):
+    require(importlib.util.find_spec("rosbags"), "rosbags (`pip install 'sketchmatch[rosbag]'`)")
+    cells = np.zeros((100, 100), np.int8)
+    cells[20:40, 20:40] = cells[60:80, 50:90] = 100
+    page = visit(pad)
+    bag = file_of(write(tmp_path, MCAP, ("/map", cells, 0.0)))
+    page.get_by_test_id("map-file").set_input_files(bag)
+    page.locator(".map-pane .title", has_text=bag.name).wait_for()
+    page.get_by_test_id("mend").click()
+    page.get_by_test_id("mend-0").click()
+    with page.expect_request("**/*SceneService/Segment") as asked:
+        page.get_by_label("Name on the map").fill("sofa")
+        page.keyboard.press("Enter")
+    sent = asked.value.post_data_buffer
+    assert b"mode: scale" in sent
+    assert b"MCAP" not in sent
+    wait_until(lambda: labels(page) == ["sofa"], "it has no name")
+    assert shades_of_the_grid(page) == {"wall", "floor"}
 
 
 def test_a_bags_folder_that_is_dropped_is_opened(pad, visit, tmp_path):

@@ -58,6 +58,30 @@ def test_things_are_found_in_the_frame_of_the_bags_map(client, tmp_path, kind):
     assert client.segment(written).scene == found.scene
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.5])
+def test_its_map_is_returned_to_whoever_asks_and_has_the_same_things(client, tmp_path, yaw):
+    cells = room()
+    cells[:, 180:] = -1
+    cells[60:80, 70:95] = 40
+    bag = file_of(write(tmp_path, MCAP, ("/map", cells, yaw)))
+    plain, found = (client.segment(sources.file(bag), include_map=k) for k in (False, True))
+    assert not plain.HasField("map")
+    assert plain.scene == found.scene
+    again = source_pb2.Source(map_server_map=found.map)
+    told = client.segment(again, include_map=True)
+    assert told == found
+    chosen = {"segmenter": "occupancy-grid", "params": {"free_threshold": 50}}
+    freer = client.segment(again, **chosen).scene
+    assert freer == client.segment(sources.file(bag), **chosen).scene != found.scene
+
+
+def test_a_grid_of_cells_has_a_map_and_polygons_have_none(client):
+    found = client.segment(sources.occupancy_grid(room(), 0.05), include_map=True)
+    assert client.segment(source_pb2.Source(map_server_map=found.map)).scene == found.scene
+    drawn = [[(0, 0), (2, 0), (2, 1)], [(5, 5), (6, 5), (6, 7)]]
+    assert not client.segment(sources.polygons(drawn), include_map=True).HasField("map")
+
+
 def varint(number):
     low, rest = number & 0x7F, number >> 7
     return bytes([low | 0x80]) + varint(rest) if rest else bytes([low])

@@ -1,5 +1,6 @@
 """Robots' maps: every key, mode and kind of picture, and every way to get them wrong."""
 
+import io
 import re
 import struct
 import zlib
@@ -7,10 +8,13 @@ import zlib
 import numpy as np
 import PIL.Image
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
-from sketchmatch.io.ros_map import decode_map_server
+from sketchmatch.io.ros_map import decode_map_server, encode_map_server
 from sketchmatch.model import OccupancyGrid
 from sketchmatch_map_files import parse
 from tests.tools import ROOT, require
@@ -119,6 +123,33 @@ def test_what_is_transparent_is_unknown(mode, expected, tmp_path):
     pixels = np.array([[[0, 0, 0, 255], [0, 0, 0, 0], [9, 9, 9, 254]]], np.uint8)
     data = encoded(PIL.Image.fromarray(pixels), "png", tmp_path)
     assert decode_map_server(yaml_text(mode=mode), data).cells.tolist() == [expected]
+
+
+coordinates = st.floats(-1e4, 1e4, allow_subnormal=False)
+
+
+@given(
+    arrays(np.int8, st.tuples(*2 * [st.integers(1, 9)]), elements=st.integers(-1, 100)),
+    st.floats(1e-5, 10.0),
+    st.tuples(coordinates, coordinates, coordinates),
+)
+@example(np.arange(-1, 101, dtype=np.int8).reshape(6, 17), 0.05, (-1e-7, 2.0, 0.1))
+def test_a_grid_that_is_saved_is_read_again_as_it_was(cells, resolution, origin):
+    grid = OccupancyGrid(cells, resolution, origin)
+    read = decode_map_server(*encode_map_server(grid, "the map.png"))
+    np.testing.assert_array_equal(read.cells, cells)
+    assert (read.resolution, read.origin, read.notes) == (resolution, origin, ())
+
+
+def test_a_saved_map_is_dark_at_walls_and_unknown_to_ros_1_where_it_is_transparent():
+    text, picture = encode_map_server(OccupancyGrid(np.array([[-1, 0], [50, 100]]), 0.25))
+    seen = PIL.Image.open(io.BytesIO(picture))
+    assert (seen.format, seen.mode) == ("PNG", "LA")
+    assert np.asarray(seen).tolist() == [[[128, 255], [0, 255]], [[128, 0], [255, 255]]]
+    assert text == (
+        'image: "map.png"\nmode: scale\nresolution: 0.25\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n'
+        "occupied_thresh: 1.0\nfree_thresh: 0.0\n"
+    )
 
 
 def test_numbers_that_yaml_takes_for_strings_are_numbers():

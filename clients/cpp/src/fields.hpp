@@ -168,8 +168,13 @@ inline auto fields(Of<MatchSummary> /*type*/) {
 
 inline auto fields(Of<Passage> /*type*/) { return std::tuple{FIELD(first), FIELD(second)}; }
 
+inline auto fields(Of<MapServerMap> /*type*/) {
+  return std::tuple{FIELD(yaml), FIELD(image), FIELD(objects), FIELD(own_objects)};
+}
+
 inline auto fields(Of<Segmentation> /*type*/) {
-  return std::tuple{FIELD(scene), FIELD(warnings), FIELD(segmenter), FIELD(route), FIELD(passages)};
+  return std::tuple{FIELD(scene), FIELD(warnings), FIELD(segmenter),
+                    FIELD(route), FIELD(passages), FIELD(map)};
 }
 
 inline auto fields(Of<StoredScene> /*type*/) {

@@ -242,6 +242,7 @@ v1::MatchRequest match_request(const Source& sketch, const Source& map,
 v1::SegmentRequest segment_request(const Source& source, const SegmentOptions& options) {
   v1::SegmentRequest request;
   write_segmenting(source, options, request);
+  request.set_include_map(options.include_map);
   return request;
 }
 

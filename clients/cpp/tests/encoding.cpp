@@ -42,7 +42,7 @@ const std::map<std::string, std::string> kWritten{
     {"GetMatchRequest", "match_id"},
     {"CancelMatchRequest", "match_id"},
     {"ListMatchesRequest", "page_token"},
-    {"SegmentRequest", "source segmenter profile"},
+    {"SegmentRequest", "source segmenter profile include_map"},
     {"PutSceneRequest", "source segmenter profile title"},
     {"GetSceneRequest", "name include_source"},
     {"ListScenesRequest", "page_token"},

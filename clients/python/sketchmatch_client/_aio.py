@@ -196,10 +196,11 @@ class AsyncClient:
         segmenter: str | None = None,
         params: Mapping[str, Any] | None = None,
         profile: str | None = None,
+        include_map: bool = False,
         timeout: float | None = None,
     ) -> SegmentResponse:
         """Find the objects of one source, without a match; see :meth:`Client.segment`."""
-        request = segment_request(source, segmenter, params, profile)
+        request = segment_request(source, segmenter, params, profile, include_map)
         return await self._asked(self._keeping.Segment, request, timeout)
 
     async def put_scene(

@@ -160,9 +160,10 @@ def segment_request(
     segmenter: str | None = None,
     params: Mapping[str, Any] | None = None,
     profile: str | None = None,
+    include_map: bool = False,
 ) -> SegmentRequest:
     """Return the request for the objects of one source; see :meth:`Client.segment`."""
-    request = SegmentRequest(source=_checked("source", source))
+    request = SegmentRequest(source=_checked("source", source), include_map=bool(include_map))
     _set_profile(request, profile or "")
     if segmenter or params:
         request.segmenter.CopyFrom(_selection("segmenter", segmenter or "", params or {}))

@@ -272,6 +272,7 @@ class Client:
         segmenter: str | None = None,
         params: Mapping[str, Any] | None = None,
         profile: str | None = None,
+        include_map: bool = False,
         timeout: float | None = None,
     ) -> SegmentResponse:
         """Find the objects of one source, without a match.
@@ -286,15 +287,18 @@ class Client:
             Its parameters.
         profile
             The server's pipeline that decides what is left out.
+        include_map
+            Whether the occupancy grid is wanted, too, such as that of a bag, as map_server saves
+            maps.
         timeout
             Seconds after which the call fails.
 
         Returns
         -------
         SegmentResponse
-            The scene, warnings, and the segmenter as it ran.
+            The scene, warnings, the segmenter as it ran, and the map where it is wanted.
         """
-        request = segment_request(source, segmenter, params, profile)
+        request = segment_request(source, segmenter, params, profile, include_map)
         return self._asked(self._keeping.Segment, request, timeout)
 
     def put_scene(

@@ -113,10 +113,14 @@ export class SketchmatchClient {
     });
   }
 
-  /** Find the objects of one source. */
+  /** Find the objects of one source; `includeMap` asks for its occupancy grid, too. */
   async segment(
     source: Source,
-    options: { segmenter?: { name?: string; parameters?: JsonObject }; profile?: string } = {},
+    options: {
+      segmenter?: { name?: string; parameters?: JsonObject };
+      profile?: string;
+      includeMap?: boolean;
+    } = {},
     signal?: AbortSignal,
   ): Promise<SegmentResponse> {
     const request = create(SegmentRequestSchema, { ...options, source });

@@ -301,15 +301,27 @@ export async function paint(underlay: Underlay, night: boolean): Promise<Paintin
   if (!context) return { picture: null, width, height };
   context.drawImage(bitmap, 0, 0);
   const pixels = context.getImageData(0, 0, width, height);
-  const [wall, floor] = night ? NIGHT : DAY;
+  const colours = coloursOf(underlay, night);
   const whole = new Uint32Array(pixels.data.buffer);
   for (let k = 0; k < whole.length; k++) {
-    const shade = pixels.data[4 * k] ?? 205;
-    whole[k] = shade < 100 ? wall : shade > 230 ? floor : 0;
+    // What is transparent is unknown, whatever its grey.
+    whole[k] = pixels.data[4 * k + 3] ? (colours[pixels.data[4 * k] ?? 0] ?? 0) : 0;
   }
   context.putImageData(pixels, 0, 0);
   const picture = await new Promise<Blob | null>((done) => canvas.toBlob(done));
   return { picture, width, height };
+}
+
+/** Return the colour of each grey of an occupancy grid. */
+function coloursOf({ mode, negate }: Underlay, night: boolean): Uint32Array {
+  const [wall, floor] = night ? NIGHT : DAY;
+  // map_server's grey for unknown is almost free, where greys do not tell how occupied a cell is.
+  const free = mode ? 0.25 : 0.1;
+  return Uint32Array.from({ length: 256 }, (_, shade) => {
+    if (mode === "raw" && shade > 100) return 0;
+    const share = mode === "raw" ? shade / 100 : (negate ? shade : 255 - shade) / 255;
+    return share > 0.6 ? wall : share < free ? floor : 0;
+  });
 }
 
 /** Let fingers, the wheel and the mouse move the map. */

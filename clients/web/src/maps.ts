@@ -21,6 +21,10 @@ export interface Underlay {
   readonly origin: readonly [number, number, number];
   /** Whether it is an occupancy grid, whose greys have a meaning. */
   readonly grid: boolean;
+  /** What they mean, as map_server has it; trinary where that is not said. */
+  readonly mode?: "scale" | "raw" | undefined;
+  /** Whether white is occupied. */
+  readonly negate?: boolean;
 }
 
 export interface PlaceMap {
@@ -89,8 +93,12 @@ const BAG = /\.(bag|mcap|db3)$/i;
 
 /** Whether a map's units are metres, as those of a robot's map are. */
 export function isMetric({ underlay, found: { source } }: PlaceMap): boolean {
-  const { kind } = source;
-  return underlay?.grid || (kind.case === "file" && BAG.test(kind.value.name));
+  return underlay?.grid || isBag(source);
+}
+
+/** Whether a source is a bag, in which only the server finds the map. */
+function isBag({ kind }: Source): boolean {
+  return kind.case === "file" && BAG.test(kind.value.name);
 }
 
 /** Return the files that were dropped; of a folder, such as a bag or a map is, those in it. */
@@ -156,13 +164,13 @@ export async function openMap(
   if (!first) {
     throw new RequestFailed(words.pictureLacking(""), "invalid", "", "map", undefined);
   }
-  const source = sources.file(first.name, await bytesOf(client, first));
-  return {
-    ...(await sought(client, source, first.name)),
-    place: "",
-    title: first.name,
-    underlay: await pictureOf(first),
-  };
+  const seen = await sought(
+    client,
+    sources.file(first.name, await bytesOf(client, first)),
+    first.name,
+  );
+  const underlay = await underlayOf(seen.found.source.kind);
+  return { ...seen, place: "", title: first.name, underlay };
 }
 
 /**
@@ -243,9 +251,13 @@ function titleOf(name: string, title: string, labels: readonly string[]): string
 
 /** Load a map that the server keeps. */
 export async function openStored(client: SketchmatchClient, name: string): Promise<PlaceMap> {
-  const { storedScene, source } = await client.scenes.getScene({ name, includeSource: true });
-  const kind = source?.kind;
+  const { storedScene, source: kept } = await client.scenes.getScene({ name, includeSource: true });
   const { scene, warnings, segmenter, passages, title = "" } = storedScene ?? {};
+  const how = { segmenter: segmenter?.name ?? "", parameters: segmenter?.parameters ?? {} };
+  const chosen = { name: how.segmenter, parameters: parametersOf(how) };
+  const source =
+    kept && isBag(kept) ? (await sought(client, kept, title, chosen)).found.source : kept;
+  const kind = source?.kind;
   const things = thingsOf(scene);
   const labels = things.flatMap(({ label }) => (label ? [label] : []));
   return {
@@ -257,9 +269,8 @@ export async function openStored(client: SketchmatchClient, name: string): Promi
     found: {
       source: source ?? sources.polygons(things),
       stored: name,
-      segmenter: segmenter?.name ?? "",
-      parameters: segmenter?.parameters ?? {},
       passages: !!passages?.length,
+      ...how,
     },
   };
 }
@@ -326,14 +337,19 @@ async function found(
   name = "",
   chosen?: Chosen,
 ): Promise<Pick<PlaceMap, "things" | "warnings" | "found">> {
-  const { scene, warnings, segmenter, passages } = await naming(name, () =>
-    client.segment(source, { segmenter: { ...chosen } }),
+  const { scene, warnings, segmenter, passages, map } = await naming(name, () =>
+    client.segment(source, { segmenter: { ...chosen }, includeMap: isBag(source) }),
   );
   const how = { segmenter: segmenter?.name ?? "", parameters: segmenter?.parameters ?? {} };
   return {
     things: thingsOf(scene),
     warnings,
-    found: { source, stored: "", passages: passages.length > 0, ...how },
+    found: {
+      source: map ? sources.mapServerMap(map.yaml, map.image) : source,
+      stored: "",
+      passages: passages.length > 0,
+      ...how,
+    },
   };
 }
 
@@ -372,7 +388,7 @@ export function asFound(found: Found) {
 }
 
 /** Return the parameters by which things were found, without those that stand for none. */
-export function parametersOf({ parameters }: Found): Tuned {
+export function parametersOf({ parameters }: Pick<Found, "parameters">): Tuned {
   return Object.fromEntries(
     Object.entries(parameters).filter(([, value]) => value !== null),
   ) as Tuned;
@@ -393,7 +409,9 @@ export async function foundOtherwise(
   map: PlaceMap,
   chosen: Chosen,
 ): Promise<PlaceMap> {
-  return { ...map, ...(await sought(client, map.found.source, map.title, chosen)) };
+  const seen = await sought(client, map.found.source, map.title, chosen);
+  // Where nothing was found in a bag before, its walls are known only now.
+  return { ...map, ...seen, underlay: map.underlay ?? (await underlayOf(seen.found.source.kind)) };
 }
 
 /** Have errors name the file that a person knows, not the field that it travels in. */
@@ -448,7 +466,15 @@ function gridOf(yaml: string, pixels: Blob): Underlay {
   const [x = 0, y = 0, yaw = 0] = (/^\s*origin\s*:\s*\[([^\]]*)\]/m.exec(yaml)?.[1] ?? "")
     .split(",")
     .map(Number);
-  return { pixels, resolution: number("resolution") || 1, origin: [x, y, yaw || 0], grid: true };
+  const said = /^\s*mode\s*:\s*["']?(scale|raw)\b/im.exec(yaml)?.[1]?.toLowerCase();
+  return {
+    pixels,
+    resolution: number("resolution") || 1,
+    origin: [x, y, yaw || 0],
+    grid: true,
+    mode: said as Underlay["mode"],
+    negate: /^\s*negate\s*:\s*(1|true|yes|on|y)\b/im.test(yaml),
+  };
 }
 
 /** Return a picture that browsers show; null where the file holds none that they know. */

@@ -31,7 +31,8 @@ from sketchmatch.errors import (
     ServerStoppingError,
     StoreError,
 )
-from sketchmatch.model import Scene, SceneDescriptor
+from sketchmatch.io.ros_map import encode_map_server
+from sketchmatch.model import OccupancyGrid, Scene, SceneDescriptor
 from sketchmatch.model import Source as AnySource
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.describe import in_directions
@@ -50,7 +51,7 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
     StoredScene,
 )
 from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest, SketchObjects
-from sketchmatch_proto.v1.source_pb2 import Source
+from sketchmatch_proto.v1.source_pb2 import MapServerMap, Source
 from sketchmatch_proto.v1.transfer_service_pb2 import TransferRequest
 
 __all__ = ["Job", "algorithms", "answers", "time_budget"]
@@ -368,4 +369,14 @@ def _segment(request: SegmentRequest, setup: Setup) -> Generator[Message, None, 
     source, segmenter = _source_and_segmenter(request, setup)
     with requests.paths_of(request):
         found = setup.engine.segment(source, segmenter, f"source.{source.field}")
-    yield responses.segmented(found, segmenter)
+    yield responses.segmented(found, segmenter, _map_of(request, source))
+
+
+def _map_of(request: SegmentRequest, source: AnySource) -> MapServerMap | None:
+    """Return the map that is in a source, where it is wanted."""
+    if not (request.include_map and isinstance(source, OccupancyGrid)):
+        return None
+    if request.source.HasField("map_server_map"):
+        return request.source.map_server_map
+    yaml, picture = encode_map_server(source)
+    return MapServerMap(yaml=yaml, image=picture)

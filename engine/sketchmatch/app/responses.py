@@ -222,14 +222,17 @@ def selection(value: Algorithm) -> pipeline_pb2.AlgorithmSelection:
     return message
 
 
-def segmented(found: Segmentation, segmenter: Segmenter) -> scene_service_pb2.SegmentResponse:
-    """Return what a segmenter found as a message."""
+def segmented(
+    found: Segmentation, segmenter: Segmenter, map_: source_pb2.MapServerMap | None = None
+) -> scene_service_pb2.SegmentResponse:
+    """Return what a segmenter found as a message, with its map where that is wanted."""
     return scene_service_pb2.SegmentResponse(
         scene=scene(found.scene),
         warnings=found.warnings,
         segmenter=selection(segmenter),
         route=_points(found.route),
         passages=_passages(found),
+        map=map_,
     )
 
 

@@ -53,6 +53,7 @@ References
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import re
@@ -71,7 +72,13 @@ from sketchmatch.model import GridPicture, Landmark, OccupancyGrid
 from sketchmatch.model.sources import check_placement
 from sketchmatch_map_files import MapFileError, content_of, parse
 
-__all__ = ["MapServerHeader", "decode_map_server", "header_for", "parse_header"]
+__all__ = [
+    "MapServerHeader",
+    "decode_map_server",
+    "encode_map_server",
+    "header_for",
+    "parse_header",
+]
 
 _EXAMPLES = {
     "image": "office.pgm",
@@ -212,6 +219,43 @@ def decode_map_server(
     if not objects:
         return grid
     return with_objects(grid, objects, None if own_objects else content_of(parse(yaml_text), image))
+
+
+def encode_map_server(grid: OccupancyGrid, picture: str = "map.png") -> tuple[str, bytes]:
+    """Return a grid's cells as the contents of a map's two files.
+
+    Parameters
+    ----------
+    grid
+        What to save; what its file named, and what people say its objects are, is left out.
+    picture
+        What the YAML file calls the picture.
+
+    Returns
+    -------
+    yaml_text, image
+        In mode ``scale`` with unknown cells transparent, so that each occupancy is read again as it
+        was, and browsers show walls dark on light floors. The picture is a PNG.
+
+    Examples
+    --------
+    >>> cells = np.array([[-1, 0], [63, 100]])
+    >>> decode_map_server(*encode_map_server(OccupancyGrid(cells, 0.05))).cells.tolist()
+    [[-1, 0], [63, 100]]
+    """
+    shades = np.zeros((256, 2), np.uint8)
+    shades[:101, 0] = np.rint(255.0 - 2.55 * np.arange(101))
+    shades[:101, 1] = 255
+    # ROS 1 takes what is transparent for unknown where its grey is between the thresholds.
+    shades[255, 0] = 128
+    file = io.BytesIO()
+    pixels = shades[grid.cells[::-1].view(np.uint8)]
+    PIL.Image.fromarray(pixels, "LA").save(file, "PNG", compress_level=1)
+    x, y, yaw = map(float, grid.origin)
+    return (
+        f"image: {json.dumps(picture)}\nmode: scale\nresolution: {float(grid.resolution)!r}\n"
+        f"origin: [{x!r}, {y!r}, {yaw!r}]\nnegate: 0\noccupied_thresh: 1.0\nfree_thresh: 0.0\n"
+    ), file.getvalue()
 
 
 def parse_header(yaml_text: str) -> MapServerHeader:

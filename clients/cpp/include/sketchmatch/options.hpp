@@ -105,9 +105,10 @@ struct MatchOptions {
 
 /// How to find the objects of one source; whatever is left out is the server's to decide.
 struct SegmentOptions {
-  std::string segmenter;  ///< Name of the algorithm.
-  Parameters params;      ///< Its parameters.
-  std::string profile;    ///< The server's pipeline that decides what is left out.
+  std::string segmenter;     ///< Name of the algorithm.
+  Parameters params;         ///< Its parameters.
+  std::string profile;       ///< The server's pipeline that decides what is left out.
+  bool include_map = false;  ///< Whether the occupancy grid is wanted, too, such as that of a bag.
 };
 
 /// How to make a call.

@@ -45,6 +45,14 @@ struct Passage {
   std::uint32_t second = 0;  ///< The other one.
 };
 
+/// A robot's map as map_server saves it.
+struct MapServerMap {
+  std::string yaml;          ///< Text of the YAML file.
+  std::string image;         ///< Bytes of the picture.
+  std::string objects;       ///< Text of the file that says what its objects are; may be empty.
+  bool own_objects = false;  ///< Whether these are of this map though they do not say so.
+};
+
 /// What a segmenter found in one source.
 struct Segmentation {
   Scene scene;                        ///< The objects.
@@ -52,6 +60,7 @@ struct Segmentation {
   AlgorithmSelection segmenter;       ///< The segmenter as it ran.
   std::vector<Point> route;           ///< The way that the person drew through the scene.
   std::vector<Passage> passages;      ///< Which objects open into each other: rooms do.
+  std::optional<MapServerMap> map;    ///< The occupancy grid, where it is asked for and there is one.
 };
 
 }  // namespace sketchmatch

@@ -18,7 +18,7 @@ from sketchmatch_proto.v1 import scene_pb2 as sketchmatch_dot_v1_dot_scene__pb2
 from sketchmatch_proto.v1 import source_pb2 as sketchmatch_dot_v1_dot_source__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"sketchmatch/v1/scene_service.proto\x12\x0esketchmatch.v1\x1a\x1fgoogle/protobuf/timestamp.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1asketchmatch/v1/scene.proto\x1a\x1bsketchmatch/v1/source.proto\"\x80\x01\n\x0eSegmentRequest\x12&\n\x06source\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12\x35\n\tsegmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x0f\n\x07profile\x18\x03 \x01(\t\"\xd1\x01\n\x0fSegmentResponse\x12$\n\x05scene\x18\x01 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x10\n\x08warnings\x18\x02 \x03(\t\x12\x35\n\tsegmenter\x18\x03 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12$\n\x05route\x18\x04 \x03(\x0b\x32\x15.sketchmatch.v1.Point\x12)\n\x08passages\x18\x05 \x03(\x0b\x32\x17.sketchmatch.v1.Passage\"(\n\x07Passage\x12\r\n\x05\x66irst\x18\x01 \x01(\r\x12\x0e\n\x06second\x18\x02 \x01(\r\"\x90\x01\n\x0fPutSceneRequest\x12&\n\x06source\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12\x35\n\tsegmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x0f\n\x07profile\x18\x03 \x01(\t\x12\r\n\x05title\x18\x04 \x01(\t\"V\n\x10PutSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\x12\x0f\n\x07\x63reated\x18\x02 \x01(\x08\"\xea\x01\n\x0bStoredScene\x12\x0c\n\x04name\x18\x01 \x01(\t\x12$\n\x05scene\x18\x02 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x10\n\x08warnings\x18\x03 \x03(\t\x12\x35\n\tsegmenter\x18\x04 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12$\n\x05route\x18\x05 \x03(\x0b\x32\x15.sketchmatch.v1.Point\x12\r\n\x05title\x18\x06 \x01(\t\x12)\n\x08passages\x18\x07 \x03(\x0b\x32\x17.sketchmatch.v1.Passage\"7\n\x0fGetSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x16\n\x0einclude_source\x18\x02 \x01(\x08\"m\n\x10GetSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\x12&\n\x06source\x18\x02 \x01(\x0b\x32\x16.sketchmatch.v1.Source\":\n\x11ListScenesRequest\x12\x11\n\tpage_size\x18\x01 \x01(\x05\x12\x12\n\npage_token\x18\x02 \x01(\t\"[\n\x12ListScenesResponse\x12,\n\x06scenes\x18\x01 \x03(\x0b\x32\x1c.sketchmatch.v1.SceneSummary\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"\x7f\n\x0cSceneSummary\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x14\n\x0cobject_count\x18\x02 \x01(\r\x12\x0e\n\x06labels\x18\x03 \x03(\t\x12,\n\x08put_time\x18\x04 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05title\x18\x05 \x01(\t\"m\n\x12UpdateSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12+\n\x06labels\x18\x02 \x03(\x0b\x32\x1b.sketchmatch.v1.ObjectLabel\x12\x12\n\x05title\x18\x03 \x01(\tH\x00\x88\x01\x01\x42\x08\n\x06_title\",\n\x0bObjectLabel\x12\x0e\n\x06object\x18\x01 \x01(\r\x12\r\n\x05label\x18\x02 \x01(\t\"H\n\x13UpdateSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\"\"\n\x12\x44\x65leteSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"\x15\n\x13\x44\x65leteSceneResponse2\xfd\x03\n\x0cSceneService\x12J\n\x07Segment\x12\x1e.sketchmatch.v1.SegmentRequest\x1a\x1f.sketchmatch.v1.SegmentResponse\x12M\n\x08PutScene\x12\x1f.sketchmatch.v1.PutSceneRequest\x1a .sketchmatch.v1.PutSceneResponse\x12M\n\x08GetScene\x12\x1f.sketchmatch.v1.GetSceneRequest\x1a .sketchmatch.v1.GetSceneResponse\x12S\n\nListScenes\x12!.sketchmatch.v1.ListScenesRequest\x1a\".sketchmatch.v1.ListScenesResponse\x12V\n\x0bUpdateScene\x12\".sketchmatch.v1.UpdateSceneRequest\x1a#.sketchmatch.v1.UpdateSceneResponse\x12V\n\x0b\x44\x65leteScene\x12\".sketchmatch.v1.DeleteSceneRequest\x1a#.sketchmatch.v1.DeleteSceneResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"sketchmatch/v1/scene_service.proto\x12\x0esketchmatch.v1\x1a\x1fgoogle/protobuf/timestamp.proto\x1a\x1dsketchmatch/v1/pipeline.proto\x1a\x1asketchmatch/v1/scene.proto\x1a\x1bsketchmatch/v1/source.proto\"\x95\x01\n\x0eSegmentRequest\x12&\n\x06source\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12\x35\n\tsegmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x0f\n\x07profile\x18\x03 \x01(\t\x12\x13\n\x0binclude_map\x18\x04 \x01(\x08\"\xfc\x01\n\x0fSegmentResponse\x12$\n\x05scene\x18\x01 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x10\n\x08warnings\x18\x02 \x03(\t\x12\x35\n\tsegmenter\x18\x03 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12$\n\x05route\x18\x04 \x03(\x0b\x32\x15.sketchmatch.v1.Point\x12)\n\x08passages\x18\x05 \x03(\x0b\x32\x17.sketchmatch.v1.Passage\x12)\n\x03map\x18\x06 \x01(\x0b\x32\x1c.sketchmatch.v1.MapServerMap\"(\n\x07Passage\x12\r\n\x05\x66irst\x18\x01 \x01(\r\x12\x0e\n\x06second\x18\x02 \x01(\r\"\x90\x01\n\x0fPutSceneRequest\x12&\n\x06source\x18\x01 \x01(\x0b\x32\x16.sketchmatch.v1.Source\x12\x35\n\tsegmenter\x18\x02 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12\x0f\n\x07profile\x18\x03 \x01(\t\x12\r\n\x05title\x18\x04 \x01(\t\"V\n\x10PutSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\x12\x0f\n\x07\x63reated\x18\x02 \x01(\x08\"\xea\x01\n\x0bStoredScene\x12\x0c\n\x04name\x18\x01 \x01(\t\x12$\n\x05scene\x18\x02 \x01(\x0b\x32\x15.sketchmatch.v1.Scene\x12\x10\n\x08warnings\x18\x03 \x03(\t\x12\x35\n\tsegmenter\x18\x04 \x01(\x0b\x32\".sketchmatch.v1.AlgorithmSelection\x12$\n\x05route\x18\x05 \x03(\x0b\x32\x15.sketchmatch.v1.Point\x12\r\n\x05title\x18\x06 \x01(\t\x12)\n\x08passages\x18\x07 \x03(\x0b\x32\x17.sketchmatch.v1.Passage\"7\n\x0fGetSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x16\n\x0einclude_source\x18\x02 \x01(\x08\"m\n\x10GetSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\x12&\n\x06source\x18\x02 \x01(\x0b\x32\x16.sketchmatch.v1.Source\":\n\x11ListScenesRequest\x12\x11\n\tpage_size\x18\x01 \x01(\x05\x12\x12\n\npage_token\x18\x02 \x01(\t\"[\n\x12ListScenesResponse\x12,\n\x06scenes\x18\x01 \x03(\x0b\x32\x1c.sketchmatch.v1.SceneSummary\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"\x7f\n\x0cSceneSummary\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x14\n\x0cobject_count\x18\x02 \x01(\r\x12\x0e\n\x06labels\x18\x03 \x03(\t\x12,\n\x08put_time\x18\x04 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05title\x18\x05 \x01(\t\"m\n\x12UpdateSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12+\n\x06labels\x18\x02 \x03(\x0b\x32\x1b.sketchmatch.v1.ObjectLabel\x12\x12\n\x05title\x18\x03 \x01(\tH\x00\x88\x01\x01\x42\x08\n\x06_title\",\n\x0bObjectLabel\x12\x0e\n\x06object\x18\x01 \x01(\r\x12\r\n\x05label\x18\x02 \x01(\t\"H\n\x13UpdateSceneResponse\x12\x31\n\x0cstored_scene\x18\x01 \x01(\x0b\x32\x1b.sketchmatch.v1.StoredScene\"\"\n\x12\x44\x65leteSceneRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"\x15\n\x13\x44\x65leteSceneResponse2\xfd\x03\n\x0cSceneService\x12J\n\x07Segment\x12\x1e.sketchmatch.v1.SegmentRequest\x1a\x1f.sketchmatch.v1.SegmentResponse\x12M\n\x08PutScene\x12\x1f.sketchmatch.v1.PutSceneRequest\x1a .sketchmatch.v1.PutSceneResponse\x12M\n\x08GetScene\x12\x1f.sketchmatch.v1.GetSceneRequest\x1a .sketchmatch.v1.GetSceneResponse\x12S\n\nListScenes\x12!.sketchmatch.v1.ListScenesRequest\x1a\".sketchmatch.v1.ListScenesResponse\x12V\n\x0bUpdateScene\x12\".sketchmatch.v1.UpdateSceneRequest\x1a#.sketchmatch.v1.UpdateSceneResponse\x12V\n\x0b\x44\x65leteScene\x12\".sketchmatch.v1.DeleteSceneRequest\x1a#.sketchmatch.v1.DeleteSceneResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -26,37 +26,37 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'sketchmatch_proto.v1.scene_
 if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
   _globals['_SEGMENTREQUEST']._serialized_start=176
-  _globals['_SEGMENTREQUEST']._serialized_end=304
-  _globals['_SEGMENTRESPONSE']._serialized_start=307
-  _globals['_SEGMENTRESPONSE']._serialized_end=516
-  _globals['_PASSAGE']._serialized_start=518
-  _globals['_PASSAGE']._serialized_end=558
-  _globals['_PUTSCENEREQUEST']._serialized_start=561
-  _globals['_PUTSCENEREQUEST']._serialized_end=705
-  _globals['_PUTSCENERESPONSE']._serialized_start=707
-  _globals['_PUTSCENERESPONSE']._serialized_end=793
-  _globals['_STOREDSCENE']._serialized_start=796
-  _globals['_STOREDSCENE']._serialized_end=1030
-  _globals['_GETSCENEREQUEST']._serialized_start=1032
-  _globals['_GETSCENEREQUEST']._serialized_end=1087
-  _globals['_GETSCENERESPONSE']._serialized_start=1089
-  _globals['_GETSCENERESPONSE']._serialized_end=1198
-  _globals['_LISTSCENESREQUEST']._serialized_start=1200
-  _globals['_LISTSCENESREQUEST']._serialized_end=1258
-  _globals['_LISTSCENESRESPONSE']._serialized_start=1260
-  _globals['_LISTSCENESRESPONSE']._serialized_end=1351
-  _globals['_SCENESUMMARY']._serialized_start=1353
-  _globals['_SCENESUMMARY']._serialized_end=1480
-  _globals['_UPDATESCENEREQUEST']._serialized_start=1482
-  _globals['_UPDATESCENEREQUEST']._serialized_end=1591
-  _globals['_OBJECTLABEL']._serialized_start=1593
-  _globals['_OBJECTLABEL']._serialized_end=1637
-  _globals['_UPDATESCENERESPONSE']._serialized_start=1639
-  _globals['_UPDATESCENERESPONSE']._serialized_end=1711
-  _globals['_DELETESCENEREQUEST']._serialized_start=1713
-  _globals['_DELETESCENEREQUEST']._serialized_end=1747
-  _globals['_DELETESCENERESPONSE']._serialized_start=1749
-  _globals['_DELETESCENERESPONSE']._serialized_end=1770
-  _globals['_SCENESERVICE']._serialized_start=1773
-  _globals['_SCENESERVICE']._serialized_end=2282
+  _globals['_SEGMENTREQUEST']._serialized_end=325
+  _globals['_SEGMENTRESPONSE']._serialized_start=328
+  _globals['_SEGMENTRESPONSE']._serialized_end=580
+  _globals['_PASSAGE']._serialized_start=582
+  _globals['_PASSAGE']._serialized_end=622
+  _globals['_PUTSCENEREQUEST']._serialized_start=625
+  _globals['_PUTSCENEREQUEST']._serialized_end=769
+  _globals['_PUTSCENERESPONSE']._serialized_start=771
+  _globals['_PUTSCENERESPONSE']._serialized_end=857
+  _globals['_STOREDSCENE']._serialized_start=860
+  _globals['_STOREDSCENE']._serialized_end=1094
+  _globals['_GETSCENEREQUEST']._serialized_start=1096
+  _globals['_GETSCENEREQUEST']._serialized_end=1151
+  _globals['_GETSCENERESPONSE']._serialized_start=1153
+  _globals['_GETSCENERESPONSE']._serialized_end=1262
+  _globals['_LISTSCENESREQUEST']._serialized_start=1264
+  _globals['_LISTSCENESREQUEST']._serialized_end=1322
+  _globals['_LISTSCENESRESPONSE']._serialized_start=1324
+  _globals['_LISTSCENESRESPONSE']._serialized_end=1415
+  _globals['_SCENESUMMARY']._serialized_start=1417
+  _globals['_SCENESUMMARY']._serialized_end=1544
+  _globals['_UPDATESCENEREQUEST']._serialized_start=1546
+  _globals['_UPDATESCENEREQUEST']._serialized_end=1655
+  _globals['_OBJECTLABEL']._serialized_start=1657
+  _globals['_OBJECTLABEL']._serialized_end=1701
+  _globals['_UPDATESCENERESPONSE']._serialized_start=1703
+  _globals['_UPDATESCENERESPONSE']._serialized_end=1775
+  _globals['_DELETESCENEREQUEST']._serialized_start=1777
+  _globals['_DELETESCENEREQUEST']._serialized_end=1811
+  _globals['_DELETESCENERESPONSE']._serialized_start=1813
+  _globals['_DELETESCENERESPONSE']._serialized_end=1834
+  _globals['_SCENESERVICE']._serialized_start=1837
+  _globals['_SCENESERVICE']._serialized_end=2346
 # @@protoc_insertion_point(module_scope)

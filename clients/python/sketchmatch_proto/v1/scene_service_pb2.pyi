@@ -25,9 +25,14 @@ class SegmentRequest(google.protobuf.message.Message):
     SOURCE_FIELD_NUMBER: builtins.int
     SEGMENTER_FIELD_NUMBER: builtins.int
     PROFILE_FIELD_NUMBER: builtins.int
+    INCLUDE_MAP_FIELD_NUMBER: builtins.int
     profile: builtins.str
     """Name of the profile that decides what is left out; see `Pipeline.profile`. Its sketch segmenter
     holds for strokes and images, its map segmenter for polygons and grids, each where it reads them.
+    """
+    include_map: builtins.bool
+    """Whether the occupancy grid is wanted, too: to show the walls of a map that came in a bag, or to
+    save it. It may be large.
     """
     @property
     def source(self) -> sketchmatch_proto.v1.source_pb2.Source:
@@ -43,9 +48,10 @@ class SegmentRequest(google.protobuf.message.Message):
         source: sketchmatch_proto.v1.source_pb2.Source | None = ...,
         segmenter: sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection | None = ...,
         profile: builtins.str = ...,
+        include_map: builtins.bool = ...,
     ) -> None: ...
     def HasField(self, field_name: typing.Literal["segmenter", b"segmenter", "source", b"source"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["profile", b"profile", "segmenter", b"segmenter", "source", b"source"]) -> None: ...
+    def ClearField(self, field_name: typing.Literal["include_map", b"include_map", "profile", b"profile", "segmenter", b"segmenter", "source", b"source"]) -> None: ...
 
 global___SegmentRequest = SegmentRequest
 
@@ -60,6 +66,7 @@ class SegmentResponse(google.protobuf.message.Message):
     SEGMENTER_FIELD_NUMBER: builtins.int
     ROUTE_FIELD_NUMBER: builtins.int
     PASSAGES_FIELD_NUMBER: builtins.int
+    MAP_FIELD_NUMBER: builtins.int
     @property
     def scene(self) -> sketchmatch_proto.v1.scene_pb2.Scene:
         """The objects, two or more."""
@@ -84,6 +91,13 @@ class SegmentResponse(google.protobuf.message.Message):
         then says. Empty where objects are things.
         """
 
+    @property
+    def map(self) -> sketchmatch_proto.v1.source_pb2.MapServerMap:
+        """The occupancy grid of the source, where it is wanted and there is one, as a map of map_server; one
+        that the source is itself comes back as it is. Of other sources it is in mode `scale`, in a PNG whose
+        unknown cells are transparent, and has the same objects as the source.
+        """
+
     def __init__(
         self,
         *,
@@ -92,9 +106,10 @@ class SegmentResponse(google.protobuf.message.Message):
         segmenter: sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection | None = ...,
         route: collections.abc.Iterable[sketchmatch_proto.v1.source_pb2.Point] | None = ...,
         passages: collections.abc.Iterable[global___Passage] | None = ...,
+        map: sketchmatch_proto.v1.source_pb2.MapServerMap | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["scene", b"scene", "segmenter", b"segmenter"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["passages", b"passages", "route", b"route", "scene", b"scene", "segmenter", b"segmenter", "warnings", b"warnings"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["map", b"map", "scene", b"scene", "segmenter", b"segmenter"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["map", b"map", "passages", b"passages", "route", b"route", "scene", b"scene", "segmenter", b"segmenter", "warnings", b"warnings"]) -> None: ...
 
 global___SegmentResponse = SegmentResponse
 
