@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from platformdirs import user_state_path
 
 from sketchmatch.cli import app
 from sketchmatch.config import load
@@ -73,6 +74,20 @@ def test_the_variables_of_the_image_are_settings(monkeypatch):
     settings = load(search=False).settings.server
     assert settings.address == variables["SKETCHMATCH_SERVER__ADDRESS"]
     assert settings.metrics_address == variables["SKETCHMATCH_SERVER__METRICS_ADDRESS"]
+
+
+def test_what_a_server_keeps_has_a_place_of_its_own_wherever_it_is_deployed(monkeypatch):
+    stage = DOCKERFILE.rpartition("\nFROM ")[2]
+    monkeypatch.setenv("XDG_STATE_HOME", re.search(r"XDG_STATE_HOME=(\S+)", stage)[1])
+    kept = str(user_state_path("sketchmatch", appauthor=False))
+    user = container_user()
+    assert f"RUN install --directory --owner={user} --group={user} --mode=0700 {kept}\n" in stage
+    assert re.search(r"^VOLUME (\S+)$", stage, re.M)[1] == kept
+    assert kept in [mount["mountPath"] for mount in container()["volumeMounts"]]
+    servers = [item for name, item in COMPOSE["services"].items() if name != "envoy"]
+    named = [each for item in servers for each in item["volumes"] if each.endswith(f":{kept}")]
+    assert {name.partition(":")[0] for name in named} == set(COMPOSE["volumes"])
+    assert len(named) == len(servers) == len(set(named)), "two servers cannot have one store"
 
 
 @pytest.mark.slow
