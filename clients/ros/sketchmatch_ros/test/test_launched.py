@@ -59,6 +59,10 @@ def launched(tmp_path_factory):
     server = subprocess.Popen([program, "serve", "--address", address])
     said = folder / "said.txt"
     try:
+        end = time.monotonic() + PATIENCE
+        while subprocess.run([program, "health", address], check=False).returncode:
+            assert time.monotonic() < end, f"the server is not ready within {PATIENCE:g} s"
+            time.sleep(0.5)
         with said.open("wb") as log:
             node = subprocess.Popen(
                 [*launch, f"params_file:={parameters}"],
