@@ -17,12 +17,15 @@ _CHECKOUT = (
     "engine",
     "plugins",
     "clients",
+    "Makefile",
+    "constraints.txt",
     "pyproject.toml",
     "README.md",
     "CHANGELOG.md",
     "LICENSE",
     "CONTRIBUTING.md",
 )
+_BUILT = shutil.ignore_patterns("__pycache__", "node_modules", "target")
 NO_INDEX = re.compile("No matching distribution|Could not find a version|connection error", re.I)
 
 
@@ -131,7 +134,7 @@ def _copy_checkout(folder: Path) -> None:
     for name in _CHECKOUT:
         source = ROOT / name
         if source.is_dir():
-            shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(source, folder / name, ignore=_BUILT)
         else:
             shutil.copy(source, folder / name)
 

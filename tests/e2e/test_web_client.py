@@ -7,10 +7,14 @@ import subprocess
 import pytest
 
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
+from tests.pages import Page
 from tests.tools import ROOT, require
 from tests.web import CLIENTS, serving_pad
 
-README = (CLIENTS / "typescript" / "README.md").read_text(encoding="utf-8")
+PAGE = Page("clients/typescript/README.md", __name__)
+INSTALL = PAGE.take_one("sh", "npm install")
+PROGRAMS = PAGE.take("js")
+PRINTED = PAGE.take("")
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +36,7 @@ def node(code, folder=CLIENTS / "web"):
 
 
 def test_the_readme_shows_a_first_answer_in_five_lines():
-    (first, *_) = re.findall(r"^```js\n(.*?)^```", README, re.S | re.M)
-    assert len(first.partition("\n\n")[2].splitlines()) == 5
+    assert len(PROGRAMS[0].text.partition("\n\n")[2].splitlines()) == 5
 
 
 @pytest.mark.slow
@@ -42,17 +45,14 @@ def test_every_program_of_the_readme_prints_what_it_says(url, tmp_path):
     shutil.copy(LIVING_ROOM_MAP, tmp_path / "room.yaml")
     shutil.copy(LIVING_ROOM_MAP.with_suffix(".pgm"), tmp_path / "room.pgm")
     (tmp_path / "node_modules").symlink_to(CLIENTS / "node_modules")
-    programs = re.findall(r"^```js\n(.*?)^```\n\n^```\n(.*?)^```", README, re.S | re.M)
-    assert len(programs) == README.count("```js")
-    for code, printed in programs:
-        done = node(code.replace("http://127.0.0.1:8080", url.rstrip("/")), tmp_path)
-        assert (done.stdout, done.stderr) == (printed, "")
+    for program, printed in zip(PROGRAMS, PRINTED, strict=True):
+        done = node(program.text.replace("http://127.0.0.1:8080", url.rstrip("/")), tmp_path)
+        assert (done.stdout, done.stderr) == (printed.text, "")
 
 
 @pytest.mark.slow
 def test_the_package_is_installed_as_the_readme_says(url, tmp_path):
-    (commands,) = re.findall(r"^```sh\n(.*?)^```", README, re.S | re.M)
-    ci, build, *rest = commands.splitlines()
+    ci, build, *rest = INSTALL.commands
     # `built` has done these two.
     assert (ci.rpartition("clients ")[2], build.rpartition("clients ")[2]) == ("ci", "run build")
     (tmp_path / "package.json").write_text('{"type": "module"}', encoding="utf-8")
