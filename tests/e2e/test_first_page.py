@@ -1,4 +1,4 @@
-"""The first page, command by command and program by program."""
+"""The first page, command by command and program by program, and where all clients begin."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 from tests.certificates import Authority
 from tests.pages import Page
 from tests.processes import free_port, server
-from tests.tools import require
+from tests.tools import ROOT, require
 from tests.web import built
 
 # An environment is made, and kernels are compiled in it.
@@ -32,6 +32,9 @@ TRANSFER = PAGE.take_one("python", "import Feature, carry")
 RELATION = PAGE.take_one("python", "directional_relation(")
 CLIENT = PAGE.take_one("python", "sources.strokes(strokes")
 IN_PROGRESS = PAGE.take_one("python", "client.sketch(")
+BEGIN = Page("clients/README.md", __name__).take_one("console", "$ sketchmatch serve")
+FIRST = Page("clients/python/README.md", __name__).take("python")[0]
+TUTORIAL = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 GIVEN = """\
 from sketchmatch_client import Client, sources
@@ -117,6 +120,17 @@ def test_the_demo_runs_in_a_fresh_checkout(clean_shell):
     said = clean_shell.run(f"cd sketchmatch && {demo} && cd ..", seconds=600)
     assert any("8 of 8 sketched objects matched" in line for line in said), said
     assert (clean_shell.folder / "sketchmatch" / "demo-overlay.png").exists()
+
+
+def test_whoever_begins_with_a_client_has_an_answer(clean_shell):
+    _, install, *lay_files, serve = BEGIN.commands
+    assert f"\n$ {install}\n" in TUTORIAL  # as the shell's environment was made
+    place = f"localhost:{free_port()}"
+    follow(clean_shell, [*lay_files, f"{serve} --address {place}"])
+    program = FIRST.text.replace("localhost:50051", place)
+    said = clean_shell.run(f"python -W error -c {shlex.quote(program)}")
+    clean_shell.run("kill $!; wait $!")
+    assert said[0].startswith("8 of 8 sketched objects matched")
 
 
 def test_the_sketch_pad_is_served():

@@ -83,13 +83,55 @@ def test_errors_say_what_to_do_and_where(url):
         const told = await client.match(there, there).catch((error) => error);
         console.log(told.name, told.failure, told.reason, told.field);
         const nobody = new SketchmatchClient("http://127.0.0.1:9");
-        console.log((await nobody.info().catch((error) => error)).failure);
+        const away = await nobody.info().catch((error) => error);
+        console.log(away.failure, away.message);
         const stop = new AbortController();
         const call = client.match(there, there, {{}}, {{}}, stop.signal).catch((error) => error);
         stop.abort();
         console.log((await call).failure);
+        for (const address of ["", "127.0.0.1:8080", "ftp://127.0.0.1"]) {{
+          try {{ new SketchmatchClient(address); }} catch (error) {{ console.log(error.message); }}
+        }}
+        for (const options of [{{ colour: 3 }}, {{ seed: -1n }}]) {{
+          const {{ failure, message }} = await client.match(there, there, options).catch((e) => e);
+          console.log(failure, message);
+        }}
     """)
     assert done.stderr == ""
-    first, away, cancelled = done.stdout.splitlines()
+    first, away, cancelled, *addresses, unknown, negative = done.stdout.splitlines()
     assert re.match(r"RequestFailed invalid [A-Z_]+ sketch", first)
-    assert (away, cancelled) == ("away", "cancelled")
+    assert re.fullmatch(
+        r"away the sketchmatch server at http://127\.0\.0\.1:9 is not available; start it with --web, "
+        r"or check the address \(.+\)",
+        away,
+    )
+    assert cancelled == "cancelled"
+    assert addresses == [
+        f"address is '{none}'; give a URL, as in 'http://127.0.0.1:8080'"
+        for none in ("", "127.0.0.1:8080", "ftp://127.0.0.1")
+    ]
+    assert unknown == "invalid MatchRequest has no 'colour'; correct the name"
+    assert re.fullmatch(r"invalid the request cannot be sent \(.*seed.*-1\); correct it", negative)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("url")  # it sees that the client is built
+def test_a_server_that_breaks_off_is_away():
+    done = node("""
+        import { createServer } from "node:http";
+        import { SketchmatchClient, sources } from "@sketchmatch/client";
+        const server = createServer((request, response) => {
+          response.writeHead(200, { "content-type": "application/connect+proto" });
+          response.write(Buffer.from([0, 0, 0]), () => response.destroy());
+        });
+        await new Promise((begun) => server.listen(0, "127.0.0.1", begun));
+        const client = new SketchmatchClient(`http://127.0.0.1:${server.address().port}`);
+        const there = sources.strokes([]);
+        const { failure, message } = await client.match(there, there).catch((error) => error);
+        console.log(failure, message);
+        process.exit();
+    """)
+    assert done.stderr == ""
+    assert re.match(
+        r"away the sketchmatch server at http://127\.0\.0\.1:\d+ is not available; ", done.stdout
+    )
