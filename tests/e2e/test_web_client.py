@@ -101,8 +101,8 @@ def test_errors_say_what_to_do_and_where(url):
     first, away, cancelled, *addresses, unknown, negative = done.stdout.splitlines()
     assert re.match(r"RequestFailed invalid [A-Z_]+ sketch", first)
     assert re.fullmatch(
-        r"away the sketchmatch server at http://127\.0\.0\.1:9 is not available; start it with --web, "
-        r"or check the address \(.+\)",
+        r"away the sketchmatch server at http://127\.0\.0\.1:9 is not available; "
+        r"start it with --web, or check the address \(.+\)",
         away,
     )
     assert cancelled == "cancelled"
