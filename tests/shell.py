@@ -17,6 +17,7 @@ _CHECKOUT = (
     "engine",
     "plugins",
     "clients",
+    "proto",
     "Makefile",
     "constraints.txt",
     "pyproject.toml",
