@@ -14,6 +14,7 @@ from tests.client.fake_server import running
 from tests.client.test_golden import MATCHES
 from tests.contract.golden import FOLDER, NAMES, golden
 from tests.pages import Page
+from tests.processes import free_port
 from tests.shell import steps
 from tests.tools import ROOT, TOOLS, require, tool
 
@@ -90,6 +91,11 @@ class Program:
         (step,) = self._run
         done = self._bash(f"{step.command.replace('localhost:50051', address)} {file}")
         return done.returncode, done.stdout.splitlines()
+
+    def alone(self):
+        """Run the program without arguments."""
+        (step,) = self._run
+        return self._bash(step.command.replace("localhost:50051", ""))
 
     def generated_otherwise(self):
         """Generate by the page's other commands, compile it, and return the files of both ways."""
@@ -222,6 +228,19 @@ def test_an_error_is_told_with_its_details(program, name):
     with running() as fake:
         fake.error = golden(name)
         assert program.says(fake.address, MatchRequest()) == (1, SAID[name])
+
+
+def test_a_program_without_an_address_says_how_it_is_called(program):
+    done = program.alone()
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert re.fullmatch(r"usage: .+ ADDRESS \[REQUEST\]", line)
+
+
+def test_nobody_at_the_address_is_told(program):
+    code, lines = program.says(f"127.0.0.1:{free_port()}", MatchRequest())
+    assert code == 1
+    assert "refused" in lines[0].lower()
 
 
 def test_what_the_server_refuses_names_its_field(program, address):
