@@ -17,12 +17,16 @@ _CHECKOUT = (
     "engine",
     "plugins",
     "clients",
+    "proto",
+    "Makefile",
+    "constraints.txt",
     "pyproject.toml",
     "README.md",
     "CHANGELOG.md",
     "LICENSE",
     "CONTRIBUTING.md",
 )
+_BUILT = shutil.ignore_patterns("__pycache__", "node_modules", "target")
 NO_INDEX = re.compile("No matching distribution|Could not find a version|connection error", re.I)
 
 
@@ -80,13 +84,13 @@ class Shell:
         assert self.said[last] == f"{_END}0", f"{command}\n" + "\n".join(lines)
         return lines
 
-    def follow(self, step: Step) -> list[str]:
+    def follow(self, step: Step, seconds: float = 200.0) -> list[str]:
         """Run a step of a document, and see that it shows what the document shows.
 
         One in the background goes on once it has shown that.
         """
         began = len(self.said)
-        lines = self.run(step.command)
+        lines = self.run(step.command, seconds)
         if step.command.endswith("&"):
             for line in step.shown:
                 self._wait(began, lambda said, line=line: said == line, 100.0, step.command)
@@ -120,7 +124,7 @@ def install(shell: Shell, block: str) -> None:
     """Follow the block that makes the environment, or do without where there is no index."""
     for step in steps(block):
         try:
-            shell.follow(step)
+            shell.follow(step, 600.0)  # pip builds wheels
         except AssertionError as error:
             require(not NO_INDEX.search(str(error)), "a package index that pip reaches")
             raise
@@ -131,7 +135,7 @@ def _copy_checkout(folder: Path) -> None:
     for name in _CHECKOUT:
         source = ROOT / name
         if source.is_dir():
-            shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(source, folder / name, ignore=_BUILT)
         else:
             shutil.copy(source, folder / name)
 

@@ -31,5 +31,5 @@ export default defineConfig({
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
   },
-  server: { proxy: { "/sketchmatch.": "http://127.0.0.1:8080" } },
+  server: { proxy: { "/sketchmatch.": process.env.SKETCHMATCH_WEB ?? "http://127.0.0.1:8080" } },
 });

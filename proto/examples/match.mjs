@@ -58,6 +58,10 @@ const example = {
   pipeline: { histogram: { parameters: struct({ directions: 36 }) } },
 };
 const [address, file] = process.argv.slice(2);
+if (!address) {
+  console.error("usage: node match.mjs ADDRESS [REQUEST]");
+  process.exit(2);
+}
 const request = file ? sketchmatch.v1.MatchRequest.deserialize(readFileSync(file)) : example;
 const client = new sketchmatch.v1.MatchService(address, grpc.credentials.createInsecure());
 const stream = client.Match(request, { deadline: Date.now() + 60_000 });

@@ -1,14 +1,12 @@
 """The client works beside every protobuf that it allows, though the oldest generated its code."""
 
-import os
 import subprocess
-import sys
 
 import pytest
 
 from tests.client import oldest_runtime
-from tests.shell import NO_INDEX
-from tests.tools import ROOT, require
+from tests.environment import environment
+from tests.tools import ROOT
 
 pytestmark = pytest.mark.slow
 
@@ -19,18 +17,9 @@ CLIENT = ROOT / "clients" / "python"
 def python(request, tmp_path_factory):
     """Return the Python of an environment that holds one protobuf and what goes with it."""
     folder = tmp_path_factory.mktemp(f"protobuf{request.param}")
-    subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     wanted = [f"protobuf=={request.param}.*", "googleapis-common-protos", "grpcio", "pyyaml"]
-    done = subprocess.run(
-        [folder / "bin" / "pip", "install", "--quiet", "--only-binary", ":all:", *wanted],
-        env={name: value for name, value in os.environ.items() if name != "PIP_CONSTRAINT"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    require(not NO_INDEX.search(done.stderr), "a package index that pip reaches")
-    assert done.returncode == 0, done.stderr
-    return request.param, folder / "bin" / "python"
+    programs = environment(folder, "--only-binary", ":all:", *wanted, PIP_CONSTRAINT="")
+    return request.param, programs / "python"
 
 
 def test_both_clients_match(python, server):

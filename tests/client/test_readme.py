@@ -1,5 +1,4 @@
 import json
-import re
 import time
 from threading import Thread
 
@@ -15,10 +14,13 @@ from sketchmatch_client import (
     sources,
 )
 from tests.client.fake_server import EVENTS
-from tests.tools import ROOT
+from tests.pages import Page
 
-README = (ROOT / "clients" / "python" / "README.md").read_text(encoding="utf-8")
-EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+PAGE = Page("clients/python/README.md", __name__)
+README = PAGE.text
+EXAMPLES = [block.text for block in PAGE.take("python", "import ")]
+BUTTON = PAGE.take_one("py", "stop_button")
+GEOJSON = PAGE.take_one("py", "to_geojson")
 
 
 @pytest.mark.parametrize(
@@ -44,7 +46,6 @@ def test_a_button_stops_a_match(server):
                 time.sleep(0.01)
             action()
 
-    _, example = re.findall(r"```py\n(.*?)```", README, re.DOTALL)
     server.events, server.endless = EVENTS[:3], True
     source = sources.image(b"picture")
     with Client(server.address) as client:
@@ -52,18 +53,17 @@ def test_a_button_stops_a_match(server):
             **{"client": client, "sketch": source, "room": source, "stop_button": Button()},
             "CallCancelledError": CallCancelledError,
         }
-        exec(example, names)
+        exec(BUTTON.text, names)
     assert names["match"] is None
     assert server.cancelled.wait(5)
 
 
 def test_a_match_is_written_as_geojson(server, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    example, _ = re.findall(r"```py\n(.*?)```", README, re.DOTALL)
     source = sources.image(b"picture")
     with Client(server.address) as client:
         match = client.match(source, source)
-    exec(example, {"match": match})
+    exec(GEOJSON.text, {"match": match})
     written = json.loads((tmp_path / "answer.geojson").read_text(encoding="utf-8"))
     assert written == match.to_geojson()
 

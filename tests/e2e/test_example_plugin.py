@@ -3,11 +3,11 @@
 import ast
 import json
 import re
-import socket
 import zipfile
 
 import pytest
 
+from tests.processes import free_port
 from tests.shell import steps
 from tests.tools import ROOT
 
@@ -22,12 +22,6 @@ TUTORIAL = re.search(
 )[1]
 _, *BLOCKS = re.findall(r"^```(console|python|toml)\n(.*?)^```", TUTORIAL, re.S | re.M)
 MATCH = "sketchmatch match living_room_sketch.svg living_room.yaml --searcher annealing --json"
-
-
-def free_port():
-    with socket.socket() as link:
-        link.bind(("127.0.0.1", 0))
-        return link.getsockname()[1]
 
 
 @pytest.fixture(scope="module")

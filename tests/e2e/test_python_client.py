@@ -1,19 +1,24 @@
 """The Python client's README, block by block, against a real server."""
 
-import re
+import os
 import shutil
 import subprocess
 import sys
+import tomllib
 
 import PIL.Image
 import PIL.ImageDraw
 import pytest
 
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
+from tests.environment import environment, said_by
+from tests.pages import Page
 from tests.tools import ROOT
 
-README = (ROOT / "clients" / "python" / "README.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"^(?:```|~~~)python\n(.*?)^(?:```|~~~)", README, re.S | re.M)
+CLIENT = ROOT / "clients" / "python"
+PAGE = Page("clients/python/README.md", __name__)
+INSTALL = PAGE.take_one("sh", "pip install")
+BLOCKS = [block.text for block in PAGE.take("python")]
 GIVEN = """\
 from sketchmatch_client import Client, sources
 
@@ -70,3 +75,38 @@ def test_every_block_runs(address, here, number):
     )
     assert done.returncode == 0, done.stderr
     assert SAID[number] in done.stdout
+
+
+@pytest.fixture(scope="module")
+def published(tmp_path_factory):
+    """Return the client as it is published, by the ending of the file."""
+    folder = tmp_path_factory.mktemp("published")
+    programs = environment(folder / "tools", "hatchling")
+    said_by(programs / "python", "-m", "hatchling", "build", "--directory", folder, cwd=CLIENT)
+    return {file.suffix: file for file in folder.iterdir() if file.is_file()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", [".whl", ".gz"])
+def test_what_is_installed_as_the_page_says_gives_a_first_answer(published, ending, address, here):
+    programs = environment(here / "environment")
+    own = here / "own.txt"
+    own.write_text(f"sketchmatch-client @ {published[ending].as_uri()}\n", encoding="utf-8")
+    said_by(
+        *("bash", "-ec", INSTALL.text),
+        PATH=f"{programs}{os.pathsep}{os.environ['PATH']}",
+        PIP_CONSTRAINT=f"{ROOT / 'constraints.txt'} {own}",
+    )
+    where = "import sketchmatch_client, sys\nprint(sketchmatch_client.__file__)\n"
+    light = "print({'numpy', 'numba', 'cv2'} & sys.modules.keys())\n"
+    code = where + BLOCKS[0].replace("localhost:50051", address) + light
+    first, *said, heavy = said_by(programs / "python", "-W", "error", "-c", code, cwd=here)
+    assert first.startswith(str(here))
+    assert SAID[0] in said[0]
+    assert heavy == "set()"
+
+
+def test_the_source_distribution_holds_every_package_of_the_wheel():
+    project = tomllib.loads((CLIENT / "pyproject.toml").read_text(encoding="utf-8"))
+    targets = project["tool"]["hatch"]["build"]["targets"]
+    assert set(targets["wheel"]["packages"]) < set(targets["sdist"]["include"])

@@ -7,10 +7,14 @@ import subprocess
 import pytest
 
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
+from tests.pages import Page
 from tests.tools import ROOT, require
 from tests.web import CLIENTS, serving_pad
 
-README = (CLIENTS / "typescript" / "README.md").read_text(encoding="utf-8")
+PAGE = Page("clients/typescript/README.md", __name__)
+INSTALL = PAGE.take_one("sh", "npm install")
+PROGRAMS = PAGE.take("js")
+PRINTED = PAGE.take("")
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +36,7 @@ def node(code, folder=CLIENTS / "web"):
 
 
 def test_the_readme_shows_a_first_answer_in_five_lines():
-    (first, *_) = re.findall(r"^```js\n(.*?)^```", README, re.S | re.M)
-    assert len(first.partition("\n\n")[2].splitlines()) == 5
+    assert len(PROGRAMS[0].text.partition("\n\n")[2].splitlines()) == 5
 
 
 @pytest.mark.slow
@@ -42,17 +45,14 @@ def test_every_program_of_the_readme_prints_what_it_says(url, tmp_path):
     shutil.copy(LIVING_ROOM_MAP, tmp_path / "room.yaml")
     shutil.copy(LIVING_ROOM_MAP.with_suffix(".pgm"), tmp_path / "room.pgm")
     (tmp_path / "node_modules").symlink_to(CLIENTS / "node_modules")
-    programs = re.findall(r"^```js\n(.*?)^```\n\n^```\n(.*?)^```", README, re.S | re.M)
-    assert len(programs) == README.count("```js")
-    for code, printed in programs:
-        done = node(code.replace("http://127.0.0.1:8080", url.rstrip("/")), tmp_path)
-        assert (done.stdout, done.stderr) == (printed, "")
+    for program, printed in zip(PROGRAMS, PRINTED, strict=True):
+        done = node(program.text.replace("http://127.0.0.1:8080", url.rstrip("/")), tmp_path)
+        assert (done.stdout, done.stderr) == (printed.text, "")
 
 
 @pytest.mark.slow
 def test_the_package_is_installed_as_the_readme_says(url, tmp_path):
-    (commands,) = re.findall(r"^```sh\n(.*?)^```", README, re.S | re.M)
-    ci, build, *rest = commands.splitlines()
+    ci, build, *rest = INSTALL.commands
     # `built` has done these two.
     assert (ci.rpartition("clients ")[2], build.rpartition("clients ")[2]) == ("ci", "run build")
     (tmp_path / "package.json").write_text('{"type": "module"}', encoding="utf-8")
@@ -83,13 +83,55 @@ def test_errors_say_what_to_do_and_where(url):
         const told = await client.match(there, there).catch((error) => error);
         console.log(told.name, told.failure, told.reason, told.field);
         const nobody = new SketchmatchClient("http://127.0.0.1:9");
-        console.log((await nobody.info().catch((error) => error)).failure);
+        const away = await nobody.info().catch((error) => error);
+        console.log(away.failure, away.message);
         const stop = new AbortController();
         const call = client.match(there, there, {{}}, {{}}, stop.signal).catch((error) => error);
         stop.abort();
         console.log((await call).failure);
+        for (const address of ["", "127.0.0.1:8080", "ftp://127.0.0.1"]) {{
+          try {{ new SketchmatchClient(address); }} catch (error) {{ console.log(error.message); }}
+        }}
+        for (const options of [{{ colour: 3 }}, {{ seed: -1n }}]) {{
+          const {{ failure, message }} = await client.match(there, there, options).catch((e) => e);
+          console.log(failure, message);
+        }}
     """)
     assert done.stderr == ""
-    first, away, cancelled = done.stdout.splitlines()
+    first, away, cancelled, *addresses, unknown, negative = done.stdout.splitlines()
     assert re.match(r"RequestFailed invalid [A-Z_]+ sketch", first)
-    assert (away, cancelled) == ("away", "cancelled")
+    assert re.fullmatch(
+        r"away the sketchmatch server at http://127\.0\.0\.1:9 is not available; "
+        r"start it with --web, or check the address \(.+\)",
+        away,
+    )
+    assert cancelled == "cancelled"
+    assert addresses == [
+        f"address is '{none}'; give a URL, as in 'http://127.0.0.1:8080'"
+        for none in ("", "127.0.0.1:8080", "ftp://127.0.0.1")
+    ]
+    assert unknown == "invalid MatchRequest has no 'colour'; correct the name"
+    assert re.fullmatch(r"invalid the request cannot be sent \(.*seed.*-1\); correct it", negative)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("url")  # it sees that the client is built
+def test_a_server_that_breaks_off_is_away():
+    done = node("""
+        import { createServer } from "node:http";
+        import { SketchmatchClient, sources } from "@sketchmatch/client";
+        const server = createServer((request, response) => {
+          response.writeHead(200, { "content-type": "application/connect+proto" });
+          response.write(Buffer.from([0, 0, 0]), () => response.destroy());
+        });
+        await new Promise((begun) => server.listen(0, "127.0.0.1", begun));
+        const client = new SketchmatchClient(`http://127.0.0.1:${server.address().port}`);
+        const there = sources.strokes([]);
+        const { failure, message } = await client.match(there, there).catch((error) => error);
+        console.log(failure, message);
+        process.exit();
+    """)
+    assert done.stderr == ""
+    assert re.match(
+        r"away the sketchmatch server at http://127\.0\.0\.1:\d+ is not available; ", done.stdout
+    )

@@ -3,18 +3,22 @@
 ``test_real_server.py`` sends the goal that it shows.
 """
 
-import re
 import subprocess
 import sys
 from types import ModuleType, SimpleNamespace
 
 import yaml
 
+from tests.pages import Page
 from tests.ros.messages import message
 from tests.ros.rclpy_stand_in import Policy
 from tests.tools import ROOT
 
-README = (ROOT / "clients" / "ros" / "README.md").read_text(encoding="utf-8")
+PAGE = Page("clients/ros/README.md", __name__)
+COMMANDS = PAGE.take_one("sh", "ros2 launch")
+GOAL = PAGE.take_one("yaml", "strokes:")
+DRIVER = PAGE.take_one("python", "FollowPath")
+COSTMAP = PAGE.take_one("yaml", "costmap")
 _STAND_IN = """\
 #!/bin/bash
 printf '%s\\n' "$(basename "$0")" "$@" --- >> "$SAID"
@@ -26,15 +30,6 @@ fi
 """
 
 
-def block(language):
-    (text,) = re.findall(rf"^```{language}\n(.*?)^```", README, re.M | re.S)
-    return text
-
-
-def test_the_blocks_are_those_that_tests_go_through():
-    assert re.findall(r"^```(\w+)", README, re.M) == ["sh", "yaml", "python", "yaml"]
-
-
 def test_the_commands_put_both_packages_where_they_are_built_and_send_the_goal(tmp_path):
     tools, home = tmp_path / "tools", tmp_path / "home"
     tools.mkdir()
@@ -43,11 +38,10 @@ def test_the_commands_put_both_packages_where_they_are_built_and_send_the_goal(t
         (tools / name).write_text(_STAND_IN)
         (tools / name).chmod(0o755)
     (tmp_path / "sketchmatch").symlink_to(ROOT)
-    goal, _ = re.findall(r"^```yaml\n(.*?)^```", README, re.M | re.S)
-    (home / "workspace" / "goal.yaml").write_text(goal, "utf-8")
+    (home / "workspace" / "goal.yaml").write_text(GOAL.text, "utf-8")
     said = tmp_path / "said.txt"
     subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", block("sh") + '\necho "$SOURCED"'],
+        ["bash", "-euo", "pipefail", "-c", COMMANDS.text + '\necho "$SOURCED"'],
         cwd=tmp_path,
         env={"PATH": f"{tools}:/usr/bin:/bin", "HOME": str(home), "SAID": str(said)},
         check=True,
@@ -75,7 +69,7 @@ def test_the_commands_put_both_packages_where_they_are_built_and_send_the_goal(t
         "sketchmatch_msgs/action/MatchSketch",
     ]
     assert (ROOT / "clients" / "ros" / f"{action[5]}.action").is_file()
-    assert yaml.safe_load("\n".join(action[6:])) == yaml.safe_load(goal)
+    assert yaml.safe_load("\n".join(action[6:])) == yaml.safe_load(GOAL.text)
 
 
 def test_the_program_drives_each_route_that_is_published(ros, monkeypatch):
@@ -121,14 +115,13 @@ def test_the_program_drives_each_route_that_is_published(ros, monkeypatch):
     }
     for name, part in parts.items():
         monkeypatch.setitem(sys.modules, name, part)
-    exec(block("python"), {})
+    exec(DRIVER.text, {})
     assert told == [("follow_path", route)]
 
 
 def test_the_costmap_hears_the_filter_that_the_node_publishes(ros):
     del ros
-    _, shown = re.findall(r"^```yaml\n(.*?)^```", README, re.M | re.S)
-    parameters = yaml.safe_load(shown)["global_costmap"]["global_costmap"]["ros__parameters"]
+    parameters = yaml.safe_load(COSTMAP.text)["global_costmap"]["global_costmap"]["ros__parameters"]
     (name,) = parameters["filters"]
     topic = parameters[name]["filter_info_topic"]
     code = (ROOT / "clients/ros/sketchmatch_ros/sketchmatch_ros/node.py").read_text("utf-8")

@@ -1,6 +1,5 @@
 """The node, between stand-ins for ROS, matches the README's goal on a real server."""
 
-import re
 from array import array
 
 import numpy as np
@@ -8,13 +7,13 @@ import pytest
 import yaml
 
 from tests import processes
+from tests.pages import Page
 from tests.ros.messages import message
 from tests.ros.rclpy_stand_in import GoalHandle, GoalResponse
-from tests.tools import ROOT
 
 pytestmark = pytest.mark.slow
 
-README = (ROOT / "clients" / "ros" / "README.md").read_text(encoding="utf-8")
+GOAL = Page("clients/ros/README.md", __name__).take_one("yaml", "strokes:")
 BOXES = {"table": (7, 7, 2, 3), "bunk": (1, 9, 4, 2), "rack": (2, 1, 1, 5)}
 CELL = 0.05
 
@@ -33,8 +32,7 @@ def room():
 
 def drawn():
     """Return the goal that the README shows, read as ``ros2 action send_goal`` reads it."""
-    (text,) = re.findall(r"```yaml\n(sketch:.*?)```", README, re.S)
-    given = yaml.safe_load(text)
+    given = yaml.safe_load(GOAL.text)
     point, stroke = message("geometry_msgs/msg/Point"), message("sketchmatch_msgs/msg/Stroke")
     strokes = [
         stroke(

@@ -19,7 +19,9 @@ from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import Choice, resolve
 from sketchmatch.registry import Kind, PluginStatus, Registry, default_registry
 from sketchmatch_client import AccessOptions
-from tests.tools import ROOT
+from tests.pages import Page
+
+SHOWN = Page("README.md", __name__).take_one("toml")
 
 SCENE = Scene.from_polygons(
     [[[0, 0], [2, 0], [2, 1]], [[5, 1], [6, 1], [6, 4]], [[1, 5], [2, 5], [2, 7]]]
@@ -525,8 +527,7 @@ def test_the_file_to_begin_with_has_every_setting():
 
 
 def test_the_file_in_the_readme_is_sound(file):
-    (text,) = re.findall(r"```toml\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.S)
-    path = file(text)
+    path = file(SHOWN.text)
     assert check(path) == (path, [])
     assert searcher_of(load(path)).name == "exact"
 

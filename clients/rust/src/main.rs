@@ -2,7 +2,7 @@
 //!
 //! REQUEST is a file with a MatchRequest in binary, in place of the one below.
 
-use std::{env, error::Error, fs, process::ExitCode, time::Duration};
+use std::{env, error::Error, fs, iter, process::ExitCode, time::Duration};
 
 use prost::Message;
 use prost_types::{value::Kind, Struct, Value};
@@ -21,14 +21,24 @@ mod v1 {
 #[tokio::main(flavor = "current_thread")]
 async fn main() -> ExitCode {
     let given: Vec<String> = env::args().skip(1).collect();
-    let Err(error) = run(&given[0], given.get(1)).await else {
+    let Some(address) = given.first() else {
+        eprintln!("usage: sketch ADDRESS [REQUEST]");
+        return ExitCode::from(2);
+    };
+    let Err(error) = run(address, given.get(1)).await else {
         return ExitCode::SUCCESS;
     };
     match error.downcast_ref::<Status>() {
         Some(status) => explain(status),
-        None => println!("{error}"),
+        None => println!("{}", whole(error.as_ref())),
     }
     ExitCode::FAILURE
+}
+
+/// An error of the transport says in its sources alone what is wrong.
+fn whole(error: &dyn Error) -> String {
+    let causes = iter::successors(Some(error), |error| error.source());
+    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
 }
 
 async fn run(address: &str, file: Option<&String>) -> Result<(), Box<dyn Error>> {

@@ -1,8 +1,13 @@
-import { create, type JsonObject, type MessageInitShape } from "@bufbuild/protobuf";
+import {
+  create,
+  type DescMessage,
+  type JsonObject,
+  type MessageInitShape,
+} from "@bufbuild/protobuf";
 import { type Client, createClient, type Interceptor, type Transport } from "@connectrpc/connect";
 import { createConnectTransport } from "@connectrpc/connect-web";
 
-import { RequestFailed } from "./errors.js";
+import { invalid, RequestFailed } from "./errors.js";
 import {
   CatalogService,
   type GetServerInfoResponse,
@@ -51,6 +56,7 @@ export interface Answer {
 
 /** Asks a server at its address for browsers, as in `http://127.0.0.1:8080`. */
 export class SketchmatchClient {
+  readonly #address: string;
   readonly #matches: Client<typeof MatchService>;
   readonly #catalog: Client<typeof CatalogService>;
   /** Scenes that the server keeps. Calls of this and the two below throw what `RequestFailed.from` reads. */
@@ -62,7 +68,14 @@ export class SketchmatchClient {
   /** Calls any service of the contract, those too that have no method here. */
   readonly transport: Transport;
 
+  /** @throws RequestFailed if the address is none. */
   constructor(address: string, access: Access = {}) {
+    if (!/^https?:\/\/[^/]/i.test(address))
+      throw invalid(
+        `address is '${address}'; give a URL, as in 'http://127.0.0.1:8080'`,
+        "address",
+      );
+    this.#address = address;
     this.transport = createConnectTransport({
       baseUrl: address,
       useBinaryFormat: true,
@@ -91,8 +104,9 @@ export class SketchmatchClient {
     signal?: AbortSignal,
   ): Promise<Answer> {
     let scenes: MatchScenes | undefined;
+    known(MatchRequestSchema, options);
     const request = create(MatchRequestSchema, { ...options, sketch, map });
-    return failing(async () => {
+    return this.#failing(async () => {
       for await (const { event } of this.#matches.match(request, stopping(signal))) {
         switch (event.case) {
           case "accepted":
@@ -123,18 +137,27 @@ export class SketchmatchClient {
     } = {},
     signal?: AbortSignal,
   ): Promise<SegmentResponse> {
+    known(SegmentRequestSchema, options);
     const request = create(SegmentRequestSchema, { ...options, source });
-    return failing(() => this.scenes.segment(request, stopping(signal)));
+    return this.#failing(() => this.scenes.segment(request, stopping(signal)));
   }
 
   /** Return what there is to choose from. */
   async algorithms(signal?: AbortSignal): Promise<ListAlgorithmsResponse> {
-    return failing(() => this.#catalog.listAlgorithms({}, stopping(signal)));
+    return this.#failing(() => this.#catalog.listAlgorithms({}, stopping(signal)));
   }
 
   /** Return the server's versions and limits. */
   async info(signal?: AbortSignal): Promise<GetServerInfoResponse> {
-    return failing(() => this.#catalog.getServerInfo({}, stopping(signal)));
+    return this.#failing(() => this.#catalog.getServerInfo({}, stopping(signal)));
+  }
+
+  async #failing<T>(call: () => Promise<T>): Promise<T> {
+    try {
+      return await call();
+    } catch (thrown) {
+      throw RequestFailed.from(thrown, this.#address);
+    }
   }
 }
 
@@ -150,10 +173,9 @@ function stopping(signal: AbortSignal | undefined): { signal?: AbortSignal } {
   return signal ? { signal } : {};
 }
 
-async function failing<T>(call: () => Promise<T>): Promise<T> {
-  try {
-    return await call();
-  } catch (thrown) {
-    throw RequestFailed.from(thrown);
-  }
+/** Refuse options that a message has no field for, which would be left out in silence. */
+function known(schema: DescMessage, options: object): void {
+  for (const name of Object.keys(options))
+    if (!schema.members.some((member) => member.localName === name))
+      throw invalid(`${schema.name} has no '${name}'; correct the name`, name);
 }

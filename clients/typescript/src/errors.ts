@@ -63,17 +63,20 @@ export class RequestFailed extends Error {
     super(message);
   }
 
-  /** Return what went wrong with a call, whatever was thrown. */
-  static from(thrown: unknown): RequestFailed {
+  /** Return what went wrong with a call, whatever was thrown; `address` is who was asked. */
+  static from(thrown: unknown, address = ""): RequestFailed {
     if (thrown instanceof RequestFailed) return thrown;
     const error = ConnectError.from(thrown);
+    if (isUnreachable(error)) return unreachable(error, address);
+    if (isUnsendable(error))
+      return invalid(`the request cannot be sent (${error.rawMessage}); correct it`, "");
     const [info] = error.findDetails(ErrorInfoSchema);
     const [request] = error.findDetails(BadRequestSchema);
     const [retry] = error.findDetails(RetryInfoSchema);
     const delay = retry?.retryDelay;
     return new RequestFailed(
       error.rawMessage,
-      isUnreachable(error) ? "away" : (FAILURES[error.code] ?? "failed"),
+      FAILURES[error.code] ?? "failed",
       info?.reason ?? "",
       request?.fieldViolations[0]?.field ?? "",
       delay && Number(delay.seconds) + delay.nanos / 1e9,
@@ -81,7 +84,31 @@ export class RequestFailed extends Error {
   }
 }
 
-/** Whether nobody answered: fetch throws a TypeError then, in browsers and in Node.js. */
+/** Return the error of a request that cannot be sent as it is. */
+export function invalid(message: string, field: string): RequestFailed {
+  return new RequestFailed(message, "invalid", "INVALID_FIELD", field, undefined);
+}
+
+/** Whether nobody answered, or not to the end: fetch throws a TypeError then, in browsers and in Node.js. */
 function isUnreachable(error: ConnectError): boolean {
   return error.code === Code.Unknown && error.cause instanceof TypeError;
+}
+
+function unreachable(error: ConnectError, address: string): RequestFailed {
+  // In Node.js the cause of the cause says more than "fetch failed".
+  const { message, cause } = error.cause as TypeError;
+  const deeper = cause instanceof Error ? cause.message || (cause as { code?: string }).code : "";
+  const who = address ? `the sketchmatch server at ${address}` : "the sketchmatch server";
+  return new RequestFailed(
+    `${who} is not available; start it with --web, or check the address (${(deeper || message).trim()})`,
+    "away",
+    "",
+    "",
+    undefined,
+  );
+}
+
+/** Whether a value has no place in its message, which is found out before anything is sent. */
+function isUnsendable(error: ConnectError): boolean {
+  return error.code === Code.Internal && error.rawMessage.startsWith("serialize ");
 }
