@@ -19,7 +19,7 @@ from tests.tools import ROOT
 
 OURS = ROOT / "clients" / "ros" / "sketchmatch_msgs"
 # As nav2 of Jazzy has it: https://docs.ros.org/en/jazzy/p/nav2_msgs/msg/CostmapFilterInfo.html
-_FILTER_INFO = """\
+FILTER_INFO = """\
 std_msgs/Header header
 uint8 type
 string filter_mask_topic
@@ -27,11 +27,20 @@ float32 base
 float32 multiplier
 """
 # https://docs.ros.org/en/jazzy/p/nav2_msgs/action/FollowPath.html
-_FOLLOW_PATH = """\
+FOLLOW_PATH = """\
 nav_msgs/Path path
 string controller_id
 string goal_checker_id
 string progress_checker_id
+"""
+FOLLOW_PATH_RESULT = """\
+std_msgs/Empty result
+uint16 error_code
+string error_msg
+"""
+FOLLOW_PATH_FEEDBACK = """\
+float32 distance_to_goal
+float32 speed
 """
 
 
@@ -49,8 +58,8 @@ def store():
         parts = file.read_text("utf-8").split("\n---\n")
         for part, text in zip(names, parts, strict=True):
             texts[f"sketchmatch_msgs/msg/{file.stem}{part}"] = text
-    texts["nav2_msgs/msg/CostmapFilterInfo"] = _FILTER_INFO
-    texts["nav2_msgs/msg/FollowPathGoal"] = _FOLLOW_PATH
+    texts["nav2_msgs/msg/CostmapFilterInfo"] = FILTER_INFO
+    texts["nav2_msgs/msg/FollowPathGoal"] = FOLLOW_PATH
     types = {}
     for name, text in texts.items():
         types.update(get_types_from_msg(text, name))

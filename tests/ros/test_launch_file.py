@@ -1,47 +1,12 @@
-"""The test of the package that runs where ROS is, run between stand-ins for ROS.
+"""The launch file, run between stand-ins for launch, of which there is no wheel."""
 
-So what it sends and expects is known to be right; that ROS itself does its part is for the
-container to show.
-"""
-
-import importlib.util
 import runpy
 import sys
 from types import ModuleType, SimpleNamespace
 
-import pytest
-
-from tests import processes
-from tests.ros import in_process
 from tests.ros.conftest import PACKAGE
 
 NAME = "sketchmatch_ros"
-PROGRAM = PACKAGE / "test" / "test_launched.py"
-
-
-@pytest.fixture
-def node(ros):
-    made = ros.node.SketchmatchNode(ros.carrying.carry)
-    made.parameters["radius"] = 0.2
-    return made
-
-
-@pytest.mark.slow
-def test_what_is_expected_of_the_launched_node_is_so(node):
-    person = in_process.install(node)
-    spec = importlib.util.spec_from_file_location("launched", PROGRAM)
-    launched = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(launched)
-    tests = [test for name, test in vars(launched).items() if name.startswith("test_")]
-    assert len(tests) == 7
-    with processes.server() as running:
-        node.parameters["address"] = running.address
-        someone = launched.Person(person, lambda: str(node.said))
-        person.ros.change(1)
-        person.ros.change(3)
-        for test in tests:
-            test(someone)
-        node.go("shutdown", "finalized")
 
 
 class Recorded(SimpleNamespace):
