@@ -8,6 +8,7 @@ import pytest
 from tests.ros import messages, rclpy_stand_in
 from tests.tools import ROOT, require
 
+collect_ignore = ["follow.py", "ros2.py"]  # programs for where ROS is
 PACKAGE = ROOT / "clients" / "ros" / "sketchmatch_ros"
 
 

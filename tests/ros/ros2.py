@@ -6,6 +6,7 @@ does: it configures the node, and activates it.
 
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import rclpy
@@ -36,7 +37,5 @@ def main(verb: str, package: str, _file: str, parameters: str) -> None:
 
 
 if __name__ == "__main__":
-    try:
+    with suppress(KeyboardInterrupt):
         main(*sys.argv[1:])
-    except KeyboardInterrupt:
-        pass

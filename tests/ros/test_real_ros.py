@@ -1,7 +1,7 @@
 """The packages where ROS 2 is: built, launched and tested by ROS's own means.
 
-ROS 2 Jazzy comes as wheels (``jazzy.txt``): build tools, middleware and rclpy. Of what has no wheel,
-nav2's interfaces are built from their definitions, and ``ros2 launch`` is ``ros2.py``.
+ROS 2 Jazzy comes as wheels (``jazzy.txt``): build tools, middleware and rclpy. Of what has no
+wheel, nav2's interfaces are built from their definitions, and ``ros2 launch`` is ``ros2.py``.
 """
 
 import os
@@ -96,7 +96,7 @@ def make_at_home(programs: Path) -> None:
 
 
 def write_nav2_msgs(folder: Path) -> None:
-    """Write a package with those interfaces of nav2 that are used."""
+    """Write a package with the interfaces of nav2 that are used."""
     package = (ROS / "sketchmatch_msgs" / "package.xml").read_text("utf-8")
     package = package.replace("<name>sketchmatch_msgs<", "<name>nav2_msgs<")
     follow = "---\n".join((FOLLOW_PATH, FOLLOW_PATH_RESULT, FOLLOW_PATH_FEEDBACK))
