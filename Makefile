@@ -17,7 +17,8 @@ KERNEL_SHARE := 99
 says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 
 .PHONY: demo test test-slow test-all test-units test-interpreted mutation lint proto bench \
-  bench-histograms bench-match bench-searchers bench-server bench-sketches bench-startup experiments \
+  bench-histograms bench-match bench-requests bench-searchers bench-server bench-sketches \
+  bench-startup experiments \
   fuzz look \
   reference api serve clean web pad lint-web bench-web look-web
 
@@ -104,6 +105,9 @@ bench-histograms: $(VENV)/dev
 
 bench-match: $(VENV)/dev
 	@$(BIN)/python -m tests.benchmarks.matches $(ARGS)
+
+bench-requests: $(VENV)/dev
+	@$(BIN)/python -m tests.benchmarks.requests $(ARGS)
 
 bench-searchers: $(VENV)/bench
 	@$(BIN)/python -m tests.benchmarks.searchers $(ARGS)

@@ -10,8 +10,9 @@ from sketchmatch.api import forces
 from sketchmatch.app.jobs import answers
 from sketchmatch.app.orders import Order
 from sketchmatch.app.remembered import Remembered
-from sketchmatch.app.scenes import Described, SceneArchive
+from sketchmatch.app.scenes import SceneArchive
 from sketchmatch.app.setup import RequestLimits, Setup
+from sketchmatch.app.shelf import Described
 from sketchmatch.app.store import Store
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import default_registry

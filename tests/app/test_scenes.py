@@ -8,7 +8,8 @@ import pytest
 
 from sketchmatch.api import Segmentation
 from sketchmatch.app import responses
-from sketchmatch.app.scenes import Described, SceneArchive, Shelf, described_by, name_of
+from sketchmatch.app.scenes import SceneArchive
+from sketchmatch.app.shelf import Described, Shelf, described_by, name_of
 from sketchmatch.app.store import Store
 from sketchmatch.errors import InvalidInputError, NotFoundError, QuotaError, StoreError
 from sketchmatch.model import Scene

@@ -2,8 +2,8 @@
 
 import pytest
 
-from sketchmatch.app.scenes import segmentation
 from sketchmatch.app.setup import RequestLimits
+from sketchmatch.app.shelf import segmentation
 from sketchmatch.errors import InvalidInputError
 from tests.contract.conversions import requests, responses
 from tests.contract.golden import as_json, as_written, golden

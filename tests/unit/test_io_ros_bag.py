@@ -5,6 +5,7 @@ import math
 import sqlite3
 import struct
 import sys
+import tracemalloc
 from contextlib import closing
 from types import SimpleNamespace
 
@@ -307,6 +308,73 @@ def test_a_bag_whose_index_leads_to_one_place_again_and_again_ends_soon():
     assert 13 + len(head) == start
     with pytest.raises(InvalidInputError, match="leads to the same place again and again"):
         decode_file("a.bag", data + info * chunks)
+
+
+MESSAGE = b"\5" + struct.pack("<QHIQQ", 22, 1, 0, 10**9, 10**9)
+
+
+def stuffed(folder, monkeypatch, content):
+    """Return an MCAP bag of one map, whose chunk has more content after it."""
+    from rosbags.rosbag2.storage_mcap import McapWriter
+
+    close = McapWriter.close_chunk
+
+    def close_chunk(writer):
+        writer.chunk.bio.write(content)
+        close(writer)
+
+    monkeypatch.setattr(McapWriter, "close_chunk", close_chunk)
+    return file_of(write(folder, MCAP, ("/map", CELLS, 0.0), packing="zstd"))
+
+
+@pytest.mark.parametrize("filler", [MESSAGE, bytes(9)], ids=["messages of the topic", "nothing"])
+def test_a_small_chunk_of_millions_of_records_is_refused_before_it_is_unpacked(
+    tmp_path, monkeypatch, filler
+):
+    """Read one by one they took 20 s and 1 GiB where 25 KB unpack to as much as a file may hold."""
+    data = stuffed(tmp_path, monkeypatch, filler * 1_000_000).read_bytes()
+    assert len(data) < 10_000
+    tracemalloc.start()
+    try:
+        with pytest.raises(InvalidInputError, match="packs more records into its"):
+            decode_file("a.mcap", data)
+        assert tracemalloc.get_traced_memory()[1] < 8_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_chunk_that_says_that_it_is_too_large_is_not_unpacked(tmp_path, monkeypatch):
+    one_record = b"\x7f" + struct.pack("<Q", 20_000_000) + bytes(20_000_000)
+    data = stuffed(tmp_path, monkeypatch, one_record).read_bytes()
+    assert decode_file("a.mcap", data).cells.shape == CELLS.shape
+    monkeypatch.setattr("sketchmatch.io.ros_bag._unpacker", pytest.fail)
+    with (
+        limited_to(SourceLimits(max_bytes=1_000_000)),
+        pytest.raises(InvalidInputError, match="unpacks to more than 1000000 bytes"),
+    ):
+        decode_file("a.mcap", data)
+
+
+def test_a_chunk_that_is_larger_than_it_says_is_refused_as_soon_as_it_is(tmp_path, monkeypatch):
+    one_record = b"\x7f" + struct.pack("<Q", 20_000_000) + bytes(20_000_000)
+    data = bytearray(stuffed(tmp_path, monkeypatch, one_record).read_bytes())
+    size = data.index(b"zstd") - 16
+    (said,) = struct.unpack_from("<Q", data, size)
+    assert said > 20_000_000
+    lying = bytes(data).replace(data[size : size + 8], struct.pack("<Q", 1000))
+    tracemalloc.start()
+    try:
+        with pytest.raises(InvalidInputError, match="more than the 1000 bytes that it says"):
+            decode_file("a.mcap", lying)
+        assert tracemalloc.get_traced_memory()[1] < 8_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_many_small_messages_beside_the_map_are_no_attack(tmp_path):
+    ticks = [("/tick", "t", 0.0)] * 20_000
+    bag = write(tmp_path, MCAP, *ticks, ("/map", CELLS, 0.0), packing="zstd")
+    assert (decoded(file_of(bag)).cells == CELLS).all()
 
 
 def test_the_text_of_how_a_topic_is_delivered_is_not_read(tmp_path, monkeypatch):

@@ -266,7 +266,7 @@ def test_touching_overlapping_and_equal_objects_are_nearest():
     assert found[2].phrase == NO_DIRECTION
 
 
-@given(st.integers(0, 10**6), st.integers(2, 12))
+@given(st.integers(0, 10**6), st.sampled_from([2, 3, 7, 12, 24, 25, 31]))
 @settings(max_examples=25)
 def test_the_nearest_is_the_one_at_the_smallest_distance(seed, count):
     rng = np.random.default_rng(seed)

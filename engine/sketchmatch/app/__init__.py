@@ -10,9 +10,9 @@ get workers of their own kind, which are watched besides, and at most half of th
 workers the same is done in threads of the server's process, and for the command line in its own.
 
 Scenes are kept under the hash of what they are in one SQLite file (``scenes``, ``keeping``), which
-workers read for themselves; what they remember of scenes (``remembered``) saves the next request
-about the same ones that work. Sketches in progress (``sketches``) live in the event loop, each with
-a runner that has its latest revision matched.
+workers read for themselves (``shelf``); what they remember of scenes (``remembered``) saves the
+next request about the same ones that work. Sketches in progress (``sketches``) live in the event
+loop, each with a runner that has its latest revision matched.
 A match has a life beyond the call that began it (``matches``): whoever asks for it again under its
 name reads the same one, and it is kept on disk (``archive``) by a thread that nobody waits for.
 """

@@ -13,7 +13,8 @@ from google.protobuf.wrappers_pb2 import BytesValue
 from sketchmatch.api import Segmentation, Segmenter
 from sketchmatch.app import requests, responses
 from sketchmatch.app.costs import Costs
-from sketchmatch.app.scenes import (
+from sketchmatch.app.setup import Setup
+from sketchmatch.app.shelf import (
     LARGEST_KEPT,
     Described,
     cleaned_title,
@@ -22,7 +23,6 @@ from sketchmatch.app.scenes import (
     segmentation,
     without_store,
 )
-from sketchmatch.app.setup import Setup
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,

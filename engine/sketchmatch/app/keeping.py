@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, TypeVar
 from google.protobuf.wrappers_pb2 import BytesValue
 
 from sketchmatch.app.following import followed
-from sketchmatch.app.scenes import Described, SceneArchive, cleaned_title, without_store
+from sketchmatch.app.scenes import SceneArchive
+from sketchmatch.app.shelf import Described, cleaned_title, without_store
 from sketchmatch.app.waiting import Caller
 from sketchmatch.errors import InvalidInputError, Reason, ServerStoppingError, StoreError
 from sketchmatch_proto.v1.scene_service_pb2 import (

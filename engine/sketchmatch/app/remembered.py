@@ -8,8 +8,8 @@ from pathlib import Path
 
 from sketchmatch.api import Histogram
 from sketchmatch.api.forces import hold_own_histogram
-from sketchmatch.app.scenes import LARGEST_KEPT, Described, Shelf, described_by
 from sketchmatch.app.setup import Setup
+from sketchmatch.app.shelf import LARGEST_KEPT, Described, Shelf, described_by
 from sketchmatch.model import FloatArray, Scene, SceneDescriptor
 from sketchmatch.pipeline.memory import Lookups, Memory
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 from google.protobuf.duration_pb2 import Duration
@@ -28,11 +29,9 @@ from sketchmatch.model import (
 from sketchmatch.pipeline.events import Accepted, Finished, MatchEvent, Progress, Segmented
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.result import (
-    Ambiguity,
     Correspondence,
     MatchResult,
     ObjectMatch,
-    ObjectRelation,
 )
 from sketchmatch.pipeline.selection import (
     UNCONFIGURED,
@@ -57,6 +56,8 @@ from sketchmatch_proto.v1 import (
 )
 
 if TYPE_CHECKING:
+    from google.protobuf.internal.containers import RepeatedCompositeFieldContainer as _Repeated
+
     from sketchmatch.app.tasks import Record
 
 __all__ = [
@@ -64,7 +65,6 @@ __all__ = [
     "catalogue",
     "details",
     "fmap_entry",
-    "result",
     "scene",
     "segmented",
     "selection",
@@ -85,6 +85,10 @@ _SOURCE_KINDS = {
 }
 
 
+_MANY_POINTS = 16
+"""Of an object: what has fewer is sooner written than looked for among those written before."""
+
+
 class ResponseWriter:
     """Turns the events of one match into responses.
 
@@ -100,125 +104,141 @@ class ResponseWriter:
 
     def response(self, event: MatchEvent) -> match_service_pb2.MatchResponse:
         """Return the response for the next event."""
+        # Written in place: a message that is handed over is copied, once at every level.
+        response = match_service_pb2.MatchResponse()
         match event:
             case Accepted():
-                return match_service_pb2.MatchResponse(accepted=self._accepted(event))
+                self._write_accepted(response.accepted, event)
             case Segmented():
                 self._labels = (event.sketch.scene.labels, event.map.scene.labels)
-                return match_service_pb2.MatchResponse(scenes=_scenes(event))
+                _write_scenes(response.scenes, event)
             case Progress():
-                return match_service_pb2.MatchResponse(progress=self._progress(event))
+                self._write_progress(response.progress, event)
             case Finished():
-                return match_service_pb2.MatchResponse(result=result(event.result))
+                _write_result(response.result, event.result)
+        return response
 
-    def _accepted(self, event: Accepted) -> match_pb2.MatchAccepted:
-        stages = {stage: selection(item) for stage, item in event.pipeline.stages().items()}
-        budget = self._request.time_budget
-        return match_pb2.MatchAccepted(
-            match_id=event.match_id,
-            seed=event.seed,
-            pipeline=pipeline_pb2.Pipeline(**stages, profile=event.pipeline.profile),
-            weights=_weights(event.weights),
-            time_budget=None if budget is None else _duration(budget),
-            unmatched_price=event.unmatched_price,
+    def _write_accepted(self, message: match_pb2.MatchAccepted, event: Accepted) -> None:
+        message.match_id = event.match_id
+        message.seed = event.seed
+        message.pipeline.profile = event.pipeline.profile
+        for stage, item in event.pipeline.stages().items():
+            getattr(message.pipeline, stage).CopyFrom(selection(item))
+        message.weights.CopyFrom(_weights(event.weights))
+        if (budget := self._request.time_budget) is not None:
+            _write_duration(message.time_budget, budget)
+        if event.unmatched_price is not None:
+            message.unmatched_price = event.unmatched_price
+
+    def _write_progress(self, message: match_pb2.MatchProgress, event: Progress) -> None:
+        message.phase = _phase(event.phase)
+        message.iteration = event.iteration
+        message.evaluations = event.evaluations
+        for name in ("fraction", "confidence", "upper_bound"):
+            if (value := getattr(event, name)) is not None:
+                setattr(message, name, value)
+        _write_duration(message.elapsed, event.elapsed)
+        _add_object_matches(message.object_matches, event.matches, self._labels)
+
+
+def _write_result(message: match_pb2.MatchResult, value: MatchResult) -> None:
+    labels = value.sketch.labels, value.map.labels
+    message.match_id = value.match_id
+    message.seed = value.seed
+    message.outcome = _outcome(value.outcome)
+    _add_object_matches(message.object_matches, value.matches, labels)
+    message.unmatched_sketch_objects.extend(value.unmatched_sketch_objects)
+    message.unmatched_map_objects.extend(value.unmatched_map_objects)
+    message.omap_confidence = value.omap_confidence
+    _write_fmap_confidence(message.fmap_confidence, value.confidence)
+    for entry in value.fmap:
+        _write_fmap_entry(message.fmap_entries.add(), entry)
+    message.rotation_radians = value.rotation
+    message.scale = value.scale
+    message.statistics.iterations = value.statistics.iterations
+    message.statistics.evaluations = value.statistics.evaluations
+    for stage, spent in value.statistics.seconds.items():
+        _write_duration(getattr(message.statistics, f"{stage}_elapsed"), spent)
+    for other in value.alternatives:
+        alternative = message.alternatives.add(
+            omap_confidence=other.omap_confidence, probability=other.probability
         )
-
-    def _progress(self, event: Progress) -> match_pb2.MatchProgress:
-        return match_pb2.MatchProgress(
-            phase=match_pb2.Phase.Value(f"PHASE_{event.phase}"),
-            fraction=event.fraction,
-            iteration=event.iteration,
-            evaluations=event.evaluations,
-            confidence=event.confidence,
-            upper_bound=event.upper_bound,
-            object_matches=_object_matches(event.matches, *self._labels),
-            elapsed=_duration(event.elapsed),
+        _write_fmap_confidence(alternative.fmap_confidence, other.confidence)
+        _add_object_matches(alternative.object_matches, other.matches, labels)
+    message.search_note = value.search_note
+    for name in ("upper_bound", "probability", "place_probability"):
+        if (known := getattr(value, name)) is not None:
+            setattr(message, name, known)
+    if (open_ := value.ambiguity) is not None:
+        message.ambiguity.maps = open_.maps
+        message.ambiguity.alternatives.extend(open_.alternatives)
+        message.ambiguity.deciding_sketch_objects.extend(open_.deciding_sketch_objects)
+    message.unmatched_sketch_probabilities.extend(value.unmatched_sketch_probabilities)
+    message.provisional = value.provisional
+    for group in value.groups:
+        message.object_groups.add(
+            sketch_objects=group.sketch_objects,
+            map_objects=group.map_objects,
+            probability=group.probability,
         )
-
-
-def result(value: MatchResult) -> match_pb2.MatchResult:
-    """Return a result as a message."""
-    seconds = value.statistics.seconds
-    return match_pb2.MatchResult(
-        match_id=value.match_id,
-        seed=value.seed,
-        outcome=match_pb2.Outcome.Value(f"OUTCOME_{value.outcome}"),
-        object_matches=_object_matches(value.matches, value.sketch.labels, value.map.labels),
-        unmatched_sketch_objects=value.unmatched_sketch_objects,
-        unmatched_map_objects=value.unmatched_map_objects,
-        omap_confidence=value.omap_confidence,
-        fmap_confidence=_fmap_confidence(value.confidence),
-        upper_bound=value.upper_bound,
-        fmap_entries=[fmap_entry(entry) for entry in value.fmap],
-        rotation_radians=value.rotation,
-        scale=value.scale,
-        statistics=match_pb2.MatchStatistics(
-            iterations=value.statistics.iterations,
-            evaluations=value.statistics.evaluations,
-            **{f"{stage}_elapsed": _duration(spent) for stage, spent in seconds.items()},
-        ),
-        alternatives=[
-            match_pb2.AlternativeMap(
-                object_matches=_object_matches(
-                    other.matches, value.sketch.labels, value.map.labels
-                ),
-                fmap_confidence=_fmap_confidence(other.confidence),
-                omap_confidence=other.omap_confidence,
-                probability=other.probability,
-            )
-            for other in value.alternatives
-        ],
-        search_note=value.search_note,
-        probability=value.probability,
-        place_probability=value.place_probability,
-        ambiguity=_ambiguity(value.ambiguity),
-        unmatched_sketch_probabilities=value.unmatched_sketch_probabilities,
-        provisional=value.provisional,
-        object_groups=[
-            match_pb2.ObjectGroup(
-                sketch_objects=group.sketch_objects,
-                map_objects=group.map_objects,
-                probability=group.probability,
-            )
-            for group in value.groups
-        ],
-    )
 
 
 def fmap_entry(entry: Correspondence) -> match_pb2.FmapEntry:
     """Return a line of a histogram map as a message."""
-    (a, b), (c, d) = entry.sketch_pair, entry.map_pair
-    return match_pb2.FmapEntry(
-        sketch_pair=match_pb2.ObjectPair(first=a, second=b),
-        map_pair=match_pb2.ObjectPair(first=c, second=d),
-        similarity=entry.similarity,
-        rotation_radians=entry.rotation,
-        dilation=entry.dilation,
-    )
+    message = match_pb2.FmapEntry()
+    _write_fmap_entry(message, entry)
+    return message
+
+
+def _write_fmap_entry(message: match_pb2.FmapEntry, entry: Correspondence) -> None:
+    sketch_pair, map_pair = message.sketch_pair, message.map_pair
+    sketch_pair.first, sketch_pair.second = entry.sketch_pair
+    map_pair.first, map_pair.second = entry.map_pair
+    message.similarity = entry.similarity
+    message.rotation_radians = entry.rotation
+    message.dilation = entry.dilation
 
 
 @lru_cache(maxsize=32)
 def scene(value: Scene) -> scene_pb2.Scene:
     """Return a scene as a message, which is not to be changed: one is made of each scene."""
-    return scene_pb2.Scene(objects=map(_scene_object, value.objects))
+    message = scene_pb2.Scene()
+    for item in value.objects:
+        if sum(map(len, item.rings)) < _MANY_POINTS:
+            _write_scene_object(message.objects.add(), item)
+        else:
+            message.objects.append(_scene_object(item))
+    return message
 
 
 @lru_cache(maxsize=1024)
 def _scene_object(item: SceneObject) -> scene_pb2.SceneObject:
     """Return an object as a message: the next revision of a sketch has most of them again."""
-    return scene_pb2.SceneObject(
-        rings=[source_pb2.Ring(points=_points(ring)) for ring in item.rings],
-        label=item.label,
-        area=item.area,
-        centroid=source_pb2.Point(x=item.centroid[0], y=item.centroid[1]),
-        certainty=item.certainty if item.certainty < 1.0 else None,
-    )
+    message = scene_pb2.SceneObject()
+    _write_scene_object(message, item)
+    return message
+
+
+def _write_scene_object(message: scene_pb2.SceneObject, item: SceneObject) -> None:
+    message.label = item.label
+    message.area = item.area
+    message.centroid.x, message.centroid.y = item.centroid
+    if item.certainty < 1.0:
+        message.certainty = item.certainty
+    for ring in item.rings:
+        _add_points(message.rings.add().points, ring)
 
 
 def selection(value: Algorithm) -> pipeline_pb2.AlgorithmSelection:
     """Return an algorithm with all its parameters as a message."""
-    message = pipeline_pb2.AlgorithmSelection(name=value.name)
-    message.parameters.update(value.params.model_dump(mode="json"))
+    return _selection(value.name, value.params.model_dump_json())
+
+
+@lru_cache(maxsize=256)
+def _selection(name: str, parameters: str) -> pipeline_pb2.AlgorithmSelection:
+    """Return a message, not to be changed, as most requests choose the same."""
+    message = pipeline_pb2.AlgorithmSelection(name=name)
+    message.parameters.update(json.loads(parameters))
     return message
 
 
@@ -308,46 +328,46 @@ def server_info(
     )
 
 
-def _scenes(event: Segmented) -> match_pb2.MatchScenes:
-    return match_pb2.MatchScenes(
-        sketch=scene(event.sketch.scene),
-        map=scene(event.map.scene),
-        sketch_warnings=event.sketch.warnings,
-        map_warnings=event.map.warnings,
-        sketch_route=_points(event.sketch.route),
-    )
+def _write_scenes(message: match_pb2.MatchScenes, event: Segmented) -> None:
+    message.sketch.CopyFrom(scene(event.sketch.scene))
+    message.map.CopyFrom(scene(event.map.scene))
+    message.sketch_warnings.extend(event.sketch.warnings)
+    message.map_warnings.extend(event.map.warnings)
+    if event.sketch.route is not None:
+        _add_points(message.sketch_route, event.sketch.route)
+
+
+def _add_points(message: _Repeated[source_pb2.Point], points: FloatArray) -> None:
+    add = message.add
+    for x, y in points.tolist():
+        add(x=x, y=y)
 
 
 def _points(points: FloatArray | None) -> list[source_pb2.Point]:
     return [] if points is None else [source_pb2.Point(x=x, y=y) for x, y in points.tolist()]
 
 
-def _object_matches(
-    matches: Iterable[ObjectMatch], sketch_labels: Sequence[str], map_labels: Sequence[str]
-) -> list[match_pb2.ObjectMatch]:
-    return [
-        match_pb2.ObjectMatch(
+def _add_object_matches(
+    message: _Repeated[match_pb2.ObjectMatch],
+    matches: Iterable[ObjectMatch],
+    labels: tuple[Sequence[str], Sequence[str]],
+) -> None:
+    sketch_labels, map_labels = labels
+    for match in matches:
+        line = message.add(
             sketch_object=match.sketch_object,
             map_object=match.map_object,
             sketch_label=sketch_labels[match.sketch_object],
             map_label=map_labels[match.map_object],
             confidence=match.confidence,
             margin=match.margin,
-            relation=_relation(match.relation),
             probability=match.probability,
         )
-        for match in matches
-    ]
-
-
-def _relation(relation: ObjectRelation | None) -> match_pb2.ObjectRelation | None:
-    if relation is None:
-        return None
-    return match_pb2.ObjectRelation(
-        reference_object=relation.reference_object,
-        phrase=relation.phrase,
-        degree=relation.degree,
-    )
+        if (seen := match.relation) is not None:
+            relation = line.relation
+            relation.reference_object = seen.reference_object
+            relation.phrase = seen.phrase
+            relation.degree = seen.degree
 
 
 def summary(record: Record) -> match_service_pb2.MatchSummary:
@@ -389,35 +409,33 @@ def _timestamp(seconds: float) -> Timestamp:
     return stamp
 
 
-def _ambiguity(value: Ambiguity | None) -> match_pb2.Ambiguity | None:
-    if value is None:
-        return None
-    return match_pb2.Ambiguity(
-        maps=value.maps,
-        alternatives=value.alternatives,
-        deciding_sketch_objects=value.deciding_sketch_objects,
-    )
-
-
-def _fmap_confidence(confidence: Confidence) -> match_pb2.FmapConfidence:
-    return match_pb2.FmapConfidence(
-        total=confidence.total,
-        similarity=confidence.similarity,
-        rotation=confidence.rotation,
-        dilation=confidence.dilation,
-        shape=confidence.shape,
-        size=confidence.size,
-    )
+def _write_fmap_confidence(message: match_pb2.FmapConfidence, confidence: Confidence) -> None:
+    message.total = confidence.total
+    message.similarity = confidence.similarity
+    message.rotation = confidence.rotation
+    message.dilation = confidence.dilation
+    if confidence.shape is not None:
+        message.shape = confidence.shape
+    if confidence.size is not None:
+        message.size = confidence.size
 
 
 def _weights(weights: RequestWeights) -> match_pb2.ConfidenceWeights:
     return match_pb2.ConfidenceWeights(**ConfidenceWeights(*weights)._asdict())
 
 
-def _duration(seconds: float) -> Duration:
-    duration = Duration()
-    duration.FromNanoseconds(round(seconds * 1e9))
-    return duration
+@cache
+def _outcome(value: str) -> match_pb2.Outcome.ValueType:
+    return match_pb2.Outcome.Value(f"OUTCOME_{value}")
+
+
+@cache
+def _phase(value: str) -> match_pb2.Phase.ValueType:
+    return match_pb2.Phase.Value(f"PHASE_{value}")
+
+
+def _write_duration(message: Duration, seconds: float) -> None:
+    message.seconds, message.nanos = divmod(round(seconds * 1e9), 1_000_000_000)
 
 
 def _profile(profile: Profile, is_default: bool) -> catalog_service_pb2.Profile:
@@ -491,7 +509,7 @@ def _plugin(status: PluginStatus) -> catalog_service_pb2.Plugin:
 def transferred(value: TransferResult) -> transfer_service_pb2.TransferResponse:
     """Return what became of a transfer as a message."""
     warp = value.warp
-    return transfer_service_pb2.TransferResponse(
+    message = transfer_service_pb2.TransferResponse(
         features=[_carried(each, k < value.drawn) for k, each in enumerate(value.carried)],
         warp=transfer_service_pb2.Warp(
             kind=transfer_service_pb2.WarpKind.Value(f"WARP_KIND_{warp.kind.name}"),
@@ -504,9 +522,11 @@ def transferred(value: TransferResult) -> transfer_service_pb2.TransferResponse:
             transfer_service_pb2.Partners(sketch_object=a, map_object=b)
             for a, b in value.object_map
         ],
-        scenes=_scenes(Segmented(value.sketch, value.map)),
-        match=None if value.match is None else result(value.match),
     )
+    _write_scenes(message.scenes, Segmented(value.sketch, value.map))
+    if value.match is not None:
+        _write_result(message.match, value.match)
+    return message
 
 
 def _carried(value: Carried, drawn: bool) -> transfer_service_pb2.CarriedFeature:

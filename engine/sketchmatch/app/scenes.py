@@ -1,45 +1,32 @@
-"""Scenes that a server keeps under the hash of what they are, written by one, read by its workers.
-
-A scene is a record, the message ``StoredScene``, that whoever matches with it decodes once. Beside
-it lie its source, and the histograms of its pairs and those within its objects, which the worker
-that computed them hands in. Each of these carries a checksum. What does not fit it is damaged:
-histograms are computed and kept again, and a scene is mended where it is put again.
-"""
+"""The file of the scenes that a server keeps: written by it, read by its workers (``shelf``)."""
 
 from __future__ import annotations
 
 import json
-import re
 import sqlite3
 import time
 import zlib
-from collections import OrderedDict
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import numpy as np
 
-import sketchmatch
-from sketchmatch.api import Histogram, Segmentation, Segmenter
-from sketchmatch.api.forces import OWN_DIRECTIONS, own_histograms
-from sketchmatch.app.store import DamagedError, Database, Reading, Store
-from sketchmatch.errors import (
-    InvalidInputError,
-    NotFoundError,
-    QuotaError,
-    Reason,
-    StoreError,
-    quoted,
+from sketchmatch.app.shelf import (
+    RECORD_OF,
+    SOURCE_OF,
+    Described,
+    kept_record,
+    not_kept,
+    segmentation,
+    source_of,
+    summed,
+    unsummed,
 )
-from sketchmatch.model import FloatArray, Scene, SceneObject, pair_count
-from sketchmatch.model.arrays import frozen_floats, sealed
+from sketchmatch.app.store import Database, Store
+from sketchmatch.errors import InvalidInputError, QuotaError, Reason, StoreError, quoted
 from sketchmatch.model.labels import cleaned_label
-from sketchmatch.registry import Registry
-from sketchmatch_proto.v1 import source_pb2
 from sketchmatch_proto.v1.scene_service_pb2 import (
     GetSceneResponse,
     ListScenesResponse,
@@ -47,20 +34,11 @@ from sketchmatch_proto.v1.scene_service_pb2 import (
     StoredScene,
 )
 
-__all__ = [
-    "LARGEST_KEPT",
-    "Described",
-    "SceneArchive",
-    "Shelf",
-    "cleaned_title",
-    "described_by",
-    "name_of",
-    "segmentation",
-    "without_store",
-]
+__all__ = ["SceneArchive"]
 
 _FILE, _VERSION = "scenes", 3
 _MIB = 1024 * 1024
+_PAGE, _LONGEST_PAGE = 100, 1000
 
 _SCHEMA = """
 CREATE TABLE contents (
@@ -82,113 +60,6 @@ CREATE TABLE histograms (
     PRIMARY KEY (outlines, described_by)
 )
 """
-_RECORD_OF = "SELECT record FROM scenes WHERE name = ?"
-_HISTOGRAMS_OF = "SELECT bytes FROM histograms WHERE outlines = ? AND described_by = ?"
-_SOURCE_OF = "SELECT source FROM contents JOIN scenes USING (content) WHERE name = ?"
-LARGEST_KEPT = 32 * 1024 * 1024
-"""Bytes of the histograms of a scene above which these are computed again."""
-
-_OWN = f"within objects, {OWN_DIRECTIONS}"
-_SUM_BYTES = 4
-_PAGE, _LONGEST_PAGE = 100, 1000
-_A_NAME = re.compile(r"[0-9a-f]{64}")
-_HELD = 32
-_NAMED = 80
-_LONGEST_TITLE = 200
-
-
-def name_of(
-    source: source_pb2.Source, segmenter: Segmenter, registry: Registry
-) -> tuple[str, bytes]:
-    """Return the name of the scene that a segmenter finds in a source, and the source's bytes.
-
-    The bytes are the same however the source was encoded.
-    """
-    plain = source_pb2.Source()
-    plain.CopyFrom(source)
-    plain.DiscardUnknownFields()
-    data = plain.SerializeToString(deterministic=True)
-    made = {
-        "engine": sketchmatch.__version__,
-        "segmenter": registry.whose(segmenter),
-        "parameters": segmenter.params.model_dump(mode="json"),
-        "readers": [item.origin for item in registry.readers] if plain.HasField("file") else [],
-    }
-    digest = sha256(json.dumps(made, sort_keys=True).encode())
-    digest.update(data)
-    return digest.hexdigest(), data
-
-
-def cleaned_title(given: str) -> str:
-    """Return what a caller calls a scene, in one line.
-
-    Raises
-    ------
-    InvalidInputError
-        If it is too long.
-    """
-    title = cleaned_label(given)
-    if len(title) > _LONGEST_TITLE:
-        problem = f"has {len(title)} characters; give up to {_LONGEST_TITLE}"
-        raise InvalidInputError(Reason.INVALID_FIELD, "title", problem)
-    return title
-
-
-def segmentation(record: StoredScene) -> Segmentation:
-    """Return a kept scene as it was found."""
-    objects = tuple(
-        SceneObject(
-            tuple(frozen_floats(_points(ring.points)) for ring in item.rings),
-            item.label,
-            item.certainty if item.HasField("certainty") else 1.0,
-        )
-        for item in record.scene.objects
-    )
-    route = frozen_floats(_points(record.route)) if record.route else None
-    passages = tuple((passage.first, passage.second) for passage in record.passages)
-    return Segmentation(Scene(objects), tuple(record.warnings), route, passages)
-
-
-def without_store(field: str) -> StoreError:
-    """Return what there is to say of a stored scene where none is kept."""
-    return StoreError(
-        f"{field} needs a store, and this server keeps nothing; start it with one, or send the "
-        "source itself"
-    )
-
-
-@dataclass(frozen=True)
-class Described:
-    """Histograms of a scene, as a worker hands them in.
-
-    Attributes
-    ----------
-    outlines, described_by
-        Identities of the scene and of the histogram.
-    histograms
-        Shape (Q, n) of pairs, or (N, n) within objects.
-    """
-
-    outlines: str
-    described_by: str
-    histograms: FloatArray
-
-    @classmethod
-    def within(cls, scene: Scene) -> Described:
-        """Return the histograms within the objects of a scene."""
-        return cls(scene.identity, described_by(_OWN), own_histograms(scene.objects))
-
-    def packed(self) -> bytes:
-        """Return it as bytes."""
-        head = json.dumps([self.outlines, self.described_by, self.histograms.shape[1]]).encode()
-        return head + b"\n" + np.ascontiguousarray(self.histograms, dtype="<f8").tobytes()
-
-    @classmethod
-    def unpacked(cls, data: bytes) -> Described:
-        """Return what :meth:`packed` made bytes of."""
-        head, _, values = data.partition(b"\n")
-        outlines, described_by, directions = json.loads(head)
-        return cls(outlines, described_by, _table(values, directions))
 
 
 class SceneArchive:
@@ -207,7 +78,7 @@ class SceneArchive:
 
     @property
     def path(self) -> Path:
-        """The file, for a :class:`Shelf`."""
+        """The file, for a :class:`~sketchmatch.app.shelf.Shelf`."""
         return self._file.path
 
     def open(self) -> None:
@@ -243,7 +114,7 @@ class SceneArchive:
             The scene, and whether the caller had not put it.
         """
         record = found.stored_scene
-        source = _summed(zlib.compress(found.source.SerializeToString(deterministic=True), 1))
+        source = summed(zlib.compress(found.source.SerializeToString(deterministic=True), 1))
         labels = _labels_of(record)
 
         def job(connection: sqlite3.Connection) -> tuple[StoredScene, bool]:
@@ -273,11 +144,11 @@ class SceneArchive:
         """
 
         def job(connection: sqlite3.Connection) -> tuple[StoredScene, bool] | None:
-            found = connection.execute(_RECORD_OF, (name,)).fetchone()
+            found = connection.execute(RECORD_OF, (name,)).fetchone()
             if found is None:
                 return None
             created = _own(connection, name, caller, most)
-            record = StoredScene.FromString(_unsummed(found[0]))
+            record = StoredScene.FromString(unsummed(found[0]))
             return _titled(connection, record, caller, title or None), created
 
         return self._file.work(job)
@@ -297,7 +168,7 @@ class SceneArchive:
             record = _record(connection, name, caller, field)
             source = None
             if include_source:
-                source = _source(_unsummed(connection.execute(_SOURCE_OF, (name,)).fetchone()[0]))
+                source = source_of(unsummed(connection.execute(SOURCE_OF, (name,)).fetchone()[0]))
             return GetSceneResponse(stored_scene=record, source=source)
 
         return self._file.work(job)
@@ -401,7 +272,7 @@ class SceneArchive:
                 "DELETE FROM owners WHERE caller = ? AND name = ?", (caller, name)
             )
             if not gone.rowcount:
-                raise _not_kept(name, "name")
+                raise not_kept(name, "name")
             for statement in (
                 "DELETE FROM scenes WHERE name NOT IN (SELECT name FROM owners)",
                 "DELETE FROM contents WHERE content NOT IN (SELECT content FROM scenes)",
@@ -421,7 +292,7 @@ class SceneArchive:
                 (
                     described.outlines,
                     described.described_by,
-                    _summed(np.ascontiguousarray(described.histograms, dtype="<f8").tobytes()),
+                    summed(np.ascontiguousarray(described.histograms, dtype="<f8").tobytes()),
                     described.outlines,
                 ),
             )
@@ -434,110 +305,6 @@ class SceneArchive:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-
-class Shelf:
-    """Kept scenes, as those see them who match with them, in any process and thread.
-
-    Parameters
-    ----------
-    path
-        The archive's file; None where none is kept, but for those that come with requests.
-    met
-        Told of each scene that was decoded.
-    """
-
-    def __init__(self, path: Path | None, met: Callable[[Scene], None] = lambda _: None) -> None:
-        self._file = None if path is None else Reading(path)
-        self._met = met
-        self._lock = Lock()
-        self._held: OrderedDict[str, Segmentation] = OrderedDict()
-
-    def close(self) -> None:
-        """Close the file, until it is read again."""
-        if self._file is not None:
-            self._file.close()
-
-    def forget(self) -> None:
-        """Decode all scenes anew."""
-        with self._lock:
-            self._held.clear()
-
-    def segmentation(self, name: str, caller: str, field: str) -> Segmentation:
-        """Return a scene of a caller as it was found.
-
-        Raises
-        ------
-        NotFoundError
-            If the caller has put none of this name; the sentence begins with ``field``.
-        StoreError
-            If there is no file, or it cannot be read.
-        """
-        if self._file is None:
-            raise without_store(field)
-        record, _ = self._file.work(lambda connection: _kept(connection, name, caller, field))
-        return self.decoded(name, record)
-
-    def decoded(self, name: str, record: bytes) -> Segmentation:
-        """Return the scene of a record, decoded once."""
-        with self._lock:
-            if (held := self._held.get(name)) is not None:
-                self._held.move_to_end(name)
-                return held
-        found = segmentation(StoredScene.FromString(record))
-        with self._lock:
-            self._held[name] = found
-            while len(self._held) > _HELD:
-                self._held.popitem(last=False)
-        self._met(found.scene)
-        return found
-
-    def record(self, name: str) -> bytes | None:
-        """Return the record of a scene that somebody has put, or None."""
-        return self._found(_RECORD_OF, name)
-
-    def source(self, name: str) -> source_pb2.Source | None:
-        """Return what a scene was found in, or None where it is not kept."""
-        found = self._found(_SOURCE_OF, name)
-        return None if found is None else _source(found)
-
-    def histograms(self, scene: Scene, histogram: Histogram) -> FloatArray | None:
-        """Return the histograms of a scene, or None where they are not kept, or damaged."""
-        shape = pair_count(len(scene)), histogram.directions
-        return self._table(scene, histogram.identity, shape)
-
-    def own_histograms(self, scene: Scene) -> FloatArray | None:
-        """Return the histograms within the objects of a scene, or None as :meth:`histograms`."""
-        return self._table(scene, _OWN, (len(scene), OWN_DIRECTIONS // 2))
-
-    def _table(self, scene: Scene, identity: str, shape: tuple[int, int]) -> FloatArray | None:
-        found = self._found(_HISTOGRAMS_OF, scene.identity, described_by(identity))
-        fits = found is not None and len(found) == 8 * shape[0] * shape[1]
-        return _table(found, shape[1]) if found is not None and fits else None
-
-    def _found(self, query: str, *keys: str) -> bytes | None:
-        """Return what is kept, or None for nothing that can be read: who writes is told why."""
-        if self._file is None:
-            return None
-
-        def job(connection: sqlite3.Connection) -> bytes | None:
-            row = connection.execute(query, keys).fetchone()
-            return None if row is None else _unsummed(row[0])
-
-        try:
-            return self._file.work(job)
-        except StoreError:
-            return None
-
-    def holds(self, scene: Scene) -> bool:
-        """Whether a scene came from here."""
-        with self._lock:
-            return any(held.scene is scene for held in self._held.values())
-
-
-def described_by(identity: str) -> str:
-    """Return what histograms are kept by: the algorithm's identity, and its version."""
-    return f"{sketchmatch.__version__} {identity}"
 
 
 def _put(
@@ -555,7 +322,7 @@ def _put(
             record.name,
             content,
             segmentation(record).scene.identity,
-            _summed(record.SerializeToString(deterministic=True)),
+            summed(record.SerializeToString(deterministic=True)),
             len(labels),
             json.dumps(labels),
         ),
@@ -608,29 +375,9 @@ def _titled(
     return with_title
 
 
-def _kept(connection: sqlite3.Connection, name: str, caller: str, field: str) -> tuple[bytes, str]:
-    """Return the record of a scene of a caller, and its title."""
-    found = connection.execute(
-        "SELECT record, title FROM scenes JOIN owners USING (name) WHERE name = ? AND caller = ?",
-        (name, caller),
-    ).fetchone()
-    if found is None:
-        raise _not_kept(name, field)
-    record, title = found
-    return _unsummed(record), title
-
-
-def _not_kept(name: str, field: str) -> NotFoundError:
-    shown = name if _A_NAME.fullmatch(name) else quoted(name)
-    return NotFoundError(
-        f"{field} is {shown[:_NAMED]}, and you keep no scene of this name here; put it, or "
-        "list those there are"
-    )
-
-
 def _record(connection: sqlite3.Connection, name: str, caller: str, field: str) -> StoredScene:
     """Return a scene of a caller, with its title."""
-    kept, title = _kept(connection, name, caller, field)
+    kept, title = kept_record(connection, name, caller, field)
     record = StoredScene.FromString(kept)
     record.title = title
     return record
@@ -657,36 +404,3 @@ def _place(page_token: str) -> tuple[int, str]:
             f"is {quoted(page_token)}; give the next_page_token of the response before, or none",
         )
     return min(int(time_), 2**63 - 1), name
-
-
-def _source(kept: bytes) -> source_pb2.Source:
-    """Return the source that is kept, compressed."""
-    return source_pb2.Source.FromString(zlib.decompress(kept))
-
-
-def _summed(data: bytes) -> bytes:
-    """Return bytes with their checksum before them."""
-    return zlib.crc32(data).to_bytes(_SUM_BYTES, "little") + data
-
-
-def _unsummed(kept: bytes) -> bytes:
-    """Return bytes without their checksum, if it fits.
-
-    Raises
-    ------
-    DamagedError
-        If it does not.
-    """
-    data = kept[_SUM_BYTES:]
-    if zlib.crc32(data).to_bytes(_SUM_BYTES, "little") != kept[:_SUM_BYTES]:
-        raise DamagedError
-    return data
-
-
-def _points(points: Any) -> FloatArray:
-    flat = [value for point in points for value in (point.x, point.y)]
-    return np.array(flat, dtype=np.float64).reshape(-1, 2)
-
-
-def _table(data: bytes, directions: int) -> FloatArray:
-    return sealed(np.frombuffer(data, dtype="<f8").reshape(-1, directions).astype(np.float64))

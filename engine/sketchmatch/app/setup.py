@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from sketchmatch.app.scenes import Shelf
+from sketchmatch.app.shelf import Shelf
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.registry import OWN_DISTRIBUTION, Registered, RegisteredReader
 from sketchmatch.registry.distributions import canonical

@@ -19,7 +19,7 @@ import math
 import os
 import sqlite3
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from contextvars import ContextVar
 from functools import cache, partial
@@ -92,7 +92,7 @@ def decode_bag(suffix: str, data: bytes, topic: str = "") -> OccupancyGrid:
     InvalidInputError
         As :func:`read_bag` does, and if more is packed in it than a file may hold.
     """
-    token = _bounds.set(_Bounds(source_limits().max_bytes))
+    token = _bounds.set(_Bounds(source_limits().max_bytes, len(data)))
     try:
         return _last_map(_InMemory(suffix, data), topic)
     finally:
@@ -134,26 +134,69 @@ class _Metered(io.BytesIO):
 
 
 class _Bounds:
-    """How much a stranger's bag may still unpack."""
+    """How much a stranger's bag may still unpack: bytes, and records, each of which takes time.
 
-    def __init__(self, limit: int) -> None:
+    Parameters
+    ----------
+    limit
+        Bytes that may be unpacked.
+    size
+        Bytes of the file: as each record has its time, hardly more than one fits into 4 of them.
+    """
+
+    def __init__(self, limit: int, size: int) -> None:
         self._limit = self._left = limit
+        self._size, self._records = size, _FEW_RECORDS + size // 4
 
     def unpack(self, packing: str, data: bytes) -> bytes:
-        if packing in ("", "none"):
-            plain = data
-        else:
-            unpacker = _unpacker(packing)
-            plain = unpacker.decompress(data, self._left + 1)
-            if len(plain) <= self._left and not unpacker.eof:
-                raise ValueError("what is packed in it has no end")
-        if len(plain) > self._left:
-            check_bytes(self._limit + 1, "", f"unpacks to more than {self._limit} bytes")
+        """Unpack what is read by an index."""
+        return self._unpacked(packing, data, self._left)
+
+    def unpack_records(self, packing: str, data: bytes, said: int) -> bytes:
+        """Unpack what is read record by record, and says how many bytes it is."""
+        return self._unpacked(packing, data, said, of_records=True)
+
+    def _unpacked(self, packing: str, data: bytes, said: int, of_records: bool = False) -> bytes:
+        plain, place = bytearray(), 0
+        self._check(said)
+        for piece in _pieces(packing, data):
+            plain += piece
+            self._check(len(plain))
+            if len(plain) > said:
+                raise ValueError(f"a chunk unpacks to more than the {said} bytes that it says")
+            while of_records and place + _HEAD <= len(plain):
+                place += _HEAD + int.from_bytes(plain[place + 1 : place + _HEAD], "little")
+                self._records -= 1
+                if self._records < 0:
+                    problem = f"packs more records into its {self._size} bytes than any recorder"
+                    raise _invalid(f"{problem} does; record it again")
         self._left -= len(plain)
-        return plain
+        return bytes(plain)
+
+    def _check(self, unpacked: int) -> None:
+        if unpacked > self._left:
+            check_bytes(self._limit + 1, "", f"unpacks to more than {self._limit} bytes")
 
 
 _bounds: ContextVar[_Bounds | None] = ContextVar("bounds", default=None)
+
+_FEW_RECORDS = 10_000
+_HEAD = 9
+"""Bytes before the content of a record: its kind, and how long it is."""
+_PIECE = 1 << 20
+
+
+def _pieces(packing: str, data: bytes) -> Iterator[bytes]:
+    """Yield what is packed, a little at a time."""
+    if packing in ("", "none"):
+        yield data
+        return
+    unpacker = _unpacker(packing)
+    while not unpacker.eof:
+        yield (piece := unpacker.decompress(data, _PIECE))
+        if not piece and unpacker.needs_input:
+            raise ValueError("what is packed in it has no end")
+        data = b""
 
 
 def _unpacker(packing: str) -> Any:
@@ -183,7 +226,9 @@ def _bound_rosbags() -> None:
 
 def _unpacked(packing: str, unpack: Callable[..., bytes], data: bytes, *size: int) -> bytes:
     bounds = _bounds.get()
-    return unpack(data, *size) if bounds is None else bounds.unpack(packing, data)
+    if bounds is None:
+        return unpack(data, *size)
+    return bounds.unpack_records(packing, data, *size) if size else bounds.unpack(packing, data)
 
 
 def _qos(read: Callable[[bytes], list[Any]], metadata: bytes) -> list[Any]:

@@ -8,7 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from sketchmatch.model.arrays import FloatArray, IntArray, frozen, frozen_floats
-from sketchmatch.model.relations import object_pairs, pair_count, pair_index
+from sketchmatch.model.relations import (
+    correspondences,
+    object_pairs,
+    pair_count,
+    pair_index,
+)
 
 __all__ = [
     "MAX_DISTANCE",
@@ -121,10 +126,8 @@ class Fmap:
         >>> Fmap.from_object_map(np.array([2, 0, 1]), 3).entries
         array([4, 5, 0])
         """
-        half = pair_count(argument_objects)
         c, d = np.asarray(partners, dtype=np.int64)[object_pairs(len(partners))].T
-        column = pair_index(np.minimum(c, d), np.maximum(c, d), argument_objects)
-        return cls(np.where(c < d, column, column + half))
+        return cls(correspondences(argument_objects)[c, d])
 
     def object_pair(self, i: int, argument_objects: int) -> tuple[int, int]:
         """Return the argument objects (c, d) that template pair i is mapped to, in order."""

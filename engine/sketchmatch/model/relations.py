@@ -142,10 +142,11 @@ class SceneDescriptor:
     def histogram(self, a: int, b: int) -> FloatArray:
         """Return the histogram of object a on object b, in either order."""
         if a < b:
-            return frozen_floats(self.histograms[pair_index(a, b, self.objects)])
+            row: FloatArray = self.histograms[pair_index(a, b, self.objects)]
+            return row
         dual = self.histograms[pair_index(b, a, self.objects)]
         half = self.directions - self.directions // 2
-        return frozen_floats(np.concatenate([dual[half:], dual[:half]]))
+        return sealed(np.concatenate([dual[half:], dual[:half]]))
 
 
 @dataclass(frozen=True, eq=False)

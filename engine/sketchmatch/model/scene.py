@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,15 +21,18 @@ from sketchmatch.model.caching import cached_property
 from sketchmatch.model.labels import cleaned_label, label_from
 from sketchmatch.model.text import listed, name, shortened
 
-__all__ = ["DOUBTFUL", "Edges", "Scene", "SceneObject"]
+__all__ = ["DOUBTFUL", "FARTHEST", "FLAT", "Edges", "Scene", "SceneObject"]
 
 DOUBTFUL = 0.5
 """Below this certainty it is in doubt that an object is one thing."""
 
-# Below this share of its squared extent an area is rounding, not a shape.
-_FLAT = 1e-9
-# Beyond this, forces and areas would leave the range of floating-point numbers.
-_FAR = 1e15
+FLAT = 1e-9
+"""Below this share of its squared extent an area is rounding, not a shape."""
+
+FARTHEST = 1e15
+"""Beyond this, forces and areas would leave the range of floating-point numbers."""
+
+_LITTLE = np.dtype("<f8")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +88,9 @@ class SceneObject:
             raise InvalidInputError(
                 Reason.INVALID_POLYGON, "rings", "is empty; give at least an outer ring"
             )
-        outer, areas = arrays[0], [_signed_area(ring) for ring in arrays]
+        outer, areas = arrays[0], [signed_area(ring) for ring in arrays]
         extent = float((outer.max(axis=0) - outer.min(axis=0)).max())
-        if abs(areas[0]) <= _FLAT * extent * extent and not _crosses_itself(outer):
+        if abs(areas[0]) <= FLAT * extent * extent and not _crosses_itself(outer):
             raise InvalidInputError(
                 Reason.INVALID_POLYGON, "", "has no area; give three corners not on one line"
             )
@@ -99,7 +103,7 @@ class SceneObject:
             raise InvalidInputError(
                 Reason.INVALID_POLYGON, "", _explain(shapely.Polygon(outer, arrays[1:]))
             )
-        if polygon.area <= _FLAT * extent * extent:
+        if polygon.area <= FLAT * extent * extent:
             raise InvalidInputError(
                 Reason.INVALID_POLYGON, "", "has no area left between its holes; remove a hole"
             )
@@ -148,7 +152,7 @@ class SceneObject:
     @cached_property
     def area(self) -> float:
         """Area without the holes, in squared scene units."""
-        return float(sum(_signed_area(ring) for ring in self.rings))
+        return float(sum(signed_area(ring) for ring in self.rings))
 
     @cached_property
     def centroid(self) -> tuple[float, float]:
@@ -273,12 +277,12 @@ class Scene:
     def edges(self) -> Edges:
         """The edges of all objects, ring by ring."""
         rings = [ring for item in self.objects for ring in item.rings]
-        counts = [sum(len(ring) for ring in item.rings) for item in self.objects]
-        return Edges(
-            sealed(np.concatenate(rings)),
-            sealed(np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])),
-            sealed(np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)),
-        )
+        counts = [sum(map(len, item.rings)) for item in self.objects]
+        starts, stops = np.concatenate(rings), np.cumsum(list(map(len, rings)))
+        after = np.arange(1, len(starts) + 1)
+        after[stops - 1] = [0, *stops[:-1]]
+        offsets = np.array([0, *itertools.accumulate(counts)], dtype=np.int64)
+        return Edges(sealed(starts), sealed(starts[after]), sealed(offsets))
 
     @cached_property
     def identity(self) -> str:
@@ -297,10 +301,10 @@ class Scene:
         for item in self.objects:
             content.update(b"object")
             if item.certainty < 1.0:
-                content.update(np.array(item.certainty, dtype="<f8").tobytes())
+                content.update(np.array(item.certainty, dtype=_LITTLE).tobytes())
             for ring in item.rings:
                 content.update(len(ring).to_bytes(8, "little"))
-                content.update(np.ascontiguousarray(ring, dtype="<f8").tobytes())
+                content.update(ring.astype(_LITTLE, copy=False).tobytes())
         return content.hexdigest()
 
     @cached_property
@@ -383,9 +387,9 @@ def _clean_ring(ring: Any, field: str) -> FloatArray:
         raise InvalidInputError(
             Reason.INVALID_POLYGON, f"{field}.points[{k}]", "is not finite; give plain numbers"
         )
-    if np.abs(points).max(initial=0.0) > _FAR:
+    if np.abs(points).max(initial=0.0) > FARTHEST:
         raise InvalidInputError(
-            Reason.INVALID_POLYGON, field, f"reaches beyond ±{_FAR:g}; use a larger unit"
+            Reason.INVALID_POLYGON, field, f"reaches beyond ±{FARTHEST:g}; use a larger unit"
         )
     before = np.concatenate([points[-1:], points[:-1]])
     points = np.compress((points != before).any(axis=1), points, axis=0)
@@ -402,7 +406,7 @@ def _crosses_itself(ring: FloatArray) -> bool:
     """Whether a closed ring touches itself other than by lying on one line."""
     hull = shapely.MultiPoint(ring).convex_hull
     extent = float(np.ptp(ring, axis=0).max())
-    return bool(hull.area > _FLAT * extent * extent)
+    return bool(hull.area > FLAT * extent * extent)
 
 
 def _explain(polygon: shapely.Polygon) -> str:
@@ -415,7 +419,8 @@ def _explain(polygon: shapely.Polygon) -> str:
     return f"is not a polygon ({message}); keep holes inside the outer ring and apart"
 
 
-def _signed_area(ring: FloatArray) -> float:
-    x, y = (ring - ring[0]).T
-    after = np.concatenate([ring[1:], ring[:1]]) - ring[0]  # a tenth of what np.roll takes
-    return float(np.dot(x, after[:, 1]) - np.dot(y, after[:, 0])) / 2.0
+def signed_area(ring: FloatArray) -> float:
+    around = ring - ring[0]
+    after = np.concatenate([around[1:], around[:1]])  # a tenth of what np.roll takes
+    (x, y), (u, v) = around.T, after.T
+    return float(np.dot(x, v) - np.dot(y, u)) / 2.0

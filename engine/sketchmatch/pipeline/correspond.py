@@ -203,19 +203,20 @@ def object_map(matrix: Occm) -> ObjectMap:
 
     Ties go to the pairing that the order of the entries implies, then to the lower indices.
     """
-    evidence, implied = matrix.evidence.copy(), matrix.implied
-    objects = len(evidence)
+    evidence = matrix.evidence.copy()
+    left, known, implied = evidence.ravel(), matrix.evidence.ravel(), matrix.implied.ravel()
+    objects, columns = evidence.shape
     partners = np.full(objects, -1, dtype=np.int64)
     confidences = np.zeros(objects)
     for _ in range(objects):
-        first = int(evidence.argmax())
-        (best,) = np.nonzero(evidence.ravel() >= evidence.flat[first] - _TIE)
+        first = int(left.argmax())
+        (best,) = (left >= left[first] - _TIE).nonzero()
         if len(best) > 1:
-            told = implied.flat[best]
-            first = int(best[np.argmax(told >= told.max() - _TIE)])
-        g, h = divmod(first, evidence.shape[1])
-        partners[g], confidences[g] = h, matrix.evidence[g, h] / (objects - 1)
-        evidence[g, :], evidence[:, h] = -np.inf, -np.inf
+            told = implied[best]
+            first = int(best[(told >= told.max() - _TIE).argmax()])
+        g, h = divmod(first, columns)
+        partners[g], confidences[g] = h, known[first] / (objects - 1)
+        evidence[g] = evidence[:, h] = -np.inf
     return ObjectMap(partners, confidences, float(confidences.mean()))
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.kernels.directions import HalfTurns, effective_forces
-from sketchmatch.model import FloatArray, Scene, SceneDescriptor
+from sketchmatch.model import FloatArray, IntArray, Scene, SceneDescriptor, object_pairs
 from sketchmatch.model.arrays import sealed
 from sketchmatch.pipeline.result import ObjectRelation
 
@@ -50,6 +51,8 @@ _PLAIN_FIRST = np.array([0, 2, 4, 6, 1, 3, 5, 7])
 # Degrees this close are a tie: what differs is rounding.
 _DECIMALS = 9
 _ROWS = 256
+# Of so many objects all distances are measured sooner than a tree is asked.
+_FEW = 24
 
 
 @dataclass(frozen=True)
@@ -138,9 +141,9 @@ def directional_relations(histograms: FloatArray) -> tuple[DirectionalRelation, 
     As :func:`directional_relation`; what is negative counts as 0.
     """
     return tuple(
-        _relation(degrees)
+        relation
         for first in range(0, len(histograms), _ROWS)
-        for degrees in directional_degrees(histograms[first : first + _ROWS], _TURNS)
+        for relation in _relations(directional_degrees(histograms[first : first + _ROWS], _TURNS))
     )
 
 
@@ -165,7 +168,7 @@ def nearest_relations(
     pairs = _nearest_pairs(scene, sorted(objects))
     if not pairs:
         return {}
-    rows = np.stack([descriptor.histogram(a, b) for a, b in pairs])
+    rows = np.array([descriptor.histogram(a, b) for a, b in pairs])
     return {
         a: ObjectRelation(b, relation.phrase, relation.degree)
         for (a, b), relation in zip(pairs, directional_relations(rows), strict=True)
@@ -198,7 +201,7 @@ def directional_degrees(histograms: FloatArray, directions: FloatArray) -> Float
     right, right_moments = effective_forces(rows, _half_turns(bins, tuple((-starts).tolist())), -1)
     # share · (1 − 2|φ|/π), where φ is the moment over the forces, times 2π/n.
     loss = np.abs(left_moments - right_moments) * 4.0 / bins
-    degrees: FloatArray = np.clip((left + right - loss) / totals[:, None], 0.0, 1.0)
+    degrees: FloatArray = np.minimum(np.maximum((left + right - loss) / totals[:, None], 0.0), 1.0)
     return degrees
 
 
@@ -218,20 +221,36 @@ def _half_turns(bins: int, starts: tuple[float, ...]) -> HalfTurns:
     return HalfTurns(sealed(places), sealed(low), sealed(width), sealed(low < bins / 4.0))
 
 
-def _relation(degrees: FloatArray) -> DirectionalRelation:
-    """Return the best of the eight directions with these degrees."""
-    best = int(_PLAIN_FIRST[np.argmax(np.round(degrees[_PLAIN_FIRST], _DECIMALS))])
-    degree = float(degrees[best])
-    if degree < _LEAST_DEGREE:
-        return DirectionalRelation(NO_DIRECTION, degree, None)
-    return DirectionalRelation(PHRASES[best], degree, _EIGHTH * (best if best <= 4 else best - 8))
+def _relations(degrees: FloatArray) -> Iterator[DirectionalRelation]:
+    """Yield the best of the eight directions with each row of degrees."""
+    best = _PLAIN_FIRST[degrees[:, _PLAIN_FIRST].round(_DECIMALS).argmax(axis=1)]
+    for k, row in zip(best.tolist(), degrees.tolist(), strict=True):
+        if row[k] < _LEAST_DEGREE:
+            yield DirectionalRelation(NO_DIRECTION, row[k], None)
+        else:
+            yield DirectionalRelation(PHRASES[k], row[k], _EIGHTH * (k if k <= 4 else k - 8))
 
 
 def _nearest_pairs(scene: Scene, objects: Sequence[int]) -> list[tuple[int, int]]:
     """Return each of the objects with the nearest other of them."""
     if len(objects) < 2:
         return []
-    shapes = [scene.objects[k].polygon for k in objects]
+    # np.array would first ask each polygon whether it is a sequence.
+    shapes = np.fromiter((scene.objects[k].polygon for k in objects), object, len(objects))
+    near = _nearest_of_few(shapes) if len(shapes) <= _FEW else _nearest_by_tree(shapes)
+    return [(objects[k], objects[other]) for k, other in enumerate(near.tolist())]
+
+
+def _nearest_of_few(shapes: NDArray[np.object_]) -> IntArray:
+    """Return the nearest other of each of some shapes: all distances are measured."""
+    a, b = object_pairs(len(shapes)).T
+    distances = np.full((len(shapes), len(shapes)), np.inf)
+    distances[a, b] = distances[b, a] = shapely.distance(shapes[a], shapes[b])
+    return np.asarray(distances.argmin(axis=1))
+
+
+def _nearest_by_tree(shapes: NDArray[np.object_]) -> IntArray:
+    """Return the nearest other of each of many shapes, as :func:`_nearest_of_few` does."""
     tree = shapely.STRtree(shapes)
     near = np.full(len(shapes), len(shapes))
     touching, touched = tree.query(shapes, predicate="intersects")
@@ -239,6 +258,6 @@ def _nearest_pairs(scene: Scene, objects: Sequence[int]) -> list[tuple[int, int]
     np.minimum.at(near, touching[others], touched[others])
     # Nothing touches these, so nothing is their equal, and "exclusive" leaves out itself alone.
     apart = np.flatnonzero(near == len(shapes))
-    distant, nearest = tree.query_nearest([shapes[k] for k in apart], exclusive=True)
+    distant, nearest = tree.query_nearest(shapes[apart], exclusive=True)
     np.minimum.at(near, apart[distant], nearest)
-    return [(objects[k], objects[other]) for k, other in enumerate(near.tolist())]
+    return near

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from sketchmatch.api import InvalidInputError, Reason, Segmentation, Segmenter
-from sketchmatch.model import LabelledPolygon, PolygonSet, Scene, SceneObject
+from sketchmatch.model import PolygonSet, Scene
+from sketchmatch.model.outlines import objects_of
 
 __all__ = ["PolygonSegmenter"]
 
@@ -45,13 +46,4 @@ class PolygonSegmenter(Segmenter):
                 f"holds {'no polygon' if not count else 'one polygon'}; "
                 "a match compares relations between objects, so give at least two",
             )
-        return Segmentation(
-            Scene(tuple(_object(polygon, k) for k, polygon in enumerate(source.polygons)))
-        )
-
-
-def _object(polygon: LabelledPolygon, k: int) -> SceneObject:
-    try:
-        return SceneObject.from_rings(polygon.rings, polygon.label, polygon.certainty)
-    except InvalidInputError as error:
-        raise error.within(f"polygons[{k}]") from None
+        return Segmentation(Scene(objects_of(source.polygons)))
