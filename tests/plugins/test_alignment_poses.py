@@ -12,6 +12,7 @@ from sketchmatch_builtin.alignment._poses import (
     TOLERANCES,
     empty_guesses,
     fitted_pose,
+    fitting_pose,
     grid_of,
     grown,
     guess_poses,
@@ -319,6 +320,32 @@ def test_objects_in_one_place_fit_no_pose():
     spread = things(rng, 3)
     assert fitted_pose(1.0 + 0j, 0j, flat, spread, TOLERANCES, np.arange(3)) == (0.0, 0.0)
     assert fitted_pose(1.0 + 0j, 0j, spread, flat, TOLERANCES, np.arange(3)) == (0.0, 0.0)
+
+
+@given(st.integers(0, 2**32), st.integers(2, 6), st.integers(0, 3))
+@examples(40)
+def test_the_pose_of_a_map_lays_its_objects_with_the_least_squares(seed, n, more):
+    rng = np.random.default_rng(seed)
+    drawn, mapped = things(rng, n), things(rng, n + more)
+    partners = rng.permutation(n + more)[:n]
+    partners[2 + rng.integers(n - 1) :] = -1
+    partners = rng.permutation(partners)
+    matched = np.flatnonzero(partners >= 0)
+    known = np.stack([drawn.places[matched], np.ones(len(matched))], axis=1)
+    (v, s), *_ = np.linalg.lstsq(known, mapped.places[partners[matched]])
+    u, t, growth = fitting_pose(partners, drawn, mapped)
+    assert u == pytest.approx(v, abs=1e-9)
+    assert t == pytest.approx(s, abs=1e-9 * (1.0 + abs(s)))
+    assert growth == grown(drawn, mapped, partners, 2.0 * math.log(abs(u)), TOLERANCES)
+
+
+def test_a_map_tells_of_no_pose_where_it_has_one_line_or_all_in_one_place():
+    rng = np.random.default_rng(0)
+    drawn, flat = things(rng, 3), things(rng, 3, places=np.zeros(3))
+    for partners in ([-1, -1, -1], [0, -1, -1]):
+        assert fitting_pose(np.array(partners), drawn, drawn) is None
+    assert fitting_pose(np.arange(3), drawn, flat) is None
+    assert fitting_pose(np.arange(3), flat, drawn) is None
 
 
 def test_sizes_grow_with_the_pose_unless_things_say_otherwise():
