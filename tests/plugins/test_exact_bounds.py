@@ -474,6 +474,72 @@ def test_no_map_of_a_cell_loses_less_than_its_costs():
     assert belonging > 20
 
 
+def share_bounds(t, ends):
+    """Return between which shares of the L̂ the one up to t lies, by the quantiles of a cell."""
+    shares = list(zip(_cells.QUANTILES, ends.tolist(), strict=True))
+    least = max((share for share, (_, high) in shares if high <= t), default=0.0)
+    return least, min((share for share, (low, _) in shares if low > t), default=1.0)
+
+
+@given(SEEDS)
+def test_hinges_and_constant_of_a_cell_are_the_integral_of_its_chords(seed):
+    rng = np.random.default_rng(seed)
+    box = some_box(rng)
+    hinges = np.zeros((2, 2 * QUANTILES, 2))
+    constant = _cells._write_hinges(box, hinges)
+    edges = [-9.0, *np.sort(box[1:].ravel()), 9.0]
+    levels = np.array([*rng.uniform(-3.0, 3.0, 5), *box[1:].ravel()])
+    expected, total = np.zeros(len(levels)), 0.0
+    for low, high in itertools.pairwise(edges):
+        least, most = share_bounds(0.5 * (low + high), box[1:])
+        steep = 1.0 - least - most
+        if steep > 0.0:
+            expected += 2.0 * steep * np.maximum(high - np.maximum(low, levels), 0.0)
+        else:
+            expected -= 2.0 * steep * np.maximum(np.minimum(high, levels) - low, 0.0)
+        total += 2.0 * (high - low) * min(least * most, (1.0 - least) * (1.0 - most))
+    (left, right), found = hinges, np.zeros(len(levels))
+    for (place, slope), (other, fall) in zip(left, right, strict=True):
+        found += slope * np.maximum(place - levels, 0.0) + fall * np.maximum(levels - other, 0.0)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    assert constant == pytest.approx(total, abs=1e-12)
+
+
+@given(SEEDS, st.sampled_from(WEIGHTS), st.sampled_from([0.05, 0.5, 0.9, 0.99]))
+def test_a_cell_costs_what_its_quantiles_and_the_incumbent_leave(seed, weights, incumbent):
+    rng = np.random.default_rng(seed)
+    relations, spread = relations_of(random_table(rng, 4, 5), weights)
+    similarity, rotation, dilation = np.array(weights) / sum(weights)
+    box = some_box(rng)
+    terms = _cells.cell_terms(relations, incumbent, spread, box)
+    least = _cells._write_hinges(box, np.zeros((2, 2 * QUANTILES, 2))) * 6.0 / 5.0
+    most = spread
+    if 1.0 - incumbent < dilation:  # δL of what is better is bounded
+        most = min(most, -math.log2(1.0 - (1.0 - incumbent) / dilation))
+    chord = math.log(2.0) * 2.0**-most
+    if most > least + 1e-6:
+        chord = (2.0**-least - 2.0**-most) / (most - least)
+    assert terms.similarity_rate == pytest.approx(similarity / 6.0)
+    assert terms.rotation_rate == pytest.approx(rotation / 6.0)
+    assert terms.dilation_rate == pytest.approx(dilation * chord / 5.0)
+    assert terms.base == pytest.approx(dilation * (1.0 - 2.0**-least))
+    middle, half = box[0]
+    np.testing.assert_allclose(terms.turn, [*direction(middle), *direction(half)])
+
+
+def direction(angle):
+    return math.cos(angle), math.sin(angle)
+
+
+def test_a_cell_all_around_keeps_no_direction_and_one_pair_costs_similarity_alone():
+    box = _cells.first_cell((2, 3), -1.0, 1.0).boxes[0]
+    relations, spread = relations_of(random_table(np.random.default_rng(0), 2, 3), (1.0, 2.0, 3.0))
+    terms = _cells.cell_terms(relations, 0.5, spread, box)
+    assert terms.turn[_cells.HALF_COSINE] == -2.0
+    assert terms[:4] == (pytest.approx(1.0 / 6.0), 0.0, 0.0, 0.0)
+    assert not terms.hinges.any()
+
+
 def test_the_levels_of_a_path_are_those_of_its_entries_in_order():
     table = random_table(np.random.default_rng(3), 4, 5)
     relations, _ = relations_of(table, (0.0, 0.0, 1.0))
