@@ -197,6 +197,21 @@ def test_a_floor_keeps_what_is_not_worth_more_out():
     assert found.state[1] == len(values)
 
 
+def test_once_there_is_no_room_only_better_guesses_are_kept():
+    rng = np.random.default_rng(5)
+    mapped, drawn = things(rng, 6), things(rng, 3)
+    pairs, allowed = np.array([(0, 1), (1, 2)]), np.ones((3, 6), dtype=bool)
+    found, _ = guessed(pairs, drawn, mapped, allowed, room=4)
+    values = sorted(
+        aligning.pose_worth(pose, drawn, mapped, allowed, ROUGH)
+        for _, pose in aligning.guesses(pairs, drawn, mapped, allowed)
+    )
+    assert len(values) > 8
+    # The second best when the room was last full: at most one that is better came after.
+    assert values[-3] - 1e-9 <= found.floor[0] <= values[-2] + 1e-9
+    assert found.scores[: found.state[0]].min() >= found.floor[0]
+
+
 def test_guessing_pauses_soon_however_few_poses_there_are():
     rng = np.random.default_rng(0)
     drawn = things(rng, 3)
