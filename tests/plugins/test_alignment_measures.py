@@ -183,6 +183,13 @@ def test_what_nobody_drew_amid_others_is_missed():
     assert row_of([0, -1, 2, -1], corners, centre)["crowd"] == 0.0
 
 
+def test_three_near_ones_make_a_crowd():
+    corners = line(0.0, 2.0, 1.0 + 1.7j)
+    for place, crowd in ((1.0 + 0.6j, 1.0), (1.0 - 2.6j, 0.0)):  # the third is too far from there
+        assert row_of([0, 1, 2], corners, line(*corners.places, place))["crowd"] == crowd
+        assert row_of([0, 1, -1], corners, line(*corners.places, place))["crowd"] == 0.0
+
+
 def test_a_stretched_page_bends():
     rng = np.random.default_rng(1)
     drawn = things(rng, 9)

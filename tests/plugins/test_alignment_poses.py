@@ -323,6 +323,25 @@ def test_a_line_that_is_far_off_hardly_moves_the_pose():
     )
 
 
+@given(st.integers(0, 2**32), st.integers(2, 6), st.integers(0, 3))
+@examples(40)
+def test_a_pose_is_fitted_by_squares_each_weighed_by_how_well_it_fits(seed, n, more):
+    rng = np.random.default_rng(seed)
+    drawn, mapped = things(rng, n), things(rng, n + more)
+    partners = rng.permutation(n + more)[:n]
+    partners[2 + rng.integers(n - 1) :] = -1
+    partners = rng.permutation(partners)
+    u, t = complex(1.0 + rng.random(), rng.normal()), complex(*rng.normal(size=2))
+    matched = np.flatnonzero(partners >= 0)
+    here, there = drawn.places[matched], mapped.places[partners[matched]]
+    unit = 3.0 * abs(u) ** 2 * (TOLERANCES.place * drawn.spacing) ** 2
+    known = np.stack([here, np.ones(len(here))], axis=1)
+    roots = np.sqrt(1.0 / (1.0 + abs(there - u * here - t) ** 2 / unit))
+    (v, s), *_ = np.linalg.lstsq(roots[:, None] * known, roots * there)
+    found = fitted_pose(u, t, drawn, mapped, TOLERANCES, partners)
+    assert found == (pytest.approx(v, abs=1e-7), pytest.approx(s, abs=1e-7 * (1.0 + abs(s))))
+
+
 @pytest.mark.parametrize("partners", [[-1, -1, -1], [0, -1, -1]])
 def test_fewer_than_two_lines_fit_no_pose(partners):
     drawn = things(np.random.default_rng(0), 3)

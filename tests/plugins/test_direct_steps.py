@@ -19,6 +19,7 @@ from sketchmatch_builtin.searchers._moves import (
     weigh_moves,
 )
 from tests.oracle import maps as oracle
+from tests.oracle.enumeration import every_confidence
 from tests.searching import geometric_table
 from tests.strategies import random_table
 
@@ -145,6 +146,14 @@ def entries_of(table, partners):
     return similar, np.exp(1j * turns), DILATION_SCALE * np.log(dilations)
 
 
+def moved(partners, a, c):
+    """Return a map after a move: a gets c, and who had it what a had."""
+    after = partners.copy()
+    after[after == c] = partners[a]
+    after[a] = c
+    return tuple(after.tolist())
+
+
 @given(SEEDS, st.integers(2, 6))
 def test_lines_lie_below_the_sum_of_distances_and_close_to_it(seed, objects):
     rng = np.random.default_rng(seed)
@@ -186,10 +195,7 @@ def test_the_most_promising_move_is_the_best_by_the_tangent_of_dilation(weights)
         worths = {}
         for a in range(4):
             for c in set(range(5)) - {int(partners[a])}:
-                after = partners.copy()
-                after[after == c] = partners[a]
-                after[a] = c
-                similar, turns, levels = entries_of(table, tuple(after.tolist()))
+                similar, turns, levels = entries_of(table, moved(partners, a, c))
                 more = sum(
                     _moves._line(moves.lines, new) - _moves._line(moves.lines, old)
                     for new, old in zip(levels, before, strict=True)
@@ -209,3 +215,30 @@ def test_the_most_promising_move_is_the_best_by_the_tangent_of_dilation(weights)
             assert worths[a, c] == pytest.approx(max(worths.values()), abs=1e-5)
             assert worths[a, c] > now
     assert none < 12
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0, 1.0), (0.0, 0.0, 1.0), (1.0, 0.0, 5.0)])
+def test_no_move_above_a_threshold_is_missed_and_some_below_are_left_out(weights):
+    evaluated = above = possible = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        table = random_table(rng, 4, 5)
+        state, moves, _ = read(table, weights)
+        partners = rng.permutation(5)[:4]
+        place_map(state, partners)
+        renew_moves(state, moves)
+        every = every_confidence(table, weights)
+        threshold = float(np.quantile(list(every.values()), 0.9))
+        for a in range(4):
+            evaluated += weigh_moves(state, moves, a, threshold)
+            for c in range(5):
+                b = int(state.holders[c])
+                if 0 <= b <= a:  # an exchange is weighed once
+                    assert moves.values[c] == -1.0
+                    continue
+                value = every[moved(partners, a, c)]
+                expected = value if value > threshold else -1.0
+                assert moves.values[c] == pytest.approx(expected, abs=1e-9)
+                above += value > threshold
+                possible += 1
+    assert 0 < above <= evaluated < possible
