@@ -149,6 +149,8 @@ def test_own_histograms_are_read_between_the_bins_of_the_turn():
         assert (row["alike"], row["unlike"]) == (2.0, 1.0)
         row = row_of([1, -1, 2], drawn, mapped, relations)
         assert (row["alike"], row["unlike"]) == (0.0, 2.0)
+        row = row_of([2, 1, 0], drawn, mapped, relations)  # of two of them nothing is said
+        assert (row["alike"], row["unlike"]) == (1.0, 0.0)
 
 
 def assert_finite(partners, drawn, mapped):

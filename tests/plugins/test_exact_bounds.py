@@ -1,5 +1,6 @@
 """The parts of ``exact`` on their own: each bound and whatever is left out, against enumeration."""
 
+import dataclasses
 import itertools
 import math
 
@@ -525,6 +526,36 @@ def test_a_cell_costs_what_its_quantiles_and_the_incumbent_leave(seed, weights, 
     assert terms.base == pytest.approx(dilation * (1.0 - 2.0**-least))
     middle, half = box[0]
     np.testing.assert_allclose(terms.turn, [*direction(middle), *direction(half)])
+
+
+@given(SEEDS, st.sampled_from(WEIGHTS), st.booleans())
+def test_an_entry_costs_what_the_direction_that_suits_it_best_leaves(seed, weights, directed):
+    rng = np.random.default_rng(seed)
+    table = with_rotation_weights(rng, random_table(rng, 3, 4))
+    if directed:
+        table = dataclasses.replace(table, evidence=rng.random((3, 12)))
+    relations, spread = relations_of(table, weights)
+    box = some_box(rng)
+    terms = _cells.cell_terms(relations, 0.3, spread, box)
+    costs, (middle, half) = np.empty((3, 12)), box[0]
+    _cells.pair_costs(relations, 0, 3, terms, costs)
+    for i, pair in itertools.product(range(3), itertools.permutations(range(4), 2)):
+        column = relations.columns[pair]
+        similar, turn, dilation = oracle.look_up(table, i, pair)
+        if directed:
+            similar = table.evidence[i, column]
+        away = abs(np.angle(np.exp(1j * (turn - middle))))
+        greatest = math.cos(max(0.0, away - half))
+        level = 1.5 * math.log2(dilation)
+        left, right = terms.hinges
+        kinked = sum(slope * max(place - level, 0.0) for place, slope in left)
+        kinked += sum(slope * max(level - place, 0.0) for place, slope in right)
+        assert costs[i, column] == pytest.approx(
+            terms.similarity_rate * (1.0 - similar)
+            + terms.rotation_rate * table.rotation_weights[i] * (1.0 - greatest)
+            + terms.dilation_rate * kinked,
+            abs=1e-12,
+        )
 
 
 def direction(angle):
