@@ -571,6 +571,20 @@ def test_a_cell_all_around_keeps_no_direction_and_one_pair_costs_similarity_alon
     assert not terms.hinges.any()
 
 
+@given(SEEDS, st.sampled_from(WEIGHTS))
+def test_while_maps_are_tried_none_is_more_than_the_best_of_each_pair(seed, weights):
+    table = random_table(np.random.default_rng(seed), 4, 5)
+    begin = Ranking(np.arange(4)[None], np.zeros(1))
+    search = module._Search(
+        MatchProblem(table, weights), Evolved(Outcome.CONVERGED, begin, 0, 0), Exact.Params()
+    )
+    finish(search.read())
+    next(search.backtrack(), None)
+    share = weights[0] / sum(weights)
+    most = share * table.entry_evidence.max(axis=1).mean() + 1.0 - share
+    assert search.upper_bound == pytest.approx(most)
+
+
 def test_the_levels_of_a_path_are_those_of_its_entries_in_order():
     table = random_table(np.random.default_rng(3), 4, 5)
     relations, _ = relations_of(table, (0.0, 0.0, 1.0))
