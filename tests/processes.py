@@ -65,10 +65,27 @@ def children_of(pid: int) -> list[int]:
     return found
 
 
+def status_of(pid: int) -> dict[str, str]:
+    """Return what the kernel tells of a process, by name.
+
+    Raises
+    ------
+    OSError
+        If there is none.
+    """
+    told = Path(f"/proc/{pid}/status").read_text(encoding="utf-8", errors="replace")
+    return dict(line.split(":\t", 1) for line in told.splitlines())
+
+
+def memory_of(pid: int, of: str = "VmRSS") -> int:
+    """Return the bytes of memory that a process occupies, or that ``VmHWM`` says it did at most."""
+    return 1024 * int(status_of(pid).get(of, "0 kB").split()[0])
+
+
 def is_alive(pid: int) -> bool:
     """Whether a process runs; one that has ended and nobody asks about does not."""
     try:
-        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+        return not status_of(pid).get("State", "").startswith("Z")
     except OSError:
         return False
 

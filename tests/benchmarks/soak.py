@@ -29,7 +29,7 @@ from rich.table import Table
 
 from sketchmatch_client import AsyncClient, sources
 from sketchmatch_client.errors import SketchmatchError
-from tests.processes import Server, children_of
+from tests.processes import Server, children_of, memory_of, status_of
 from tests.server.harness import ENDLESS, shapes, turned
 
 _MIB = 1024 * 1024
@@ -282,11 +282,9 @@ class _Soak:
 
 
 def _sample(pid: int) -> Sample:
-    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
-    told = dict(line.split(":", 1) for line in status.splitlines() if ":" in line)
     return Sample(
-        int(told["VmRSS"].split()[0]) * 1024,
-        int(told["Threads"]),
+        memory_of(pid),
+        int(status_of(pid)["Threads"]),
         len(list(Path(f"/proc/{pid}/fd").iterdir())),
         len(children_of(pid)),
     )

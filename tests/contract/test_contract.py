@@ -2,12 +2,15 @@
 
 import re
 import subprocess
+from dataclasses import fields
 from pathlib import Path
 
 import grpc
 import pytest
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
+import sketchmatch
+import sketchmatch_client
 from sketchmatch.api import Outcome
 from sketchmatch.errors import Reason
 from sketchmatch_proto.v1 import catalog_service_pb2, errors_pb2, match_pb2, source_pb2
@@ -70,6 +73,14 @@ def test_error_reasons_are_the_engines():
 
 def test_outcomes_are_the_engines():
     assert names(match_pb2.Outcome, "OUTCOME_") == {outcome.name for outcome in Outcome}
+
+
+def test_what_the_client_says_of_an_object_is_what_the_engine_takes():
+    ours, theirs = (
+        [(field.name, field.type, field.default) for field in fields(pin)]
+        for pin in (sketchmatch.Pin, sketchmatch_client.Pin)
+    )
+    assert ours == theirs
 
 
 def test_source_kinds_are_the_fields_of_a_source():

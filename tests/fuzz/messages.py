@@ -15,8 +15,8 @@ import struct
 import sys
 import time
 from collections import Counter, deque
+from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import grpc
 from google.protobuf import message_factory
@@ -34,7 +34,7 @@ from sketchmatch_proto.v1.sketch_service_pb2 import (
 from sketchmatch_proto.v1.source_pb2 import Source
 from sketchmatch_proto.v1.transfer_service_pb2 import TransferRequest
 from tests.contract.golden import FILES, NAMES, golden
-from tests.processes import Server, children_of
+from tests.processes import Server, children_of, memory_of
 from tests.server.harness import shapes, turned
 
 METHODS: tuple[MethodDescriptor, ...] = tuple(
@@ -287,15 +287,11 @@ def _ended(
 
 def _mebibytes(running: Server) -> float:
     """Return the resident memory of a server and of all that it has started."""
-    pids = [running.process.pid, *children_of(running.process.pid)]
-    kibibytes = 0
-    for pid in pids:
-        try:
-            status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
-        except OSError:
-            continue
-        kibibytes += sum(int(line.split()[1]) for line in status.splitlines() if "VmRSS" in line)
-    return kibibytes / 1024
+    total = memory_of(running.process.pid)
+    for child in children_of(running.process.pid):
+        with suppress(OSError):  # it has ended meanwhile
+            total += memory_of(child)
+    return total / 2**20
 
 
 def main() -> int:

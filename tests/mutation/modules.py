@@ -87,7 +87,7 @@ _GROUPS = {
         "plugins/sketchmatch_builtin/judges",
         {
             "_odds": "unit/test_probability unit/test_judge",
-            "calibration": "unit/test_probability unit/test_learning",
+            "calibration": "unit/test_probability unit/test_learning plugins/test_posterior",
             "confidence": "unit/test_judge unit/test_thesis_profile",
             "_described": "plugins/test_posterior",
             "_evidence": "plugins/test_posterior",

@@ -78,10 +78,9 @@ class Mutant:
         again = f" ({self.repeat + 1})" if self.repeat else ""
         return f"{self.path}: {self.before} → {self.after}{again}"
 
-    @property
-    def rank(self) -> str:
-        """A number by chance, that depends on the name alone: a sample is the lowest ones."""
-        return hashlib.sha256(self.name.encode()).hexdigest()
+    def rank(self, seed: str = "") -> str:
+        """Return a number by chance that the name alone decides: a sample is the lowest ones."""
+        return hashlib.sha256(f"{seed}{self.name}".encode()).hexdigest()
 
     def applied(self, source: str) -> str:
         """Return the file's text with the change."""

@@ -7,7 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sketchmatch_builtin.alignment import Laid, Sides, completed, drive, laid_maps, template_maps
+from sketchmatch_builtin.alignment import (
+    Laid,
+    Sides,
+    completed,
+    drive,
+    known_maps,
+    known_near_maps,
+    laid_maps,
+    near_maps,
+    template_maps,
+)
 from sketchmatch_builtin.alignment import _candidates as module
 from sketchmatch_builtin.alignment._poses import TOLERANCES
 from tests.interpreted import examples
@@ -162,6 +172,61 @@ def test_alike_things_on_a_square_are_laid_in_all_four_ways_alike():
     laid = lay(sides(square, square))
     best = {tuple(each.partners.tolist()) for each in laid if each.score > -1e-6}
     assert best == {tuple((k + np.arange(4)) % 4) for k in range(4)}
+
+
+@pytest.mark.parametrize("partial", [True, False])
+def test_a_map_that_was_right_a_moment_ago_is_mended(partial, monkeypatch):
+    monkeypatch.setattr(module, "_NEAR_POSES", 0)  # no other way of laying leads to it
+    drawn, mapped, order = copied(2, 5, 7)
+    seen, before = sides(drawn, mapped), np.array([order[0], order[1], -1, order[3], -1])
+    assert near_maps(seen, [], partial=partial) == []
+    laid = near_maps(seen, [np.full(5, -1), before], maps=9, partial=partial)
+    np.testing.assert_array_equal(laid[0].partners, order)
+    u, t, _ = laid[0].pose
+    np.testing.assert_allclose(u * drawn.places + t, mapped.places[order], atol=1e-6)
+    assert laid[0].score == pytest.approx(0.0, abs=1e-6)
+    assert 1 < len({each.partners.tobytes() for each in laid}) == len(laid) <= 9
+    assert min(each.lines for each in laid) >= (3 if partial else 5)
+
+
+def test_the_better_of_two_maps_that_were_right_a_moment_ago_comes_first():
+    drawn, mapped, order = copied(3, 4, 8)
+    wrong = np.setdiff1d(np.arange(8), order)
+    laid = near_maps(sides(drawn, mapped), [wrong, order], maps=500)
+    np.testing.assert_array_equal(laid[0].partners, order)
+    scores = [each.score for each in laid]
+    assert scores == sorted(scores, reverse=True)
+
+
+def test_whoever_moves_to_another_place_is_found_there_by_a_few_pairs():
+    drawn, mapped, order = copied(5, 6, 9)
+    laid = near_maps(sides(drawn, mapped), [np.roll(order, 1)])
+    np.testing.assert_array_equal(laid[0].partners, order)
+
+
+def test_what_was_found_just_before_is_known_of_the_same_alone():
+    drawn, mapped, order = copied(6, 4, 6)
+    seen, other = sides(drawn, mapped), sides(mapped, drawn, swapped=True)
+    assert known_near_maps(seen) == []
+    near = near_maps(seen, [order], maps=7)
+    assert known_near_maps(seen) is near
+    assert known_near_maps(seen, partial=False) == known_near_maps(other) == []
+    assert len(known_maps(seen)) > len(near)  # looked for in every way
+    laid = lay(seen, poses=5, maps=8)
+    assert known_maps(seen, 5, 8, True) is laid
+    assert known_maps(seen, 5, 9, True) is not laid
+    assert known_near_maps(seen) is near
+
+
+def test_far_pairs_are_laid_first_and_each_object_soon():
+    places = np.array([0.0, 1.0, 10.0, 12.0 + 1e-6j])
+    pairs = module._pairs(things(np.random.default_rng(0), 4, places=places))
+    # 12; 10 − 1 of two that are new; then what is left, 11, 10 and 2 and 1, of used ones.
+    assert pairs.tolist() == [[0, 3], [1, 2], [1, 3], [0, 2], [2, 3], [0, 1]]
+    few = module._pairs(things(np.random.default_rng(0), 4, places=places), 2)
+    assert few.tolist() == pairs[:2].tolist()
+    many = module._pairs(things(np.random.default_rng(0), 30))
+    assert len({tuple(sorted(pair)) for pair in many.tolist()}) == len(many) == 60
 
 
 def test_work_between_pauses_is_bounded(monkeypatch):

@@ -149,6 +149,8 @@ def test_own_histograms_are_read_between_the_bins_of_the_turn():
         assert (row["alike"], row["unlike"]) == (2.0, 1.0)
         row = row_of([1, -1, 2], drawn, mapped, relations)
         assert (row["alike"], row["unlike"]) == (0.0, 2.0)
+        row = row_of([2, 1, 0], drawn, mapped, relations)  # of two of them nothing is said
+        assert (row["alike"], row["unlike"]) == (1.0, 0.0)
 
 
 def assert_finite(partners, drawn, mapped):
@@ -181,6 +183,13 @@ def test_what_nobody_drew_amid_others_is_missed():
     # Two that were drawn surround nothing.
     assert row_of([0, -1, 2, -1], corners, centre)["missing"] == 0.0
     assert row_of([0, -1, 2, -1], corners, centre)["crowd"] == 0.0
+
+
+def test_three_near_ones_make_a_crowd():
+    corners = line(0.0, 2.0, 1.0 + 1.7j)
+    for place, crowd in ((1.0 + 0.6j, 1.0), (1.0 - 2.6j, 0.0)):  # the third is too far from there
+        assert row_of([0, 1, 2], corners, line(*corners.places, place))["crowd"] == crowd
+        assert row_of([0, 1, -1], corners, line(*corners.places, place))["crowd"] == 0.0
 
 
 def test_a_stretched_page_bends():

@@ -12,6 +12,7 @@ from sketchmatch_builtin.alignment._poses import (
     TOLERANCES,
     empty_guesses,
     fitted_pose,
+    fitting_pose,
     grid_of,
     grown,
     guess_poses,
@@ -196,6 +197,21 @@ def test_a_floor_keeps_what_is_not_worth_more_out():
     assert found.state[1] == len(values)
 
 
+def test_once_there_is_no_room_only_better_guesses_are_kept():
+    rng = np.random.default_rng(5)
+    mapped, drawn = things(rng, 6), things(rng, 3)
+    pairs, allowed = np.array([(0, 1), (1, 2)]), np.ones((3, 6), dtype=bool)
+    found, _ = guessed(pairs, drawn, mapped, allowed, room=4)
+    values = sorted(
+        aligning.pose_worth(pose, drawn, mapped, allowed, ROUGH)
+        for _, pose in aligning.guesses(pairs, drawn, mapped, allowed)
+    )
+    assert len(values) > 8
+    # The second best when the room was last full: at most one that is better came after.
+    assert values[-3] - 1e-9 <= found.floor[0] <= values[-2] + 1e-9
+    assert found.scores[: found.state[0]].min() >= found.floor[0]
+
+
 def test_guessing_pauses_soon_however_few_poses_there_are():
     rng = np.random.default_rng(0)
     drawn = things(rng, 3)
@@ -307,6 +323,25 @@ def test_a_line_that_is_far_off_hardly_moves_the_pose():
     )
 
 
+@given(st.integers(0, 2**32), st.integers(2, 6), st.integers(0, 3))
+@examples(40)
+def test_a_pose_is_fitted_by_squares_each_weighed_by_how_well_it_fits(seed, n, more):
+    rng = np.random.default_rng(seed)
+    drawn, mapped = things(rng, n), things(rng, n + more)
+    partners = rng.permutation(n + more)[:n]
+    partners[2 + rng.integers(n - 1) :] = -1
+    partners = rng.permutation(partners)
+    u, t = complex(1.0 + rng.random(), rng.normal()), complex(*rng.normal(size=2))
+    matched = np.flatnonzero(partners >= 0)
+    here, there = drawn.places[matched], mapped.places[partners[matched]]
+    unit = 3.0 * abs(u) ** 2 * (TOLERANCES.place * drawn.spacing) ** 2
+    known = np.stack([here, np.ones(len(here))], axis=1)
+    roots = np.sqrt(1.0 / (1.0 + abs(there - u * here - t) ** 2 / unit))
+    (v, s), *_ = np.linalg.lstsq(roots[:, None] * known, roots * there)
+    found = fitted_pose(u, t, drawn, mapped, TOLERANCES, partners)
+    assert found == (pytest.approx(v, abs=1e-7), pytest.approx(s, abs=1e-7 * (1.0 + abs(s))))
+
+
 @pytest.mark.parametrize("partners", [[-1, -1, -1], [0, -1, -1]])
 def test_fewer_than_two_lines_fit_no_pose(partners):
     drawn = things(np.random.default_rng(0), 3)
@@ -319,6 +354,32 @@ def test_objects_in_one_place_fit_no_pose():
     spread = things(rng, 3)
     assert fitted_pose(1.0 + 0j, 0j, flat, spread, TOLERANCES, np.arange(3)) == (0.0, 0.0)
     assert fitted_pose(1.0 + 0j, 0j, spread, flat, TOLERANCES, np.arange(3)) == (0.0, 0.0)
+
+
+@given(st.integers(0, 2**32), st.integers(2, 6), st.integers(0, 3))
+@examples(40)
+def test_the_pose_of_a_map_lays_its_objects_with_the_least_squares(seed, n, more):
+    rng = np.random.default_rng(seed)
+    drawn, mapped = things(rng, n), things(rng, n + more)
+    partners = rng.permutation(n + more)[:n]
+    partners[2 + rng.integers(n - 1) :] = -1
+    partners = rng.permutation(partners)
+    matched = np.flatnonzero(partners >= 0)
+    known = np.stack([drawn.places[matched], np.ones(len(matched))], axis=1)
+    (v, s), *_ = np.linalg.lstsq(known, mapped.places[partners[matched]])
+    u, t, growth = fitting_pose(partners, drawn, mapped)
+    assert u == pytest.approx(v, abs=1e-9)
+    assert t == pytest.approx(s, abs=1e-9 * (1.0 + abs(s)))
+    assert growth == grown(drawn, mapped, partners, 2.0 * math.log(abs(u)), TOLERANCES)
+
+
+def test_a_map_tells_of_no_pose_where_it_has_one_line_or_all_in_one_place():
+    rng = np.random.default_rng(0)
+    drawn, flat = things(rng, 3), things(rng, 3, places=np.zeros(3))
+    for partners in ([-1, -1, -1], [0, -1, -1]):
+        assert fitting_pose(np.array(partners), drawn, drawn) is None
+    assert fitting_pose(np.arange(3), drawn, flat) is None
+    assert fitting_pose(np.arange(3), flat, drawn) is None
 
 
 def test_sizes_grow_with_the_pose_unless_things_say_otherwise():

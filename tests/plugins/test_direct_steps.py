@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from sketchmatch.api.kernels import empty_map_state, place_map
 from sketchmatch.model import DILATION_SCALE, RelationTable, object_pairs
 from sketchmatch_builtin.searchers import _memetic as steps
+from sketchmatch_builtin.searchers import _moves
 from sketchmatch_builtin.searchers._moves import (
     empty_moves,
     read_relations,
@@ -18,6 +19,7 @@ from sketchmatch_builtin.searchers._moves import (
     weigh_moves,
 )
 from tests.oracle import maps as oracle
+from tests.oracle.enumeration import every_confidence
 from tests.searching import geometric_table
 from tests.strategies import random_table
 
@@ -135,3 +137,108 @@ def test_where_dilation_counts_for_nothing_only_moves_above_a_threshold_are_eval
             evaluated += weigh_moves(state, moves, a, threshold)
             above += (moves.values >= 0.0).sum()
     assert evaluated == above > 100
+
+
+def entries_of(table, partners):
+    """Return e, e^{iR} and L̂ of each entry of a map."""
+    found = [oracle.look_up(table, i, pair) for i, pair in enumerate(oracle.induced(partners))]
+    similar, turns, dilations = np.array(found).T
+    return similar, np.exp(1j * turns), DILATION_SCALE * np.log(dilations)
+
+
+def moved(partners, a, c):
+    """Return a map after a move: a gets c, and who had it what a had."""
+    after = partners.copy()
+    after[after == c] = partners[a]
+    after[a] = c
+    return tuple(after.tolist())
+
+
+@given(SEEDS, st.integers(2, 6))
+def test_lines_lie_below_the_sum_of_distances_and_close_to_it(seed, objects):
+    rng = np.random.default_rng(seed)
+    table = random_table(rng, objects, objects + 1)
+    state, moves, _ = read(table)
+    place_map(state, rng.permutation(objects + 1)[:objects])
+    renew_moves(state, moves)
+    levels = np.sort(state.levels)
+    low, high, count = levels[0], levels[-1], len(levels)
+    for value in [*levels, *rng.uniform(low - 1.0, high + 1.0, 9)]:
+        line, distance = _moves._line(moves.lines, value), abs(levels - value).sum()
+        assert line <= distance + 1e-9
+        # Off by 2 for each level, and by its distance, between the value and the middle of a
+        # bucket: no more than those of the bucket.
+        bucket = min(max(np.floor((value - low) * count / (high - low or 1.0)), 0), count - 1)
+        width = (high - low) / count
+        within = (levels >= low + bucket * width - 1e-9) & (
+            levels <= low + (bucket + 1) * width + 1e-9
+        )
+        outside = max(low - value, value - high, 0.0)
+        assert distance - line <= 2.0 * within.sum() * (width + outside) + 1e-9
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0, 1.0), (0.0, 0.0, 1.0), (1.0, 0.0, 5.0)])
+def test_the_most_promising_move_is_the_best_by_the_tangent_of_dilation(weights):
+    w_s, w_r, w_l = np.array(weights) / sum(weights)
+    none = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        table = random_table(rng, 4, 5)
+        state, moves, _ = read(table, weights)
+        partners = rng.permutation(5)[:4]
+        now = place_map(state, partners)
+        renew_moves(state, moves)
+        before = entries_of(table, tuple(partners.tolist()))[2]
+        count = len(before)
+        scale = 2.0 / (count * (count - 1))
+        level = 2.0 ** (-scale * sum(abs(before[i] - before[:i]).sum() for i in range(count)))
+        worths = {}
+        for a in range(4):
+            for c in set(range(5)) - {int(partners[a])}:
+                similar, turns, levels = entries_of(table, moved(partners, a, c))
+                more = sum(
+                    _moves._line(moves.lines, new) - _moves._line(moves.lines, old)
+                    for new, old in zip(levels, before, strict=True)
+                    if new != old
+                )
+                worths[a, c] = (
+                    w_s * similar.mean()
+                    + w_r * abs(turns.mean())
+                    + w_l * level * (1.0 - np.log(2.0) * scale * more)
+                )
+        a, c = _moves._most_promising(state, moves)
+        if a < 0:
+            none += 1
+            assert max(worths.values()) <= now + 1e-5
+        else:
+            # What is read of relations has seven digits.
+            assert worths[a, c] == pytest.approx(max(worths.values()), abs=1e-5)
+            assert worths[a, c] > now
+    assert none < 12
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0, 1.0), (0.0, 0.0, 1.0), (1.0, 0.0, 5.0)])
+def test_no_move_above_a_threshold_is_missed_and_some_below_are_left_out(weights):
+    evaluated = above = possible = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        table = random_table(rng, 4, 5)
+        state, moves, _ = read(table, weights)
+        partners = rng.permutation(5)[:4]
+        place_map(state, partners)
+        renew_moves(state, moves)
+        every = every_confidence(table, weights)
+        threshold = float(np.quantile(list(every.values()), 0.9))
+        for a in range(4):
+            evaluated += weigh_moves(state, moves, a, threshold)
+            for c in range(5):
+                b = int(state.holders[c])
+                if 0 <= b <= a:  # an exchange is weighed once
+                    assert moves.values[c] == -1.0
+                    continue
+                value = every[moved(partners, a, c)]
+                expected = value if value > threshold else -1.0
+                assert moves.values[c] == pytest.approx(expected, abs=1e-9)
+                above += value > threshold
+                possible += 1
+    assert 0 < above <= evaluated < possible

@@ -54,16 +54,16 @@ def population(individuals, fitness, size):
     worth[: len(fitness) - 1], worth[size] = fitness[:-1], fitness[-1]
     status = np.zeros(7, dtype=np.int64)
     status[steps.MEMBERS], status[steps.STALE] = len(individuals) - 1, 3
-    no, none = np.zeros(0), np.zeros(0, dtype=np.int64)
+    no, none, flat = np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 0))
     return steps.Evolution(
         by_object=True,
         rates=no,
         pairs=np.zeros((0, 2), dtype=np.int64),
         columns=np.zeros((0, 0), dtype=np.int64),
-        evidence=no,
-        cosine=no,
-        sine=no,
-        dilation=no,
+        evidence=flat,
+        cosine=flat,
+        sine=flat,
+        dilation=flat,
         weights=no,
         individuals=rows,
         places=np.arange(count),
@@ -145,6 +145,28 @@ def crossed(one, other, others, seed, rate=0.5):
         one, other, child, sibling, pairs, rate, order, holders, free, seeded(seed)
     )
     return child, sibling
+
+
+def test_each_two_different_members_are_crossed_as_often_as_any_others():
+    members = [(0, 1, 2, 3, 4, 5), (3, 4, 5, 0, 1, 2), (5, 4, 3, 2, 1, 0)]
+    evolution = population([*members, (0,) * 6], [0.5, 0.4, 0.3, 0.0], 3)._replace(
+        by_object=False,
+        rates=np.array([1.0, 1.0, 0.0]),  # all is exchanged
+        known=np.zeros(2**12, dtype=np.int64),
+        order=np.arange(6),
+        holders=np.empty((2, 6), dtype=np.int64),
+        free=np.empty(6, dtype=np.int64),
+        seed=seeded(5),
+    )
+    for each in members:  # so that their children are not judged
+        steps._is_known(evolution.known, np.array(each))
+    parents = Counter()
+    for _ in range(1200):
+        evolution.status[steps.TRIAL] = 0
+        steps._cross(evolution, 1, 100)
+        parents[tuple(map(tuple, evolution.individuals[3:5].tolist()))] += 1
+    assert set(parents) == {(a, b) for a in members for b in members if a != b}
+    assert all(150 < count < 250 for count in parents.values())
 
 
 @given(object_maps(1), SEEDS)

@@ -1,5 +1,6 @@
 """The parts of ``exact`` on their own: each bound and whatever is left out, against enumeration."""
 
+import dataclasses
 import itertools
 import math
 
@@ -472,6 +473,116 @@ def test_no_map_of_a_cell_loses_less_than_its_costs():
                 loss = terms.base + sum(_costs(relations, terms, partners))
                 assert 1.0 - value >= loss - 1e-12, seed
     assert belonging > 20
+
+
+def share_bounds(t, ends):
+    """Return between which shares of the L̂ the one up to t lies, by the quantiles of a cell."""
+    shares = list(zip(_cells.QUANTILES, ends.tolist(), strict=True))
+    least = max((share for share, (_, high) in shares if high <= t), default=0.0)
+    return least, min((share for share, (low, _) in shares if low > t), default=1.0)
+
+
+@given(SEEDS)
+def test_hinges_and_constant_of_a_cell_are_the_integral_of_its_chords(seed):
+    rng = np.random.default_rng(seed)
+    box = some_box(rng)
+    hinges = np.zeros((2, 2 * QUANTILES, 2))
+    constant = _cells._write_hinges(box, hinges)
+    edges = [-9.0, *np.sort(box[1:].ravel()), 9.0]
+    levels = np.array([*rng.uniform(-3.0, 3.0, 5), *box[1:].ravel()])
+    expected, total = np.zeros(len(levels)), 0.0
+    for low, high in itertools.pairwise(edges):
+        least, most = share_bounds(0.5 * (low + high), box[1:])
+        steep = 1.0 - least - most
+        if steep > 0.0:
+            expected += 2.0 * steep * np.maximum(high - np.maximum(low, levels), 0.0)
+        else:
+            expected -= 2.0 * steep * np.maximum(np.minimum(high, levels) - low, 0.0)
+        total += 2.0 * (high - low) * min(least * most, (1.0 - least) * (1.0 - most))
+    (left, right), found = hinges, np.zeros(len(levels))
+    for (place, slope), (other, fall) in zip(left, right, strict=True):
+        found += slope * np.maximum(place - levels, 0.0) + fall * np.maximum(levels - other, 0.0)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    assert constant == pytest.approx(total, abs=1e-12)
+
+
+@given(SEEDS, st.sampled_from(WEIGHTS), st.sampled_from([0.05, 0.5, 0.9, 0.99]))
+def test_a_cell_costs_what_its_quantiles_and_the_incumbent_leave(seed, weights, incumbent):
+    rng = np.random.default_rng(seed)
+    relations, spread = relations_of(random_table(rng, 4, 5), weights)
+    similarity, rotation, dilation = np.array(weights) / sum(weights)
+    box = some_box(rng)
+    terms = _cells.cell_terms(relations, incumbent, spread, box)
+    least = _cells._write_hinges(box, np.zeros((2, 2 * QUANTILES, 2))) * 6.0 / 5.0
+    most = spread
+    if 1.0 - incumbent < dilation:  # δL of what is better is bounded
+        most = min(most, -math.log2(1.0 - (1.0 - incumbent) / dilation))
+    chord = math.log(2.0) * 2.0**-most
+    if most > least + 1e-6:
+        chord = (2.0**-least - 2.0**-most) / (most - least)
+    assert terms.similarity_rate == pytest.approx(similarity / 6.0)
+    assert terms.rotation_rate == pytest.approx(rotation / 6.0)
+    assert terms.dilation_rate == pytest.approx(dilation * chord / 5.0)
+    assert terms.base == pytest.approx(dilation * (1.0 - 2.0**-least))
+    middle, half = box[0]
+    np.testing.assert_allclose(terms.turn, [*direction(middle), *direction(half)])
+
+
+@given(SEEDS, st.sampled_from(WEIGHTS), st.booleans())
+def test_an_entry_costs_what_the_direction_that_suits_it_best_leaves(seed, weights, directed):
+    rng = np.random.default_rng(seed)
+    table = with_rotation_weights(rng, random_table(rng, 3, 4))
+    if directed:
+        table = dataclasses.replace(table, evidence=rng.random((3, 12)))
+    relations, spread = relations_of(table, weights)
+    box = some_box(rng)
+    terms = _cells.cell_terms(relations, 0.3, spread, box)
+    costs, (middle, half) = np.empty((3, 12)), box[0]
+    _cells.pair_costs(relations, 0, 3, terms, costs)
+    for i, pair in itertools.product(range(3), itertools.permutations(range(4), 2)):
+        column = relations.columns[pair]
+        similar, turn, dilation = oracle.look_up(table, i, pair)
+        if directed:
+            similar = table.evidence[i, column]
+        away = abs(np.angle(np.exp(1j * (turn - middle))))
+        greatest = math.cos(max(0.0, away - half))
+        level = 1.5 * math.log2(dilation)
+        left, right = terms.hinges
+        kinked = sum(slope * max(place - level, 0.0) for place, slope in left)
+        kinked += sum(slope * max(level - place, 0.0) for place, slope in right)
+        assert costs[i, column] == pytest.approx(
+            terms.similarity_rate * (1.0 - similar)
+            + terms.rotation_rate * table.rotation_weights[i] * (1.0 - greatest)
+            + terms.dilation_rate * kinked,
+            abs=1e-12,
+        )
+
+
+def direction(angle):
+    return math.cos(angle), math.sin(angle)
+
+
+def test_a_cell_all_around_keeps_no_direction_and_one_pair_costs_similarity_alone():
+    box = _cells.first_cell((2, 3), -1.0, 1.0).boxes[0]
+    relations, spread = relations_of(random_table(np.random.default_rng(0), 2, 3), (1.0, 2.0, 3.0))
+    terms = _cells.cell_terms(relations, 0.5, spread, box)
+    assert terms.turn[_cells.HALF_COSINE] == -2.0
+    assert terms[:4] == (pytest.approx(1.0 / 6.0), 0.0, 0.0, 0.0)
+    assert not terms.hinges.any()
+
+
+@given(SEEDS, st.sampled_from(WEIGHTS))
+def test_while_maps_are_tried_none_is_more_than_the_best_of_each_pair(seed, weights):
+    table = random_table(np.random.default_rng(seed), 4, 5)
+    begin = Ranking(np.arange(4)[None], np.zeros(1))
+    search = module._Search(
+        MatchProblem(table, weights), Evolved(Outcome.CONVERGED, begin, 0, 0), Exact.Params()
+    )
+    finish(search.read())
+    next(search.backtrack(), None)
+    share = weights[0] / sum(weights)
+    most = share * table.entry_evidence.max(axis=1).mean() + 1.0 - share
+    assert search.upper_bound == pytest.approx(most)
 
 
 def test_the_levels_of_a_path_are_those_of_its_entries_in_order():

@@ -503,6 +503,19 @@ def test_whether_the_right_map_is_known_follows_from_the_best_share_and_worth():
     )
 
 
+def test_it_is_less_likely_to_be_known_the_less_the_best_is_worth():
+    known = Described(np.array([[0, 1], [1, 0]]), scored(-3.0, -1.0, n=2), (), 2, 3, True)
+    lost = np.array([0.1, 0.2, -0.3, 0.4, 0.5, 0.6])
+    found = weighed(known, PLAIN._replace(lost=lost))
+    numbers = [1.0, 2.0, math.log(3), math.log(found.shares.max()), 2 / 3, -AT_FIRST / 2]
+    assert found.lost == pytest.approx(1.0 / (1.0 + math.exp(-lost @ numbers)))
+
+
+def test_what_is_known_of_the_place_is_taken_as_it_is():
+    known = Described(np.array([[0, 1]]), scored(-1.0, n=2), (), 2, 3, True)
+    assert weighed(known, PLAIN, elsewhere=0.125).elsewhere == 0.125
+
+
 def test_odds_are_bounded():
     assert _evidence._logistic(0.0) == 0.5
     assert _evidence._logistic(1e6) == _evidence._logistic(50.0) < 1.0 + 1e-12

@@ -1,9 +1,7 @@
 """Requests as bytes: compressed, exploding, cut off and broken ones, on every method."""
 
 import gzip
-import re
 import zlib
-from pathlib import Path
 
 import grpc
 import pytest
@@ -24,7 +22,7 @@ from sketchmatch_client import (
 from sketchmatch_proto.v1 import catalog_service_pb2, match_service_pb2, scene_service_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MATCH_STATE_QUEUED, MatchResponse
 from tests.pace import wait_until
-from tests.processes import server
+from tests.processes import memory_of, server
 from tests.server.harness import ENDLESS, scene, serving
 
 OURS = {
@@ -160,11 +158,6 @@ def varint(number):
     return bytes([*digits, number])
 
 
-def peak_mib(pid):
-    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
-    return int(re.search(r"VmHWM:\s+(\d+)", status)[1]) / 1024
-
-
 @pytest.mark.slow
 def test_nothing_is_inflated_for_which_there_is_no_place():
     explosive = zlib.compress(b"\x0a" + varint(60 * MIB) + bytes(60 * MIB))
@@ -177,12 +170,12 @@ def test_nothing_is_inflated_for_which_there_is_no_place():
         events = client.events(scene(8), scene(8, 1), **ENDLESS, time_budget=60)
         while not next(events).progress.HasField("confidence"):
             pass
-        before = peak_mib(running.process.pid)
+        before = memory_of(running.process.pid, "VmHWM")
         for _ in range(6):
             assert refused(running.address, path, explosive)[0] is (
                 grpc.StatusCode.RESOURCE_EXHAUSTED
             )
-        assert peak_mib(running.process.pid) - before < 40
+        assert memory_of(running.process.pid, "VmHWM") - before < 40 * MIB
         events.close()
 
 
@@ -200,7 +193,7 @@ def test_a_queue_takes_no_more_memory_than_it_may():
         events = client.events(scene(8), scene(8, 1), **ENDLESS, time_budget=60)
         while not next(events).progress.HasField("confidence"):
             pass
-        before = peak_mib(running.process.pid)
+        before = memory_of(running.process.pid, "VmHWM")
         calls = [channel.unary_stream(path)(request, timeout=8) for _ in range(3)]
         wait_until(
             lambda: [each.state for each in client.matches()].count(MATCH_STATE_QUEUED) == 3,
@@ -211,7 +204,7 @@ def test_a_queue_takes_no_more_memory_than_it_may():
             assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
             assert f"those that wait may have {32 * MIB} bytes together" in sentence
         # What comes and goes beside what waits is little; what was refused must not stay.
-        assert peak_mib(running.process.pid) - before < 4 * 32
+        assert memory_of(running.process.pid, "VmHWM") - before < 4 * 32 * MIB
         for call in calls:
             call.cancel()
         events.close()

@@ -1,14 +1,15 @@
 """The door for every kind of file."""
 
 import json
+import re
 import subprocess
 import sys
 
 import pytest
 
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.io import read_source
-from sketchmatch.io.files import file_and_part, kind_of_file
+from sketchmatch.io import files, read_source
+from sketchmatch.io.files import file_and_part, kind_of_file, read_here
 from sketchmatch.model import PolygonSet, StrokeSet
 
 
@@ -114,6 +115,44 @@ def test_many_keys_are_not_all_shown(tmp_path):
 )
 def test_json_is_known_by_what_is_in_it(name, text, kind):
     assert kind_of_file(name, text.encode()).source is kind
+
+
+STROKES = '{"strokes": [{"points": [[0, 0], [4, 0], [4, 3], [0, 3]]}]}'
+
+
+def test_a_sketch_is_read_and_parsed_once_where_it_needs_no_plugin(tmp_path, monkeypatch):
+    path, parsed = tmp_path / "sketch.json", []
+    path.write_text(STROKES)
+    load = files.load_sequence
+    monkeypatch.setattr(files, "load_sequence", lambda text: parsed.append(text) or load(text))
+    assert read_here(path).strokes[0].points.tolist() == [[0, 0], [4, 0], [4, 3], [0, 3]]
+    assert parsed == [STROKES]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("a.json", '{"shapes": []}'), ("a.json", "{}"), ("a.json", "["), ("a.dxf", ""), ("a.x", "")],
+)
+def test_what_a_plugin_may_read_is_not_read_here(tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    assert read_here(tmp_path / name) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("none.json", "does not exist"),
+        ("none.svg", "does not exist"),
+        ("bad.json", "strokes[0].points[1][1] is missing"),
+        ("good.json#x", "has no part 'x', nor any other"),
+    ],
+)
+def test_what_is_read_here_is_refused_as_by_the_one_door(tmp_path, name, problem):
+    (tmp_path / "bad.json").write_text('{"strokes": [{"points": [[0, 0], [1, null]]}]}')
+    (tmp_path / "good.json").write_text(STROKES)
+    with pytest.raises(InvalidInputError, match=re.escape(problem)) as caught:
+        read_here(tmp_path / name)
+    assert str(caught.value) == str(refused(tmp_path / name))
 
 
 def test_slow_libraries_wait_until_a_file_needs_them():

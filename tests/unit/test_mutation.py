@@ -111,6 +111,8 @@ def test_a_sample_is_the_same_whatever_else_is_there():
     left_out = runs.sample([moved], 20, {names[3]})
     assert names[3] not in [mutant.name for _, mutant in left_out]
     assert len({mutant.name for _, mutant in left_out} & set(names)) == 19
+    another = [mutant.name for _, mutant in runs.sample([moved], 20, set(), "2")]
+    assert set(another) != set(names)
 
 
 def test_what_is_no_program_is_not_tried():
@@ -164,6 +166,8 @@ def test_a_mutant_is_tried_in_a_copy_and_killed_where_a_test_fails(tmp_path, mon
     before = Path(home / made.path).read_text(encoding="utf-8")
     assert copy.killer(made, before.replace("x + x", "x - x")) == "tests/test_sums.py::test_it"
     assert copy.killer(made, before.replace("x + x", "2 * x")) is None
+    waiting = f"{before}    while True:\n        pass\n".replace("return x + x", "x = x + x")
+    assert copy.killer(made, waiting) == "tests/test_sums.py::test_it (out of time)"
     assert (home / made.path).read_text("utf-8") == before
     assert (tmp_path / "copy" / made.path).read_text("utf-8") == before
     (home / "tests/test_sums.py").write_text("def test_it(): assert 0", "utf-8")

@@ -16,7 +16,7 @@ from sketchmatch.pipeline.correspond import fmap_confidence, object_map, occm
 from sketchmatch.pipeline.slices import finish
 from sketchmatch.pipeline.unmatched import Part, omission_confidences, part_of
 from sketchmatch.testing import random_scene, simulate_sketch
-from sketchmatch_builtin.judges._odds import likelihood
+from sketchmatch_builtin.judges._odds import likelihood, met
 from sketchmatch_builtin.judges.calibration import Calibration, calibrated, default_price
 from sketchmatch_builtin.searchers.exact import Exact
 from tests.strategies import random_table
@@ -136,6 +136,20 @@ def test_a_rival_counts_once_where_it_is_an_exchange_or_an_omission_too(rival, k
     same = beside.maps[0].probability == alone.maps[0].probability
     assert same is known
     assert (beside.lines == alone.lines).all() is np.bool_(known)
+
+
+@pytest.mark.parametrize("alternatives", [0, 2, 9])
+def test_as_many_maps_of_the_same_objects_count_as_are_wanted_and_all_of_others(alternatives):
+    table = random_table(np.random.default_rng(0), 3, 4)
+    rows = [(0, 1, 2), (1, 0, 2), (0, 1, -1), (2, 1, 0), (-1, 1, 2), (0, 2, 1)]
+    first, *others = (Candidate(np.array(row), zeta((0, 1, 2), (0, 1, 2), table)) for row in rows)
+    problem = JudgeProblem(
+        SCENE, SCENE, table, ConfidenceWeights(), (first, *others), alternatives=alternatives
+    )
+    whole = [(1, 0, 2), (2, 1, 0), (0, 2, 1)]
+    counted = {*whole[:alternatives], (0, 1, -1), (-1, 1, 2)}
+    found = [tuple(each.partners.tolist()) for each in met(problem)]
+    assert found == [row for row in rows if row in counted]
 
 
 def random_map(rng, few, many):

@@ -9,10 +9,9 @@ from sketchmatch.cli.display import say_notes
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io.files import (
     file_and_part,
-    is_read_here,
     read_bytes,
+    read_here,
     read_map_files,
-    read_source,
 )
 from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
 from sketchmatch_client import Client, sources
@@ -110,9 +109,8 @@ def source_of(path: Path, side: str = "") -> Source:
             note = f"{path.name} is read as a drawing; for a robot's map give its .yaml"
             say_notes(side, [note], verbose=True)
         return sources.image(read_bytes(file))
-    if not is_read_here(file):
+    if (source := read_here(path)) is None:
         return sources.file(read_bytes(file), name=file.name, part=part)
-    source = read_source(path)
     # The messages of what is decoded already have no room for notes.
     say_notes(side, getattr(source, "notes", ()), verbose=True)
     match source:

@@ -29,9 +29,9 @@ __all__ = [
     "FileKind",
     "decode_file",
     "file_and_part",
-    "is_read_here",
     "kind_of_file",
     "read_bytes",
+    "read_here",
     "read_map_files",
     "read_source",
 ]
@@ -127,22 +127,31 @@ def kind_of_file(name: str, data: bytes, readers: _Readers | None = None) -> Fil
     raise _invalid("", f"is of no known kind; give a file that ends in one of {_suffixes(readers)}")
 
 
-def is_read_here(path: Path) -> bool:
-    """Whether a file is of a kind that needs no plugin's reader; of JSON, what is in it decides.
+def read_here(path: Path) -> Source | None:
+    """Read a sketch or a map as :func:`read_source` does, if that needs no plugin's reader.
+
+    Returns
+    -------
+    Source or None
+        None for every other kind of file; of JSON, what is in it decides.
 
     Raises
     ------
     InvalidInputError
-        If it has to be looked into and cannot be read.
+        As :func:`read_source` does.
     """
-    if path.suffix.lower() not in _JSON_SUFFIXES:
-        return path.suffix.lower() in (*_KINDS, *YAML_SUFFIXES) or is_bag(bag_and_topic(path)[0])
-    try:
-        return kind_of_file(path.name, _read(path, str(path)), ()).reader is None
-    except InvalidInputError as error:
-        if error.field.startswith(str(path)):
-            raise
-        return False
+    file, part = file_and_part(path)
+    suffix = file.suffix.lower()
+    if suffix not in _JSON_SUFFIXES:
+        known = suffix in (*_KINDS, *YAML_SUFFIXES) or is_bag(bag_and_topic(file)[0])
+        return read_source(path) if known else None
+    with _placed_in(path):
+        data = _read(file, str(file))
+        try:
+            kind = kind_of_file(file.name, data, ())
+        except InvalidInputError:
+            return None
+        return _of_kind(kind, file.name, data, part)
 
 
 def decode_file(name: str, data: bytes, part: str = "", readers: _Readers | None = None) -> Source:
@@ -163,7 +172,11 @@ def decode_file(name: str, data: bytes, part: str = "", readers: _Readers | None
         If a plugin's reader fails.
     """
     check_bytes(len(data), "data")
-    kind = kind_of_file(name, data, readers)
+    return _of_kind(kind_of_file(name, data, readers), name, data, part)
+
+
+def _of_kind(kind: FileKind, name: str, data: bytes, part: str) -> Source:
+    """Return what is in a file of a known kind."""
     if kind.reader is not None:
         source: Source = kind.reader.read(data, part)
     elif kind.source is OccupancyGrid:

@@ -27,7 +27,7 @@ from sketchmatch.api.kernels import (
     pair_index,
     total_distance,
 )
-from sketchmatch.model import FloatArray, IntArray
+from sketchmatch.model import FloatArray, IntArray, pair_count
 
 __all__ = [
     "GAIN",
@@ -94,7 +94,7 @@ class Moves(NamedTuple):
 
 def empty_moves(template_objects: int, argument_objects: int, directed: bool = False) -> Moves:
     """Return room for the moves of a map."""
-    pairs = template_objects * (template_objects - 1) // 2
+    pairs = pair_count(template_objects)
     return Moves(
         directed=directed,
         relations=np.empty((pairs, argument_objects, argument_objects, 4), dtype=np.float32),

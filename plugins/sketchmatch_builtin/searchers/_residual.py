@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sketchmatch.api.kernels import kernel
-from sketchmatch.model import FloatArray, IntArray
+from sketchmatch.model import FloatArray, IntArray, pair_count
 from sketchmatch_builtin.searchers._assignment import FORBIDDEN, reduce_by_assignment
 from sketchmatch_builtin.searchers._cells import (
     CellTerms,
@@ -82,7 +82,7 @@ class Tree(NamedTuple):
 def empty_tree(template_objects: int, argument_objects: int) -> Tree:
     """Return room for a tree; the memory is taken as it is written to."""
     n, m, levels = template_objects, argument_objects, template_objects + 1
-    root = min(n * (n - 1) // 2 * m * m, _MOST_ROOT_COSTS)
+    root = min(pair_count(n) * m * m, _MOST_ROOT_COSTS)
     return Tree(
         counts=np.zeros(levels, dtype=np.int64),
         ends=np.zeros(levels, dtype=np.int64),
