@@ -43,6 +43,7 @@ _COMPACT, _RAGGED = 0.3, 0.4
 _SHADOW, _SPECK, _NEAR, _EDGE = 0.2, 2.0, 2.5, 2.0
 # The share of its hull that something straight fills.
 _STRAIGHT = 0.6
+_SIDES = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 # Legs, before they are merged to tables.
 _MOST_PARTS = 10_000
 
@@ -376,7 +377,7 @@ def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:
     left, below, right, top = np.floor(polygon.bounds).astype(int).tolist()
     window = np.s_[max(below - reach, 0) : top + reach, max(left - reach, 0) : right + reach]
     unseen = 1 - (room.free[window] | room.inside[window] | room.occupied[window])
-    beside = cv2.dilate(unseen, np.ones((3, 3), np.uint8)) > 0
+    beside = cv2.dilate(unseen, _SIDES) > 0
     return bool(np.count_nonzero(beside & (room.free[window] > 0)) > _EDGE * room.small)
 
 
