@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sketchmatch.model import FloatArray, IntArray
 from sketchmatch_builtin.segmenters._at_walls import Bounds, Leans, Pocket, at_walls, is_thick
-from sketchmatch_builtin.segmenters._cells import Mask, closed, outline, refuse_more
+from sketchmatch_builtin.segmenters._cells import Mask, closed, outline, outlines, refuse_more
 from sketchmatch_builtin.segmenters._furniture import FOOT, Bars, Legs, crowds, facing, tables
 from sketchmatch_builtin.segmenters._merging import apart, merged
 
@@ -122,8 +122,16 @@ class Parts(NamedTuple):
     def outlines(self, which: Sequence[int]) -> _Geometries:
         """Return the outlines of some parts."""
         found: _Geometries = np.empty(len(which), dtype=object)
-        for n, k in enumerate(which):
-            found[n] = shapely.Polygon(outline(self.mask(k)) + self.boxes[k, :2])
+        boxes = self.boxes[list(which)]
+        if (boxes[:, 2] * boxes[:, 3]).sum() <= self.labels.size:
+            for n, k in enumerate(which):
+                found[n] = shapely.Polygon(outline(self.mask(k)) + self.boxes[k, :2])
+            return found
+        # Of things that go around others the boxes are more than the room.
+        chosen = np.zeros(len(self.boxes), np.uint8)
+        chosen[list(which)] = 1
+        rings = {int(self.labels[at]): ring for at, ring in outlines(chosen[self.labels])}
+        found[:] = [shapely.Polygon(rings[k]) for k in which]
         return found
 
 
@@ -242,8 +250,9 @@ def _bar(k: int, parts: Parts, cell: float) -> list[float]:
 
     A cell has a moment too, so that it hardly matters how a bar lies on the cells.
     """
-    rows, columns = np.nonzero(parts.mask(k))
-    spread = np.cov(columns, rows, ddof=0) + np.eye(2) / 12.0
+    about = cv2.moments(parts.mask(k), binaryImage=True)
+    x, y, both = (about[name] / about["m00"] for name in ("mu20", "mu02", "mu11"))
+    spread = np.array([[x, both], [both, y]]) + np.eye(2) / 12.0
     moments, along = np.linalg.eigh(spread)
     width, length = cell * np.sqrt(12.0 * moments)
     return [*(cell * parts.middles[k]), *along[:, 1], length, width]
