@@ -17,8 +17,8 @@ KERNEL_SHARE := 99
 says = @echo "$(1), on $$($(BIN)/python --version): about $(2) on 2 cores"
 
 .PHONY: demo test test-slow test-all test-units test-interpreted mutation lint proto bench \
-  bench-histograms bench-match bench-requests bench-searchers bench-server bench-sketches \
-  bench-startup experiments \
+  bench-grids bench-histograms bench-match bench-requests bench-searchers bench-server \
+  bench-sketches bench-startup experiments \
   fuzz look \
   reference api serve clean web pad lint-web bench-web look-web
 
@@ -99,6 +99,9 @@ look: $(VENV)/dev
 
 bench: $(VENV)/dev
 	@$(BIN)/python -m tests.benchmarks.stages
+
+bench-grids: $(VENV)/dev
+	@$(BIN)/python -m tests.benchmarks.grids $(ARGS)
 
 bench-histograms: $(VENV)/dev
 	@$(BIN)/python -m tests.benchmarks.histograms

@@ -156,16 +156,16 @@ def lost(before, after):
 
 
 # Of what was found without doubt: lost on cells of half the size, turned by 37° on these, and
-# turned by 37° on cells as large as they were. On the last, a gap one or two cells wide closes here
-# and there: the bed of the small house, a cell off its wall, joins it.
+# turned by 37° on cells as large as they were. On the last, what stood two cells off a wall or
+# another thing may touch it: a leg of a bed, a bar of a table, an end of a shelf.
 LOST = {
-    "aws-small-house": (0, 0, 4),
-    "elsabot-downstairs": (0, 0, 1),
+    "aws-small-house": (0, 0, 2),
+    "elsabot-downstairs": (0, 0, 0),
     "tb4-warehouse": (0, 1, 0),
     "turtlebot3": (0, 0, 0),
     "husky-playpen": (0, 0, 0),
-    "josefgst-ros-map12": (1, 0, 1),
-    "marrtino-montreal": (0, 0, 2),
+    "josefgst-ros-map12": (1, 0, 0),
+    "marrtino-montreal": (0, 0, 1),
     "nav2-depot": (0, 0, 1),
     "pmb2-small-office": (0, 0, 0),
 }
@@ -181,6 +181,34 @@ def test_neither_turning_a_map_nor_smaller_cells_lose_what_is_found(name):
     for (moved, back), most in zip(changes, LOST[name], strict=True):
         again = [back(item.polygon) for item in found(moved)]
         assert lost(sure, again) <= most
+
+
+def slanted(degrees, gap=1, cells=160):
+    """A room whose wall runs slanted, with a box in front of it, so many cells away."""
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    rows, columns = np.mgrid[:cells, :cells] - (cells - 1) / 2.0
+    away, along = c * rows - s * columns, c * columns + s * rows
+    seen = np.where(abs(away) + abs(along) < 0.65 * cells, 0, -1)
+    # A wall one cell thick, of cells that its line goes through.
+    seen[away < -20.0] = -1
+    seen[abs(away + 20.5) <= 0.5 * max(c, s)] = 100
+    low = -20.0 + gap
+    seen[(away > low) & (away < low + 12.0) & (abs(along) < 9.0)] = 100
+    seen[(abs(away - 20.0) < 6.0) & (abs(along) < 6.0)] = 100
+    return OccupancyGrid(seen.astype(np.int8), 0.05)
+
+
+@pytest.mark.parametrize("degrees", [0, 10, 30, 37, 45, 60, 80])
+def test_what_stands_a_cell_off_a_slanted_wall_stands_free(degrees):
+    areas = sorted(item.area for item in found(slanted(degrees)) if item.certainty == 1.0)
+    assert areas == pytest.approx([0.36, 0.54], rel=0.1)
+
+
+@pytest.mark.parametrize("degrees", [10, 30, 37, 45, 60, 80])
+def test_a_wall_of_cells_that_meet_in_corners_holds_no_gap(degrees):
+    """What leans on it is a thing of its own, however the wall lies, and is not surrounded."""
+    (leaning,) = [item for item in found(slanted(degrees, gap=0)) if item.area > 0.45]
+    assert leaning.certainty < 1.0
 
 
 def room(*boxes, shape=(80, 120), cell=0.05):

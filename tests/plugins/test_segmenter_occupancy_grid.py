@@ -14,7 +14,8 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import OccupancyGrid
 from sketchmatch.model.limits import SourceLimits, limited_to
-from sketchmatch_builtin.segmenters._border import outer_border
+from sketchmatch_builtin.segmenters._border import outer_border, outer_borders
+from sketchmatch_builtin.segmenters._cells import holes
 from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
 from tests.tools import ROOT, require
 
@@ -295,6 +296,18 @@ def test_a_border_is_valid_and_encloses_its_cells_exactly(cells):
     assert outline.area == mask.sum() + 0.25 * pinches(mask)
     rows, columns = np.nonzero(mask)
     assert outline.bounds == (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)
+
+
+@given(arrays(np.uint8, st.tuples(*[st.integers(1, 16)] * 2), elements=st.integers(0, 1)))
+def test_borders_of_all_components_are_those_of_each_alone_with_what_it_encloses(cells):
+    _, labels = cv2.connectedComponents(cells, connectivity=8)
+    borders = outer_borders(cells)
+    assert len(borders) == labels.max()
+    for border in borders:
+        x, y = border[0].astype(int)
+        alone = (labels == labels[y, x]).astype(np.uint8)
+        assert cells[y, x]
+        np.testing.assert_array_equal(border, outer_border(alone | holes(alone)))
 
 
 @pytest.mark.slow

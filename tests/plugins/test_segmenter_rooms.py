@@ -186,6 +186,25 @@ def test_a_hall_that_narrows_stays_whole():
     assert areas(segmented(cells)) == pytest.approx([118.0, 25.0], rel=0.05)
 
 
+def test_corridors_around_each_other_are_rooms_with_what_they_go_around_left_out():
+    # Corridors of 2 m around each other, each with a door to the next.
+    cells, count = walls(52.2, 52.2), 11
+    for k in range(count):
+        side = 51.8 - 4.4 * k
+        low = 0.2 + 2.2 * k
+        free(cells, (low, low, side, side))
+        low, side = low + 2.0, side - 4.0
+        cells[round(low / CELL) : round((low + side) / CELL), round(low / CELL) :][
+            :, : round(side / CELL)
+        ] = 100
+        if k < count - 1:
+            free(cells, (low + side / 3.0, low, 0.8, 0.2))
+    found = segmented(cells)
+    sides = 51.8 - 4.4 * np.arange(count)
+    assert areas(found) == pytest.approx(sides**2 - (sides - 4.0) ** 2, rel=0.03)
+    assert found.passages == tuple((k, k + 1) for k in range(count - 1))
+
+
 def test_rays_of_a_laser_through_glass_are_no_room():
     cells = np.pad(floor(), ((0, 160), (0, 0)), constant_values=-1)
     rows, columns = np.mgrid[: len(cells), : cells.shape[1]]

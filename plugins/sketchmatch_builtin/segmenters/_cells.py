@@ -13,18 +13,18 @@ from pydantic import Field
 
 from sketchmatch.api import InvalidInputError, Params, Reason
 from sketchmatch.model import FloatArray, OccupancyGrid
-from sketchmatch_builtin.segmenters._border import outer_border
+from sketchmatch_builtin.segmenters._border import outer_border, outer_borders
 
 __all__ = [
     "TOLERANCE",
     "FreeSpaceParams",
     "Mask",
     "closed",
-    "components",
     "free_cells",
     "holes",
     "in_map",
     "outline",
+    "outlines",
     "reading_order",
     "refuse_more",
 ]
@@ -129,27 +129,24 @@ def refuse_more(count: int, most: int, remedy: str) -> None:
         )
 
 
-def components(
-    mask: Mask, least: float, most: int, remedy: str
-) -> Iterator[tuple[Mask, tuple[int, int]]]:
-    """Yield each component of at least so many cells, cropped, and the (x, y) of its crop.
-
-    Raises
-    ------
-    InvalidInputError
-        With the path ``cells`` and the remedy, if there are more than ``most`` of them.
-    """
-    count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    large = 1 + np.flatnonzero(statistics[1:count, cv2.CC_STAT_AREA] >= least)
-    refuse_more(len(large), most, remedy)
-    for k in large.tolist():
-        x, y, width, height, _ = statistics[k].tolist()
-        yield np.asarray(labels[y : y + height, x : x + width] == k, dtype=np.uint8), (x, y)
-
-
 def outline(mask: Mask) -> FloatArray:
     """Return the corners of a mask's outer border, see :func:`outer_border`, shape (k, 2)."""
-    points = outer_border(mask)
+    return _corners(outer_border(mask))
+
+
+def outlines(mask: Mask) -> Iterator[tuple[tuple[int, int], FloatArray]]:
+    """Yield (row, column) of a cell of each component of a mask, and its outline.
+
+    The cell is the leftmost one of the component's first row. All are found at once: each by
+    itself, of corridors around each other every one would cost the whole grid.
+    """
+    for border in outer_borders(mask):
+        x, y = border[0].astype(int).tolist()
+        yield (y, x), _corners(border)
+
+
+def _corners(points: FloatArray) -> FloatArray:
+    """Return a closed line's points in which it turns."""
     # The border names some points twice.
     points = points[(points != np.concatenate([points[-1:], points[:-1]])).any(axis=1)]
     before = points - np.concatenate([points[-1:], points[:-1]])

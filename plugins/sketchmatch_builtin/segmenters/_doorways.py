@@ -172,8 +172,12 @@ def _with_highest(labels: Labels, away: _Widths, reach: int) -> Labels:
         changed = highest > flat[rest]
         rest, highest = rest[changed], highest[changed]
         flat[rest] = highest
-        beside = np.unique(np.concatenate([rest + step for step, _ in steps]))
-        rest = beside[distances[beside] <= reach]
+        beside = []
+        for step, length in steps:
+            farther = distances[rest] + length == distances[rest + step]
+            beside.append((rest + step)[farther & (flat[rest + step] < highest)])
+        rest = np.unique(np.concatenate(beside))
+        rest = rest[distances[rest] <= reach]
     return np.ascontiguousarray(found[2:-2, 2:-2])
 
 

@@ -22,6 +22,8 @@ __all__ = ["divided_at_openings"]
 
 # Of its convex hull: what fills as much of it is one room, however wide its parts are joined.
 _WHOLE = 0.9
+# What fills less of it goes around others, as a corridor does that is of one width.
+_AROUND = 0.2
 # Of a leaf's own width: what opens wider belongs to what it opens into.
 _OPEN = 0.8
 # Widths of openings are tried up to twice the doorway's, each by so much wider than the last.
@@ -32,7 +34,8 @@ def divided_at_openings(free: Mask, door: float, least: float) -> Mask:
     """Return what :func:`divided` does, with leaves cut off as rooms of their own.
 
     A leaf is a convex part of a room that is not, joined to the rest at one place that is wider
-    than a doorway but narrower than the leaf; the rest is no smaller, and stays in one piece.
+    than a doorway but narrower than the leaf; the rest is no smaller, and stays in one piece. At
+    corridors that go around others, and fill little of their hulls, none is sought.
 
     Parameters
     ----------
@@ -60,7 +63,7 @@ def _number_leaves(labels: Labels, door: float, least: float) -> None:
         window = labels[y - 1 : y + rows + 1, x - 1 : x + columns + 1]
         within = pieces[y - 1 : y + rows + 1, x - 1 : x + columns + 1] == k
         room = np.pad((window == window[within][0]).view(np.uint8), 1)
-        if _filling(room) < _WHOLE:
+        if _AROUND <= _filling(room) < _WHOLE:
             for leaf in _leaves(room, door, least):
                 last += 1
                 window[leaf[1:-1, 1:-1] > 0] = last

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sketchmatch.model import FloatArray, IntArray
 from sketchmatch_builtin.segmenters._at_walls import Bounds, Leans, Pocket, at_walls, is_thick
-from sketchmatch_builtin.segmenters._cells import Mask, closed, outline, refuse_more
+from sketchmatch_builtin.segmenters._cells import Mask, closed, outline, outlines, refuse_more
 from sketchmatch_builtin.segmenters._furniture import FOOT, Bars, Legs, crowds, facing, tables
 from sketchmatch_builtin.segmenters._merging import apart, merged
 
@@ -43,6 +43,7 @@ _COMPACT, _RAGGED = 0.3, 0.4
 _SHADOW, _SPECK, _NEAR, _EDGE = 0.2, 2.0, 2.5, 2.0
 # The share of its hull that something straight fills.
 _STRAIGHT = 0.6
+_SIDES = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 # Legs, before they are merged to tables.
 _MOST_PARTS = 10_000
 
@@ -121,8 +122,16 @@ class Parts(NamedTuple):
     def outlines(self, which: Sequence[int]) -> _Geometries:
         """Return the outlines of some parts."""
         found: _Geometries = np.empty(len(which), dtype=object)
-        for n, k in enumerate(which):
-            found[n] = shapely.Polygon(outline(self.mask(k)) + self.boxes[k, :2])
+        boxes = self.boxes[list(which)]
+        if (boxes[:, 2] * boxes[:, 3]).sum() <= self.labels.size:
+            for n, k in enumerate(which):
+                found[n] = shapely.Polygon(outline(self.mask(k)) + self.boxes[k, :2])
+            return found
+        # Of things that go around others the boxes are more than the room.
+        chosen = np.zeros(len(self.boxes), np.uint8)
+        chosen[list(which)] = 1
+        rings = {int(self.labels[at]): ring for at, ring in outlines(chosen[self.labels])}
+        found[:] = [shapely.Polygon(rings[k]) for k in which]
         return found
 
 
@@ -241,8 +250,9 @@ def _bar(k: int, parts: Parts, cell: float) -> list[float]:
 
     A cell has a moment too, so that it hardly matters how a bar lies on the cells.
     """
-    rows, columns = np.nonzero(parts.mask(k))
-    spread = np.cov(columns, rows, ddof=0) + np.eye(2) / 12.0
+    about = cv2.moments(parts.mask(k), binaryImage=True)
+    x, y, both = (about[name] / about["m00"] for name in ("mu20", "mu02", "mu11"))
+    spread = np.array([[x, both], [both, y]]) + np.eye(2) / 12.0
     moments, along = np.linalg.eigh(spread)
     width, length = cell * np.sqrt(12.0 * moments)
     return [*(cell * parts.middles[k]), *along[:, 1], length, width]
@@ -376,7 +386,7 @@ def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:
     left, below, right, top = np.floor(polygon.bounds).astype(int).tolist()
     window = np.s_[max(below - reach, 0) : top + reach, max(left - reach, 0) : right + reach]
     unseen = 1 - (room.free[window] | room.inside[window] | room.occupied[window])
-    beside = cv2.dilate(unseen, np.ones((3, 3), np.uint8)) > 0
+    beside = cv2.dilate(unseen, _SIDES) > 0
     return bool(np.count_nonzero(beside & (room.free[window] > 0)) > _EDGE * room.small)
 
 

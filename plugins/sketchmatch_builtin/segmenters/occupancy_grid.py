@@ -54,10 +54,12 @@ class OccupancyGridSegmenter(Segmenter):
     """Takes as objects what stands in free regions, at their walls, and on legs.
 
     A region is free cells joined by their sides; a hole is what it encloses, joined by sides or
-    corners. That fills an object's unseen interior, whatever its grey, and leaves out the walls
-    and all that lies behind them. Regions that are small beside the largest are no rooms but
-    what was seen of an object's inside; a hole with a room in it is a building and no
-    object. Outlines run exactly along the cells' borders and are then simplified [1]_.
+    corners. A gap one cell wide goes on across corners, so that what stands a cell off a wall is
+    a hole however both lie on the cells. That fills an object's unseen interior, whatever its
+    grey, and leaves out the walls and all that lies behind them. Regions that are small beside the
+    largest are no rooms but what was seen of an object's inside; a hole with a room in it is a
+    building and no object. Outlines run exactly along the cells' borders and are then
+    simplified [1]_.
 
     What touches a wall, or was not seen from behind, is no hole but a pocket of the region's
     outline: one that hangs on the wall by a neck, or leans against it as a box does. Of a table a
@@ -208,6 +210,7 @@ class OccupancyGridSegmenter(Segmenter):
     def segment(self, source: OccupancyGrid) -> Segmentation:
         """Return what stands in the free regions, in metres in the map's frame."""
         free, corner = free_cells(source, self.params)
+        free = _with_slanted_gaps(free, _cells(self.params.min_size, source.resolution))
         rooms = list(_rooms(free, self.params.region_share))
         things = sorted(
             (
@@ -275,6 +278,40 @@ class OccupancyGridSegmenter(Segmenter):
 def _cells(length: float, cell: float) -> float:
     """Return a length in cells, without what rounding adds: 0.3 / 0.1 is a little less than 3."""
     return round(length / cell, 9)
+
+
+def _with_slanted_gaps(free: Mask, shortest: float) -> Mask:
+    """Return free cells with gaps one cell wide joined by sides, however they lie on the cells.
+
+    Of a slanted gap the cells meet in corners alone, as those of a slanted wall do. It is a gap
+    where no two by two free cells hold either of them, and so many such cells follow each other.
+    One of the two cells between is made free, beyond which there is nothing free.
+    """
+    framed = np.pad(free, 2)
+    square = np.ones((2, 2), np.uint8)
+    wide = cv2.dilate(cv2.erode(framed, square, anchor=(1, 1)), square, anchor=(0, 0))
+    thin = framed & (1 - np.asarray(wide, dtype=np.uint8))
+    corners = [*_meeting(thin, framed, 1), *_meeting(thin, framed, -1)]
+    if not corners:
+        return free
+    _, gaps, sizes, _ = cv2.connectedComponentsWithStats(thin, connectivity=8)
+    opened = framed.copy()
+    for y, x, aside in corners:
+        if sizes[gaps[y, x], cv2.CC_STAT_AREA] < shortest:
+            continue
+        if not framed[y - 1, x + aside] and not framed[y, x + 2 * aside]:
+            opened[y, x + aside] = 1
+        elif not framed[y + 2, x] and not framed[y + 1, x - aside]:
+            opened[y + 1, x] = 1
+    return np.ascontiguousarray(opened[2:-2, 2:-2])
+
+
+def _meeting(thin: Mask, free: Mask, aside: int) -> Iterator[tuple[int, int, int]]:
+    """Yield (row, column) of cells that meet those below and aside in a corner alone."""
+    here, there = (np.s_[:-1], np.s_[1:])[::aside]
+    apart = 1 - (free[:-1, there] | free[1:, here])
+    for y, x in np.argwhere(thin[:-1, here] & thin[1:, there] & apart).tolist():
+        yield y, x + (aside < 0), aside
 
 
 def _rooms(free: Mask, share: float) -> Iterator[tuple[Mask, Mask, tuple[int, int]]]:

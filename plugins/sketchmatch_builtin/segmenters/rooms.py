@@ -30,14 +30,14 @@ from sketchmatch_builtin.segmenters._cells import (
     TOLERANCE,
     FreeSpaceParams,
     Mask,
-    components,
     free_cells,
     holes,
     in_map,
-    outline,
+    outlines,
     reading_order,
+    refuse_more,
 )
-from sketchmatch_builtin.segmenters._doorways import divided, doorway, parts_that_meet
+from sketchmatch_builtin.segmenters._doorways import Labels, divided, doorway, parts_that_meet
 from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of
 from sketchmatch_builtin.segmenters._leaves import divided_at_openings
 from sketchmatch_builtin.segmenters._plans import Plan, drawn
@@ -72,12 +72,13 @@ class RoomSegmenter(Segmenter):
     is half the width of a square room. Parts that are joined by a passage nearly as wide as the
     wider of them are one room, so that a corridor stays whole. A convex part that hangs at the rest
     of its room by one opening, wider than a doorway but narrower than itself, is a room of its own;
-    not where ``door_width`` is given. Rays of a laser through glass and
-    the insides of cupboards' outlines are no rooms. Things that stand free in a room and are no
-    longer than ``furniture`` neither cut it nor are holes in it; longer ones are holes. Unknown and
-    occupied cells otherwise belong to no room, and two rooms are always at least a cell apart. A
-    turned map has the same rooms, turned. A map of more than four million cells is looked at in
-    cells twice as large, or larger, as long as a doorway is 20 of these wide.
+    not where ``door_width`` is given, nor at a corridor that fills less than a fifth of its hull.
+    Rays of a laser through glass and the insides of cupboards' outlines are no rooms. Things that
+    stand free in a room and are no longer than ``furniture`` neither cut it nor are holes in it;
+    longer ones are holes. Unknown and occupied cells otherwise belong to no room, and two rooms are
+    always at least a cell apart. A turned map has the same rooms, turned. A map of more than four
+    million cells is looked at in cells twice as large, or larger, as long as a doorway is 20 of
+    these wide.
 
     In a drawing walls are strokes, the borders of polygons, or one of two shades of a picture, in
     which either the walls or the free space may be dark; what joins the picture's border is
@@ -225,9 +226,9 @@ class RoomSegmenter(Segmenter):
         least = max(area / cell**2, 1.0)
         rooms = (divided_at_openings if width is None else divided)(inside, door, least)
         cut = f"at passages of up to {door * cell:.2g} m"
-        outlines, passages = self._outlines(inside, rooms, area, cell, "cells", cut)
+        found, passages = self._outlines(inside, rooms, area, cell, "cells", cut)
         rooms_in_map = [
-            [in_map(step * ring + corner, source) for ring in _rings(room)] for room in outlines
+            [in_map(step * ring + corner, source) for ring in _rings(room)] for room in found
         ]
         labels, unplaced = labels_of(
             [shapely.Polygon(outer, inner) for outer, *inner in rooms_in_map],
@@ -266,8 +267,8 @@ class RoomSegmenter(Segmenter):
             cut = f"at passages of up to {width:.2g}"
         path = {"stroke_set": "strokes", "polygon_set": "polygons", "image": "pixels"}[source.field]
         area = self._least(plan)
-        outlines, passages = self._outlines(plan.free, parts, area, plan.cell, path, cut)
-        rooms = [[plan.cell * ring + plan.corner for ring in _rings(room)] for room in outlines]
+        found, passages = self._outlines(plan.free, parts, area, plan.cell, path, cut)
+        rooms = [[plan.cell * ring + plan.corner for ring in _rings(room)] for room in found]
         labels, unplaced = labels_of(
             [shapely.Polygon(outer, inner) for outer, *inner in rooms], _names(source), 0.0
         )
@@ -284,27 +285,21 @@ class RoomSegmenter(Segmenter):
         cut: str,
     ) -> tuple[list[shapely.Polygon], tuple[tuple[int, int], ...]]:
         """Return rooms, components of cells, as outlines in reading order, and who meets whom."""
-        params = self.params
-        found = [
-            *components(
-                rooms, max(area / cell**2, 1.0), source_limits().max_objects, "raise min_area"
-            )
-        ]
-        if len(found) < 2:
-            raise _too_few(len(found), path, area, cut)
-        tolerance = TOLERANCE if params.tolerance is None else params.tolerance / cell
-        outlines = _simplified([_polygon(*room) for room in found], tolerance)
-        order = sorted(range(len(found)), key=lambda k: reading_order(outlines[k]))
-        return [outlines[k] for k in order], _passages(free, [found[k] for k in order])
-
-
-def _passages(free: Mask, rooms: list[tuple[Mask, tuple[int, int]]]) -> tuple[tuple[int, int], ...]:
-    """Return which rooms, each a crop and its corner (x, y), open into each other."""
-    labels = np.zeros(free.shape, np.int32)
-    for number, (mask, (x, y)) in enumerate(rooms, start=1):
-        rows, columns = mask.shape
-        labels[y : y + rows, x : x + columns][mask > 0] = number
-    return tuple((a - 1, b - 1) for a, b in parts_that_meet(free, labels).tolist())
+        _, parts, statistics, _ = cv2.connectedComponentsWithStats(rooms, connectivity=8)
+        large = statistics[:, cv2.CC_STAT_AREA] >= area / cell**2
+        large[0] = False
+        which = np.flatnonzero(large)
+        refuse_more(len(which), source_limits().max_objects, "raise min_area")
+        if len(which) < 2:
+            raise _too_few(len(which), path, area, cut)
+        tolerance = self.params.tolerance
+        labels = np.where(large, np.cumsum(large), 0).astype(np.int32)[parts]
+        found = _simplified(_polygons(labels), TOLERANCE if tolerance is None else tolerance / cell)
+        order = sorted(range(len(found)), key=lambda k: reading_order(found[k]))
+        place = np.zeros(len(found) + 1, np.int32)
+        place[np.add(order, 1)] = np.arange(1, len(found) + 1)
+        meeting = parts_that_meet(free, place[labels]) - 1
+        return [found[k] for k in order], tuple((a, b) for a, b in meeting.tolist())
 
 
 def _names(source: StrokeSet | PolygonSet | Image) -> list[Landmark]:
@@ -360,16 +355,24 @@ def _small(mask: Mask, longest: float, connectivity: int) -> Mask:
     return np.asarray(small[labels], dtype=np.uint8)
 
 
-def _polygon(mask: Mask, corner: tuple[int, int]) -> shapely.Polygon:
-    """Return the outline of a room whose crop begins at a corner (x, y), its holes left out."""
-    held = holes(mask)
-    outer = shapely.Polygon(outline(mask | held) + corner)
-    inner = [
-        shapely.Polygon(outline(hole) + np.array([x, y]) + corner)
-        for hole, (x, y) in components(held, 1, _MOST_HOLES, "raise furniture")
-    ]
-    parts = shapely.get_parts(outer.difference(shapely.union_all(inner))) if inner else [outer]
-    return cast(shapely.Polygon, max(parts, key=lambda part: part.area))
+def _polygons(labels: Labels) -> list[shapely.Polygon]:
+    """Return the outlines of rooms, of which each cell has the number, their holes left out."""
+    rooms = (labels > 0).view(np.uint8)
+    outer = {int(labels[cell]): ring for cell, ring in outlines(rooms)}
+    inner: dict[int, list[FloatArray]] = {number: [] for number in outer}
+    for (row, column), ring in outlines(holes(rooms)):
+        # What lies before the first cell of a hole is of the room around it.
+        inner[int(labels[row - 1, column])].append(ring)
+    return [_with_holes(outer[number], inner[number]) for number in range(1, len(outer) + 1)]
+
+
+def _with_holes(outer: FloatArray, inner: list[FloatArray]) -> shapely.Polygon:
+    """Return the largest piece of what an outline encloses and others do not."""
+    refuse_more(len(inner), _MOST_HOLES, "raise furniture")
+    if not inner:
+        return shapely.Polygon(outer)
+    pieces = shapely.Polygon(outer) - shapely.union_all([shapely.Polygon(ring) for ring in inner])
+    return cast(shapely.Polygon, max(shapely.get_parts(pieces), key=lambda part: part.area))
 
 
 def _simplified(outlines: list[shapely.Polygon], tolerance: float) -> list[shapely.Polygon]:
@@ -377,8 +380,11 @@ def _simplified(outlines: list[shapely.Polygon], tolerance: float) -> list[shape
     result = np.array([_begun(exact).simplify(tolerance) for exact in outlines], dtype=object)
     kept = np.zeros(len(result), dtype=bool)
     while True:
-        a, b = shapely.STRtree(result).query(result, predicate="intersects")
-        touching = np.unique(a[(a != b) & ~kept[a]])
+        a, b = shapely.STRtree(result).query(result)
+        a, b = a[a < b], b[a < b]
+        meet = shapely.intersects(result[a], result[b])
+        touching = np.unique(np.concatenate([a[meet], b[meet]]))
+        touching = touching[~kept[touching]]
         if not touching.size:
             return list(result)
         kept[touching] = True
