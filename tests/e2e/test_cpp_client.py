@@ -378,7 +378,7 @@ def test_conan_makes_a_package_that_a_program_uses(tmp_path):
     path = f"{programs}{os.pathsep}{os.environ['PATH']}"
     said = shell(CONAN, tmp_path, PATH=path, CONAN_HOME=str(tmp_path / "conan"))
     assert "Running test()" in said
-    assert "the sketchmatch server at localhost:1 is not available" in said
+    assert "the sketchmatch server at localhost:1 " in said
 
 
 def test_doxygen_finds_everything_documented():

@@ -37,7 +37,7 @@ async fn main() -> ExitCode {
 
 /// An error of the transport says in its sources alone what is wrong.
 fn whole(error: &dyn Error) -> String {
-    let causes = iter::successors(Some(error), |error| error.source());
+    let causes = iter::successors(Some(error), |&error| error.source());
     causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
 }
 
