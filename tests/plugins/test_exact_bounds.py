@@ -585,6 +585,20 @@ def test_while_maps_are_tried_none_is_more_than_the_best_of_each_pair(seed, weig
     assert search.upper_bound == pytest.approx(most)
 
 
+@pytest.mark.parametrize("weights", [(1.0, 1.0, 1.0), (1.0, 0.0, 1.0), (1.0, 1.0, 0.0)])
+def test_where_maps_are_few_cells_stay_four_times_as_wide(weights):
+    table = random_table(np.random.default_rng(0), 4, 5)
+    begin = Ranking(np.arange(4)[None], np.zeros(1))
+    params = Exact.Params(cell_angle=30.0, cell_dilation=50.0)  # wider than a layer
+    search = module._Search(
+        MatchProblem(table, weights), Evolved(Outcome.CONVERGED, begin, 0, 0), params
+    )
+    finish(search.read())
+    angle = 2.0 * math.radians(30.0) if weights[1] else math.inf
+    dilation = 100.0 if weights[2] else math.inf
+    np.testing.assert_allclose(search._smallest_cell(), [angle, *[dilation] * QUANTILES])
+
+
 def test_the_levels_of_a_path_are_those_of_its_entries_in_order():
     table = random_table(np.random.default_rng(3), 4, 5)
     relations, _ = relations_of(table, (0.0, 0.0, 1.0))
