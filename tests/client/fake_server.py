@@ -58,6 +58,7 @@ class FakeServer(
         self.endless = False
         self.cancelled = Event()
         self.segments: scene_service_pb2.SegmentResponse | None = None
+        self.kept: scene_service_pb2.PutSceneResponse | None = None
         self.catalogue = catalog_service_pb2.ListAlgorithmsResponse(
             algorithms=[catalog_service_pb2.Algorithm(name="easm")]
         )
@@ -109,6 +110,12 @@ class FakeServer(
         if self.segments is not None:
             return self.segments
         return scene_service_pb2.SegmentResponse(segmenter=request.segmenter, warnings=["w"])
+
+    def PutScene(self, request, context):
+        if self.kept is None:
+            context.abort(grpc.StatusCode.FAILED_PRECONDITION, "the server keeps no scenes")
+        self._take(request, context)
+        return self.kept
 
     def DeleteScene(self, request, context):
         self._take(request, context)

@@ -8,7 +8,8 @@ import grpc
 import numpy as np
 import pytest
 
-from sketchmatch_client import InvalidRequestError, sources
+from sketchmatch_client import InvalidRequestError, NotFoundError, sources
+from sketchmatch_proto.v1 import scene_service_pb2
 from tests.client.fake_server import EVENTS, reason, running, violation
 from tests.contract.golden import golden
 from tests.pace import wait_until
@@ -206,6 +207,83 @@ def test_a_node_that_was_never_configured_can_be_shut_down(ros):
     )
 
 
+def put(name, **fields):
+    stored = scene_service_pb2.StoredScene(name=name, **fields)
+    return scene_service_pb2.PutSceneResponse(stored_scene=stored, created=True)
+
+
+def asked(server):
+    """Return what a server was asked since the last look: each method, and which scene."""
+    told = []
+    for request in server.requests:
+        kind = type(request).__name__.removesuffix("Request")
+        source = getattr(request, "map", None) or getattr(request, "source", None)
+        told.append((kind, (source and source.stored_scene) or getattr(request, "name", "")))
+    server.requests.clear()
+    return told
+
+
+def test_the_server_keeps_the_map_so_that_goals_need_not_bring_it(node, server):
+    server.kept = put("first")
+    executed(node)
+    first = server.requests[0]
+    assert first.source == sources.occupancy_grid(bytes(6), 0.05, columns=3)
+    assert first.profile == "careful"
+    executed(node)
+    assert asked(server) == [("PutScene", ""), ("Match", "first"), ("Match", "first")]
+    node.subscriptions["map"].callback(room(4, 5))
+    server.kept = put("second")
+    executed(node)
+    assert asked(server) == [("PutScene", ""), ("DeleteScene", "first"), ("Match", "second")]
+    # Another pipeline finds other objects, here the same ones.
+    executed(node, profile="proof")
+    assert asked(server) == [("PutScene", ""), ("Match", "second")]
+    node.go("deactivate", "inactive")
+    node.go("cleanup", "unconfigured")
+    assert asked(server) == [("DeleteScene", "second")]
+    node.go("configure", "inactive")
+
+
+def test_what_others_have_the_server_keep_stays(node, server):
+    server.kept = put("theirs")
+    server.kept.created = False
+    executed(node)
+    node.subscriptions["map"].callback(room(4, 5))
+    server.kept = put("ours")
+    executed(node)
+    assert asked(server) == [
+        ("PutScene", ""),
+        ("Match", "theirs"),
+        ("PutScene", ""),
+        ("Match", "ours"),
+    ]
+
+
+def test_a_map_of_rooms_is_sent_itself_since_they_are_cut_to_fit_the_sketch(node, server):
+    server.kept = put("rooms", passages=[scene_service_pb2.Passage(first=0, second=1)])
+    executed(node)
+    executed(node)
+    assert asked(server) == [("PutScene", ""), ("Match", ""), ("Match", "")]
+    node.subscriptions["map"].callback(room(4, 5))
+    server.kept = put("things")
+    executed(node)
+    assert asked(server) == [("PutScene", ""), ("DeleteScene", "rooms"), ("Match", "things")]
+
+
+def test_a_map_that_the_server_has_lost_is_sent_again(node, server):
+    server.kept = put("lost")
+    executed(node)
+    assert asked(server)[1:] == [("Match", "lost")]
+    server.fail(grpc.StatusCode.NOT_FOUND, "no scene is called lost")
+    server.fails = 1
+    handle, _ = executed(node)
+    assert handle.status == "succeeded"
+    assert asked(server) == [("Match", "lost"), ("Match", "")]
+    server.error = None
+    executed(node)
+    assert asked(server) == [("PutScene", ""), ("Match", "lost")]
+
+
 class Carrier:
     """Carries a hundredth of everything; fails where it is told to."""
 
@@ -288,6 +366,20 @@ def test_what_cannot_be_carried_aborts_and_keeps_the_object_map(carrying, carrie
     assert (result.error, result.error_field) == ("the objects are mirrored", "object_map")
     assert len(result.object_map.objects) == 2
     assert sent(carrying, "route") == []
+
+
+def test_routes_are_carried_onto_the_map_that_the_server_keeps(carrying, carrier, server):
+    server.kept = put("kept")
+    executed(carrying)
+    point, stroke = message("geometry_msgs/msg/Point"), message("sketchmatch_msgs/msg/Stroke")
+    line = stroke(points=[point(x=1.0), point(x=3.0)])
+    wanted = message("sketchmatch_msgs/msg/CarryRequest")(routes=[line], y_axis=1)
+    carrying.services["~/carry"](wanted)
+    assert [map_.stored_scene for _, map_, *_ in carrier.asked] == ["kept", "kept"]
+    carrier.error = NotFoundError("no scene is called kept", "")
+    assert "no scene" in carrying.services["~/carry"](wanted).error
+    names = [map_.stored_scene for _, map_, *_ in carrier.asked[2:]]
+    assert names == ["kept", ""]
 
 
 def test_more_of_the_latest_sketch_is_carried_on_demand(carrying, carrier):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
+from sketchmatch_client import Client
 from tests import processes
 from tests.pages import Page
 from tests.ros.messages import message
@@ -72,7 +73,10 @@ def test_a_drawn_route_and_a_zone_are_carried_where_they_were_drawn(ros):
         rows, columns = np.nonzero(np.array(mask.data).reshape(240, 240))
         edges = [columns.min(), columns.max(), rows.min(), rows.max()]
         assert np.array(edges) * CELL == pytest.approx((7, 9, 2, 4), abs=0.2)
-        node.go("shutdown", "finalized")
+        with Client(running.address) as client:
+            assert len(client.list_scenes()) == 1
+            node.go("shutdown", "finalized")
+            assert client.list_scenes() == []
 
 
 def test_the_goal_of_the_readme_has_its_objects_where_they_are(ros):

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
-from sketchmatch_client import Client, Match, MatchCall, Progress
+from sketchmatch_client import (
+    Client,
+    Match,
+    MatchCall,
+    NotFoundError,
+    Progress,
+    SketchmatchError,
+    sources,
+)
 from sketchmatch_proto.v1.source_pb2 import Source
 
-__all__ = ["Carrier", "Features", "Matching", "Options"]
+__all__ = ["Carrier", "Features", "KeptMap", "Matching", "Options"]
 
 _LOOK_SECONDS = 0.05
+_DELETE_SECONDS = 2.0
 
+T = TypeVar("T")
 XY = tuple[float, float]
 
 
@@ -93,6 +103,71 @@ class Carrier(Protocol):
         """
 
 
+class KeptMap:
+    """The latest map as the server keeps it, so that goals need not bring it each time.
+
+    Parameters
+    ----------
+    client
+        Asks the server.
+    """
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._lock = threading.Lock()
+        self._of: tuple[Source, str] | None = None
+        self._kept: Source | None = None
+        self._ours = ""
+
+    def keep(self, map_: Source, profile: str, timeout: float) -> Source:
+        """Have the server keep a map in place of the one before, and return how it is named.
+
+        Where the server keeps none, and of rooms, which are cut to fit each sketch, it is the map.
+        """
+        with self._lock:
+            if self._of != (map_, profile):
+                before, self._ours = self._ours, ""
+                self._of, self._kept = (map_, profile), None
+                # What is wrong with the map or the server a match will tell.
+                with suppress(SketchmatchError):
+                    self._put(map_, profile, timeout, before)
+                if before != self._ours:
+                    self._delete(before)
+            return self._kept or map_
+
+    def named(self, map_: Source) -> Source:
+        """Return how a map is named if it is the one that is kept, and else the map."""
+        with self._lock:
+            is_latest = self._of is not None and self._of[0] == map_
+            return (is_latest and self._kept) or map_
+
+    def forget(self) -> None:
+        """Take it that the server keeps nothing any more, as after a restart without its store."""
+        with self._lock:
+            self._of, self._kept, self._ours = None, None, ""
+
+    def close(self) -> None:
+        """Have the server keep nothing any more."""
+        with self._lock:
+            self._delete(self._ours)
+        self.forget()
+
+    def _put(self, map_: Source, profile: str, timeout: float, before: str) -> None:
+        put = self._client.put_scene(
+            map_, profile=profile or None, title="a robot's map", timeout=timeout or None
+        )
+        name = put.stored_scene.name
+        if put.created or name == before:  # what was there already is somebody else's to delete
+            self._ours = name
+        if not put.stored_scene.passages:
+            self._kept = sources.stored_scene(name)
+
+    def _delete(self, name: str) -> None:
+        if name:
+            with suppress(SketchmatchError):
+                self._client.delete_scene(name, timeout=_DELETE_SECONDS)
+
+
 class Matching:
     """Matches that go on, each of which can be stopped.
 
@@ -104,6 +179,7 @@ class Matching:
 
     def __init__(self, client: Client) -> None:
         self._client = client
+        self._map = KeptMap(client)
         self._lock = threading.Lock()
         self._running: set[MatchCall] = set()
 
@@ -125,6 +201,41 @@ class Matching:
         SketchmatchError
             As the client's calls do.
         """
+
+        def matched(source: Source) -> Match:
+            return self._matched(sketch, source, options, on_progress, is_cancelled)
+
+        kept = self._map.keep(map_, options.profile, options.timeout)
+        return self._unless_lost(matched, kept, map_)
+
+    def carried(self, carry: Callable[[Source], Features], map_: Source) -> Features:
+        """Return what is carried onto a map, which the server may keep.
+
+        Raises
+        ------
+        SketchmatchError
+            As ``carry`` does.
+        """
+        return self._unless_lost(carry, self._map.named(map_), map_)
+
+    def _unless_lost(self, ask: Callable[[Source], T], kept: Source, map_: Source) -> T:
+        """Ask with the map itself where the server does not keep it any more."""
+        try:
+            return ask(kept)
+        except NotFoundError:
+            if kept is map_:
+                raise
+            self._map.forget()
+            return ask(map_)
+
+    def _matched(
+        self,
+        sketch: Source,
+        map_: Source,
+        options: Options,
+        on_progress: Callable[[Progress], object],
+        is_cancelled: Callable[[], bool],
+    ) -> Match:
         call = self._client.events(
             sketch,
             map_,
@@ -135,6 +246,11 @@ class Matching:
         )
         with self._known(call), _stopped_when(is_cancelled, call):
             return call.result(on_progress)
+
+    def close(self) -> None:
+        """Stop all that go on, and have the server keep no map any more."""
+        self.stop()
+        self._map.close()
 
     def stop(self) -> None:
         """Stop all that go on."""

@@ -136,7 +136,6 @@ class SketchmatchNode(LifecycleNode):
         done = super().on_shutdown(state)
         self._active = False
         if hasattr(self, "_client"):
-            self._matching.stop()
             self._give_back()
         return done
 
@@ -224,9 +223,11 @@ class SketchmatchNode(LifecycleNode):
         self._filter.publish(conversions.filter_info(self._mask.topic_name, header))
 
     def _carried(self, last: _Matched, drawn: Features) -> Features:
-        return self._carry(
-            self._client, last.sketch, last.map_, last.partners, drawn, self._said("radius")
-        )
+        def carry(map_: Source) -> Features:
+            radius = self._said("radius")
+            return self._carry(self._client, last.sketch, map_, last.partners, drawn, radius)
+
+        return self._matching.carried(carry, last.map_)
 
     def _header(self, grid: OccupancyGrid) -> Header:
         return Header(stamp=self.get_clock().now().to_msg(), frame_id=grid.header.frame_id)
@@ -243,6 +244,7 @@ class SketchmatchNode(LifecycleNode):
         return self.get_parameter(parameter).value
 
     def _give_back(self) -> None:
+        self._matching.close()
         self._server.destroy()
         self.destroy_subscription(self._maps)
         for publisher in self._published:
