@@ -21,14 +21,9 @@ import numpy as np
 import shapely
 
 from sketchmatch.model import FloatArray, IntArray, Scene
-from tests.experiments.drawings import Drawing
 
-__all__ = ["crowd_drawing"]
+__all__ = ["Style", "drawn_by_somebody", "invented", "kept_of", "place_of", "style_of"]
 
-_OBJECTS = (3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 28, 36, 44, 52, 60)
-_DRAWN = (2, 3, 4, 5, 6, 6, 7, 7, 8, 8, 8, 9, 10, 12, 14)
-_NEARLY_ALL = 0.3
-_EXTRAS = (0.5, 0.3, 0.15, 0.05)
 _FORGOTTEN = (0.4, 0.3, 0.2, 0.1)
 _GAP = 0.03
 _TRIES = 60
@@ -80,34 +75,7 @@ class Style(NamedTuple):
     modules: tuple[tuple[FloatArray, FloatArray, IntArray], ...]
 
 
-def crowd_drawing(number: int, uneven: bool = False) -> Drawing:
-    """Return a sketch of this place, its map, and the truth.
-
-    Parameters
-    ----------
-    number
-        Which one.
-    uneven
-        Whether who draws is good at some of it and bad at the rest.
-    """
-    rng = np.random.default_rng((173205, number, 2 * uneven + 1))
-    style, count = _style_of(rng), int(rng.choice(_DRAWN))
-    objects = int(rng.choice(_OBJECTS))
-    if rng.random() < _NEARLY_ALL:
-        objects = max(3, count + int(rng.integers(-1, 4)))
-    map_ = _place_of(style, objects, rng)
-    kept, seen = _kept(map_, count, rng)
-    things = [map_.objects[k].rings[0] for k in kept]
-    extra = int(rng.choice(len(_EXTRAS), p=_EXTRAS)) if len(kept) > 2 else 0
-    added = _invented(style, map_, seen, kept, extra, rng)
-    truth = np.array([*kept, *[-1] * len(added)])
-    order = rng.permutation(len(truth))
-    every = [*things, *added]
-    sketch = Scene.from_polygons(_drawn_by_somebody([every[k] for k in order], rng, uneven))
-    return Drawing(sketch, map_, truth[order])
-
-
-def _style_of(rng: np.random.Generator) -> Style:
+def style_of(rng: np.random.Generator) -> Style:
     """Return how somebody furnishes places."""
     varied, longer = rng.uniform(0.0, 0.7), rng.uniform(0.0, 0.8)
     shapes = rng.dirichlet((1.2, 0.5, 0.6, 0.4, 0.2))
@@ -133,7 +101,7 @@ def _style_of(rng: np.random.Generator) -> Style:
     )
 
 
-def _place_of(style: Style, objects: int, rng: np.random.Generator) -> Scene:
+def place_of(style: Style, objects: int, rng: np.random.Generator) -> Scene:
     """Return so many things as somebody furnishes a place with; about 1 from each to the next."""
     rings: list[FloatArray] = []
     outlines: list[shapely.Polygon] = []
@@ -234,7 +202,7 @@ def _modular(style: Style, objects: int, spread: float, rng: np.random.Generator
     return found
 
 
-def _kept(place: Scene, count: int, rng: np.random.Generator) -> tuple[IntArray, IntArray]:
+def kept_of(place: Scene, count: int, rng: np.random.Generator) -> tuple[IntArray, IntArray]:
     """Return what is drawn of a place, and what is seen there: that, and what is forgotten."""
     centres = _middles([item.rings[0] for item in place.objects])
     forgotten = int(rng.choice(len(_FORGOTTEN), p=_FORGOTTEN))
@@ -251,7 +219,7 @@ def _kept(place: Scene, count: int, rng: np.random.Generator) -> tuple[IntArray,
     return kept, seen
 
 
-def _invented(
+def invented(
     style: Style,
     place: Scene,
     seen: IntArray,
@@ -290,7 +258,7 @@ def _invented(
     return found
 
 
-def _drawn_by_somebody(
+def drawn_by_somebody(
     things: Sequence[FloatArray], rng: np.random.Generator, uneven: bool = False
 ) -> list[FloatArray]:
     """Return things as somebody draws them, clear of each other."""

@@ -9,8 +9,8 @@ and ``posterior.json`` beside that module:
   has;
 - ``posterior``: what evidence counts for with the judge ``posterior``, by
   :mod:`tests.experiments.posterior`: first of places and maps, from few numbers of each line, then
-  of maps alone, from more of them and from more sketches of other kinds, and last how likely the
-  right map is not known, from a crowd of all kinds;
+  of maps alone, from more of them and from more sketches of other kinds, then from all of them and
+  from anyone's sketches of any place, and last from these how likely the right map is not known;
 - and how well the probabilities of both hold on yet other sketches.
 
 ``--sketches 50`` learns from so many of each kind, to try it, and ``--into`` writes into another
@@ -29,7 +29,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from sketchmatch_builtin.judges import calibration
-from tests.experiments.crowd import crowd_drawing
+from sketchmatch_builtin.judges._evidence import BESIDE
+from tests.experiments.anyones import anyones_drawing
 from tests.experiments.drawings import Drawing
 from tests.experiments.odds import considered_by, errors, learned_odds
 from tests.experiments.posterior import (
@@ -62,13 +63,15 @@ SKETCHES = {
     "halls": 2300,
     "inventive": 1500,
     "anything": 1500,
-    "crowd": 3800,
-    "uneven": 3400,
+    "once more": 5800,
+    "anyones": 8700,
+    "exchanged": 1600,
     "strangers": 600,
     "checked": 200,
 }
-"""How many there are; of ``again``, the first ones of ``training``, to ``anything`` it goes on with
-maps, and from ``crowd`` on it learns to doubt; ``checked`` are further ``strangers``."""
+"""How many there are; of ``again`` to ``anything`` it goes on with maps, then of ``once more`` to
+``exchanged`` and of ``many``. ``again`` and ``once more`` are the first ones of ``training``, and
+``checked`` further ``strangers``."""
 
 _KINDS: dict[str, Callable[[int], Drawing]] = {
     "training": training_drawing,
@@ -76,8 +79,8 @@ _KINDS: dict[str, Callable[[int], Drawing]] = {
     "halls": hall_drawing,
     "inventive": inventive_drawing,
     "anything": partial(inventive_drawing, anything=True),
-    "crowd": crowd_drawing,
-    "uneven": partial(crowd_drawing, uneven=True),
+    "anyones": anyones_drawing,
+    "exchanged": partial(anyones_drawing, exchanged=True),
     "strangers": stranger_drawing,
 }
 
@@ -86,6 +89,10 @@ _OF_PLACES = ("training", "many", "strangers")
 
 _FEWEST = 4
 """How many objects a sketch has at least that is gone on with."""
+
+_KEPT, _KEPT_OF_ALL = 0.3, 0.5
+"""The share of what was begun with in who went on from there, the first time as much as costs
+nothing on other sketches of the same kinds, then what does best on ``strangers``."""
 
 _AT_ONCE = 200
 
@@ -129,17 +136,23 @@ def _posterior(counts: dict[str, int], kept: Path | None) -> tuple[str, dict[str
     """Return what was learned, and its errors."""
     of = {kind: _known(kind, range(counts[kind]), kept) for kind in _KINDS}
     learned = learned_posterior([*of["training"], *of["many"]])
-    again = _known("training", range(counts["again"]), kept)
-    further = [*again, *of["halls"], *of["inventive"], *of["anything"]]
-    learned = gone_on(
-        learned, [each for each in further if not each.elsewhere and len(each.truth) >= _FEWEST]
+    again, once_more = (
+        _known("training", range(counts[part]), kept) for part in ("again", "once more")
     )
-    learned = doubting(learned, [*of["crowd"], *of["uneven"]], of["strangers"])
+    further = [*again, *of["halls"], *of["inventive"], *of["anything"]]
+    learned = gone_on(learned, _to_go_on(further), _KEPT, BESIDE)
+    anyones = [*of["anyones"], *of["exchanged"]]
+    learned = gone_on(learned, _to_go_on([*once_more, *of["many"], *anyones]), _KEPT_OF_ALL)
+    learned = doubting(learned, anyones, of["strangers"])
     others = counts["strangers"]
     checked = _known("strangers", range(others, others + counts["checked"]), kept)
     found = judged_errors(checked, learned)
     print(found)
     return posterior_text(learned), found
+
+
+def _to_go_on(cases: Sequence[Known]) -> list[Known]:
+    return [each for each in cases if not each.elsewhere and len(each.truth) >= _FEWEST]
 
 
 def _known(kind: str, numbers: range, kept: Path | None) -> list[Known]:

@@ -31,9 +31,6 @@ _RATE = 2e-3
 _WARMING = 0.05
 _DECAY = 0.1
 _MOMENTS = 0.9, 0.995
-_KEPT = 0.3
-"""The share of what was begun with in who went on from there: as much as costs nothing on other
-sketches of the same kinds."""
 
 _SCALED_BY = 4000
 """Cases of which the scales of numbers are taken."""
@@ -68,7 +65,7 @@ class Case(NamedTuple):
 
 
 def fitted_maps(
-    cases: Sequence[Case], seed: int = 0, start: Layers | None = None, kept: float = _KEPT
+    cases: Sequence[Case], seed: int = 0, start: Layers | None = None, kept: float = 0.0
 ) -> Layers:
     """Return the layers under which the right maps are likeliest.
 

@@ -189,14 +189,28 @@ def learned_posterior(cases: Sequence[Known]) -> Posterior:
     )
 
 
-def gone_on(first: Posterior, cases: Sequence[Known]) -> Posterior:
+def gone_on(
+    first: Posterior, cases: Sequence[Known], kept: float, numbers: int | None = None
+) -> Posterior:
     """Return what was learned first, and of maps also from more sketches of this place.
 
-    These tell of each line what the others beside it are like as well. How often the right map is
-    not known, and of places, nothing more is learned: these sketches are of harder kinds.
+    How often the right map is not known, and of places, nothing more is learned: these sketches are
+    of harder kinds.
+
+    Parameters
+    ----------
+    first
+        What to go on from.
+    cases
+        What to learn from.
+    kept
+        The share of what was learned first in the mean with what comes of going on.
+    numbers
+        How many numbers of each line are learned from; all, if not given.
     """
     found = [each for each in cases if each.right >= 0]
-    maps = _rounded_layers(fitted_maps([_case(each, True) for each in found], start=first.maps))
+    known = [_case(each, True, numbers) for each in found]
+    maps = _rounded_layers(fitted_maps(known, start=first.maps, kept=kept))
     labels = _labels(found, {True: maps, False: first.bare})
     return first._replace(maps=maps, labels=_rounded(labels))
 
@@ -239,7 +253,7 @@ def knowing(first: Posterior, cases: Sequence[Known]) -> Posterior:
     """
     here = [each for each in cases if not each.elsewhere]
     found = [_case(each, True) for each in here if each.right >= 0]
-    maps = fitted_maps(found, start=first.maps, kept=0.0)
+    maps = fitted_maps(found, start=first.maps)
     place = fitted_place(
         np.array([place_numbers(each.described, first.bare) for each in cases]),
         np.array([not each.elsewhere for each in cases]),

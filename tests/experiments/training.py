@@ -21,7 +21,16 @@ from tests.experiments.drawings import Drawing
 from tests.experiments.halls import hall, recalled
 from tests.experiments.people import Person, Shapes, remembered, with_extras
 
-__all__ = ["hall_drawing", "inventive_drawing", "training_drawing"]
+__all__ = [
+    "drawn_by_anybody",
+    "extras",
+    "hall_drawing",
+    "inventive_drawing",
+    "seen_around",
+    "strewn",
+    "training_drawing",
+    "turning",
+]
 
 _BY_PEOPLE = 0.25
 _ELSEWHERE = 0.35
@@ -51,13 +60,13 @@ def training_drawing(number: int, many: bool = False) -> Drawing:
     by_people = rng.random() < _BY_PEOPLE
     sizes = _MANY_OBJECTS if many else _OBJECTS[2:10] if by_people else _OBJECTS
     objects = int(rng.choice(sizes))
-    furnish = random_scene if by_people else _strewn
+    furnish = random_scene if by_people else strewn
     map_ = furnish(rng, objects)
     elsewhere = rng.random() < _ELSEWHERE
     there = max(2, round(objects * rng.uniform(0.7, 1.4)))
     place = furnish(rng, there) if elsewhere else map_
     count = min(len(place), int(rng.choice(_MANY_DRAWN if many else _DRAWN)))
-    kept = _seen(place, count, rng)
+    kept = seen_around(place, count, rng)
     extra = int(rng.choice(3, p=_EXTRAS)) if count > 2 else 0
     sketch, truth = (_by_people if by_people else _by_anybody)(place, kept, extra, rng)
     order = rng.permutation(len(sketch))
@@ -78,8 +87,8 @@ def inventive_drawing(number: int, anything: bool = False) -> Drawing:
     rng = np.random.default_rng((161803, number, int(anything)) if anything else (161803, number))
     by_people = rng.random() < _BY_PEOPLE
     objects = int(rng.choice(_OBJECTS[3:10] if by_people else _OBJECTS[3:]))
-    map_ = (random_scene if by_people else _strewn)(rng, objects)
-    kept = _seen(map_, min(objects, int(rng.choice(_DRAWN[3:]))), rng)
+    map_ = (random_scene if by_people else strewn)(rng, objects)
+    kept = seen_around(map_, min(objects, int(rng.choice(_DRAWN[3:]))), rng)
     extra = int(rng.choice(3, p=_INVENTED))
     if by_people:
         sketch, truth = _by_people(map_, kept, extra, rng)
@@ -97,9 +106,9 @@ def hall_drawing(number: int) -> Drawing:
     elsewhere = rng.random() < _ELSEWHERE
     place = hall(rng, max(4, round(objects * rng.uniform(0.7, 1.4)))) if elsewhere else map_
     count = min(len(place), int(rng.choice(_DRAWN[2:])))
-    kept = _seen(place, count, rng)
+    kept = seen_around(place, count, rng)
     things = [place.objects[k].rings[0] for k in kept]
-    added = _extras(place, things, int(rng.choice(3, p=_INVENTED)), rng)
+    added = extras(place, things, int(rng.choice(3, p=_INVENTED)), rng)
     truth = np.array([*kept, *[-1] * len(added)])
     order = rng.permutation(len(truth))
     every = [*things, *added]
@@ -107,7 +116,7 @@ def hall_drawing(number: int) -> Drawing:
     return Drawing(scene, map_, np.full(len(order), -1) if elsewhere else truth[order])
 
 
-def _seen(place: Scene, count: int, rng: np.random.Generator) -> IntArray:
+def seen_around(place: Scene, count: int, rng: np.random.Generator) -> IntArray:
     """Return some of what lies around one object, or of all there is."""
     centres = np.array([item.centroid for item in place.objects])
     nearest = np.argsort(np.hypot(*(centres - centres[rng.integers(len(place))]).T))
@@ -130,7 +139,7 @@ def _by_people(
     return bare, np.where(drawn < len(place), drawn, -1)
 
 
-def _strewn(rng: np.random.Generator, objects: int) -> Scene:
+def strewn(rng: np.random.Generator, objects: int) -> Scene:
     """Return things on a floor: alike or not, in rows, in clusters, or anyhow."""
     varied, elongated = rng.uniform(0.15, 0.7), rng.uniform(0.1, 0.7)
     straight, repeated, clustered = rng.random(3) < (0.5, 0.4, 0.3)
@@ -149,7 +158,7 @@ def _strewn(rng: np.random.Generator, objects: int) -> Scene:
         again = repeated and rng.random() < 0.7
         kind = kinds[rng.integers(len(kinds))] if again else _kind(rng, varied, elongated)
         heading = rng.integers(4) * np.pi / 2.0 + rng.normal(0.0, 0.03)
-        ring = _outline(rng, *kind) @ _turning(heading if straight else rng.uniform(0.0, 7.0))
+        ring = _outline(rng, *kind) @ turning(heading if straight else rng.uniform(0.0, 7.0))
         centre = rng.uniform(0.0, 1.0, 2) * floor
         if clustered and rng.random() < 0.8:
             centre = middles[rng.integers(len(middles))] + rng.normal(0.0, 0.9 * width, 2)
@@ -197,17 +206,17 @@ def _by_anybody(
 ) -> tuple[Scene, IntArray]:
     """Draw with deviations of this sketch's own."""
     things = [place.objects[k].rings[0] for k in kept]
-    added = _extras(place, things, extra, rng, anything)
+    added = extras(place, things, extra, rng, anything)
     truth = np.array([*kept, *[-1] * len(added)])
     strength = rng.uniform(0.3, 1.05)
     while True:
         try:
-            return Scene.from_polygons(_drawn([*things, *added], strength, rng)), truth
+            return Scene.from_polygons(drawn_by_anybody([*things, *added], strength, rng)), truth
         except InvalidInputError:
             strength *= _BETTER
 
 
-def _extras(
+def extras(
     place: Scene,
     things: Sequence[FloatArray],
     count: int,
@@ -226,7 +235,7 @@ def _extras(
         if anything:
             size = math.sqrt(shapely.Polygon(like).area)
             like = _outline(rng, *_kind(rng, 0.3, 0.4)) * size
-        ring = (like - like.mean(axis=0)) @ _turning(rng.uniform(0.0, 7.0))
+        ring = (like - like.mean(axis=0)) @ turning(rng.uniform(0.0, 7.0))
         ring = ring * math.exp(rng.normal(0.0, 0.2)) + rng.uniform(low, high)
         outline = shapely.Polygon(ring)
         if shapely.distance(there, outline).min() > 0.05:
@@ -235,7 +244,7 @@ def _extras(
     return found
 
 
-def _drawn(
+def drawn_by_anybody(
     things: Sequence[FloatArray], strength: float, rng: np.random.Generator
 ) -> list[FloatArray]:
     """Return things as they are drawn."""
@@ -249,9 +258,9 @@ def _drawn(
     evenly, simple = rng.random() < 0.3, int(rng.choice(3, p=(0.6, 0.25, 0.15)))
     gradient = rng.normal(0.0, 0.12, 2)
     small = math.exp(rng.normal(0.0, 0.15)) if rng.random() < 0.7 else rng.uniform(0.4, 0.9)
-    along = _turning(rng.uniform(0.0, np.pi))
+    along = turning(rng.uniform(0.0, np.pi))
     page = along.T @ np.diag(np.exp(rng.normal(0.0, rng.uniform(0.0, 0.15)) * np.array([1, -1])))
-    page = page @ along @ _turning(rng.uniform(0.0, 7.0)) * math.exp(rng.uniform(-1.0, 4.0))
+    page = page @ along @ turning(rng.uniform(0.0, 7.0)) * math.exp(rng.uniform(-1.0, 4.0))
     # Some people draw all with the same care, others one thing well and the next anyhow.
     uneven = rng.choice((0.0, rng.uniform(0.0, 0.7)))
     rings = []
@@ -263,7 +272,7 @@ def _drawn(
         else:
             outline = outline * np.exp(careless[0] * rng.normal(0.0, stretched, 2))
         growth = float(gradient @ (centre - middle)) / extent
-        outline = outline @ _turning(careless[1] * rng.normal(0.0, turned))
+        outline = outline @ turning(careless[1] * rng.normal(0.0, turned))
         outline = outline * small * math.exp(careless[2] * rng.normal(0.0, sized) + growth)
         where = (centre - middle) * math.exp(growth / 2.0)
         where = where + careless[3] * rng.normal(0.0, displaced, 2)
@@ -288,7 +297,7 @@ def _around(turns: FloatArray) -> FloatArray:
     return np.stack([np.cos(2.0 * np.pi * turns), np.sin(2.0 * np.pi * turns)], axis=1)
 
 
-def _turning(angle: float) -> FloatArray:
+def turning(angle: float) -> FloatArray:
     """Return the matrix by which rows of points are turned clockwise."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s], [s, c]])

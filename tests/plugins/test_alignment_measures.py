@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from sketchmatch.model import Scene
 from sketchmatch_builtin.alignment import Line, Whole, measured, relations_of
+from sketchmatch_builtin.alignment._forms import form_distances
 from sketchmatch_builtin.alignment._measures import Relations, fit_map
 from sketchmatch_builtin.alignment._poses import TOLERANCES
 from sketchmatch_builtin.alignment._selves import self_similarities
@@ -19,7 +20,7 @@ from tests.oracle import aligning
 from tests.plugins.test_alignment_poses import moved, things
 from tests.strategies import random_table, scenes
 
-LINE_RELATED = {"self", "relation"}
+LINE_RELATED = {"self", "relation", "form"}
 WHOLE_RELATED = {"alike", "unlike"}
 
 
@@ -119,12 +120,13 @@ def test_relations_count_by_what_their_similarities_lack(seed, n, more, swapped)
             assert row["relation"] == pytest.approx(expected, abs=1e-9)
 
 
-def _bare(n, m, similarity=None, selves=None, names=None):
+def _bare(n, m, similarity=None, selves=None, forms=None, names=None):
     """Return relations of which nothing is known but what is given."""
     pairs = n * (n - 1) // 2, m * (m - 1) // 2
     return Relations(
         np.zeros(pairs) if similarity is None else similarity,
         np.zeros((n, m, 4)) if selves is None else selves,
+        np.zeros((n, m)) if forms is None else forms,
         np.zeros((n, m), dtype=np.int64) if names is None else names,
         False,
     )
@@ -151,6 +153,16 @@ def test_own_histograms_are_read_between_the_bins_of_the_turn():
         assert (row["alike"], row["unlike"]) == (0.0, 2.0)
         row = row_of([2, 1, 0], drawn, mapped, relations)  # of two of them nothing is said
         assert (row["alike"], row["unlike"]) == (1.0, 0.0)
+
+
+def test_a_line_is_as_far_from_its_partner_in_form_as_both_are_apart():
+    rng = np.random.default_rng(1)
+    drawn, mapped = things(rng, 3), things(rng, 4)
+    forms = rng.uniform(0.0, 5.0, (3, 4))
+    relations = _bare(3, 4, forms=forms)
+    for swapped in (False, True):
+        found = lines_of([2, -1, 1], drawn, mapped, relations._replace(swapped=swapped))
+        assert [row["form"] for row in found] == [forms[0, 2], 0.0, forms[2, 1]]
 
 
 def assert_finite(partners, drawn, mapped):
@@ -268,6 +280,7 @@ def test_relations_are_those_of_the_table_and_of_the_objects_alone():
     found = relations_of((first, second), table, None, False)
     np.testing.assert_array_equal(found.similarity, table.similarity)
     np.testing.assert_array_equal(found.selves, self_similarities(first, second))
+    np.testing.assert_array_equal(found.forms, form_distances(first, second))
     np.testing.assert_array_equal(found.names, np.zeros((3, 4)))
     names = rng.integers(-1, 2, (4, 3))
     swapped = relations_of((first, second), table, names, True)

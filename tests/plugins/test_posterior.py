@@ -39,7 +39,7 @@ from tests.plugins.test_align import seen_as, sloppy, strewn
 from tests.searching import relations_of
 from tests.strategies import random_table
 
-OF_LINE, OF_BARE, OF_MAP, OF_SCENE, PLACE, LOST = 22, 9, 8, 3, 38, 6
+OF_LINE, OF_BARE, OF_MAP, OF_SCENE, PLACE, LOST = 24, 9, 8, 3, 38, 6
 
 
 def learned(rng=None, scale=0.3, width=3, score=1.0, constant=2.0, lost=-2.0, luck=0.4):
@@ -295,7 +295,7 @@ def test_the_same_is_judged_the_same():
 
 def test_lines_are_described_by_what_is_measured_of_them():
     row = np.zeros((1, 2, len(Line)))
-    row[0, 0] = 0.04, -0.5, 0.09, 0.7, 0.01, 0.2, 0.3, 0.4, 0.05, 0.02, 1.5
+    row[0, 0] = 0.04, -0.5, 0.09, 0.7, 0.01, 0.2, 0.3, 0.4, 0.05, 0.02, 1.5, 0.6
     one = np.array([[True, False]])
     found = line_numbers(Measured(row, np.zeros((1, 8)), one), related=True)
     ln = math.log
@@ -303,8 +303,9 @@ def test_lines_are_described_by_what_is_measured_of_them():
     # Beside none the others deviate by nothing.
     beside = [ln(1.0 + 100.0 * each) for each in (0.05, 0.02, 0.25, 0.09, 0.3, 0.4, 0.01, 0.2)]
     alone = ln(0.053), ln(0.023), ln(1.51)
+    form = ln(0.61), ln(61.0)
     np.testing.assert_allclose(
-        found[0, 0], [1.0, ln(0.043), 0.2, ln(0.253), -0.5, *shape, *beside, *alone]
+        found[0, 0], [1.0, ln(0.043), 0.2, ln(0.253), -0.5, *shape, *beside, *alone, *form]
     )
     np.testing.assert_array_equal(found[0, 1], np.zeros(OF_LINE))
     bare = line_numbers(Measured(row, np.zeros((1, 8)), np.array([[True, True]])), related=False)

@@ -14,6 +14,7 @@ import numpy as np
 from sketchmatch.api.kernels import kernel, pair_index, sort_values
 from sketchmatch.model import BoolArray, FloatArray, IntArray, RelationTable, Scene
 from sketchmatch.model.arrays import frozen, sealed
+from sketchmatch_builtin.alignment._forms import form_distances
 from sketchmatch_builtin.alignment._poses import (
     TOLERANCES,
     Tolerances,
@@ -52,6 +53,7 @@ class Line(IntEnum):
     ALONE = 8
     BENT = 9
     ROOM = 10
+    FORM = 11
 
 
 class Whole(IntEnum):
@@ -113,6 +115,8 @@ class Relations(NamedTuple):
     selves
         Shape (n, m, bins): how alike the own histograms of a sketched and a mapped object are for
         turns from sketch to map over half of the full turn.
+    forms
+        Shape (n, m): how far the forms of a sketched and a mapped object are apart, squared.
     names
         int64, shape (n, m): 1 where labels mean the same, −1 where they do not, 0 without one.
     swapped
@@ -121,6 +125,7 @@ class Relations(NamedTuple):
 
     similarity: FloatArray
     selves: FloatArray
+    forms: FloatArray
     names: IntArray
     swapped: bool
 
@@ -450,6 +455,7 @@ def _relate(
         selves = relations.selves[a, c]
         alike = (1.0 - rest) * selves[whole] + rest * selves[after]
         lines[a, Line.SELF] = max(0.0, 1.0 - alike)
+        lines[a, Line.FORM] = relations.forms[a, c]
         if relations.names[a, c] > 0:
             row[Whole.ALIKE] += 1.0
         elif relations.names[a, c] < 0:
@@ -496,6 +502,7 @@ def relations_of(
     return Relations(
         table.similarity,
         sealed(self_similarities(*scenes)),
+        sealed(form_distances(*scenes)),
         sealed(alike),
         swapped,
     )
@@ -504,6 +511,7 @@ def relations_of(
 _UNRELATED = Relations(
     frozen(np.zeros((0, 0))),
     frozen(np.zeros((0, 0, 0))),
+    frozen(np.zeros((0, 0))),
     frozen(np.zeros((0, 0), dtype=np.int64)),
     False,
 )

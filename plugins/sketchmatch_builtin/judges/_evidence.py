@@ -19,6 +19,7 @@ from sketchmatch_builtin.judges.calibration import Layers, Posterior
 
 __all__ = [
     "AT_FIRST",
+    "BESIDE",
     "FARTHEST",
     "JUDGED",
     "LINES",
@@ -51,8 +52,9 @@ FARTHEST = 5.0
 say anything."""
 
 LINES = 0.25
-OF_PLACES = 11
-"""How many numbers of lines tell places, and were learned from first; the others came later."""
+OF_PLACES, BESIDE = 11, 22
+"""How many numbers of lines tell places, and were learned from first; and how many tell what they
+are beside the others, and were learned from next. Forms came last."""
 
 _RELATIONS = 2
 _MOST_BESIDE = 9.0
@@ -131,9 +133,9 @@ def line_numbers(measured: Measured, related: bool) -> FloatArray:
     Returns
     -------
     ndarray
-        Shape (c, n, 22), or 9 where relations do not count.
+        Shape (c, n, 24), or 9 where relations do not count.
     """
-    place, size, shape, round_, own, relation, way, near, alone, bent, room = np.moveaxis(
+    place, size, shape, round_, own, relation, way, near, alone, bent, room, form = np.moveaxis(
         measured.lines, 2, 0
     )
     numbers = [
@@ -156,6 +158,8 @@ def line_numbers(measured: Measured, related: bool) -> FloatArray:
             np.log(0.003 + alone),
             np.log(0.003 + bent),
             np.log(0.01 + room),
+            np.log(0.01 + form),
+            _beside(form, measured.matched),
         ]
     return np.stack(numbers, axis=2) * measured.matched[:, :, None]
 

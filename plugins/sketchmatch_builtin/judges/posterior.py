@@ -26,12 +26,12 @@ class Posterior(Judge):
 
     The maps are those met by the search and those that laying the sketch upon the map leads to, as
     the searcher ``align`` does. A conditional logit [1]_ makes probabilities of what each one is
-    worth: how well its places, sizes and shapes agree in one frame, the ways between objects,
-    their relations and the forces within them, what a page is stretched by, what is left out on
-    either side, and labels where both sides have some; and how certain it is that each mapped
-    object in it is one. What that comes to is a network of two
-    small layers over the lines of a map, in any order [2]_, so that a deviation counts the more,
-    the better the others fit. That the right map is none of them has a share as well.
+    worth: how well its places, sizes and shapes agree in one frame, what outlines are however they
+    are stretched, the ways between objects, their relations and the forces within them, what a page
+    is stretched by, what is left out on either side, and labels where both sides have some; and how
+    certain it is that each mapped object in it is one. What that comes to is a network of two small
+    layers over the lines of a map, in any order [2]_, so that a deviation counts the more, the
+    better the others fit. That the right map is none of them has a share as well.
 
     Whether the sketch shows this place at all follows from how far the best map exceeds what
     chance achieves on the same map: decoys, the sketch in the mirror, which nobody draws, and
