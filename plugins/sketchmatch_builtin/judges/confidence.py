@@ -23,6 +23,17 @@ class HighestConfidence(Judge):
     ----------
     "Scene Matching Between a Quantitative Map and a Qualitative Hand Drawn Sketch", thesis,
     section 3.6.1.
+
+    Examples
+    --------
+    Of the maps of a plain sketch the right one comes first:
+
+    >>> import numpy as np
+    >>> from sketchmatch.testing import judging_problem
+    >>> problem, truth = judging_problem(np.random.default_rng(0), objects=5)
+    >>> best, *others = HighestConfidence().judge(problem).maps
+    >>> best.partners.tolist() == truth.tolist(), len(others)
+    (True, 3)
     """
 
     name = "confidence"

@@ -48,6 +48,18 @@ class Posterior(Judge):
        2017.
     .. [3] D. Lang et al., "Astrometry.net: blind astrometric calibration of arbitrary
        astronomical images", The Astronomical Journal 139, 2010.
+
+    Examples
+    --------
+    One of six things was not drawn, and it is sure of the five others and of the place:
+
+    >>> from sketchmatch.testing import judging_problem
+    >>> problem, truth = judging_problem(np.random.default_rng(0), objects=6, missing=1)
+    >>> judged = Posterior().judge(problem)
+    >>> judged.maps[0].partners.tolist() == truth.tolist()
+    True
+    >>> judged.maps[0].probability > 0.9, judged.elsewhere < 0.1
+    (True, True)
     """
 
     name = "posterior"

@@ -74,6 +74,20 @@ class DxfReader(Reader):
     References
     ----------
     Autodesk, "DXF Reference", 2012; M. Moitzi, "ezdxf", ezdxf.mozman.at.
+
+    Examples
+    --------
+    A table of two metres by one, drawn in centimetres:
+
+    >>> import io
+    >>> import ezdxf
+    >>> drawing, file = ezdxf.new(units=ezdxf.units.CM), io.StringIO()
+    >>> corners = [(0, 0), (200, 0), (200, 100), (0, 100)]
+    >>> _ = drawing.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": "table"})
+    >>> drawing.write(file)
+    >>> found = DxfReader().read(file.getvalue().encode())
+    >>> found.polygons[0].label, found.polygons[0].rings[0].max(axis=0).tolist()
+    ('table', [2.0, 1.0])
     """
 
     name = "dxf"
