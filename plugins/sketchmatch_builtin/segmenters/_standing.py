@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, cast
 
@@ -44,15 +45,24 @@ _SHADOW, _SPECK, _NEAR, _EDGE = 0.2, 2.0, 2.5, 2.0
 # The share of its hull that something straight fills.
 _STRAIGHT = 0.6
 _SIDES = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
+# What has more corners is looked at in pieces; how much larger the discs of an outline may be than
+# those around the middles of its cells, in cells: √½, and what is drawn across corners.
+_CORNERS, _ASIDE = 500, 1.1
+# How much farther than an edge a corner moves at most when an outline grows.
+_MITRE = 5.0
 # Legs, before they are merged to tables.
 _MOST_PARTS = 10_000
 
 
 class Thing(NamedTuple):
-    """An outline in cells, and how sure it is that it is one thing, from 0 to 1."""
+    """An outline in cells, and how sure it is that it is one thing, from 0 to 1.
+
+    No disc of a radius beyond ``widest`` fits into it; that is known of large outlines alone.
+    """
 
     outline: shapely.Polygon
     certainty: float
+    widest: float = math.inf
 
 
 class Room(NamedTuple):
@@ -134,6 +144,19 @@ class Parts(NamedTuple):
         found[:] = [shapely.Polygon(rings[k]) for k in which]
         return found
 
+    def widest(self, outlines: _Geometries, which: Sequence[int]) -> list[float]:
+        """Return the radius beyond which no disc fits into an outline, if it has many corners."""
+        if (shapely.get_num_coordinates(outlines) <= _CORNERS).all():
+            return [math.inf] * len(which)
+        inside = cv2.copyMakeBorder(
+            np.asarray(self.labels > 0, np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(0,)
+        )
+        away = cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+        cells = np.flatnonzero(self.labels)
+        most = np.zeros(len(self.boxes))
+        np.maximum.at(most, self.labels.ravel()[cells], np.ravel(away)[cells])
+        return [float(most[k]) + _ASIDE for k in which]
+
 
 def as_they_are(room: Room, parts: Parts, least: float, most: int) -> list[Thing]:
     """Return each part of at least so many cells.
@@ -145,7 +168,11 @@ def as_they_are(room: Room, parts: Parts, least: float, most: int) -> list[Thing
     """
     large = np.flatnonzero(parts.cells >= max(least, 1.0)).tolist()
     refuse_more(len(large), most, "raise min_size")
-    return [Thing(each, _certainty(each, room)) for each in parts.outlines(large)]
+    outlines = parts.outlines(large)
+    return [
+        Thing(each, _certainty(each, room, widest), widest)
+        for each, widest in zip(outlines, parts.widest(outlines, large), strict=True)
+    ]
 
 
 def merged_within(
@@ -199,7 +226,12 @@ def furnished(room: Room, parts: Parts, least: float, largest_leg: float, most: 
     for k, n in zip(which, group.tolist(), strict=True):
         if k in among:
             certain[n] = min(certain[n], sets[among[k]][1])
-    return [Thing(each, float(c)) for each, c in zip(hulls, certain, strict=True)]
+    widest, count = np.full(len(hulls), math.inf), np.bincount(group)
+    for k, n in zip(which, group.tolist(), strict=True):
+        if k in alone and count[n] == 1:
+            widest[n] = alone[k].widest
+    columns = (certain.tolist(), widest.tolist())
+    return [Thing(*each) for each in zip(hulls, *columns, strict=True)]
 
 
 def _sets(
@@ -286,11 +318,12 @@ def _meets_walls(hull: shapely.Polygon, room: Room) -> bool:
 
 def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]:
     """Return the things of a room together with those that stand at its walls."""
-    thin = [each.outline for each in things if _is_thinner(each.outline, bounds.side)]
+    thin = [each.outline for each in things if _is_thinner(each.outline, bounds.side, each.widest)]
     outlines = [each.outline for each in things]
     tree = shapely.STRtree(outlines)
     parts_of_others, found = set(), []
-    for pocket in at_walls(_walled(room), shapely.union_all(thin), bounds):
+    sides = shapely.union_all(_sides(thin, room, bounds))
+    for pocket in at_walls(_walled(room), sides, bounds):
         line = shapely.get_coordinates(pocket.outline)
         polygon = _to_the_cell(line, bounds, room)
         near = tree.query(polygon, predicate="intersects").tolist()
@@ -305,6 +338,42 @@ def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]
             parts_of_others.update(part)
             found.append(Thing(shapely.Polygon(polygon.exterior), _of_pocket(pocket)))
     return [each for k, each in enumerate(things) if k not in parts_of_others] + found
+
+
+def _sides(thin: list[shapely.Polygon], room: Room, bounds: Bounds) -> list[shapely.Polygon]:
+    """Return which thin things may be sides of what stands at a room's walls.
+
+    One of many corners is none that is farther than a slit from the walls and all others, and
+    leaves no slit in itself: it is a hole in the room, and not in its outline.
+    """
+    few = shapely.get_num_coordinates(thin) <= _CORNERS
+    # Outlines along the cells grow by half of a slit, others by up to the limit of mitres.
+    near = math.ceil(bounds.slit / 2.0)
+    far = math.ceil(_MITRE * bounds.slit / 2.0 + bounds.stray) + 1
+    if few.all() or far >= max(room.free.shape):
+        return thin
+    rows, columns = (side + 1 for side in room.free.shape)
+    large, others = np.zeros((2, rows + 2 * far, columns + 2 * far), np.uint8)
+    others[far : far + rows - 1, far : far + columns - 1] = room.free | room.inside
+    others = 1 - others
+    rings = [np.round(shapely.get_coordinates(each)).astype(np.int32) + far for each in thin]
+    for ring, is_plain in zip(rings, few.tolist(), strict=True):
+        cv2.fillPoly(others if is_plain else large, [ring], (1,))
+    for mask, reach in ((large, near), (others, far)):
+        cv2.dilate(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8), dst=mask)
+    _, groups = cv2.connectedComponents(large, connectivity=8)
+    kept = np.zeros(int(groups.max()) + 1, dtype=bool)
+    kept[groups[(large & others) > 0]] = True
+    contours, tree = cv2.findContours(large, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+    for contour, (*_, parent) in zip(contours, tree[0], strict=True):
+        if parent >= 0:
+            kept[groups[tuple(contour[0, 0, ::-1])]] = True
+    corners = [groups[tuple(ring[0, ::-1])] for ring in rings]
+    return [
+        each
+        for each, at, is_plain in zip(thin, corners, few.tolist(), strict=True)
+        if is_plain or kept[at]
+    ]
 
 
 def _to_the_cell(line: FloatArray, bounds: Bounds, room: Room) -> shapely.Polygon:
@@ -357,10 +426,10 @@ def _walled(room: Room) -> shapely.Polygon:
     return shapely.Polygon(ring)
 
 
-def _certainty(polygon: shapely.Polygon, room: Room) -> float:
+def _certainty(polygon: shapely.Polygon, room: Room, widest: float = math.inf) -> float:
     """Return how sure it is that an outline is a thing, and no shadow of one and no speckle."""
     sure = min(1.0, _seen(shapely.get_coordinates(polygon), room) / _SEEN)
-    compact = not _is_thinner(polygon, room.small)
+    compact = not _is_thinner(polygon, room.small, widest)
     speck = polygon.area < (_SPECK * room.small) ** 2
     at_edge = (speck or not compact) and _is_at_an_unseen_edge(polygon, room)
     if speck and [compact, not at_edge, sure == 1.0].count(False) > 1:
@@ -371,13 +440,35 @@ def _certainty(polygon: shapely.Polygon, room: Room) -> float:
     return min(sure, _RAGGED) if at_edge or ragged else sure
 
 
-def _is_thinner(polygon: shapely.Polygon, width: float) -> bool:
-    """Whether a polygon in cells is nowhere so wide."""
+def _is_thinner(polygon: shapely.Polygon, width: float, widest: float = math.inf) -> bool:
+    """Whether a polygon in cells, into which no disc beyond a radius fits, is nowhere so wide."""
     # A disc of the area through the perimeter fits into anything, by Bonnesen.
     if polygon.area >= width / 2.0 * polygon.length:
         return False
     # Of stairs along the cells every step would count.
-    return bool(polygon.simplify(0.5).buffer(-width / 2.0).is_empty)
+    return widest < width / 2.0 or not _holds_disc(
+        cast(shapely.Polygon, polygon.simplify(0.5)), width / 2.0
+    )
+
+
+def _holds_disc(polygon: shapely.Polygon, radius: float) -> bool:
+    """Whether a disc lies in a polygon, looked for in pieces of few corners each."""
+    if shapely.get_num_coordinates(polygon) <= _CORNERS:
+        return not polygon.buffer(-radius).is_empty
+    low, high = np.reshape(polygon.bounds, (2, 2))
+    axis = int((high - low).argmax())
+    middle = (low[axis] + high[axis]) / 2.0
+    # Half of the middles of discs lie on either side, and of discs a little more.
+    reach = 1.1 * radius
+    if high[axis] - middle <= 2.0 * reach:
+        return not polygon.buffer(-radius).is_empty
+    for side, end in ((1, middle + reach), (0, middle - reach)):
+        box = np.array([low, high])
+        box[side, axis] = end
+        parts = shapely.get_parts(shapely.clip_by_rect(polygon, *box.ravel())).tolist()
+        if any(_holds_disc(part, radius) for part in parts):
+            return True
+    return False
 
 
 def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:
