@@ -15,7 +15,7 @@ from sketchmatch.errors import InvalidInputError
 from sketchmatch.model import OccupancyGrid
 from sketchmatch_builtin.segmenters import _at_walls, _standing
 from sketchmatch_builtin.segmenters._at_walls import Bounds
-from sketchmatch_builtin.segmenters._cells import holes
+from sketchmatch_builtin.segmenters._cells import holes, outline
 from sketchmatch_builtin.segmenters._standing import Parts, Room
 from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
 from tests.benchmarks.grids import MAPS
@@ -125,13 +125,13 @@ def test_of_pockets_that_do_not_hang_most_are_known_not_to():
 @settings(max_examples=100)
 @example(3, 2.0)
 def test_a_disc_is_found_in_pieces_where_it_is_in_the_whole(seed, radius):
-    for outline in outlines_of(seed):
+    for polygon in outlines_of(seed):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(_standing, "_CORNERS", 12)
-            held = _standing._holds_disc(outline, radius)
+            held = _standing._holds_disc(polygon, radius)
         # Buffers round discs.
-        assert held or outline.buffer(-1.01 * radius).is_empty
-        assert not held or not outline.buffer(-0.99 * radius).is_empty
+        assert held or polygon.buffer(-1.01 * radius).is_empty
+        assert not held or not polygon.buffer(-0.99 * radius).is_empty
 
 
 def outlines_of(seed):
@@ -148,10 +148,23 @@ def test_no_larger_disc_fits_into_an_outline_than_is_said(seed):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_standing, "_CORNERS", 0)
         widest = parts.widest(outlines, which)
-    for outline, radius in zip(outlines, widest, strict=True):
-        assert outline.simplify(0.5).buffer(-radius).is_empty
+    for polygon, radius in zip(outlines, widest, strict=True):
+        assert polygon.simplify(0.5).buffer(-radius).is_empty
         # It is worth something.
-        assert not outline.buffer(-(radius - 2.2)).is_empty
+        assert not polygon.buffer(-(radius - 2.2)).is_empty
+
+
+@given(SEEDS)
+@settings(max_examples=60)
+def test_parts_around_each_other_lie_as_each_does_alone(seed):
+    parts = Parts.of(room_of(seed))
+    which = np.arange(1, len(parts.boxes))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Parts, "_are_apart", lambda *_: False)
+        spreads, outlines = parts.spreads(which), parts.outlines(which)
+    assert spreads.ravel() == pytest.approx(parts.spreads(which).ravel(), abs=1e-6)
+    alone = [outline(parts.mask(k)) + parts.boxes[k, :2] for k in which.tolist()]
+    assert all(a.equals(shapely.Polygon(b)) for a, b in zip(outlines, alone, strict=True))
 
 
 @given(SEEDS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, cast
 
 import cv2
@@ -12,6 +13,7 @@ import shapely
 from numpy.typing import NDArray
 
 from sketchmatch.model import FloatArray, IntArray
+from sketchmatch.model.caching import cached_property
 from sketchmatch_builtin.segmenters._at_walls import Bounds, Leans, Pocket, at_walls, is_thick
 from sketchmatch_builtin.segmenters._cells import Mask, closed, outline, outlines, refuse_more
 from sketchmatch_builtin.segmenters._furniture import FOOT, Bars, Legs, crowds, facing, tables
@@ -65,7 +67,8 @@ class Thing(NamedTuple):
     widest: float = math.inf
 
 
-class Room(NamedTuple):
+@dataclass(frozen=True)
+class Room:
     """A free region, cropped.
 
     Attributes
@@ -87,6 +90,13 @@ class Room(NamedTuple):
     occupied: Mask
     cell: float
     small: float
+
+    @cached_property
+    def met(self) -> Mask:
+        """1 near where the laser met something."""
+        stray = max(1, min(round(self.small / 2.0), max(self.free.shape)))
+        square = np.ones((2 * stray + 1, 2 * stray + 1), np.uint8)
+        return np.asarray(cv2.dilate(self.occupied, square), dtype=np.uint8)
 
 
 class Parts(NamedTuple):
@@ -129,15 +139,34 @@ class Parts(NamedTuple):
         crop = self.labels[y : y + rows, x : x + columns] == k
         return np.asarray(crop, dtype=np.uint8)
 
+    def spreads(self, which: IntArray) -> FloatArray:
+        """Return how far parts' cells are from their middles, shape (k, 2, 2), squared."""
+        if self._are_apart(which):
+            found = [cv2.moments(self.mask(k), binaryImage=True) for k in which.tolist()]
+            about = np.array([[m[name] for m in found] for name in ("mu20", "mu11", "mu02")])
+        else:
+            number = np.full(len(self.boxes), -1)
+            number[which] = np.arange(len(which))
+            cells = np.flatnonzero(self.labels)
+            of = number[self.labels.ravel()[cells]]
+            cells, of = cells[of >= 0], of[of >= 0]
+            y, x = np.divmod(cells, self.labels.shape[1])
+            x, y = np.stack([x, y]) + 0.5 - self.middles[which].T[:, of]
+            about = np.array([np.bincount(of, each, len(which)) for each in (x * x, x * y, y * y)])
+        return np.reshape((about / self.cells[which])[[0, 1, 1, 2]].T, (-1, 2, 2))
+
+    def _are_apart(self, which: IntArray) -> bool:
+        """Whether parts' boxes are not more than the room, as those of what goes around others."""
+        boxes = self.boxes[which]
+        return bool((boxes[:, 2] * boxes[:, 3]).sum() <= self.labels.size)
+
     def outlines(self, which: Sequence[int]) -> _Geometries:
         """Return the outlines of some parts."""
         found: _Geometries = np.empty(len(which), dtype=object)
-        boxes = self.boxes[list(which)]
-        if (boxes[:, 2] * boxes[:, 3]).sum() <= self.labels.size:
+        if self._are_apart(np.array(which, dtype=np.int64)):
             for n, k in enumerate(which):
                 found[n] = shapely.Polygon(outline(self.mask(k)) + self.boxes[k, :2])
             return found
-        # Of things that go around others the boxes are more than the room.
         chosen = np.zeros(len(self.boxes), np.uint8)
         chosen[list(which)] = 1
         rings = {int(self.labels[at]): ring for at, ring in outlines(chosen[self.labels])}
@@ -273,21 +302,13 @@ def _sets(
 
 
 def _bars(which: IntArray, parts: Parts, cell: float) -> Bars:
-    sides = np.array([_bar(k, parts, cell) for k in which.tolist()]).reshape(-1, 6)
-    return Bars(sides[:, :2], sides[:, 2:4], sides[:, 4], sides[:, 5])
-
-
-def _bar(k: int, parts: Parts, cell: float) -> list[float]:
-    """Return middle, direction, length and width of the rectangle with a part's moments.
+    """Return the rectangles with some parts' moments.
 
     A cell has a moment too, so that it hardly matters how a bar lies on the cells.
     """
-    about = cv2.moments(parts.mask(k), binaryImage=True)
-    x, y, both = (about[name] / about["m00"] for name in ("mu20", "mu02", "mu11"))
-    spread = np.array([[x, both], [both, y]]) + np.eye(2) / 12.0
-    moments, along = np.linalg.eigh(spread)
-    width, length = cell * np.sqrt(12.0 * moments)
-    return [*(cell * parts.middles[k]), *along[:, 1], length, width]
+    moments, along = np.linalg.eigh(parts.spreads(which) + np.eye(2) / 12.0)
+    widths, lengths = cell * np.sqrt(12.0 * moments).T
+    return Bars(cell * parts.middles[which], along[:, :, 1], lengths, widths)
 
 
 def _is_furniture(
@@ -483,14 +504,9 @@ def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:
 
 def _seen(line: FloatArray, room: Room) -> float:
     """Return along which share of a line, in cells, the laser met something."""
-    stray = max(1, min(round(room.small / 2.0), max(room.free.shape)))
     until = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
     steps = np.arange(0.25, until[-1], 0.5)
     xy = [np.interp(steps, until, each) for each in line.T]
     points = np.floor(np.stack(xy, axis=1)).astype(int)
-    low = np.maximum(points.min(axis=0) - stray, 0)
-    high = points.max(axis=0) + stray + 1
-    crop = room.occupied[low[1] : high[1], low[0] : high[0]]
-    grown = cv2.dilate(crop, np.ones((2 * stray + 1, 2 * stray + 1), np.uint8))
-    x, y = np.clip(points - low, 0, np.array(grown.shape)[::-1] - 1).T
-    return float(grown[y, x].mean())
+    x, y = np.clip(points, 0, np.array(room.met.shape)[::-1] - 1).T
+    return float(room.met[y, x].mean())
