@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +38,10 @@ _BELLY = 0.87
 _NECK = 0.5
 # As a share of how wide it may be at the wall: how far a thing juts out at most.
 _DEEPEST = 1.5
+# Radii up to this ratio are looked at together, all of them less what rounding discs takes off.
+_RADII, _LESS = 1.5, 0.95
+# In cells, what is nothing.
+_ROUNDING = 1e-6
 
 
 class Bounds(NamedTuple):
@@ -126,9 +129,18 @@ def at_walls(room: shapely.Polygon, sides: shapely.Geometry, bounds: Bounds) -> 
     around = plain.difference(sides).buffer(-bounds.slit / 2.0, join_style="mitre")
     opened = around.buffer(bounds.slit / 2.0, join_style="mitre")
     found: list[Pocket] = []
-    for ring in (*_simplified(opened, bounds.stray), *_simplified(plain, bounds.stray)):
-        if ring.area > bounds.smallest**2:
-            found += _pockets(orient(ring), bounds)
+    seen: list[tuple[shapely.Polygon, list[_Candidate]]] = []
+    for each in (*_simplified(opened, bounds.stray), *_simplified(plain, bounds.stray)):
+        if each.area <= bounds.smallest**2:
+            continue
+        ring = orient(each)
+        # Where there is no slit, both are the same but for rounding.
+        same = (real for other, real in seen if shapely.equals_exact(ring, other, _ROUNDING))
+        known = next(same, None)
+        candidates = _candidates(ring, bounds) if known is None else known
+        pockets = [_pocket(ring, candidate, bounds) for candidate in candidates]
+        seen.append((ring, [c for c, pocket in zip(candidates, pockets, strict=True) if pocket]))
+        found += [pocket for pocket in pockets if pocket]
     taken: list[Pocket] = []
     for pocket in sorted(found, key=lambda each: each.order):
         if not any(pocket.outline.intersects(other.outline) for other in taken):
@@ -143,14 +155,25 @@ def _simplified(shape: shapely.Geometry, stray: float) -> list[shapely.Polygon]:
         points = shapely.get_coordinates(part.exterior)[:-1]
         if not len(points):
             continue
-        away = np.hypot(*(points - shapely.get_coordinates(part.centroid)).T)
+        # Holes do not count.
+        middle = shapely.get_coordinates(shapely.Polygon(points).centroid)
+        away = np.hypot(*(points - middle).T)
         first = np.roll(points, -int(away.argmax()), axis=0)
         found += shapely.get_parts(shapely.Polygon(first).simplify(stray).buffer(0)).tolist()
     return found
 
 
-def _pockets(ring: shapely.Polygon, bounds: Bounds) -> Iterator[Pocket]:
-    """Yield the pockets of a ring that are things."""
+class _Candidate(NamedTuple):
+    """Two corners of a ring, the area between, and whether it may hang between them by a neck."""
+
+    first: int
+    last: int
+    area: float
+    may_hang: bool
+
+
+def _candidates(ring: shapely.Polygon, bounds: Bounds) -> list[_Candidate]:
+    """Return what may be a pocket of a ring."""
     points = shapely.get_coordinates(ring.exterior)[:-1]
     corners = np.flatnonzero(_turns(points) > _CORNER)
     spots = np.asarray(shapely.points(points[corners]), dtype=object)
@@ -168,26 +191,62 @@ def _pockets(ring: shapely.Polygon, bounds: Bounds) -> Iterator[Pocket]:
     shapely.prepare(inner)
     across = shapely.linestrings(np.stack([points[a], points[b]], axis=1))
     walled = ~shapely.intersects(inner, across)
-    for first, last in zip(a[walled].tolist(), b[walled].tolist(), strict=True):
-        pocket = _pocket(points, first, last, bounds)
-        if pocket is not None:
-            yield pocket
+    a, b = a[walled], b[walled]
+    columns = (a, b, areas[counts][walled], _may_hang(ring, a, b))
+    return [_Candidate(*each) for each in zip(*(c.tolist() for c in columns), strict=True)]
 
 
-def _pocket(points: FloatArray, a: int, b: int, bounds: Bounds) -> Pocket | None:
+def _may_hang(
+    ring: shapely.Polygon, a: NDArray[np.int64], b: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Whether discs of the radius of their necks may fit into pockets; if not, none does.
+
+    A pocket whose neck does not cross the ring lies outside of it. There the middles of discs form
+    cores, each so far away from the ring that no neck crosses it: it is in a pocket or not, as any
+    of its points is. So all pockets of about one radius are decided at once; each by itself, as
+    large as it may be, would cost its whole outline.
+    """
+    points = shapely.get_coordinates(ring.exterior)[:-1]
+    across = shapely.linestrings(np.stack([points[a], points[b]], axis=1))
+    inner = ring.buffer(-_ROUNDING, join_style="mitre")
+    shapely.prepare(inner)
+    may = np.asarray(shapely.intersects(inner, across))
+    beside = ~may
+    radii = _LESS * 0.5 * np.linalg.norm(points[a] - points[b], axis=1) / _NECK
+    about = np.floor(np.log(radii) / math.log(_RADII)).astype(int)
+    outside = ring.convex_hull.difference(ring)
+    for power in np.unique(about[beside]).tolist():
+        which = np.flatnonzero(beside & (about == power))
+        cores = shapely.get_parts(outside.buffer(-(_RADII**power)))
+        # Of a larger disc, a disc of the rest lies in the core.
+        largest = _RADII**power + np.sqrt(shapely.area(cores) / math.pi)
+        for core, most in zip(cores.tolist(), largest.tolist(), strict=True):
+            fits = which[radii[which] <= most]
+            if fits.size and not core.is_empty:
+                within = shapely.get_coordinates(core)[0]
+                may[fits] |= _encloses(points - within, a[fits], b[fits])
+    return may
+
+
+def _pocket(ring: shapely.Polygon, candidate: _Candidate, bounds: Bounds) -> Pocket | None:
     """Return the pocket between two corners, or None if it is no thing."""
+    points, (a, b, area, may_hang) = shapely.get_coordinates(ring.exterior)[:-1], candidate
     chain = _chain(points, a, b)
-    outline, neck = shapely.Polygon(chain), math.dist(chain[0], chain[-1])
+    neck = math.dist(chain[0], chain[-1])
     depth = _depth(chain)
     leans = (
         bounds.thinnest < depth <= _DEEPEST * bounds.widest
-        and outline.area <= bounds.widest**2
-        and _FULL <= outline.area / (neck * depth) <= 1.0 / _BELLY
+        and area <= bounds.widest**2
+        and _FULL <= area / (neck * depth) <= 1.0 / _BELLY
         and _goes_on(points, a, b, _STRETCH * bounds.thinnest)
     )
     # The disc of the thickness that it has at least.
     radius = 0.5 * neck / _NECK
-    hangs = outline.area > math.pi * radius**2 and not outline.buffer(-radius).is_empty
+    may_hang = may_hang and area > math.pi * radius**2
+    if not leans and not may_hang:
+        return None
+    outline = shapely.Polygon(chain)
+    hangs = may_hang and not outline.buffer(-radius).is_empty
     if not (leans or hangs) or not outline.is_valid or not is_thick(outline, bounds.thinnest):
         return None
     if not hangs:
@@ -225,8 +284,7 @@ def _depth(chain: FloatArray) -> float:
 def _turns(points: FloatArray) -> FloatArray:
     """Return the angle by which a closed line turns left at each point."""
     before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
-    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return np.asarray(np.arctan2(cross, (before * after).sum(axis=1)))
+    return _angles(before, after)
 
 
 def _areas(points: FloatArray, a: NDArray[np.int64], b: NDArray[np.int64]) -> FloatArray:
@@ -237,6 +295,19 @@ def _areas(points: FloatArray, a: NDArray[np.int64], b: NDArray[np.int64]) -> Fl
     way = np.where(a < b, until[b] - until[a], until[-1] - until[a] + until[b])
     back = points[b, 0] * points[a, 1] - points[b, 1] * points[a, 0]
     return np.asarray(-(way + back) / 2.0)
+
+
+def _encloses(points: FloatArray, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether the way along the ring from each a to its b and straight back goes around 0, 0."""
+    until = np.concatenate([[0.0], np.cumsum(_angles(points, np.roll(points, -1, axis=0)))])
+    way = np.where(a < b, until[b] - until[a], until[-1] - until[a] + until[b])
+    return np.asarray(np.abs(way + _angles(points[b], points[a])) > math.pi)
+
+
+def _angles(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return by which angle each point is left of another, seen from 0, 0."""
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.asarray(np.arctan2(cross, (before * after).sum(axis=1)))
 
 
 def _chain(points: FloatArray, a: int, b: int) -> FloatArray:

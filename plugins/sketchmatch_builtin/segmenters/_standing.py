@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, cast
 
 import cv2
@@ -11,6 +13,7 @@ import shapely
 from numpy.typing import NDArray
 
 from sketchmatch.model import FloatArray, IntArray
+from sketchmatch.model.caching import cached_property
 from sketchmatch_builtin.segmenters._at_walls import Bounds, Leans, Pocket, at_walls, is_thick
 from sketchmatch_builtin.segmenters._cells import Mask, closed, outline, outlines, refuse_more
 from sketchmatch_builtin.segmenters._furniture import FOOT, Bars, Legs, crowds, facing, tables
@@ -44,18 +47,28 @@ _SHADOW, _SPECK, _NEAR, _EDGE = 0.2, 2.0, 2.5, 2.0
 # The share of its hull that something straight fills.
 _STRAIGHT = 0.6
 _SIDES = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
+# What has more corners is looked at in pieces; how much larger the discs of an outline may be than
+# those around the middles of its cells, in cells: √½, and what is drawn across corners.
+_CORNERS, _ASIDE = 500, 1.1
+# How much farther than an edge a corner moves at most when an outline grows.
+_MITRE = 5.0
 # Legs, before they are merged to tables.
 _MOST_PARTS = 10_000
 
 
 class Thing(NamedTuple):
-    """An outline in cells, and how sure it is that it is one thing, from 0 to 1."""
+    """An outline in cells, and how sure it is that it is one thing, from 0 to 1.
+
+    No disc of a radius beyond ``widest`` fits into it; that is known of large outlines alone.
+    """
 
     outline: shapely.Polygon
     certainty: float
+    widest: float = math.inf
 
 
-class Room(NamedTuple):
+@dataclass(frozen=True)
+class Room:
     """A free region, cropped.
 
     Attributes
@@ -77,6 +90,13 @@ class Room(NamedTuple):
     occupied: Mask
     cell: float
     small: float
+
+    @cached_property
+    def met(self) -> Mask:
+        """1 near where the laser met something."""
+        stray = max(1, min(round(self.small / 2.0), max(self.free.shape)))
+        square = np.ones((2 * stray + 1, 2 * stray + 1), np.uint8)
+        return np.asarray(cv2.dilate(self.occupied, square), dtype=np.uint8)
 
 
 class Parts(NamedTuple):
@@ -119,20 +139,52 @@ class Parts(NamedTuple):
         crop = self.labels[y : y + rows, x : x + columns] == k
         return np.asarray(crop, dtype=np.uint8)
 
+    def spreads(self, which: IntArray) -> FloatArray:
+        """Return how far parts' cells are from their middles, shape (k, 2, 2), squared."""
+        if self._are_apart(which):
+            found = [cv2.moments(self.mask(k), binaryImage=True) for k in which.tolist()]
+            about = np.array([[m[name] for m in found] for name in ("mu20", "mu11", "mu02")])
+        else:
+            number = np.full(len(self.boxes), -1)
+            number[which] = np.arange(len(which))
+            cells = np.flatnonzero(self.labels)
+            of = number[self.labels.ravel()[cells]]
+            cells, of = cells[of >= 0], of[of >= 0]
+            y, x = np.divmod(cells, self.labels.shape[1])
+            x, y = np.stack([x, y]) + 0.5 - self.middles[which].T[:, of]
+            about = np.array([np.bincount(of, each, len(which)) for each in (x * x, x * y, y * y)])
+        return np.reshape((about / self.cells[which])[[0, 1, 1, 2]].T, (-1, 2, 2))
+
+    def _are_apart(self, which: IntArray) -> bool:
+        """Whether parts' boxes are not more than the room, as those of what goes around others."""
+        boxes = self.boxes[which]
+        return bool((boxes[:, 2] * boxes[:, 3]).sum() <= self.labels.size)
+
     def outlines(self, which: Sequence[int]) -> _Geometries:
         """Return the outlines of some parts."""
         found: _Geometries = np.empty(len(which), dtype=object)
-        boxes = self.boxes[list(which)]
-        if (boxes[:, 2] * boxes[:, 3]).sum() <= self.labels.size:
+        if self._are_apart(np.array(which, dtype=np.int64)):
             for n, k in enumerate(which):
                 found[n] = shapely.Polygon(outline(self.mask(k)) + self.boxes[k, :2])
             return found
-        # Of things that go around others the boxes are more than the room.
         chosen = np.zeros(len(self.boxes), np.uint8)
         chosen[list(which)] = 1
         rings = {int(self.labels[at]): ring for at, ring in outlines(chosen[self.labels])}
         found[:] = [shapely.Polygon(rings[k]) for k in which]
         return found
+
+    def widest(self, outlines: _Geometries, which: Sequence[int]) -> list[float]:
+        """Return the radius beyond which no disc fits into an outline, if it has many corners."""
+        if (shapely.get_num_coordinates(outlines) <= _CORNERS).all():
+            return [math.inf] * len(which)
+        inside = cv2.copyMakeBorder(
+            np.asarray(self.labels > 0, np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(0,)
+        )
+        away = cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+        cells = np.flatnonzero(self.labels)
+        most = np.zeros(len(self.boxes))
+        np.maximum.at(most, self.labels.ravel()[cells], np.ravel(away)[cells])
+        return [float(most[k]) + _ASIDE for k in which]
 
 
 def as_they_are(room: Room, parts: Parts, least: float, most: int) -> list[Thing]:
@@ -145,7 +197,11 @@ def as_they_are(room: Room, parts: Parts, least: float, most: int) -> list[Thing
     """
     large = np.flatnonzero(parts.cells >= max(least, 1.0)).tolist()
     refuse_more(len(large), most, "raise min_size")
-    return [Thing(each, _certainty(each, room)) for each in parts.outlines(large)]
+    outlines = parts.outlines(large)
+    return [
+        Thing(each, _certainty(each, room, widest), widest)
+        for each, widest in zip(outlines, parts.widest(outlines, large), strict=True)
+    ]
 
 
 def merged_within(
@@ -199,7 +255,12 @@ def furnished(room: Room, parts: Parts, least: float, largest_leg: float, most: 
     for k, n in zip(which, group.tolist(), strict=True):
         if k in among:
             certain[n] = min(certain[n], sets[among[k]][1])
-    return [Thing(each, float(c)) for each, c in zip(hulls, certain, strict=True)]
+    widest, count = np.full(len(hulls), math.inf), np.bincount(group)
+    for k, n in zip(which, group.tolist(), strict=True):
+        if k in alone and count[n] == 1:
+            widest[n] = alone[k].widest
+    columns = (certain.tolist(), widest.tolist())
+    return [Thing(*each) for each in zip(hulls, *columns, strict=True)]
 
 
 def _sets(
@@ -241,21 +302,13 @@ def _sets(
 
 
 def _bars(which: IntArray, parts: Parts, cell: float) -> Bars:
-    sides = np.array([_bar(k, parts, cell) for k in which.tolist()]).reshape(-1, 6)
-    return Bars(sides[:, :2], sides[:, 2:4], sides[:, 4], sides[:, 5])
-
-
-def _bar(k: int, parts: Parts, cell: float) -> list[float]:
-    """Return middle, direction, length and width of the rectangle with a part's moments.
+    """Return the rectangles with some parts' moments.
 
     A cell has a moment too, so that it hardly matters how a bar lies on the cells.
     """
-    about = cv2.moments(parts.mask(k), binaryImage=True)
-    x, y, both = (about[name] / about["m00"] for name in ("mu20", "mu02", "mu11"))
-    spread = np.array([[x, both], [both, y]]) + np.eye(2) / 12.0
-    moments, along = np.linalg.eigh(spread)
-    width, length = cell * np.sqrt(12.0 * moments)
-    return [*(cell * parts.middles[k]), *along[:, 1], length, width]
+    moments, along = np.linalg.eigh(parts.spreads(which) + np.eye(2) / 12.0)
+    widths, lengths = cell * np.sqrt(12.0 * moments).T
+    return Bars(cell * parts.middles[which], along[:, :, 1], lengths, widths)
 
 
 def _is_furniture(
@@ -286,11 +339,12 @@ def _meets_walls(hull: shapely.Polygon, room: Room) -> bool:
 
 def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]:
     """Return the things of a room together with those that stand at its walls."""
-    thin = [each.outline for each in things if _is_thinner(each.outline, bounds.side)]
+    thin = [each.outline for each in things if _is_thinner(each.outline, bounds.side, each.widest)]
     outlines = [each.outline for each in things]
     tree = shapely.STRtree(outlines)
     parts_of_others, found = set(), []
-    for pocket in at_walls(_walled(room), shapely.union_all(thin), bounds):
+    sides = shapely.union_all(_sides(thin, room, bounds))
+    for pocket in at_walls(_walled(room), sides, bounds):
         line = shapely.get_coordinates(pocket.outline)
         polygon = _to_the_cell(line, bounds, room)
         near = tree.query(polygon, predicate="intersects").tolist()
@@ -305,6 +359,42 @@ def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]
             parts_of_others.update(part)
             found.append(Thing(shapely.Polygon(polygon.exterior), _of_pocket(pocket)))
     return [each for k, each in enumerate(things) if k not in parts_of_others] + found
+
+
+def _sides(thin: list[shapely.Polygon], room: Room, bounds: Bounds) -> list[shapely.Polygon]:
+    """Return which thin things may be sides of what stands at a room's walls.
+
+    One of many corners is none that is farther than a slit from the walls and all others, and
+    leaves no slit in itself: it is a hole in the room, and not in its outline.
+    """
+    few = shapely.get_num_coordinates(thin) <= _CORNERS
+    # Outlines along the cells grow by half of a slit, others by up to the limit of mitres.
+    near = math.ceil(bounds.slit / 2.0)
+    far = math.ceil(_MITRE * bounds.slit / 2.0 + bounds.stray) + 1
+    if few.all() or far >= max(room.free.shape):
+        return thin
+    rows, columns = (side + 1 for side in room.free.shape)
+    large, others = np.zeros((2, rows + 2 * far, columns + 2 * far), np.uint8)
+    others[far : far + rows - 1, far : far + columns - 1] = room.free | room.inside
+    others = 1 - others
+    rings = [np.round(shapely.get_coordinates(each)).astype(np.int32) + far for each in thin]
+    for ring, is_plain in zip(rings, few.tolist(), strict=True):
+        cv2.fillPoly(others if is_plain else large, [ring], (1,))
+    for mask, reach in ((large, near), (others, far)):
+        cv2.dilate(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8), dst=mask)
+    _, groups = cv2.connectedComponents(large, connectivity=8)
+    kept = np.zeros(int(groups.max()) + 1, dtype=bool)
+    kept[groups[(large & others) > 0]] = True
+    contours, tree = cv2.findContours(large, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+    for contour, (*_, parent) in zip(contours, tree[0], strict=True):
+        if parent >= 0:
+            kept[groups[tuple(contour[0, 0, ::-1])]] = True
+    corners = [groups[tuple(ring[0, ::-1])] for ring in rings]
+    return [
+        each
+        for each, at, is_plain in zip(thin, corners, few.tolist(), strict=True)
+        if is_plain or kept[at]
+    ]
 
 
 def _to_the_cell(line: FloatArray, bounds: Bounds, room: Room) -> shapely.Polygon:
@@ -357,10 +447,10 @@ def _walled(room: Room) -> shapely.Polygon:
     return shapely.Polygon(ring)
 
 
-def _certainty(polygon: shapely.Polygon, room: Room) -> float:
+def _certainty(polygon: shapely.Polygon, room: Room, widest: float = math.inf) -> float:
     """Return how sure it is that an outline is a thing, and no shadow of one and no speckle."""
     sure = min(1.0, _seen(shapely.get_coordinates(polygon), room) / _SEEN)
-    compact = not _is_thinner(polygon, room.small)
+    compact = not _is_thinner(polygon, room.small, widest)
     speck = polygon.area < (_SPECK * room.small) ** 2
     at_edge = (speck or not compact) and _is_at_an_unseen_edge(polygon, room)
     if speck and [compact, not at_edge, sure == 1.0].count(False) > 1:
@@ -371,13 +461,35 @@ def _certainty(polygon: shapely.Polygon, room: Room) -> float:
     return min(sure, _RAGGED) if at_edge or ragged else sure
 
 
-def _is_thinner(polygon: shapely.Polygon, width: float) -> bool:
-    """Whether a polygon in cells is nowhere so wide."""
+def _is_thinner(polygon: shapely.Polygon, width: float, widest: float = math.inf) -> bool:
+    """Whether a polygon in cells, into which no disc beyond a radius fits, is nowhere so wide."""
     # A disc of the area through the perimeter fits into anything, by Bonnesen.
     if polygon.area >= width / 2.0 * polygon.length:
         return False
     # Of stairs along the cells every step would count.
-    return bool(polygon.simplify(0.5).buffer(-width / 2.0).is_empty)
+    return widest < width / 2.0 or not _holds_disc(
+        cast(shapely.Polygon, polygon.simplify(0.5)), width / 2.0
+    )
+
+
+def _holds_disc(polygon: shapely.Polygon, radius: float) -> bool:
+    """Whether a disc lies in a polygon, looked for in pieces of few corners each."""
+    if shapely.get_num_coordinates(polygon) <= _CORNERS:
+        return not polygon.buffer(-radius).is_empty
+    low, high = np.reshape(polygon.bounds, (2, 2))
+    axis = int((high - low).argmax())
+    middle = (low[axis] + high[axis]) / 2.0
+    # Half of the middles of discs lie on either side, and of discs a little more.
+    reach = 1.1 * radius
+    if high[axis] - middle <= 2.0 * reach:
+        return not polygon.buffer(-radius).is_empty
+    for side, end in ((1, middle + reach), (0, middle - reach)):
+        box = np.array([low, high])
+        box[side, axis] = end
+        parts = shapely.get_parts(shapely.clip_by_rect(polygon, *box.ravel())).tolist()
+        if any(_holds_disc(part, radius) for part in parts):
+            return True
+    return False
 
 
 def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:
@@ -392,14 +504,9 @@ def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:
 
 def _seen(line: FloatArray, room: Room) -> float:
     """Return along which share of a line, in cells, the laser met something."""
-    stray = max(1, min(round(room.small / 2.0), max(room.free.shape)))
     until = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
     steps = np.arange(0.25, until[-1], 0.5)
     xy = [np.interp(steps, until, each) for each in line.T]
     points = np.floor(np.stack(xy, axis=1)).astype(int)
-    low = np.maximum(points.min(axis=0) - stray, 0)
-    high = points.max(axis=0) + stray + 1
-    crop = room.occupied[low[1] : high[1], low[0] : high[0]]
-    grown = cv2.dilate(crop, np.ones((2 * stray + 1, 2 * stray + 1), np.uint8))
-    x, y = np.clip(points - low, 0, np.array(grown.shape)[::-1] - 1).T
-    return float(grown[y, x].mean())
+    x, y = np.clip(points, 0, np.array(room.met.shape)[::-1] - 1).T
+    return float(room.met[y, x].mean())
