@@ -98,6 +98,7 @@ _GROUPS = {
         "plugins/sketchmatch_builtin/alignment",
         {
             "_candidates": "plugins/test_alignment_candidates plugins/test_align",
+            "_forms": "unit/test_forms",
             "_measures": "plugins/test_alignment_measures",
             "_poses": "plugins/test_alignment_poses plugins/test_alignment_candidates",
             "_selves": "plugins/test_alignment_things",
