@@ -410,8 +410,8 @@ TEST_F(Golden, WhatIsForMatchesAloneIsRefusedForATransfer) {
 }
 
 TEST_F(Golden, ASegmentationIsAskedForWithASegmenter) {
-  static_cast<void>(
-      client.segment(polygons(), {"tracing", {{"closing", 0.125}, {"mode", "neat"}}, "careful", true}));
+  static_cast<void>(client.segment(
+      polygons(), {"tracing", {{"closing", 0.125}, {"mode", "neat"}}, "careful", true}));
   expect_request<v1::SegmentRequest>("SegmentRequest");
 }
 

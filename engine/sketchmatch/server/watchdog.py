@@ -45,6 +45,7 @@ def _look(loop: asyncio.AbstractEventLoop, over: threading.Event, patience: floa
     alive, silent = threading.Event(), 0.0
     alive.set()
     with _ended_by_the_system(patience) as put_off:
+        put_off()  # what locks up at once is ended, too
         while not over.wait(_TICK_SECONDS):
             put_off()
             if not alive.is_set():

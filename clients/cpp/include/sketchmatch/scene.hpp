@@ -60,7 +60,7 @@ struct Segmentation {
   AlgorithmSelection segmenter;       ///< The segmenter as it ran.
   std::vector<Point> route;           ///< The way that the person drew through the scene.
   std::vector<Passage> passages;      ///< Which objects open into each other: rooms do.
-  std::optional<MapServerMap> map;    ///< The occupancy grid, where it is asked for and there is one.
+  std::optional<MapServerMap> map;  ///< The occupancy grid, where it is asked for and there is one.
 };
 
 }  // namespace sketchmatch
