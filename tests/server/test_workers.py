@@ -276,7 +276,7 @@ def test_nothing_is_lost_or_mixed_up_among_hundreds_of_requests(address):
 
 @pytest.mark.slow
 def test_a_process_group_that_is_told_to_end_comes_to_an_end_as_its_server_does():
-    said = ("--grace", "4", "--workers", "2")
+    said = ("--grace", "8", "--workers", "2")
     with server(*said) as running, Client(running.address, retries=0) as client:
         events = searching(client)
         for pid in (*children_of(running.process.pid), running.process.pid):

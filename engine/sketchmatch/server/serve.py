@@ -59,8 +59,9 @@ _IDLE_MS = 600_000
 _QUIET = 1.0
 _DAY = 86_400.0
 _LOOK = 0.05
-_COMING_TO_AN_END = 2.0
-"""Seconds of the grace that are left to matches for coming to an end with what they have."""
+_COMING_TO_AN_END = 4.0
+"""Seconds of the grace, half of it at most, that matches have for coming to an end with what they
+have: a judge takes longer on a machine that is busy."""
 
 _SERVICES = (
     match_service_pb2.DESCRIPTOR.services_by_name["MatchService"].full_name,
