@@ -7,7 +7,6 @@ wheel, nav2's interfaces are built from their definitions, and ``ros2 launch`` i
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import sysconfig
@@ -126,6 +125,6 @@ def test_the_program_of_the_page_has_a_route_driven(workspace, tmp_path):
     try:
         told = workspace.run(f"python {HERE / 'follow.py'} 1,2 3.5,-4 5,6")
     finally:
-        driver.send_signal(signal.SIGKILL)
+        driver.kill()
         driver.wait(30)
     assert told == ["map", "1,2", "3.5,-4", "5,6"]
