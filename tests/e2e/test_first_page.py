@@ -141,7 +141,8 @@ def test_whoever_begins_with_a_client_has_an_answer(clean_shell):
     program = FIRST.text.replace("localhost:50051", place)
     said = clean_shell.run(f"python -W error -c {shlex.quote(program)}")
     clean_shell.run("kill $!; wait $!")
-    assert said[0].startswith("8 of 8 sketched objects matched")
+    # What the server logs may come in between.
+    assert any(line.startswith("8 of 8 sketched objects matched") for line in said)
 
 
 def test_the_sketch_pad_is_served():

@@ -115,9 +115,10 @@ def test_a_server_is_killed_at_each_event_and_its_reader_sees_the_uncut_stream(t
             known = [e.progress.confidence for e in seen if e.progress.HasField("confidence")]
             assert known == sorted(known)
         states = {match.match_id: match.state for match in client.matches()}
-        # Of a result that was told in its last moment a killed server may know nothing.
+        # Of a result that was told in its last moment a killed server may know nothing, nor of the
+        # match, if that was short: what is kept is written a moment later.
         assert set(states.values()) <= {MATCH_STATE_SUCCEEDED, MATCH_STATE_INTERRUPTED}
-        assert len(states) == 5
+        assert len(states) in (4, 5)
 
 
 def test_who_watches_a_match_of_a_server_that_was_killed_is_told_to_send_it_again(tmp_path):
