@@ -610,6 +610,7 @@ def strokes(page):
     if page.get_by_test_id("save-strokes").is_disabled():
         page.keyboard.press("Escape")
         return 0
+    page.wait_for_timeout(120)  # Chromium drops what is more than ten downloads in a second
     with page.expect_download() as saved:
         page.get_by_test_id("save-strokes").click()
     undo.wait_for()
