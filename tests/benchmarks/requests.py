@@ -13,7 +13,6 @@ import argparse
 import hashlib
 import json
 import os
-import subprocess
 import sys
 import time
 from collections import defaultdict
@@ -26,6 +25,8 @@ from unittest import mock
 
 from rich.console import Console
 from rich.table import Table
+
+from tests.benchmarks.asked import Asked
 
 _HERE = Path(__file__).resolve().parents[2]
 _OBJECTS = 8
@@ -44,54 +45,21 @@ def main() -> None:
     sent = _requests(searcher=given.searcher, judge=given.judge)
     checkouts = [_HERE] if given.against is None else [given.against.resolve(), _HERE]
     with ExitStack() as stack:
-        processes = [stack.enter_context(_Answering(checkout, sent)) for checkout in checkouts]
-        rounds = [[each.round() for each in processes] for _ in range(given.rounds)]
+        processes = [stack.enter_context(_answering(checkout, sent)) for checkout in checkouts]
+        # Of each a digest of all answers, and the median seconds of each part of a request.
+        rounds = [[json.loads(each.say("go")) for each in processes] for _ in range(given.rounds)]
     digests = {digest for found in rounds for digest, _ in found}
     Console().print(_table([[parts for _, parts in found] for found in rounds]))
     if given.against is not None:
         print("the answers are", "the same" if len(digests) == 1 else "NOT the same")
 
 
-class _Answering:
-    """A process that answers all requests each time that it is asked, with the code of a checkout.
-
-    Parameters
-    ----------
-    checkout
-        Its folder.
-    sent
-        The requests, as bytes.
-    """
-
-    def __init__(self, checkout: Path, sent: list[bytes]) -> None:
-        rooms = [checkout / room for room in ("engine", "plugins", "clients/python")]
-        path = os.pathsep.join(map(str, (*rooms, _HERE)))
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", f"import {__spec__.name} as it; it.answer()"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "PYTHONPATH": path},
-        )
-        self._say(json.dumps([request.hex() for request in sent]))
-
-    def __enter__(self) -> _Answering:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._process.stdin.close()  # type: ignore[union-attr]
-        self._process.wait()
-
-    def round(self) -> tuple[str, dict[str, float]]:
-        """Return a digest of all answers, and the median seconds of each part of a request."""
-        digest, parts = json.loads(self._say("go"))
-        return digest, parts
-
-    def _say(self, line: str) -> str:
-        pipe: Any = self._process
-        pipe.stdin.write(f"{line}\n")
-        pipe.stdin.flush()
-        return str(pipe.stdout.readline())
+def _answering(checkout: Path, sent: list[bytes]) -> Asked:
+    """Return a process that answers all requests, when it is asked, with a checkout's code."""
+    rooms = [checkout / room for room in ("engine", "plugins", "clients/python")]
+    path = os.pathsep.join(map(str, (*rooms, _HERE)))
+    first = json.dumps([request.hex() for request in sent])
+    return Asked("tests.benchmarks.requests", first, PYTHONPATH=path)
 
 
 def answer() -> None:

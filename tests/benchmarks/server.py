@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import os
-import subprocess
 import sys
 import time
 from collections.abc import AsyncIterator, Callable
@@ -21,7 +20,6 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median, quantiles
-from typing import Any
 
 import grpc
 from rich.console import Console
@@ -29,6 +27,7 @@ from rich.table import Table
 
 from sketchmatch_client import match_request, sources
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest, MatchResponse
+from tests.benchmarks.asked import Asked
 from tests.processes import Server, children_of, server
 from tests.server.harness import shapes, turned
 
@@ -76,14 +75,14 @@ def main() -> None:
     chosen = {stage: name for stage in ("searcher", "judge") if (name := getattr(given, stage))}
     small, large = _request(8, chosen), _request(_LARGE, {})
     counts = [int(count) for count in given.clients.split(",")]
-    with server(*given.serve.split()) as running, _InProcess(small) as alone:
+    with server(*given.serve.split()) as running, _in_process(small) as alone:
         for table in asyncio.run(_measured(running, alone, small, large, counts, given)):
             Console().print(table)
 
 
 async def _measured(
     running: Server,
-    alone: _InProcess,
+    alone: Asked,
     small: bytes,
     large: bytes,
     counts: list[int],
@@ -94,7 +93,7 @@ async def _measured(
     beside: list[_Load] = []
     await _loaded(running, small, max(counts), 1.0)
     for _ in range(given.rounds):
-        alone_rates.append(await asyncio.to_thread(alone.rate, given.seconds))
+        alone_rates.append(await asyncio.to_thread(_rate, alone, given.seconds))
         for count in counts:
             loads[count].append(await _loaded(running, small, count, given.seconds))
         async with _busy(running.address, large):
@@ -164,36 +163,15 @@ async def _busy(address: str, request: bytes) -> AsyncIterator[None]:
         await asyncio.sleep(0.5)
 
 
-class _InProcess:
-    """One thread in a process of its own that answers a request again and again."""
+def _in_process(request: bytes) -> Asked:
+    """Return a process whose one thread answers a request again and again."""
+    return Asked("tests.benchmarks.server", request.hex())
 
-    def __init__(self, request: bytes) -> None:
-        self._request = request
 
-    def __enter__(self) -> _InProcess:
-        command = [sys.executable, "-c", f"import {__name__} as it; it.answer()"]
-        if __name__ == "__main__":
-            command[2] = "import tests.benchmarks.server as it; it.answer()"
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        self._say(self._request.hex())
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._process.stdin.close()  # type: ignore[union-attr]
-        self._process.wait()
-
-    def rate(self, seconds: float) -> tuple[float, float]:
-        """Return how many answers it gives a second, and the processor seconds of each."""
-        rate, processor = self._say(f"{seconds}").split()
-        return float(rate), float(processor)
-
-    def _say(self, line: str) -> str:
-        pipe: Any = self._process
-        pipe.stdin.write(f"{line}\n")
-        pipe.stdin.flush()
-        return str(pipe.stdout.readline())
+def _rate(alone: Asked, seconds: float) -> tuple[float, float]:
+    """Return how many answers it gives a second, and the processor seconds of each."""
+    rate, processor = alone.say(f"{seconds}").split()
+    return float(rate), float(processor)
 
 
 def answer() -> None:

@@ -13,9 +13,9 @@ import pytest
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH
 from tests.certificates import Authority
 from tests.pages import Page
-from tests.processes import free_port, server
+from tests.processes import free_port
 from tests.tools import ROOT, require
-from tests.web import built
+from tests.web import serving_pad
 
 # An environment is made, and kernels are compiled in it.
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
@@ -146,12 +146,11 @@ def test_whoever_begins_with_a_client_has_an_answer(clean_shell):
 
 
 def test_the_sketch_pad_is_served():
-    built()
     (command,) = PAD.commands
     _, _, *options = command.split()
     with (
-        server(*options, "--web-address", "127.0.0.1:0") as running,
-        urllib.request.urlopen(running.wait_for(r"the sketch pad is at (\S+)")) as answer,
+        serving_pad(*options) as (_, address),
+        urllib.request.urlopen(address) as answer,
     ):
         assert "<title>" in answer.read().decode()
 

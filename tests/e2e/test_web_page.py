@@ -14,7 +14,7 @@ from PIL import Image
 
 from tests.pace import wait_until
 from tests.pages import Page
-from tests.processes import free_port, server
+from tests.processes import free_port
 from tests.tools import ROOT
 from tests.web import CLIENTS, PAD, built, serving_pad
 
@@ -26,12 +26,11 @@ BUILD, LOOK, DEVELOP, BENCH = PAGE.take_one("console", "make web").commands
 
 
 def test_the_server_lets_the_page_reach_the_robot_that_it_names():
-    built()
     (command,) = SERVE.commands
     _, _, *options = command.split()
     with (
-        server(*options, "--web-address", "127.0.0.1:0") as running,
-        urllib.request.urlopen(running.wait_for(r"the sketch pad is at (\S+)")) as answer,
+        serving_pad(*options) as (_, address),
+        urllib.request.urlopen(address) as answer,
     ):
         policy = answer.headers["content-security-policy"]
     assert re.search(rf"connect-src [^;]*{re.escape(options[-1])}", policy)
