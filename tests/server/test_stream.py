@@ -330,8 +330,10 @@ def test_a_slow_reader_gets_the_latest_progress_and_misses_no_other_event(addres
     progress = [event.progress for event in events if event.WhichOneof("event") == "progress"]
     assert_never_falls([elapsed(item) for item in progress])
     assert_never_falls([item.iteration for item in progress])
-    assert 3 <= len(progress) <= seconds / each + 3, "a prompt reader would get about 50"
-    assert max(lags) < 4 * each, "it does not fall behind"
+    # A dozen of the forty that a prompt reader gets, and a third of a second late; a loaded machine
+    # may hold up both ends. Whoever reads all forty this slowly is seven seconds late in the end.
+    assert 3 <= len(progress) <= 26, lags
+    assert max(lags) < 3, lags
 
 
 def assert_never_falls(values):
