@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -203,7 +204,10 @@ def _remembered(things: Sequence[FloatArray], rng: np.random.Generator) -> Scene
     shapes = Shapes(rng.choice([str(each) for each in Shapes]))
     small = 1.0 if rng.random() < 0.5 else rng.uniform(0.5, 1.0)
     person = Person(rng.uniform(0.4, 1.25), shapes=shapes, small=small)
-    sketch = remembered(room, person, rng)
+    try:
+        sketch = remembered(room, person, rng)
+    except ValueError:  # things that reach around each other are no boxes
+        sketch = remembered(room, replace(person, shapes=Shapes.OUTLINES), rng)
     drawn = sorted(sketch.objects, key=lambda item: int(item.label))
     return Scene(tuple(SceneObject(item.rings) for item in drawn))
 

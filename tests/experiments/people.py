@@ -41,6 +41,7 @@ EXTRA = "extra"
 """What labels of objects begin with that are drawn and not there."""
 
 _TRIES = 20
+_EXACT = 0.1
 _BETTER = 0.97
 _CLEARANCE = 0.35
 _GAP = (-0.03, 0.03)
@@ -125,14 +126,22 @@ def draw(
 
 
 def remembered(room: Scene, person: Person, rng: np.random.Generator) -> Scene:
-    """Return a room as a person remembers it, in random order: what is drawn, before the pen."""
+    """Return a room as a person remembers it, in random order: what is drawn, before the pen.
+
+    Raises
+    ------
+    ValueError
+        If objects meet even as somebody draws them who knows all: boxes around things that reach
+        around each other.
+    """
     strength = person.strength
-    while True:
+    while strength > _EXACT:
         for _ in range(_TRIES):
             sketch = _remembered(room, person, strength, rng)
             if _apart(sketch):
                 return sketch
         strength *= _BETTER
+    raise ValueError(f"things of this room meet where they are drawn as {person.shapes}")
 
 
 def with_extras(room: Scene, count: int, rng: np.random.Generator) -> Scene:

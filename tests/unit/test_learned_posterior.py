@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
+from sketchmatch.model import Scene
 from sketchmatch_builtin.alignment import Line, Measured, Whole
 from sketchmatch_builtin.judges._evidence import BESIDE, JUDGED, Described, weighed, worths
 from sketchmatch_builtin.judges.calibration import posterior_of
@@ -24,6 +25,7 @@ from tests.experiments import (
 )
 from tests.experiments.anyones import anyones_drawing
 from tests.experiments.networks import Case, fitted_place
+from tests.experiments.people import Person, Shapes, remembered
 from tests.experiments.posterior import (
     Known,
     doubting,
@@ -53,6 +55,18 @@ def test_a_number_gives_the_same_drawing_each_time_and_another_one_another(drawi
     np.testing.assert_array_equal(again.truth, drawings[7].truth)
     corners = {each.scene.objects[0].rings[0].tobytes() for each in drawings}
     assert len(corners) == len(drawings)
+
+
+def test_who_draws_boxes_draws_outlines_of_what_reaches_around_something_else():
+    rng = np.random.default_rng(0)
+    around = np.array([[0, 0], [4, 0], [4, 4], [3, 4], [3, 1], [1, 1], [1, 4], [0, 4]], float)
+    within = np.array([[1.7, 2.0], [2.3, 2.0], [2.3, 2.6], [1.7, 2.6]])
+    room = Scene.from_polygons([around, within])
+    with pytest.raises(ValueError, match="boxes"):
+        remembered(room, Person(0.5, shapes=Shapes.BOXES), rng)
+    for _ in range(6):
+        drawn = anyones._remembered([around, within], rng)
+        assert not drawn.objects[0].polygon.intersects(drawn.objects[1].polygon)
 
 
 def test_truths_are_partial_maps_and_those_of_other_places_none(drawings):
