@@ -13,9 +13,10 @@ from shapely.geometry.polygon import orient
 
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.model import OccupancyGrid
-from sketchmatch_builtin.segmenters import _at_walls, _standing
+from sketchmatch_builtin.segmenters import _at_walls, _cells, _standing
 from sketchmatch_builtin.segmenters._at_walls import Bounds
-from sketchmatch_builtin.segmenters._cells import holes, outline
+from sketchmatch_builtin.segmenters._border import outer_border
+from sketchmatch_builtin.segmenters._cells import holes, simplified
 from sketchmatch_builtin.segmenters._standing import Parts, Room
 from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
 from tests.benchmarks.grids import MAPS
@@ -147,11 +148,39 @@ def test_no_larger_disc_fits_into_an_outline_than_is_said(seed):
     outlines = parts.outlines(which)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_standing, "_CORNERS", 0)
-        widest = parts.widest(outlines, which)
-    for polygon, radius in zip(outlines, widest, strict=True):
-        assert polygon.simplify(0.5).buffer(-radius).is_empty
-        # It is worth something.
-        assert not polygon.buffer(-(radius - 2.2)).is_empty
+        cores = parts.cores(outlines, which)
+    for polygon, core in zip(outlines, cores, strict=True):
+        assert polygon.simplify(0.5).buffer(-core.widest).is_empty
+        # It is worth something, and so is where it lies.
+        least = core.widest / 1.02 - 2.2
+        assert not polygon.buffer(-least).is_empty
+        assert least <= 0.0 or _standing._holds_disc_near(polygon, least, core)
+
+
+@given(SEEDS, st.sampled_from([0.3, 0.5, 0.75, 2.0]))
+@settings(max_examples=100)
+def test_what_is_simplified_line_by_line_is_valid_and_as_near(seed, tolerance):
+    parts = Parts.of(room_of(seed))
+    for polygon in parts.outlines(range(1, len(parts.boxes))):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(_cells, "_CORNERS", 0)
+            plain = simplified(polygon, tolerance)
+        careful = polygon.simplify(tolerance)
+        assert plain.is_valid
+        assert plain.equals_exact(careful) or (
+            tolerance > 1.0 and plain.hausdorff_distance(polygon) <= tolerance + 1e-9
+        )
+
+
+def test_a_polygon_that_would_cross_itself_or_vanish_is_simplified_with_care():
+    # A zigzag corridor whose turns reach between the walls of the next.
+    comb = shapely.LineString([(0, 0), (40, 0), (40, 3), (1, 3), (1, 6), (40, 6)]).buffer(0.7)
+    for polygon in (comb, shapely.box(0.0, 0.0, 1.0, 1.0)):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(_cells, "_CORNERS", 0)
+            plain = simplified(polygon, 5.0)
+        assert plain.is_valid
+        assert plain.equals_exact(polygon.simplify(5.0))
 
 
 @given(SEEDS)
@@ -163,7 +192,7 @@ def test_parts_around_each_other_lie_as_each_does_alone(seed):
         patch.setattr(Parts, "_are_apart", lambda *_: False)
         spreads, outlines = parts.spreads(which), parts.outlines(which)
     assert spreads.ravel() == pytest.approx(parts.spreads(which).ravel(), abs=1e-6)
-    alone = [outline(parts.mask(k)) + parts.boxes[k, :2] for k in which.tolist()]
+    alone = [outer_border(parts.mask(k)) + parts.boxes[k, :2] for k in which.tolist()]
     assert all(a.equals(shapely.Polygon(b)) for a, b in zip(outlines, alone, strict=True))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import cast
 
 import cv2
 import numpy as np
@@ -27,6 +26,7 @@ from sketchmatch_builtin.segmenters._cells import (
     in_map,
     reading_order,
     refuse_more,
+    simplified,
 )
 from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of
 from sketchmatch_builtin.segmenters._standing import (
@@ -272,7 +272,7 @@ class OccupancyGridSegmenter(Segmenter):
         else:
             tolerance = self.params.tolerance / grid.resolution
         coarsest = _COARSEST_TOLERANCE * math.sqrt(polygon.area)
-        return cast(shapely.Polygon, polygon.simplify(min(tolerance, coarsest)))
+        return simplified(polygon, min(tolerance, coarsest))
 
 
 def _cells(length: float, cell: float) -> float:
@@ -308,10 +308,12 @@ def _with_slanted_gaps(free: Mask, shortest: float) -> Mask:
 
 def _meeting(thin: Mask, free: Mask, aside: int) -> Iterator[tuple[int, int, int]]:
     """Yield (row, column) of cells that meet those below and aside in a corner alone."""
-    here, there = (np.s_[:-1], np.s_[1:])[::aside]
-    apart = 1 - (free[:-1, there] | free[1:, here])
-    for y, x in np.argwhere(thin[:-1, here] & thin[1:, there] & apart).tolist():
-        yield y, x + (aside < 0), aside
+    columns, cells = free.shape[1], np.flatnonzero(thin.view(np.bool_))
+    below = cells + columns
+    apart = 1 - (free.ravel()[cells + aside] | free.ravel()[below])
+    meeting = cells[(thin.ravel()[below + aside] & apart) > 0]
+    for y, x in zip(*(each.tolist() for each in np.divmod(meeting, columns)), strict=True):
+        yield y, x, aside
 
 
 def _rooms(free: Mask, share: float) -> Iterator[tuple[Mask, Mask, tuple[int, int]]]:

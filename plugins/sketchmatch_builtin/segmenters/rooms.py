@@ -36,6 +36,7 @@ from sketchmatch_builtin.segmenters._cells import (
     outlines,
     reading_order,
     refuse_more,
+    simplified,
 )
 from sketchmatch_builtin.segmenters._doorways import Labels, divided, doorway, parts_that_meet
 from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of
@@ -377,7 +378,7 @@ def _with_holes(outer: FloatArray, inner: list[FloatArray]) -> shapely.Polygon:
 
 def _simplified(outlines: list[shapely.Polygon], tolerance: float) -> list[shapely.Polygon]:
     """Return the outlines simplified, and those left as they are that would then overlap."""
-    result = np.array([_begun(exact).simplify(tolerance) for exact in outlines], dtype=object)
+    result = np.array([simplified(_begun(exact), tolerance) for exact in outlines], dtype=object)
     kept = np.zeros(len(result), dtype=bool)
     while True:
         a, b = shapely.STRtree(result).query(result)
@@ -413,6 +414,8 @@ def _from_farthest(ring: FloatArray) -> FloatArray:
 
 
 def _rings(room: shapely.Polygon) -> list[FloatArray]:
+    if not room.interiors:
+        return [shapely.get_coordinates(room)]
     return [shapely.get_coordinates(ring) for ring in (room.exterior, *room.interiors)]
 
 
