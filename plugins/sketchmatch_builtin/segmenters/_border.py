@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from typing import Any
 
 import cv2
@@ -23,6 +25,8 @@ _NUMBERS[1, 1] = 2
 # with the cell on the left.
 _BEGINNING = np.array([[1, 1], [1, 0], [0, 0], [0, 1]])
 _HEADING = np.array([[0, -1], [-1, 0], [0, 1], [1, 0]])
+# Cells.
+_AT_ONCE = 20_000
 
 
 def outer_border(mask: NDArray[np.uint8]) -> FloatArray:
@@ -66,27 +70,20 @@ def outer_borders(mask: NDArray[np.uint8]) -> list[FloatArray]:
         for contour, (*_, parent) in zip(contours, [] if tree is None else tree[0], strict=True)
         if parent < 0
     ]
-    if not around:
-        return []
-    ends = np.cumsum([len(each) for each in around])
-    corners, ring = _along_sides(np.concatenate(around), ends, np.pad(mask, 1))
-    return np.split(corners, np.flatnonzero(np.diff(ring)) + 1)
+    framed = np.pad(mask, 1)
+    return [border for rings in _together(around) for border in _along_sides(rings, framed)]
 
 
-def _along_sides(
-    cells: NDArray[Any], ends: IntArray, framed: NDArray[np.uint8]
-) -> tuple[FloatArray, IntArray]:
-    """Return the corners of the borders along rings of cells (x, y), and the ring of each.
+def _together(rings: list[NDArray[Any]]) -> Iterator[list[NDArray[Any]]]:
+    """Yield rings of cells, so many at once that neither calls nor memory cost much."""
+    number = np.cumsum([len(ring) for ring in rings]) // _AT_ONCE
+    starts = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(rings)]
+    yield from (rings[low:high] for low, high in itertools.pairwise(starts) if low < high)
 
-    Parameters
-    ----------
-    cells
-        Shape (n, 2), of all rings.
-    ends
-        Shape (rings,), after which cell each ends.
-    framed
-        The mask in a frame of cells that are 0.
-    """
+
+def _along_sides(rings: list[NDArray[Any]], framed: NDArray[np.uint8]) -> list[FloatArray]:
+    """Return the corners of the borders along rings of cells (x, y) of a framed mask."""
+    cells, ends = np.concatenate(rings), np.cumsum([len(ring) for ring in rings])
     lengths = np.diff(ends, prepend=0)
     before = _direction(cells[_following(ends, lengths, -1)] - cells)
     after = _direction(cells[_following(ends, lengths, 1)] - cells)
@@ -117,7 +114,8 @@ def _along_sides(
     apart = np.ones(len(path), np.bool_)
     apart[1:] = (path[1:, 0] != path[:-1, 1]).any(axis=1)
     kept = np.stack([apart, cut], axis=1)
-    return np.asarray(path[kept], dtype=np.float64), np.repeat(ring, kept.sum(axis=1))
+    corners = np.asarray(path[kept], dtype=np.float64)
+    return np.split(corners, kept.sum(axis=1).cumsum()[np.flatnonzero(np.diff(ring))])
 
 
 def _following(ends: IntArray, lengths: IntArray, steps: int | IntArray) -> IntArray:

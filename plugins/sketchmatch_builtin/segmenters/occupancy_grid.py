@@ -46,6 +46,8 @@ __all__ = ["OccupancyGridSegmenter"]
 _COARSEST_TOLERANCE = 0.12
 # In percent: from here on the laser met something.
 _OCCUPIED = 50
+# On a map of more cells nothing else is tried, which would take longer than what was asked.
+_MANY = 4_000_000
 # What the text of ``attached`` recommends, in metres.
 _USUAL_ATTACHED = 2.0
 
@@ -362,14 +364,18 @@ def _too_few(
 
 
 def _cures(grid: OccupancyGrid, params: OccupancyGridSegmenter.Params) -> Iterator[str]:
-    """Yield which other options find objects enough, having tried them."""
-    if params.attached == 0.0:
+    """Yield which other options find objects enough, having tried them where that is soon done."""
+    if params.attached == 0.0 and grid.cells.size > _MANY:
+        yield f"set attached to {_USUAL_ATTACHED:g} for objects at the walls"
+    elif params.attached == 0.0:
         wider = params.model_copy(update={"attached": _USUAL_ATTACHED})
         if found := _count(OccupancyGridSegmenter(wider), grid):
             yield f"set attached to {_USUAL_ATTACHED:g}, which finds {found} objects at the walls"
     same = {"free_threshold": params.free_threshold, "keep_unknown": params.keep_unknown}
     rooms = RoomSegmenter(RoomSegmenter.Params.model_validate(same))
-    if found := _count(rooms, grid):
+    if grid.cells.size > _MANY:
+        yield "try the segmenter rooms"
+    elif found := _count(rooms, grid):
         yield f"choose the segmenter rooms, which finds {found} rooms"
 
 
