@@ -192,6 +192,8 @@ def _with_narrow_rooms(free: Mask, labels: Labels, least: float) -> Labels:
     parts, sizes = _numbered(rest, 4)
     large = sizes >= least
     large[0] = False
+    if not large.any():
+        return labels
     narrow = np.where(large, np.cumsum(large) + labels.max(), 0).astype(np.int32)
     return np.asarray(labels + narrow[parts], dtype=np.int32)
 
@@ -207,6 +209,8 @@ def _numbered(mask: Mask, connectivity: int) -> tuple[Labels, IntArray]:
     )
     sizes = statistics[:, cv2.CC_STAT_AREA].astype(np.int64)
     sizes[0] = 0
+    if len(sizes) <= 2:
+        return np.asarray(parts, dtype=np.int32), sizes
     middle = (np.array(mask.shape[::-1]) - 1.0) / 2.0
     away = np.hypot(*(centroids - middle).T).round(6)
     order = np.lexsort((away, sizes))

@@ -372,6 +372,11 @@ def _with_holes(outer: FloatArray, inner: list[FloatArray]) -> shapely.Polygon:
     refuse_more(len(inner), _MOST_HOLES, "raise furniture")
     if not inner:
         return shapely.Polygon(outer)
+    if len(inner) == 1:
+        # Most often, and soon done; the hole runs the other way round.
+        plain = shapely.Polygon(outer, [inner[0][::-1]])
+        if plain.is_valid:
+            return plain
     pieces = shapely.Polygon(outer) - shapely.union_all([shapely.Polygon(ring) for ring in inner])
     return cast(shapely.Polygon, max(shapely.get_parts(pieces), key=lambda part: part.area))
 
@@ -383,6 +388,7 @@ def _simplified(outlines: list[shapely.Polygon], tolerance: float) -> list[shape
     while True:
         a, b = shapely.STRtree(result).query(result)
         a, b = a[a < b], b[a < b]
+        shapely.prepare(result)
         meet = shapely.intersects(result[a], result[b])
         touching = np.unique(np.concatenate([a[meet], b[meet]]))
         touching = touching[~kept[touching]]
