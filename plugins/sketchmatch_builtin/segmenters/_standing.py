@@ -63,6 +63,8 @@ _ROUGH = 0.4
 _LONGER = 1.02
 # How much farther than an edge a corner moves at most when an outline grows.
 _MITRE = 5.0
+# The most that two bytes hold.
+_MOST_FEW = 65535
 # Legs, before they are merged to tables.
 _MOST_PARTS = 10_000
 
@@ -190,9 +192,12 @@ class Parts(NamedTuple):
             for n, k in enumerate(which):
                 found[n] = shapely.Polygon(outer_border(self.mask(k)) + self.boxes[k, :2])
             return found
-        chosen = np.zeros(len(self.boxes), np.uint8)
-        chosen[list(which)] = 1
-        rings = {int(self.labels[at]): ring for at, ring in outlines(chosen[self.labels])}
+        mask = (self.labels > 0).view(np.uint8)
+        if len(which) < len(self.boxes) - 1:
+            chosen = np.zeros(len(self.boxes), np.uint8)
+            chosen[list(which)] = 1
+            mask = chosen[self.labels]
+        rings = {int(self.labels[at]): ring for at, ring in outlines(mask)}
         found[:] = [shapely.Polygon(rings[k]) for k in which]
         return found
 
@@ -410,8 +415,10 @@ def _sides(thin: list[shapely.Polygon], room: Room, bounds: Bounds) -> list[shap
         cv2.fillPoly(others if is_plain else large, [ring], (1,))
     for mask, reach in ((large, near), (others, far)):
         cv2.dilate(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8), dst=mask)
-    _, groups = cv2.connectedComponents(large, connectivity=8)
-    kept = np.zeros(int(groups.max()) + 1, dtype=bool)
+    # No more of them than rings, and so few.
+    small = cv2.CV_16U if len(rings) < _MOST_FEW else cv2.CV_32S
+    count, groups = cv2.connectedComponents(large, connectivity=8, ltype=small)
+    kept = np.zeros(count, dtype=bool)
     kept[groups[(large & others) > 0]] = True
     contours, tree = cv2.findContours(large, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     for contour, (*_, parent) in zip(contours, tree[0], strict=True):
