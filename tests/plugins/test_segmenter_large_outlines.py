@@ -13,9 +13,10 @@ from shapely.geometry.polygon import orient
 
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.model import OccupancyGrid
-from sketchmatch_builtin.segmenters import _at_walls, _standing
+from sketchmatch_builtin.segmenters import _at_walls, _cells, _standing
 from sketchmatch_builtin.segmenters._at_walls import Bounds
-from sketchmatch_builtin.segmenters._cells import holes, outline
+from sketchmatch_builtin.segmenters._border import outer_border
+from sketchmatch_builtin.segmenters._cells import holes, simplified
 from sketchmatch_builtin.segmenters._standing import Parts, Room
 from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
 from tests.benchmarks.grids import MAPS
@@ -109,6 +110,24 @@ def test_a_pocket_that_cannot_hang_on_its_neck_does_not(seed):
     assert not (np.fromiter(hangs(ring, a, b), bool, len(a)) & ~may).any()
 
 
+@given(SEEDS)
+@settings(max_examples=60)
+def test_a_pocket_that_cannot_lean_on_the_wall_is_none(seed):
+    ring = outline_of(seed)
+    pockets = []
+    for bound in (_at_walls._may_lean, all_may_lean):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(_at_walls, "_may_lean", bound)
+            candidates = _at_walls._candidates(ring, BOUNDS)
+        found = (_at_walls._pocket(ring, each, BOUNDS) for each in candidates)
+        pockets.append([each for each in found if each])
+    assert pockets[0] == pockets[1]
+
+
+def all_may_lean(_points, a, *_):
+    return np.ones(len(a), bool)
+
+
 def test_of_pockets_that_do_not_hang_most_are_known_not_to():
     said = [0, 0]
     for seed in range(30):
@@ -135,8 +154,12 @@ def test_a_disc_is_found_in_pieces_where_it_is_in_the_whole(seed, radius):
 
 
 def outlines_of(seed):
+    return [each.simplify(0.5) for each in raw_outlines_of(seed)]
+
+
+def raw_outlines_of(seed):
     parts = Parts.of(room_of(seed))
-    return [each.simplify(0.5) for each in parts.outlines(range(1, len(parts.boxes)))]
+    return parts.outlines(range(1, len(parts.boxes)))
 
 
 @given(SEEDS)
@@ -147,11 +170,48 @@ def test_no_larger_disc_fits_into_an_outline_than_is_said(seed):
     outlines = parts.outlines(which)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_standing, "_CORNERS", 0)
-        widest = parts.widest(outlines, which)
-    for polygon, radius in zip(outlines, widest, strict=True):
-        assert polygon.simplify(0.5).buffer(-radius).is_empty
-        # It is worth something.
-        assert not polygon.buffer(-(radius - 2.2)).is_empty
+        cores = parts.cores(outlines, which)
+    for polygon, core in zip(outlines, cores, strict=True):
+        assert polygon.simplify(0.5).buffer(-core.widest).is_empty
+        # It is worth something, and so is where it lies.
+        least = core.widest / 1.02 - 2.2
+        assert not polygon.buffer(-least).is_empty
+        assert least <= 0.0 or _standing._holds_disc_near(polygon, least, core)
+
+
+@given(SEEDS, st.sampled_from([0.3, 0.5, 0.75, 2.0]))
+@settings(max_examples=100)
+def test_what_is_simplified_line_by_line_is_valid_and_as_near(seed, tolerance):
+    for polygon in raw_outlines_of(seed):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(_cells, "_CORNERS", 0)
+            plain = simplified(polygon, tolerance)
+        careful = polygon.simplify(tolerance)
+        assert plain.is_valid
+        near = plain.hausdorff_distance(polygon) <= tolerance + 1e-9
+        assert plain.equals_exact(careful) or near
+
+
+def test_outlines_of_many_corners_are_simplified_as_with_care():
+    many = [each for seed in range(150) for each in raw_outlines_of(seed) if has_many(each)]
+    assert len(many) > 100
+    for polygon in many:
+        assert simplified(polygon, 0.5).equals_exact(polygon.simplify(0.5))
+
+
+def has_many(polygon):
+    return shapely.get_num_coordinates(polygon) > _cells._CORNERS
+
+
+def test_a_polygon_that_would_cross_itself_or_vanish_is_simplified_with_care():
+    # A zigzag corridor whose turns reach between the walls of the next.
+    comb = shapely.LineString([(0, 0), (40, 0), (40, 3), (1, 3), (1, 6), (40, 6)]).buffer(0.7)
+    for polygon in (comb, shapely.box(0.0, 0.0, 1.0, 1.0)):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(_cells, "_CORNERS", 0)
+            plain = simplified(polygon, 5.0)
+        assert plain.is_valid
+        assert plain.equals_exact(polygon.simplify(5.0))
 
 
 @given(SEEDS)
@@ -163,7 +223,7 @@ def test_parts_around_each_other_lie_as_each_does_alone(seed):
         patch.setattr(Parts, "_are_apart", lambda *_: False)
         spreads, outlines = parts.spreads(which), parts.outlines(which)
     assert spreads.ravel() == pytest.approx(parts.spreads(which).ravel(), abs=1e-6)
-    alone = [outline(parts.mask(k)) + parts.boxes[k, :2] for k in which.tolist()]
+    alone = [outer_border(parts.mask(k)) + parts.boxes[k, :2] for k in which.tolist()]
     assert all(a.equals(shapely.Polygon(b)) for a, b in zip(outlines, alone, strict=True))
 
 

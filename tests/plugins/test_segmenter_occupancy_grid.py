@@ -14,6 +14,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import OccupancyGrid
 from sketchmatch.model.limits import SourceLimits, limited_to
+from sketchmatch_builtin.segmenters import occupancy_grid
 from sketchmatch_builtin.segmenters._border import outer_border, outer_borders
 from sketchmatch_builtin.segmenters._cells import holes
 from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
@@ -241,6 +242,14 @@ def test_too_few_objects_name_the_options_that_find_enough_and_no_others(
         segmented(grid, **params)
     assert all(cure in caught.value.problem for cure in cures), caught.value
     assert not any(other in caught.value.problem for other in others), caught.value
+
+
+def test_of_a_large_map_other_options_are_named_untried(monkeypatch):
+    monkeypatch.setattr(occupancy_grid, "_MANY", 1000)
+    with pytest.raises(InvalidInputError, match="; try the segmenter rooms, give a map"):
+        segmented(flat())
+    with pytest.raises(InvalidInputError, match="set attached to 2 for objects at the walls, try"):
+        segmented(flat(), attached=0.0)
 
 
 def test_a_map_of_noise_is_refused_before_it_takes_long():

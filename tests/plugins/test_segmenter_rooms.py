@@ -14,7 +14,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import OccupancyGrid
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter, _coarser
-from tests.plugins.test_segmenter_lidar import lost, turned
+from tests.plugins.test_segmenter_lidar import doubled, lost, turned
 from tests.tools import ROOT, require
 
 CELL = 0.05
@@ -471,6 +471,20 @@ def test_turning_a_floor_by_37_degrees_loses_few_rooms(name):
     count, kept = TURNED[name]
     assert len(before) == count
     assert lost(before, after) <= count - kept
+
+
+MORE = {"Freiburg52_scan": 1, "lab_intel": 1, "office_a": 1}
+"""How many rooms more are found on cells of half the size: of places as wide as a doorway."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TURNED)
+def test_cells_of_half_the_size_lose_no_room(name):
+    grid = OccupancyGrid(floor_of(name), CELL)
+    before = [item.polygon for item in segmented(grid).scene.objects]
+    after = [item.polygon for item in segmented(doubled(grid)[0]).scene.objects]
+    assert lost(before, after) == 0
+    assert lost(after, before) <= MORE.get(name, 0)
 
 
 def floor_of(name):

@@ -40,6 +40,8 @@ _NECK = 0.5
 _DEEPEST = 1.5
 # Radii up to this ratio are looked at together, all of them less what rounding discs takes off.
 _RADII, _LESS = 1.5, 0.95
+# Corners: pockets of more are looked at one by one.
+_LONG = 1000
 # In cells, what is nothing.
 _ROUNDING = 1e-6
 
@@ -191,9 +193,44 @@ def _candidates(ring: shapely.Polygon, bounds: Bounds) -> list[_Candidate]:
     shapely.prepare(inner)
     across = shapely.linestrings(np.stack([points[a], points[b]], axis=1))
     walled = ~shapely.intersects(inner, across)
-    a, b = a[walled], b[walled]
-    columns = (a, b, areas[counts][walled], _may_hang(ring, a, b))
+    a, b, areas = a[walled], b[walled], areas[counts][walled]
+    may_lean, may_hang = _may_lean(points, a, b, areas, bounds), _may_hang(ring, a, b)
+    columns = (each[may_lean | may_hang] for each in (a, b, areas, may_hang))
     return [_Candidate(*each) for each in zip(*(c.tolist() for c in columns), strict=True)]
+
+
+def _may_lean(
+    points: FloatArray,
+    a: NDArray[np.int64],
+    b: NDArray[np.int64],
+    areas: FloatArray,
+    bounds: Bounds,
+) -> NDArray[np.bool_]:
+    """Whether pockets fill their widths and depths as boxes do, as far as that is soon known."""
+    may = areas <= bounds.widest**2
+    steps = (b - a) % len(points)
+    # What has more corners is no plain box, but few have, and these cost more than they all.
+    which = np.flatnonzero(may & (steps < _LONG))
+    if not which.size:
+        return may
+    until = (steps[which] + 1).cumsum()
+    of = np.repeat(np.arange(len(which)), steps[which] + 1)
+    chain = points[
+        (a[which][of] + np.arange(until[-1]) - (until - steps[which] - 1)[of]) % len(points)
+    ]
+    start, along = points[a[which]], points[b[which]] - points[a[which]]
+    away = chain - start[of]
+    across = np.abs(away[:, 0] * along[of, 1] - away[:, 1] * along[of, 0])
+    necks = np.hypot(*along.T)
+    depths = np.maximum.reduceat(across, until - steps[which] - 1) / necks
+    filled = areas[which] / (necks * depths)
+    may[which] = (
+        (depths > bounds.thinnest - _ROUNDING)
+        & (depths <= _DEEPEST * bounds.widest + _ROUNDING)
+        & (filled >= _FULL - _ROUNDING)
+        & (filled <= 1.0 / _BELLY + _ROUNDING)
+    )
+    return may
 
 
 def _may_hang(
@@ -210,7 +247,7 @@ def _may_hang(
     across = shapely.linestrings(np.stack([points[a], points[b]], axis=1))
     inner = ring.buffer(-_ROUNDING, join_style="mitre")
     shapely.prepare(inner)
-    may = np.asarray(shapely.intersects(inner, across))
+    may = np.asarray(shapely.intersects(inner, across), dtype=np.bool_)
     beside = ~may
     radii = _LESS * 0.5 * np.linalg.norm(points[a] - points[b], axis=1) / _NECK
     about = np.floor(np.log(radii) / math.log(_RADII)).astype(int)

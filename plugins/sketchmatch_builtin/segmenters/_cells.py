@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import cast
 
 import cv2
 import numpy as np
@@ -13,7 +14,7 @@ from pydantic import Field
 
 from sketchmatch.api import InvalidInputError, Params, Reason
 from sketchmatch.model import FloatArray, OccupancyGrid
-from sketchmatch_builtin.segmenters._border import outer_border, outer_borders
+from sketchmatch_builtin.segmenters._border import outer_borders
 
 __all__ = [
     "TOLERANCE",
@@ -23,13 +24,16 @@ __all__ = [
     "free_cells",
     "holes",
     "in_map",
-    "outline",
     "outlines",
     "reading_order",
     "refuse_more",
+    "simplified",
 ]
 
 Mask = NDArray[np.uint8]
+
+# What has more corners is simplified ring by ring.
+_CORNERS, _TRIANGLE = 50, 3
 
 # In percent, where neither the map nor a parameter says what is free.
 _FREE = 25
@@ -129,11 +133,6 @@ def refuse_more(count: int, most: int, remedy: str) -> None:
         )
 
 
-def outline(mask: Mask) -> FloatArray:
-    """Return the corners of a mask's outer border, see :func:`outer_border`, shape (k, 2)."""
-    return _corners(outer_border(mask))
-
-
 def outlines(mask: Mask) -> Iterator[tuple[tuple[int, int], FloatArray]]:
     """Yield (row, column) of a cell of each component of a mask, and its outline.
 
@@ -142,17 +141,30 @@ def outlines(mask: Mask) -> Iterator[tuple[tuple[int, int], FloatArray]]:
     """
     for border in outer_borders(mask):
         x, y = border[0].astype(int).tolist()
-        yield (y, x), _corners(border)
+        yield (y, x), border
 
 
-def _corners(points: FloatArray) -> FloatArray:
-    """Return a closed line's points in which it turns."""
-    # The border names some points twice.
-    points = points[(points != np.concatenate([points[-1:], points[:-1]])).any(axis=1)]
-    before = points - np.concatenate([points[-1:], points[:-1]])
-    after = np.concatenate([before[1:], before[:1]])
-    turns = before[:, 0] * after[:, 1] != before[:, 1] * after[:, 0]
-    return np.asarray(points[turns])
+def simplified(polygon: shapely.Polygon, tolerance: float) -> shapely.Polygon:
+    """Return a polygon with fewer corners, of which none was farther away than the tolerance.
+
+    Of many corners GEOS looks at each line again, whether it crosses another; that costs more than
+    to look whether any does in the end, which happens hardly ever.
+    """
+    if shapely.get_num_coordinates(polygon) > _CORNERS:
+        rings = (polygon.exterior, *polygon.interiors)
+        outer, *inner = (_simplified(ring, tolerance) for ring in rings)
+        if all(len(ring) >= _TRIANGLE for ring in (outer, *inner)):
+            plain = shapely.Polygon(outer, inner)
+            if plain.is_valid:
+                return plain
+    return cast(shapely.Polygon, polygon.simplify(tolerance))
+
+
+def _simplified(ring: shapely.LinearRing, tolerance: float) -> FloatArray:
+    """Return the corners of a simplified ring, begun where GEOS begins that of a polygon."""
+    corners = shapely.get_coordinates(ring.simplify(tolerance, preserve_topology=False))[:-1]
+    begun = (corners[0] == shapely.get_coordinates(ring)[0]).all()
+    return corners if begun else np.roll(corners, 1, axis=0)
 
 
 def in_map(points: FloatArray, grid: OccupancyGrid) -> FloatArray:

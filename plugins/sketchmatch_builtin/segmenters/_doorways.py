@@ -46,6 +46,8 @@ _STEPS = [
     for x in range(-2, 3)
     if y * y + x * x in (1, 2, 5)
 ]
+# The most that two bytes hold.
+_MOST_FEW = 65535
 # In cells from either side: how wide a cut may be, and a half of it at a corner.
 _BORDER = 2
 
@@ -129,40 +131,41 @@ def _covered(free: Mask, width: _Widths, radius: float) -> Labels:
         return np.zeros(free.shape, np.int32)
     labels, reach = _numbered(cores, 8)[0], math.floor(radius)
     away = cv2.distanceTransform(1 - cores, cv2.DIST_L2, cv2.DIST_MASK_5)
-    nearest = _nearest(labels, reach) if labels.max() > 1 else np.ones_like(labels)
     # A core's disc is free, so that within it the nearest core lies on this side of all walls.
-    nearest[(away > reach) | (free == 0)] = 0
-    return nearest
+    within = (away <= reach) & (free > 0)
+    return _nearest(labels, within) if labels.max() > 1 else within.astype(np.int32)
 
 
-def _nearest(labels: Labels, reach: int) -> Labels:
-    """Return for each cell within reach the label of the nearest that has one.
+def _nearest(labels: Labels, within: NDArray[np.bool_]) -> Labels:
+    """Return for some cells the label of the nearest that has one, and for others 0.
 
-    Of several that are as near it is the highest.
+    Of several that are as near it is the highest. The shortest ways lead through these cells.
     """
     away, regions = cv2.distanceTransformWithLabels(
         (labels == 0).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
     )
-    cells = np.flatnonzero(labels)
+    cells = np.flatnonzero(labels > 0)
     label_of = np.zeros(int(labels.max()) + 1, np.int32)
     label_of[regions.reshape(-1)[cells]] = labels.reshape(-1)[cells]
-    return _with_highest(label_of[regions], np.asarray(away, dtype=np.float32), reach + 1)
+    nearest = np.where(within, label_of[regions], 0)
+    return _with_highest(nearest, np.asarray(away, dtype=np.float32))
 
 
-def _with_highest(labels: Labels, away: _Widths, reach: int) -> Labels:
-    """Return labels of the nearest, of several as near the highest, for cells within reach.
+def _with_highest(labels: Labels, away: _Widths) -> Labels:
+    """Return labels of the nearest, of several as near the highest, of cells that have one.
 
     Which of them OpenCV takes depends on how the map lies. A cell has the labels of all cells from
     which the shortest ways to it come, so that what is to be changed begins where labels meet.
     """
-    frame = np.full(tuple(side + 4 for side in labels.shape), np.inf, np.float32)
-    frame[2:-2, 2:-2] = away
     found = np.pad(labels, 2)
     # Labels are few, far below 2²⁴, and so exact as float32, which OpenCV can dilate.
     own = found.astype(np.float32)
     around = cv2.dilate(own, np.ones((5, 5), np.uint8))
-    rest = np.flatnonzero((around > own) & (frame <= reach))
-    columns, distances, flat = found.shape[1], frame.reshape(-1), found.reshape(-1)
+    columns, flat = found.shape[1], found.reshape(-1)
+    rest = np.flatnonzero((around > own) & (own > 0.0))
+    if not rest.size:
+        return labels
+    distances = np.pad(away, 2, constant_values=np.inf).reshape(-1)
     steps = [(y * columns + x, away_of) for y, x, away_of in _STEPS]
     while rest.size:
         highest = flat[rest]
@@ -177,7 +180,7 @@ def _with_highest(labels: Labels, away: _Widths, reach: int) -> Labels:
             farther = distances[rest] + length == distances[rest + step]
             beside.append((rest + step)[farther & (flat[rest + step] < highest)])
         rest = np.unique(np.concatenate(beside))
-        rest = rest[distances[rest] <= reach]
+        rest = rest[flat[rest] > 0]
     return np.ascontiguousarray(found[2:-2, 2:-2])
 
 
@@ -189,6 +192,8 @@ def _with_narrow_rooms(free: Mask, labels: Labels, least: float) -> Labels:
     parts, sizes = _numbered(rest, 4)
     large = sizes >= least
     large[0] = False
+    if not large.any():
+        return labels
     narrow = np.where(large, np.cumsum(large) + labels.max(), 0).astype(np.int32)
     return np.asarray(labels + narrow[parts], dtype=np.int32)
 
@@ -204,6 +209,8 @@ def _numbered(mask: Mask, connectivity: int) -> tuple[Labels, IntArray]:
     )
     sizes = statistics[:, cv2.CC_STAT_AREA].astype(np.int64)
     sizes[0] = 0
+    if len(sizes) <= 2:
+        return np.asarray(parts, dtype=np.int32), sizes
     middle = (np.array(mask.shape[::-1]) - 1.0) / 2.0
     away = np.hypot(*(centroids - middle).T).round(6)
     order = np.lexsort((away, sizes))
@@ -241,18 +248,21 @@ def _joined(labels: Labels, width: _Widths) -> Labels:
 def passages(labels: Labels, width: _Widths) -> tuple[IntArray, FloatArray]:
     """Return which labels touch, shape (k, 2), and how wide each passage is, shape (k,)."""
     pairs: list[IntArray] = []
-    widths: list[FloatArray] = []
-    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        at = np.nonzero(labels[here] != labels[there])
-        both = np.stack([labels[here][at], labels[there][at]], axis=1)
-        narrower = np.minimum(width[here][at], width[there][at])
-        labelled = both.all(axis=1)
-        pairs.append(np.sort(both[labelled], axis=1).astype(np.int64))
-        widths.append(narrower[labelled].astype(np.float64))
-    found, number = np.unique(np.concatenate(pairs), axis=0, return_inverse=True)
+    widths: list[NDArray[np.float32]] = []
+    flat, wide, columns = labels.reshape(-1), width.reshape(-1), labels.shape[1]
+    for here, there, step in ((np.s_[:, :-1], np.s_[:, 1:], 1), (np.s_[:-1], np.s_[1:], columns)):
+        meeting = np.zeros(labels.shape, np.bool_)
+        meeting[here] = labels[here] != labels[there]
+        at = np.flatnonzero(meeting)
+        at = at[(flat[at] > 0) & (flat[at + step] > 0)]
+        low, high = np.sort([flat[at], flat[at + step]], axis=0).astype(np.int64)
+        # A pair as one number, which sorts as the pair does.
+        pairs.append((low << 32) + high)
+        widths.append(np.minimum(wide[at], wide[at + step]))
+    found, number = np.unique(np.concatenate(pairs), return_inverse=True)
     passage = np.zeros(len(found))
-    np.maximum.at(passage, number.reshape(-1), np.concatenate(widths))
-    return found, passage
+    np.maximum.at(passage, number.reshape(-1), np.concatenate(widths).astype(np.float64))
+    return np.stack([found >> 32, found & 0xFFFFFFFF], axis=1), passage
 
 
 def parts_that_meet(free: Mask, parts: Labels) -> IntArray:
@@ -304,8 +314,10 @@ def without_borders(free: Mask, labels: Labels) -> Mask:
 def along_borders(labels: Labels) -> NDArray[np.bool_]:
     """Return the cells that touch, by a side or a corner, a cell of another room."""
     around = np.ones((3, 3), np.uint8)
-    own = labels.astype(np.float32)
+    # OpenCV can dilate these, and the smaller ones faster.
+    few = bool(labels.max(initial=0) < _MOST_FEW)
+    own: Labels = labels.astype(np.uint16 if few else np.float32)
     highest = cv2.dilate(own, around)
-    np.putmask(own, labels == 0, np.inf)
+    np.putmask(own, labels == 0, _MOST_FEW if few else np.inf)
     lowest = cv2.erode(own, around)
     return np.asarray((labels > 0) & (highest != lowest))

@@ -77,6 +77,8 @@ def _leaves(room: Mask, door: float, least: float) -> Iterator[Mask]:
             return
         parts = bodies(room, width, opening, least)
         count = int(parts.max()) + 1
+        if count <= 2:
+            continue
         widest = np.zeros(count, np.float32)
         np.maximum.at(widest, parts.reshape(-1), width.reshape(-1))
         pairs, passage = passages(parts, width)

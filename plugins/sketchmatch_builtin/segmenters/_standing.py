@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from sketchmatch.model import FloatArray, IntArray
 from sketchmatch.model.caching import cached_property
 from sketchmatch_builtin.segmenters._at_walls import Bounds, Leans, Pocket, at_walls, is_thick
-from sketchmatch_builtin.segmenters._cells import Mask, closed, outline, outlines, refuse_more
+from sketchmatch_builtin.segmenters._border import outer_border
+from sketchmatch_builtin.segmenters._cells import (
+    Mask,
+    closed,
+    outlines,
+    refuse_more,
+    simplified,
+)
 from sketchmatch_builtin.segmenters._furniture import FOOT, Bars, Legs, crowds, facing, tables
 from sketchmatch_builtin.segmenters._merging import apart, merged
 
@@ -50,21 +57,39 @@ _SIDES = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 # What has more corners is looked at in pieces; how much larger the discs of an outline may be than
 # those around the middles of its cells, in cells: √½, and what is drawn across corners.
 _CORNERS, _ASIDE = 500, 1.1
+# In cells: how far what is rougher leaves an outline, whose stairs are then straight.
+_ROUGH = 0.4
+# How much longer a way is at most than OpenCV says.
+_LONGER = 1.02
 # How much farther than an edge a corner moves at most when an outline grows.
 _MITRE = 5.0
+# The most that two bytes hold.
+_MOST_FEW = 65535
 # Legs, before they are merged to tables.
 _MOST_PARTS = 10_000
+
+
+class Core(NamedTuple):
+    """Where an outline is widest, in cells.
+
+    No disc of a radius beyond ``widest`` fits into it, and near (x, y) one does that is nearly as
+    large as any.
+    """
+
+    widest: float
+    x: float
+    y: float
 
 
 class Thing(NamedTuple):
     """An outline in cells, and how sure it is that it is one thing, from 0 to 1.
 
-    No disc of a radius beyond ``widest`` fits into it; that is known of large outlines alone.
+    Its core is known of large outlines alone.
     """
 
     outline: shapely.Polygon
     certainty: float
-    widest: float = math.inf
+    core: Core | None = None
 
 
 @dataclass(frozen=True)
@@ -147,7 +172,7 @@ class Parts(NamedTuple):
         else:
             number = np.full(len(self.boxes), -1)
             number[which] = np.arange(len(which))
-            cells = np.flatnonzero(self.labels)
+            cells = np.flatnonzero(self.labels > 0)
             of = number[self.labels.ravel()[cells]]
             cells, of = cells[of >= 0], of[of >= 0]
             y, x = np.divmod(cells, self.labels.shape[1])
@@ -165,26 +190,34 @@ class Parts(NamedTuple):
         found: _Geometries = np.empty(len(which), dtype=object)
         if self._are_apart(np.array(which, dtype=np.int64)):
             for n, k in enumerate(which):
-                found[n] = shapely.Polygon(outline(self.mask(k)) + self.boxes[k, :2])
+                found[n] = shapely.Polygon(outer_border(self.mask(k)) + self.boxes[k, :2])
             return found
-        chosen = np.zeros(len(self.boxes), np.uint8)
-        chosen[list(which)] = 1
-        rings = {int(self.labels[at]): ring for at, ring in outlines(chosen[self.labels])}
+        mask = (self.labels > 0).view(np.uint8)
+        if len(which) < len(self.boxes) - 1:
+            chosen = np.zeros(len(self.boxes), np.uint8)
+            chosen[list(which)] = 1
+            mask = chosen[self.labels]
+        rings = {int(self.labels[at]): ring for at, ring in outlines(mask)}
         found[:] = [shapely.Polygon(rings[k]) for k in which]
         return found
 
-    def widest(self, outlines: _Geometries, which: Sequence[int]) -> list[float]:
-        """Return the radius beyond which no disc fits into an outline, if it has many corners."""
+    def cores(self, outlines: _Geometries, which: Sequence[int]) -> list[Core | None]:
+        """Return where outlines are widest, if one has many corners."""
         if (shapely.get_num_coordinates(outlines) <= _CORNERS).all():
-            return [math.inf] * len(which)
-        inside = cv2.copyMakeBorder(
-            np.asarray(self.labels > 0, np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(0,)
+            return [None] * len(which)
+        inside = self.labels > 0
+        framed = cv2.copyMakeBorder(
+            inside.view(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(0,)
         )
-        away = cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
-        cells = np.flatnonzero(self.labels)
-        most = np.zeros(len(self.boxes))
-        np.maximum.at(most, self.labels.ravel()[cells], np.ravel(away)[cells])
-        return [float(most[k]) + _ASIDE for k in which]
+        distance = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_5)
+        part, away = self.labels[inside], distance[1:-1, 1:-1][inside]
+        most = np.zeros(len(self.boxes), np.float32)
+        np.maximum.at(most, part, away)
+        at_most = away == most[part]
+        spots = np.zeros((len(self.boxes), 2))
+        y, x = np.divmod(np.flatnonzero(inside)[at_most], inside.shape[1])
+        spots[part[at_most]] = np.stack([x, y], axis=1) + 0.5
+        return [Core(float(_LONGER * most[k] + _ASIDE), *spots[k].tolist()) for k in which]
 
 
 def as_they_are(room: Room, parts: Parts, least: float, most: int) -> list[Thing]:
@@ -199,8 +232,8 @@ def as_they_are(room: Room, parts: Parts, least: float, most: int) -> list[Thing
     refuse_more(len(large), most, "raise min_size")
     outlines = parts.outlines(large)
     return [
-        Thing(each, _certainty(each, room, widest), widest)
-        for each, widest in zip(outlines, parts.widest(outlines, large), strict=True)
+        Thing(each, _certainty(each, room, core), core)
+        for each, core in zip(outlines, parts.cores(outlines, large), strict=True)
     ]
 
 
@@ -255,12 +288,12 @@ def furnished(room: Room, parts: Parts, least: float, largest_leg: float, most: 
     for k, n in zip(which, group.tolist(), strict=True):
         if k in among:
             certain[n] = min(certain[n], sets[among[k]][1])
-    widest, count = np.full(len(hulls), math.inf), np.bincount(group)
+    cores: list[Core | None] = [None] * len(hulls)
+    count = np.bincount(group)
     for k, n in zip(which, group.tolist(), strict=True):
         if k in alone and count[n] == 1:
-            widest[n] = alone[k].widest
-    columns = (certain.tolist(), widest.tolist())
-    return [Thing(*each) for each in zip(hulls, *columns, strict=True)]
+            cores[n] = alone[k].core
+    return [Thing(*each) for each in zip(hulls, certain.tolist(), cores, strict=True)]
 
 
 def _sets(
@@ -339,7 +372,7 @@ def _meets_walls(hull: shapely.Polygon, room: Room) -> bool:
 
 def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]:
     """Return the things of a room together with those that stand at its walls."""
-    thin = [each.outline for each in things if _is_thinner(each.outline, bounds.side, each.widest)]
+    thin = [each.outline for each in things if _is_thinner(each.outline, bounds.side, each.core)]
     outlines = [each.outline for each in things]
     tree = shapely.STRtree(outlines)
     parts_of_others, found = set(), []
@@ -382,8 +415,10 @@ def _sides(thin: list[shapely.Polygon], room: Room, bounds: Bounds) -> list[shap
         cv2.fillPoly(others if is_plain else large, [ring], (1,))
     for mask, reach in ((large, near), (others, far)):
         cv2.dilate(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8), dst=mask)
-    _, groups = cv2.connectedComponents(large, connectivity=8)
-    kept = np.zeros(int(groups.max()) + 1, dtype=bool)
+    # No more of them than rings, and so few.
+    small = cv2.CV_16U if len(rings) < _MOST_FEW else cv2.CV_32S
+    count, groups = cv2.connectedComponents(large, connectivity=8, ltype=small)
+    kept = np.zeros(count, dtype=bool)
     kept[groups[(large & others) > 0]] = True
     contours, tree = cv2.findContours(large, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     for contour, (*_, parent) in zip(contours, tree[0], strict=True):
@@ -420,7 +455,7 @@ def _to_the_cell(line: FloatArray, bounds: Bounds, room: Room) -> shapely.Polygo
         return pocket
     largest = labels == 1 + int(boxes[1:, cv2.CC_STAT_AREA].argmax())
     corner = np.array([left, below])
-    return shapely.Polygon(outline(largest.astype(np.uint8)) + corner)
+    return shapely.Polygon(outer_border(largest.astype(np.uint8)) + corner)
 
 
 def _is_most_of(part: shapely.Polygon, whole: shapely.Polygon) -> bool:
@@ -447,10 +482,10 @@ def _walled(room: Room) -> shapely.Polygon:
     return shapely.Polygon(ring)
 
 
-def _certainty(polygon: shapely.Polygon, room: Room, widest: float = math.inf) -> float:
+def _certainty(polygon: shapely.Polygon, room: Room, core: Core | None = None) -> float:
     """Return how sure it is that an outline is a thing, and no shadow of one and no speckle."""
     sure = min(1.0, _seen(shapely.get_coordinates(polygon), room) / _SEEN)
-    compact = not _is_thinner(polygon, room.small, widest)
+    compact = not _is_thinner(polygon, room.small, core)
     speck = polygon.area < (_SPECK * room.small) ** 2
     at_edge = (speck or not compact) and _is_at_an_unseen_edge(polygon, room)
     if speck and [compact, not at_edge, sure == 1.0].count(False) > 1:
@@ -461,35 +496,57 @@ def _certainty(polygon: shapely.Polygon, room: Room, widest: float = math.inf) -
     return min(sure, _RAGGED) if at_edge or ragged else sure
 
 
-def _is_thinner(polygon: shapely.Polygon, width: float, widest: float = math.inf) -> bool:
-    """Whether a polygon in cells, into which no disc beyond a radius fits, is nowhere so wide."""
+def _is_thinner(polygon: shapely.Polygon, width: float, core: Core | None = None) -> bool:
+    """Whether a polygon in cells is nowhere so wide."""
+    radius = width / 2.0
     # A disc of the area through the perimeter fits into anything, by Bonnesen.
-    if polygon.area >= width / 2.0 * polygon.length:
+    if polygon.area >= radius * polygon.length:
         return False
+    if core is not None and core.widest < radius:
+        return True
     # Of stairs along the cells every step would count.
-    return widest < width / 2.0 or not _holds_disc(
-        cast(shapely.Polygon, polygon.simplify(0.5)), width / 2.0
-    )
+    plain = simplified(polygon, 0.5)
+    if core is not None and _holds_disc_near(plain, radius, core):
+        return False
+    return not _holds_disc(plain, radius)
+
+
+def _holds_disc_near(polygon: shapely.Polygon, radius: float, core: Core) -> bool:
+    """Whether a disc lies in the part of a polygon around where it is widest."""
+    reach = 1.1 * radius + _ASIDE
+    window = (core.x - reach, core.y - reach, core.x + reach, core.y + reach)
+    return not shapely.is_empty(shapely.buffer(shapely.clip_by_rect(polygon, *window), -radius))
 
 
 def _holds_disc(polygon: shapely.Polygon, radius: float) -> bool:
     """Whether a disc lies in a polygon, looked for in pieces of few corners each."""
     if shapely.get_num_coordinates(polygon) <= _CORNERS:
         return not polygon.buffer(-radius).is_empty
+    return any(_is_so_wide(piece, radius) for piece in _pieces(polygon, radius))
+
+
+def _pieces(polygon: shapely.Polygon, radius: float) -> Iterator[shapely.Polygon]:
+    """Yield pieces of a polygon; where a disc lies in it, it lies in one of them."""
     low, high = np.reshape(polygon.bounds, (2, 2))
     axis = int((high - low).argmax())
     middle = (low[axis] + high[axis]) / 2.0
     # Half of the middles of discs lie on either side, and of discs a little more.
     reach = 1.1 * radius
-    if high[axis] - middle <= 2.0 * reach:
-        return not polygon.buffer(-radius).is_empty
+    if shapely.get_num_coordinates(polygon) <= _CORNERS or high[axis] - middle <= 2.0 * reach:
+        yield polygon
+        return
     for side, end in ((1, middle + reach), (0, middle - reach)):
         box = np.array([low, high])
         box[side, axis] = end
-        parts = shapely.get_parts(shapely.clip_by_rect(polygon, *box.ravel())).tolist()
-        if any(_holds_disc(part, radius) for part in parts):
-            return True
-    return False
+        for part in shapely.get_parts(shapely.clip_by_rect(polygon, *box.ravel())).tolist():
+            yield from _pieces(part, radius)
+
+
+def _is_so_wide(piece: shapely.Polygon, radius: float) -> bool:
+    """Whether a disc lies in a piece; most have fewer corners without stairs, and then none."""
+    rough = piece.simplify(_ROUGH) if radius > _ROUGH else piece
+    more = rough.buffer(_ROUGH - radius)
+    return not more.is_empty and not piece.buffer(-radius).is_empty
 
 
 def _is_at_an_unseen_edge(polygon: shapely.Polygon, room: Room) -> bool:

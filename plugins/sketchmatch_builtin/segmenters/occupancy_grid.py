@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import cast
 
 import cv2
 import numpy as np
@@ -27,6 +26,7 @@ from sketchmatch_builtin.segmenters._cells import (
     in_map,
     reading_order,
     refuse_more,
+    simplified,
 )
 from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of
 from sketchmatch_builtin.segmenters._standing import (
@@ -46,6 +46,8 @@ __all__ = ["OccupancyGridSegmenter"]
 _COARSEST_TOLERANCE = 0.12
 # In percent: from here on the laser met something.
 _OCCUPIED = 50
+# On a map of more cells nothing else is tried, which would take longer than what was asked.
+_MANY = 4_000_000
 # What the text of ``attached`` recommends, in metres.
 _USUAL_ATTACHED = 2.0
 
@@ -272,7 +274,7 @@ class OccupancyGridSegmenter(Segmenter):
         else:
             tolerance = self.params.tolerance / grid.resolution
         coarsest = _COARSEST_TOLERANCE * math.sqrt(polygon.area)
-        return cast(shapely.Polygon, polygon.simplify(min(tolerance, coarsest)))
+        return simplified(polygon, min(tolerance, coarsest))
 
 
 def _cells(length: float, cell: float) -> float:
@@ -308,10 +310,12 @@ def _with_slanted_gaps(free: Mask, shortest: float) -> Mask:
 
 def _meeting(thin: Mask, free: Mask, aside: int) -> Iterator[tuple[int, int, int]]:
     """Yield (row, column) of cells that meet those below and aside in a corner alone."""
-    here, there = (np.s_[:-1], np.s_[1:])[::aside]
-    apart = 1 - (free[:-1, there] | free[1:, here])
-    for y, x in np.argwhere(thin[:-1, here] & thin[1:, there] & apart).tolist():
-        yield y, x + (aside < 0), aside
+    columns, cells = free.shape[1], np.flatnonzero(thin.view(np.bool_))
+    below = cells + columns
+    apart = 1 - (free.ravel()[cells + aside] | free.ravel()[below])
+    meeting = cells[(thin.ravel()[below + aside] & apart) > 0]
+    for y, x in zip(*(each.tolist() for each in np.divmod(meeting, columns)), strict=True):
+        yield y, x, aside
 
 
 def _rooms(free: Mask, share: float) -> Iterator[tuple[Mask, Mask, tuple[int, int]]]:
@@ -360,14 +364,18 @@ def _too_few(
 
 
 def _cures(grid: OccupancyGrid, params: OccupancyGridSegmenter.Params) -> Iterator[str]:
-    """Yield which other options find objects enough, having tried them."""
-    if params.attached == 0.0:
+    """Yield which other options find objects enough, having tried them where that is soon done."""
+    if params.attached == 0.0 and grid.cells.size > _MANY:
+        yield f"set attached to {_USUAL_ATTACHED:g} for objects at the walls"
+    elif params.attached == 0.0:
         wider = params.model_copy(update={"attached": _USUAL_ATTACHED})
         if found := _count(OccupancyGridSegmenter(wider), grid):
             yield f"set attached to {_USUAL_ATTACHED:g}, which finds {found} objects at the walls"
     same = {"free_threshold": params.free_threshold, "keep_unknown": params.keep_unknown}
     rooms = RoomSegmenter(RoomSegmenter.Params.model_validate(same))
-    if found := _count(rooms, grid):
+    if grid.cells.size > _MANY:
+        yield "try the segmenter rooms"
+    elif found := _count(rooms, grid):
         yield f"choose the segmenter rooms, which finds {found} rooms"
 
 
