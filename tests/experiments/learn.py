@@ -8,13 +8,14 @@ and ``posterior.json`` beside that module:
 - ``odds``: price, and what makes probabilities of the thesis's ζ, which the judge ``confidence``
   has;
 - ``posterior``: what evidence counts for with the judge ``posterior``, by
-  :mod:`tests.experiments.posterior`: first of places and maps, from few numbers of each line, then
-  of maps alone, from more of them and from more sketches of other kinds, then from all of them and
-  from anyone's sketches of any place, and last from these how likely the right map is not known;
+  :mod:`tests.experiments.posterior`: of places, from ordinary sketches alone; of maps, from these
+  and from sketches of harder kinds, among them anyone's of any place; and last, from the latter,
+  how likely the right map is not known;
 - and how well the probabilities of both hold on yet other sketches.
 
 ``--sketches 50`` learns from so many of each kind, to try it, and ``--into`` writes into another
-folder. ``--kept`` names a folder for the sketches in numbers: who was interrupted goes on there.
+folder. ``--only posterior`` leaves what is known of the other as it is. ``--kept`` names a folder for
+the sketches in numbers: who was interrupted goes on there.
 """
 
 from __future__ import annotations
@@ -29,14 +30,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from sketchmatch_builtin.judges import calibration
-from sketchmatch_builtin.judges._evidence import BESIDE
 from tests.experiments.anyones import anyones_drawing
 from tests.experiments.drawings import Drawing
 from tests.experiments.odds import considered_by, errors, learned_odds
 from tests.experiments.posterior import (
     Known,
     doubting,
-    gone_on,
     judged_errors,
     known_sketches,
     learned_posterior,
@@ -59,19 +58,15 @@ SKETCHES = {
     "check": 600,
     "training": 13000,
     "many": 300,
-    "again": 1200,
     "halls": 2300,
     "inventive": 1500,
     "anything": 1500,
-    "once more": 5800,
-    "anyones": 8700,
-    "exchanged": 1600,
-    "strangers": 600,
-    "checked": 200,
+    "anyones": 16000,
+    "exchanged": 5600,
+    "strangers": 1600,
+    "checked": 1200,
 }
-"""How many there are; of ``again`` to ``anything`` it goes on with maps, then of ``once more`` to
-``exchanged`` and of ``many``. ``again`` and ``once more`` are the first ones of ``training``, and
-``checked`` further ``strangers``."""
+"""How many there are; ``checked`` are further ``strangers``."""
 
 _KINDS: dict[str, Callable[[int], Drawing]] = {
     "training": training_drawing,
@@ -84,15 +79,11 @@ _KINDS: dict[str, Callable[[int], Drawing]] = {
     "strangers": stranger_drawing,
 }
 
-_OF_PLACES = ("training", "many", "strangers")
-"""Kinds of which some sketches are of other places."""
+_OF_ODDS = {"odds", "check"}
+"""What the odds are learned from, and checked with."""
 
-_FEWEST = 4
-"""How many objects a sketch has at least that is gone on with."""
-
-_KEPT, _KEPT_OF_ALL = 0.3, 0.5
-"""The share of what was begun with in who went on from there, the first time as much as costs
-nothing on other sketches of the same kinds, then what does best on ``strangers``."""
+_OF_PLACES = ("training", "many", "halls", "strangers")
+"""Kinds from which is learned what a place is."""
 
 _AT_ONCE = 200
 
@@ -110,14 +101,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser("python -m tests.experiments.learn")
     parser.add_argument("--sketches", type=int, help="at most so many of each kind")
     parser.add_argument("--into", type=Path, help="a folder for both files")
+    parser.add_argument("--only", choices=("odds", "posterior"), help="one of the two")
     parser.add_argument("--kept", type=Path, help="a folder for sketches in numbers")
     given = parser.parse_args(arguments)
     counts = {part: min(most, given.sketches or most) for part, most in SKETCHES.items()}
     learned, judge = (given.into / path.name if given.into else path for path in (LEARNED, JUDGE))
-    odds = _odds(counts)
-    text, found = _posterior(counts, given.kept)
-    judge.write_text(text, encoding="utf-8")
-    every = {"sketches": counts, "odds": odds, "posterior": {"errors": found}}
+    every = json.loads(LEARNED.read_text(encoding="utf-8"))
+    known = every["sketches"]
+    every["sketches"] = {
+        part: known[part] if given.only and (part in _OF_ODDS) != (given.only == "odds") else count
+        for part, count in counts.items()
+    }
+    if given.only != "posterior":
+        every["odds"] = _odds(counts)
+    if given.only != "odds":
+        text, found = _posterior(counts, given.kept)
+        judge.write_text(text, encoding="utf-8")
+        every["posterior"] = {"errors": found}
     learned.write_text(json.dumps(every, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
@@ -135,24 +135,15 @@ def _odds(counts: dict[str, int]) -> dict[str, Any]:
 def _posterior(counts: dict[str, int], kept: Path | None) -> tuple[str, dict[str, float]]:
     """Return what was learned, and its errors."""
     of = {kind: _known(kind, range(counts[kind]), kept) for kind in _KINDS}
-    learned = learned_posterior([*of["training"], *of["many"]])
-    again, once_more = (
-        _known("training", range(counts[part]), kept) for part in ("again", "once more")
-    )
-    further = [*again, *of["halls"], *of["inventive"], *of["anything"]]
-    learned = gone_on(learned, _to_go_on(further), _KEPT, BESIDE)
     anyones = [*of["anyones"], *of["exchanged"]]
-    learned = gone_on(learned, _to_go_on([*once_more, *of["many"], *anyones]), _KEPT_OF_ALL)
+    ordinary = [*of["training"], *of["many"], *of["halls"]]
+    learned = learned_posterior(ordinary, [*of["inventive"], *of["anything"], *anyones])
     learned = doubting(learned, anyones, of["strangers"])
     others = counts["strangers"]
     checked = _known("strangers", range(others, others + counts["checked"]), kept)
     found = judged_errors(checked, learned)
     print(found)
     return posterior_text(learned), found
-
-
-def _to_go_on(cases: Sequence[Known]) -> list[Known]:
-    return [each for each in cases if not each.elsewhere and len(each.truth) >= _FEWEST]
 
 
 def _known(kind: str, numbers: range, kept: Path | None) -> list[Known]:

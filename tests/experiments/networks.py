@@ -6,7 +6,7 @@ places, and nothing else here needs a library for such.
 References
 ----------
 D. Kingma, J. Ba, "Adam: a method for stochastic optimization", 2015.
-M. Wortsman et al., "Robust fine-tuning of zero-shot models", CVPR 2022.
+I. Loshchilov, F. Hutter, "Decoupled weight decay regularization", ICLR 2019.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from sketchmatch_builtin.judges.calibration import Layers, PlaceLayers
 
 __all__ = ["Case", "fitted_maps", "fitted_place"]
 
-_WIDTH = 32
-_PLACE_WIDTH = 16
+_WIDTH = 64
+_PLACE_WIDTH = 32
 _EPOCHS = 20
 _BATCH = 64
 _RATE = 2e-3
 _WARMING = 0.05
-_DECAY = 0.1
+_DECAY, _PLACE_DECAY = 0.5, 0.1
 _MOMENTS = 0.9, 0.995
 
 _SCALED_BY = 4000
@@ -64,9 +64,7 @@ class Case(NamedTuple):
     right: int
 
 
-def fitted_maps(
-    cases: Sequence[Case], seed: int = 0, start: Layers | None = None, kept: float = 0.0
-) -> Layers:
+def fitted_maps(cases: Sequence[Case], seed: int = 0, start: Layers | None = None) -> Layers:
     """Return the layers under which the right maps are likeliest.
 
     Parameters
@@ -76,19 +74,16 @@ def fitted_maps(
     seed
         Of what is random.
     start
-        Layers to go on from, which may know fewer numbers of a line: the first ones of them. What
-        comes of it is a mean of both, which forgets less of what is not among the cases.
-    kept
-        The share of these in the mean.
+        Layers to go on from, of which nothing need be left.
     """
     rng = np.random.default_rng(seed)
-    some = [cases[k] for k in rng.permutation(len(cases))[:_SCALED_BY]]
-    of_lines = _scaling(np.concatenate([each.lines[each.matched] for each in some]))
-    of_maps = _scaling(np.concatenate([each.whole for each in some]))
-    of_scenes = _scaling(np.stack([each.scene for each in some]))
-    if start is not None:
-        of_lines[:, : start.of_lines.shape[1]] = start.of_lines
-        of_maps, of_scenes = start.of_maps, start.of_scenes
+    if start is None:
+        some = [cases[k] for k in rng.permutation(len(cases))[:_SCALED_BY]]
+        of_lines = _scaling(np.concatenate([each.lines[each.matched] for each in some]))
+        of_maps = _scaling(np.concatenate([each.whole for each in some]))
+        of_scenes = _scaling(np.stack([each.scene for each in some]))
+    else:
+        of_lines, of_maps, of_scenes = start.of_lines, start.of_maps, start.of_scenes
     known = [_small(each, of_lines, of_maps, of_scenes) for each in cases]
     k, w, s = (one.shape[1] for one in (of_lines, of_maps, of_scenes))
     parameters = {
@@ -101,42 +96,15 @@ def fitted_maps(
         "score": np.ones(1),
     }
     if start is not None:
-        parameters = _begun(parameters, start)
-    begun = {name: each.copy() for name, each in parameters.items()}
+        parameters = {name: np.array(getattr(start, name), ndmin=1) for name in parameters}
 
     def slopes(at: _Parameters, chosen: IntArray) -> _Parameters:
         small = {name: each.astype(np.float32) for name, each in at.items()}
         return _map_slopes(small, [known[c] for c in chosen])
 
-    _descend(parameters, slopes, len(cases), rng, keep=("score",))
-    if start is not None:
-        parameters = {name: each + kept * (begun[name] - each) for name, each in parameters.items()}
+    _descend(parameters, slopes, len(cases), rng, _DECAY, keep=("score",))
     score = float(parameters.pop("score")[0])
     return Layers(of_lines, of_maps, of_scenes, score=score, **parameters)
-
-
-def _begun(fresh: _Parameters, start: Layers) -> _Parameters:
-    """Return what layers know, with more hidden ones of lines where these have more numbers.
-
-    They are as many as fresh ones have, and know nothing yet.
-    """
-    known, scenes = start.of_lines.shape[1], start.of_scenes.shape[1]
-    if known + scenes == len(fresh["first"]):
-        same = {name: getattr(start, name).copy() for name in fresh if name != "score"}
-        return {**same, "score": np.array([start.score])}
-    more = fresh["first"].shape[1]
-    old = np.zeros((len(fresh["first"]), start.first.shape[1]))
-    old[:known], old[-scenes:] = start.first[:known], start.first[known:]
-    nothing = np.zeros((more, start.second.shape[1]))
-    return {
-        "first": np.hstack([old, fresh["first"]]),
-        "first_bias": np.append(start.first_bias, fresh["first_bias"]),
-        "second": np.vstack([start.second, nothing]),
-        "second_bias": start.second_bias.copy(),
-        "last": start.last.copy(),
-        "direct": start.direct.copy(),
-        "score": np.array([start.score]),
-    }
 
 
 def fitted_place(
@@ -186,7 +154,7 @@ def fitted_place(
             "constant": off.sum(keepdims=True),
         }
 
-    _descend(parameters, slopes, len(x), rng, keep=("constant",))
+    _descend(parameters, slopes, len(x), rng, _PLACE_DECAY, keep=("constant",))
     constant = float(parameters.pop("constant")[0])
     return PlaceLayers(of_places, constant=constant, **parameters)
 
@@ -241,6 +209,7 @@ def _descend(
     slopes: _Slopes,
     cases: int,
     rng: np.random.Generator,
+    decay: float,
     keep: Sequence[str],
 ) -> None:
     """Go down the slopes by Adam, with weights that decay but for some."""
@@ -261,7 +230,7 @@ def _descend(
                 size = np.sqrt(square / (1.0 - _MOMENTS[1] ** step)) + 1e-7
                 value -= rate * (mean / (1.0 - _MOMENTS[0] ** step) / size)
                 if name not in keep:
-                    value -= rate * _DECAY * value
+                    value -= rate * decay * value
 
 
 def _random(rng: np.random.Generator, rows: int, columns: int) -> FloatArray:

@@ -27,7 +27,6 @@ from sketchmatch_builtin.histograms.constant import ConstantForce
 from sketchmatch_builtin.judges._described import described
 from sketchmatch_builtin.judges._evidence import (
     JUDGED,
-    OF_PLACES,
     Described,
     line_numbers,
     lost_numbers,
@@ -48,7 +47,6 @@ from tests.experiments.training import training_drawing
 __all__ = [
     "Known",
     "doubting",
-    "gone_on",
     "judged_errors",
     "knowing",
     "known_of",
@@ -59,11 +57,14 @@ __all__ = [
 
 _ENGINE = Engine(default_registry())
 
+_FEWEST = 4
+"""How many objects a sketch of a harder kind has at least that is learned from."""
+
 _PENALTY = 1e-4
 _UNRELATED = 0.3
 """How many sketches are learned from as if nothing were known of relations."""
 
-_OTHER_PLACES = 6.0
+_OTHER_PLACES = 15.0
 """What a sketch of another place counts for: taking it for this one is the worse mistake."""
 
 _SHIFTS = -4.0, 4.0
@@ -159,16 +160,27 @@ def _in_half_the_room(measured: Measured) -> Measured:
     return Measured(lines, wholes, measured.matched)
 
 
-def learned_posterior(cases: Sequence[Known]) -> Posterior:
-    """Return what makes the truth likeliest."""
-    told = _some_unrelated(cases)
+def learned_posterior(ordinary: Sequence[Known], more: Sequence[Known]) -> Posterior:
+    """Return what makes the truth likeliest.
+
+    Parameters
+    ----------
+    ordinary
+        Sketches of this place and of others, from which all is learned.
+    more
+        Sketches of harder kinds, from which is learned which map is right, but not what a place
+        is, or how often the right map is not known.
+    """
+    told = _some_unrelated(ordinary)
     here = [each for each in told if not each.elsewhere]
     found = [each for each in here if each.right >= 0]
-    # Each is learned from without relations too, since places are told by such worths.
-    maps, bare = (
-        _rounded_layers(fitted_maps([_case(each, related, OF_PLACES) for each in found]))
-        for related in (True, False)
-    )
+    every = [
+        *found,
+        *(each for each in more if each.right >= 0 and len(each.truth) >= _FEWEST),
+    ]
+    maps = _rounded_layers(fitted_maps([_case(each, True) for each in every]))
+    # Places are told by what is known of decoys as well, which is nothing of relations.
+    bare = _rounded_layers(fitted_maps([_case(each, False) for each in found]))
     layers = {True: maps, False: bare}
     labels = _labels(found, layers)
     lost = _logit(_lost_numbers(here, layers), _unknown(here), np.ones(len(here)))
@@ -179,7 +191,7 @@ def learned_posterior(cases: Sequence[Known]) -> Posterior:
     ]
     place = _rounded_place(
         fitted_place(
-            np.array([place_numbers(each.described, bare) for each in told]),
+            np.array([place_numbers(each.described, maps, bare) for each in told]),
             np.array([not each.elsewhere for each in told]),
             np.array([_OTHER_PLACES if _counts(each) else 1.0 for each in told]),
         )
@@ -187,32 +199,6 @@ def learned_posterior(cases: Sequence[Known]) -> Posterior:
     return Posterior(
         maps, bare, place, _rounded(labels), _rounded(lost), round(float(np.mean(luck)), 2)
     )
-
-
-def gone_on(
-    first: Posterior, cases: Sequence[Known], kept: float, numbers: int | None = None
-) -> Posterior:
-    """Return what was learned first, and of maps also from more sketches of this place.
-
-    How often the right map is not known, and of places, nothing more is learned: these sketches are
-    of harder kinds.
-
-    Parameters
-    ----------
-    first
-        What to go on from.
-    cases
-        What to learn from.
-    kept
-        The share of what was learned first in the mean with what comes of going on.
-    numbers
-        How many numbers of each line are learned from; all, if not given.
-    """
-    found = [each for each in cases if each.right >= 0]
-    known = [_case(each, True, numbers) for each in found]
-    maps = _rounded_layers(fitted_maps(known, start=first.maps, kept=kept))
-    labels = _labels(found, {True: maps, False: first.bare})
-    return first._replace(maps=maps, labels=_rounded(labels))
 
 
 def doubting(learned: Posterior, cases: Sequence[Known], others: Sequence[Known]) -> Posterior:
@@ -255,7 +241,7 @@ def knowing(first: Posterior, cases: Sequence[Known]) -> Posterior:
     found = [_case(each, True) for each in here if each.right >= 0]
     maps = fitted_maps(found, start=first.maps)
     place = fitted_place(
-        np.array([place_numbers(each.described, first.bare) for each in cases]),
+        np.array([place_numbers(each.described, maps, first.bare) for each in cases]),
         np.array([not each.elsewhere for each in cases]),
         np.ones(len(cases)),
         start=first.place,
@@ -324,11 +310,11 @@ def _counts(case: Known) -> bool:
     return case.elsewhere and case.described.drawn > 5
 
 
-def _case(known: Known, related: bool, numbers: int | None = None) -> Case:
-    """Return a sketch as the fit of maps wants it, with so many numbers of each line."""
+def _case(known: Known, related: bool) -> Case:
+    """Return a sketch as the fit of maps wants it."""
     found = known.described
     return Case(
-        line_numbers(found.measured, related)[:, :, :numbers].astype(np.float32),
+        line_numbers(found.measured, related).astype(np.float32),
         found.measured.matched,
         map_numbers(found.measured, found.drawn),
         scene_numbers(found),

@@ -11,7 +11,7 @@ import shapely
 
 from sketchmatch.model import Scene
 from sketchmatch_builtin.alignment import Line, Measured, Whole
-from sketchmatch_builtin.judges._evidence import BESIDE, JUDGED, Described, weighed, worths
+from sketchmatch_builtin.judges._evidence import JUDGED, Described, weighed, worths
 from sketchmatch_builtin.judges.calibration import posterior_of
 from tests.experiments import (
     anyones,
@@ -29,7 +29,6 @@ from tests.experiments.people import Person, Shapes, remembered
 from tests.experiments.posterior import (
     Known,
     doubting,
-    gone_on,
     knowing,
     known_of,
     learned_posterior,
@@ -344,7 +343,7 @@ def made_up(rng, count, elsewhere=0.3, maps=8, n=5):
 
 @pytest.mark.slow
 def test_a_fit_finds_what_made_the_cases():
-    learned = learned_posterior(made_up(np.random.default_rng(0), 3000))
+    learned = learned_posterior(made_up(np.random.default_rng(0), 3000), ())
     best, ideal, told = [], [], []
     for case in made_up(np.random.default_rng(1), 1000):
         found, known = weighed(case.described, learned), case.described.measured
@@ -366,7 +365,7 @@ def test_what_was_learned_is_written_and_read_again():
     cases = [networks_case(np.random.default_rng(k)) for k in range(8)]
     layers = posterior._rounded_layers(networks.fitted_maps(cases))
     place = posterior._rounded_place(
-        fitted_place(np.random.default_rng(0).normal(size=(9, 38)), np.arange(9) < 5, np.ones(9))
+        fitted_place(np.random.default_rng(0).normal(size=(9, 67)), np.arange(9) < 5, np.ones(9))
     )
     learned = posterior.Posterior(
         layers, layers, place, np.array([1.0, -2.0]), np.arange(6.0), 0.25
@@ -376,8 +375,8 @@ def test_what_was_learned_is_written_and_read_again():
     for one, other in ((again.maps, layers), (again.place, place), (again[3:], learned[3:])):
         for a, b in zip(one, other, strict=True):
             np.testing.assert_array_equal(a, b)
-    assert max(map(len, text.splitlines())) < 500
-    assert len(text.splitlines()) < 250
+    assert max(map(len, text.splitlines())) < 700
+    assert len(text.splitlines()) < 450
 
 
 def networks_case(rng):
@@ -394,48 +393,18 @@ def networks_case(rng):
     )
 
 
-@pytest.mark.parametrize("numbers", [BESIDE, None])
-def test_who_goes_on_begins_with_what_is_known(monkeypatch, numbers):
-    rng = np.random.default_rng(0)
-    first = learned_posterior(made_up(rng, 60))
-    assert first.maps.of_lines.shape == (2, 11)
-    cases = [each for each in made_up(rng, 50) if not each.elsewhere]
-    monkeypatch.setattr(networks, "_EPOCHS", 0)
-    found = gone_on(first, cases, 0.3, numbers)
-    assert found.maps.of_lines.shape == (2, numbers or 24)
-    for case in cases:
-        known = case.described
-        np.testing.assert_allclose(
-            worths(known, known.measured, found.maps, True),
-            worths(known, known.measured, first.maps, True),
-            rtol=1e-9,
-            atol=1e-9,
-        )
-    for kept, before in ((found.bare, first.bare), (found.place, first.place)):
-        for one, other in zip(kept, before, strict=True):
-            np.testing.assert_array_equal(one, other)
-    # Who goes on once more has as many layers as before.
-    for one, other in zip(gone_on(found, cases, 0.3, numbers).maps, found.maps, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9)
-
-
-def test_who_goes_on_keeps_a_share_of_what_was_known(monkeypatch):
+def test_who_goes_on_begins_with_what_is_known(monkeypatch):
     monkeypatch.setattr(networks, "_EPOCHS", 2)
-    cases = [networks_case(np.random.default_rng(k)) for k in range(20)]
-    first = networks.fitted_maps(cases[:10])
-    new, mean, old = (
-        networks.fitted_maps(cases[10:], start=first, kept=kept) for kept in (0.0, 0.25, 1.0)
-    )
-    for one, among, other in zip(new, mean, old, strict=True):
-        np.testing.assert_allclose(among, 0.75 * one + 0.25 * other)
-    for one, other in zip(old, first, strict=True):
-        np.testing.assert_allclose(one, other)
-    assert not np.allclose(new.first, old.first)
+    first, cases = ([networks_case(np.random.default_rng(k + n)) for k in range(9)] for n in (0, 9))
+    known = networks.fitted_maps(first)
+    monkeypatch.setattr(networks, "_EPOCHS", 0)
+    for one, other in zip(networks.fitted_maps(cases, start=known), known, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_who_knows_what_is_judged_leaves_nothing_of_what_was_known():
     rng = np.random.default_rng(0)
-    first = gone_on(learned_posterior(made_up(rng, 60)), made_up(rng, 50, elsewhere=0.0), 0.3)
+    first = learned_posterior(made_up(rng, 60), made_up(rng, 50, elsewhere=0.0))
     seen, checked = made_up(rng, 1200), made_up(rng, 300)
     judge = knowing(first, seen)
     for part in ("maps", "place", "lost"):
@@ -456,7 +425,7 @@ def test_who_knows_what_is_judged_leaves_nothing_of_what_was_known():
 
 
 @pytest.mark.slow
-def test_who_goes_on_learns_what_lines_are_beside_others():
+def test_maps_alone_are_learned_from_more_sketches_of_harder_kinds():
     def beside(rng, count):
         """Return cases in which the one right line is that which deviates as the others do."""
         cases = []
@@ -468,8 +437,11 @@ def test_who_goes_on_learns_what_lines_are_beside_others():
             cases.append(case)
         return cases
 
-    first = learned_posterior(made_up(np.random.default_rng(0), 300))
-    found = gone_on(first, beside(np.random.default_rng(1), 1500), 0.3)
+    ordinary = made_up(np.random.default_rng(0), 300)
+    first = learned_posterior(ordinary, ())
+    found = learned_posterior(ordinary, beside(np.random.default_rng(1), 1500))
+    for one, other in zip(found.bare, first.bare, strict=True):
+        np.testing.assert_array_equal(one, other)
     checked = [case for case in beside(np.random.default_rng(2), 300) if case.right >= 0]
     told = {
         name: np.mean([weighed(c.described, each).shares.argmax() == c.right for c in checked])
@@ -481,7 +453,7 @@ def test_who_goes_on_learns_what_lines_are_beside_others():
 
 def test_how_often_the_right_map_is_unknown_follows_from_what_the_best_is_worth():
     rng = np.random.default_rng(0)
-    first = learned_posterior(made_up(rng, 60))
+    first = learned_posterior(made_up(rng, 60), ())
 
     def lost_where_nothing_fits(count, missing):
         """Return cases of this place whose right map is unknown where all lines deviate a lot."""
@@ -499,7 +471,7 @@ def test_how_often_the_right_map_is_unknown_follows_from_what_the_best_is_worth(
 
     checked = lost_where_nothing_fits(150, 0.5)
     often = doubting(first, lost_where_nothing_fits(300, 0.5), lost_where_nothing_fits(300, 0.5))
-    assert doubts(often, checked, True) > 0.8
+    assert doubts(often, checked, True) > 0.7
     assert doubts(often, checked, False) < 0.3
     # Where fewer are lost, all are doubted less; in nothing else do they differ.
     seldom = doubting(first, lost_where_nothing_fits(300, 0.5), lost_where_nothing_fits(300, 0.02))

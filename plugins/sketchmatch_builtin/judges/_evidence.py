@@ -19,11 +19,9 @@ from sketchmatch_builtin.judges.calibration import Layers, Posterior
 
 __all__ = [
     "AT_FIRST",
-    "BESIDE",
     "FARTHEST",
     "JUDGED",
     "LINES",
-    "OF_PLACES",
     "Described",
     "Weighed",
     "best_first",
@@ -52,11 +50,9 @@ FARTHEST = 5.0
 say anything."""
 
 LINES = 0.25
-OF_PLACES, BESIDE = 11, 22
-"""How many numbers of lines tell places, and were learned from first; and how many tell what they
-are beside the others, and were learned from next. Forms came last."""
+_OF_LINES = 23
+"""How many numbers a line has, with relations, beside that it is one."""
 
-_RELATIONS = 2
 _MOST_BESIDE = 9.0
 """What others deviate at most, where deviations are compared with theirs."""
 
@@ -200,8 +196,7 @@ def worths(known: Described, measured: Measured, layers: Layers, related: bool) 
     related
         Whether relations count, or places, sizes and shapes alone.
     """
-    known_lines = line_numbers(measured, related)[:, :, : layers.of_lines.shape[1]]
-    lines = scaled_lines(known_lines, measured.matched, layers.of_lines)
+    lines = scaled_lines(line_numbers(measured, related), measured.matched, layers.of_lines)
     scene = within(scene_numbers(known), layers.of_scenes)
     whole = within(map_numbers(measured, known.drawn), layers.of_maps)
     width = lines.shape[2]
@@ -221,42 +216,51 @@ def scaled_lines(numbers: FloatArray, matched: BoolArray, of_lines: FloatArray) 
     return lines
 
 
-def place_numbers(known: Described, layers: Layers) -> FloatArray:
+def place_numbers(known: Described, maps: Layers, bare: Layers) -> FloatArray:
     """Return what says whether a sketch shows a place at all.
 
     Decoys are what the sketch is not: mirrored, or with things in each other's places. The best
     that they achieve on the map is what chance achieves there. Of decoys nothing but places, sizes
-    and shapes is known, so these alone are compared.
+    and shapes is known, so maps are compared with them by these alone.
+
+    Parameters
+    ----------
+    known
+        The maps.
+    maps, bare
+        What maps are worth, with relations and without.
     """
     measured = known.measured.at(slice(JUDGED))
-    values = worths(known, measured, layers, related=False)
-    best = int(values.argmax())
-    top, maps = float(values[best]), known.maps[: len(values)]
+    count, few = known.drawn, min(known.drawn, _MOST_DRAWN)
+    values = worths(known, measured, bare, related=False)
+    top = float(values.max())
     chance = [
-        float(worths(known, each, layers, related=False).max())
+        float(worths(known, each, bare, related=False).max())
         for each in known.decoys
         if len(each.lines)
     ] or [top + _NONE]
-    shared = ((maps == maps[best]) & (maps[best] >= 0)).sum(axis=1)
-    other = shared <= max(1, int(measured.matched[best].sum()) // 4)
-    rival = float(values[other].max()) if other.any() else float(values.min()) - 4.0
-    most, mean, lead = top - max(chance), top - float(np.mean(chance)), top - rival
+    most, mean = top - max(chance), top - float(np.mean(chance))
     at_first = measured.wholes[:, Whole.SCORE]
     first = float(at_first.max())
     by_chance = [float(each.wholes[:, Whole.SCORE].max(initial=_NONE)) for each in known.decoys]
     ahead = first - max(by_chance, default=first + _NONE)
-    lines = line_numbers(measured, True)[best, measured.matched[best], 1:OF_PLACES]
-    if not len(lines):
-        lines = np.zeros((1, lines.shape[1]))
-    if not known.related:
-        lines[:, -_RELATIONS:] = 0.0
-    count, few = known.drawn, min(known.drawn, _MOST_DRAWN)
+    leads = [_lead(known, measured, values)]
+    if known.related:
+        values = worths(known, measured, maps, related=True)
+        leads.append(_lead(known, measured, values))
+    else:
+        leads.append(0.0)
+    best = int(values.argmax())
+    lines = np.zeros((max(1, measured.matched[best].sum()), _OF_LINES))
+    numbers = line_numbers(measured, known.related)[best, measured.matched[best], 1:]
+    lines[: len(numbers), : numbers.shape[1]] = numbers
     offset, bend, matched, missing, crowd = map_numbers(measured, count)[best, :5]
     return np.array(
         [
             *scene_numbers(known),
             known.related,
-            *(each / count * scale for each in (most, mean, lead, ahead) for scale in (1.0, few)),
+            *(each / count * scale for each in (most, mean, ahead, *leads) for scale in (1.0, few)),
+            values[best] / count if known.related else 0.0,
             first / count,
             matched / count,
             missing / count,
@@ -267,6 +271,16 @@ def place_numbers(known: Described, layers: Layers) -> FloatArray:
             *lines.max(axis=0),
         ]
     )
+
+
+def _lead(known: Described, measured: Measured, values: FloatArray) -> float:
+    """Return by how much the best map is worth more than the best one that is another answer."""
+    best = int(values.argmax())
+    maps = known.maps[: len(values)]
+    shared = ((maps == maps[best]) & (maps[best] >= 0)).sum(axis=1)
+    other = shared <= max(1, int(measured.matched[best].sum()) // 4)
+    rival = float(values[other].max()) if other.any() else float(values.min()) - 4.0
+    return float(values[best]) - rival
 
 
 def weighed(known: Described, learned: Posterior, elsewhere: float | None = None) -> Weighed:
@@ -295,7 +309,7 @@ def weighed(known: Described, learned: Posterior, elsewhere: float | None = None
 
 def _elsewhere(known: Described, learned: Posterior) -> float:
     """Return how likely a sketch does not show the place of a map."""
-    numbers, layers = place_numbers(known, learned.bare), learned.place
+    numbers, layers = place_numbers(known, learned.maps, learned.bare), learned.place
     numbers = within(numbers, layers.of_places)
     hidden = np.maximum(numbers @ layers.first + layers.first_bias, 0.0)
     here = float(hidden @ layers.last + numbers @ layers.direct) + layers.constant
