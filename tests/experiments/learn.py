@@ -14,8 +14,8 @@ and ``posterior.json`` beside that module:
 - and how well the probabilities of both hold on yet other sketches.
 
 ``--sketches 50`` learns from so many of each kind, to try it, and ``--into`` writes into another
-folder. ``--only posterior`` leaves what is known of the other as it is. ``--kept`` names a folder for
-the sketches in numbers: who was interrupted goes on there.
+folder. ``--only posterior`` leaves what is known of the other as it is. ``--kept`` names a folder
+for the sketches in numbers: who was interrupted goes on there.
 """
 
 from __future__ import annotations

@@ -429,9 +429,7 @@ def test_a_place_is_described_by_how_far_its_best_map_exceeds_chance_and_rivals(
     most, mean, ahead, lead = AT_FIRST * 4.0, AT_FIRST * 6.0, 4.0, AT_FIRST * 3.0
     by_object = np.array([most, mean, ahead, lead, lead]) / 4.0
     np.testing.assert_allclose(found[4:14], np.column_stack([by_object, 4.0 * by_object]).ravel())
-    np.testing.assert_allclose(
-        found[14:21], [AT_FIRST * -0.25, -0.25, 1.0, 0.25, 0.5, 0.3, 0.7]
-    )
+    np.testing.assert_allclose(found[14:21], [AT_FIRST * -0.25, -0.25, 1.0, 0.25, 0.5, 0.3, 0.7])
     lines = line_numbers(measured_, True)[0, :, 1:]
     np.testing.assert_allclose(found[21:], [*lines.mean(axis=0), *lines.max(axis=0)])
 

@@ -11,7 +11,7 @@ import shapely
 
 from sketchmatch.model import Scene
 from sketchmatch_builtin.alignment import Line, Measured, Whole
-from sketchmatch_builtin.judges._evidence import JUDGED, Described, weighed, worths
+from sketchmatch_builtin.judges._evidence import JUDGED, Described, weighed
 from sketchmatch_builtin.judges.calibration import posterior_of
 from tests.experiments import (
     anyones,
