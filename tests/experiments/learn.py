@@ -66,7 +66,8 @@ SKETCHES = {
     "strangers": 1600,
     "checked": 1200,
 }
-"""How many there are; ``checked`` are further ``strangers``."""
+"""How many there are. ``checked`` are further ``strangers``, by which the networks' width and decay
+and the number of ``exchanged`` were chosen."""
 
 _KINDS: dict[str, Callable[[int], Drawing]] = {
     "training": training_drawing,
