@@ -90,7 +90,7 @@ def test_figures_are_words_and_what_is_not_certain_is_not_100_percent():
     terminal = Terminal("match", *ROOM, columns=100)
     terminal.end()
     text = "\n".join(lines_of(terminal))
-    assert re.search(r"Probability (> )?9\d\.\d %  This place (> )?9\d\.\d %", text)
+    assert re.search(r"Probability (> )?9\d(\.\d)? %  This place (> )?9\d(\.\d)? %", text)
     assert "Rotation 116° clockwise  Scale 0.0105 m per sketch unit" in text
     next_best = r"Next best, (< )?0\.\d %, ζ 0\.\d{3}: on the map "
     assert re.search(next_best + r"[a-z ]+ (has no partner|is No\. \d)", text)

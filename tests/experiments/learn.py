@@ -83,7 +83,7 @@ _KINDS: dict[str, Callable[[int], Drawing]] = {
 _OF_ODDS = {"odds", "check"}
 """What the odds are learned from, and checked with."""
 
-_OF_PLACES = ("training", "many", "halls", "strangers")
+_OF_PLACES = ("training", "many", "strangers")
 """Kinds from which is learned what a place is."""
 
 _AT_ONCE = 200
@@ -137,8 +137,8 @@ def _posterior(counts: dict[str, int], kept: Path | None) -> tuple[str, dict[str
     """Return what was learned, and its errors."""
     of = {kind: _known(kind, range(counts[kind]), kept) for kind in _KINDS}
     anyones = [*of["anyones"], *of["exchanged"]]
-    ordinary = [*of["training"], *of["many"], *of["halls"]]
-    learned = learned_posterior(ordinary, [*of["inventive"], *of["anything"], *anyones])
+    harder = [*of["halls"], *of["inventive"], *of["anything"], *anyones]
+    learned = learned_posterior([*of["training"], *of["many"]], harder)
     learned = doubting(learned, anyones, of["strangers"])
     others = counts["strangers"]
     checked = _known("strangers", range(others, others + counts["checked"]), kept)

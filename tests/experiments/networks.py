@@ -24,7 +24,7 @@ from sketchmatch_builtin.judges.calibration import Layers, PlaceLayers
 __all__ = ["Case", "fitted_maps", "fitted_place"]
 
 _WIDTH = 64
-_PLACE_WIDTH = 32
+_PLACE_WIDTH = 16
 _EPOCHS = 20
 _BATCH = 64
 _RATE = 2e-3

@@ -135,13 +135,14 @@ def remembered(room: Scene, person: Person, rng: np.random.Generator) -> Scene:
         around each other.
     """
     strength = person.strength
-    while strength > _EXACT:
+    while True:
         for _ in range(_TRIES):
             sketch = _remembered(room, person, strength, rng)
             if _apart(sketch):
                 return sketch
+        if strength < _EXACT:
+            raise ValueError(f"things of this room meet where they are drawn as {person.shapes}")
         strength *= _BETTER
-    raise ValueError(f"things of this room meet where they are drawn as {person.shapes}")
 
 
 def with_extras(room: Scene, count: int, rng: np.random.Generator) -> Scene:

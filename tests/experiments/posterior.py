@@ -64,7 +64,7 @@ _PENALTY = 1e-4
 _UNRELATED = 0.3
 """How many sketches are learned from as if nothing were known of relations."""
 
-_OTHER_PLACES = 15.0
+_OTHER_PLACES = 6.0
 """What a sketch of another place counts for: taking it for this one is the worse mistake."""
 
 _SHIFTS = -4.0, 4.0
@@ -191,7 +191,7 @@ def learned_posterior(ordinary: Sequence[Known], more: Sequence[Known]) -> Poste
     ]
     place = _rounded_place(
         fitted_place(
-            np.array([place_numbers(each.described, maps, bare) for each in told]),
+            np.array([place_numbers(each.described, bare) for each in told]),
             np.array([not each.elsewhere for each in told]),
             np.array([_OTHER_PLACES if _counts(each) else 1.0 for each in told]),
         )
@@ -241,7 +241,7 @@ def knowing(first: Posterior, cases: Sequence[Known]) -> Posterior:
     found = [_case(each, True) for each in here if each.right >= 0]
     maps = fitted_maps(found, start=first.maps)
     place = fitted_place(
-        np.array([place_numbers(each.described, maps, first.bare) for each in cases]),
+        np.array([place_numbers(each.described, first.bare) for each in cases]),
         np.array([not each.elsewhere for each in cases]),
         np.ones(len(cases)),
         start=first.place,

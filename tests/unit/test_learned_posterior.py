@@ -365,7 +365,7 @@ def test_what_was_learned_is_written_and_read_again():
     cases = [networks_case(np.random.default_rng(k)) for k in range(8)]
     layers = posterior._rounded_layers(networks.fitted_maps(cases))
     place = posterior._rounded_place(
-        fitted_place(np.random.default_rng(0).normal(size=(9, 67)), np.arange(9) < 5, np.ones(9))
+        fitted_place(np.random.default_rng(0).normal(size=(9, 38)), np.arange(9) < 5, np.ones(9))
     )
     learned = posterior.Posterior(
         layers, layers, place, np.array([1.0, -2.0]), np.arange(6.0), 0.25
@@ -440,8 +440,9 @@ def test_maps_alone_are_learned_from_more_sketches_of_harder_kinds():
     ordinary = made_up(np.random.default_rng(0), 300)
     first = learned_posterior(ordinary, ())
     found = learned_posterior(ordinary, beside(np.random.default_rng(1), 1500))
-    for one, other in zip(found.bare, first.bare, strict=True):
-        np.testing.assert_array_equal(one, other)
+    for kept, before in ((found.bare, first.bare), (found.place, first.place)):
+        for one, other in zip(kept, before, strict=True):
+            np.testing.assert_array_equal(one, other)
     checked = [case for case in beside(np.random.default_rng(2), 300) if case.right >= 0]
     told = {
         name: np.mean([weighed(c.described, each).shares.argmax() == c.right for c in checked])

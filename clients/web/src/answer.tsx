@@ -1,6 +1,6 @@
 /** The answer in words: what is what, how sure that is, and what to ask. */
 
-import { useEffect } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 
 import type { Carried } from "./carry";
 import { colourOf } from "./colours";
@@ -272,6 +272,8 @@ function Asking({ index }: { index: number }) {
 /** How large a sketched thing is, for who would rather type it. */
 function Size({ index }: { index: number }) {
   const t = texts.value;
+  // What is being typed stays when an answer arrives, which shows the size anew.
+  const [typing, setTyping] = useState<{ side: 0 | 1; text: string } | null>(null);
   const size = sizeOf(index);
   if (!size) return null;
   const side = (k: 0 | 1, name: string) => (
@@ -283,8 +285,11 @@ function Size({ index }: { index: number }) {
         max="100000"
         step="any"
         data-testid={k ? "height" : "width"}
-        value={Number(size[k].toPrecision(3))}
+        value={typing?.side === k ? typing.text : Number(size[k].toPrecision(3))}
+        onInput={({ currentTarget: { value } }) => setTyping({ side: k, text: value })}
+        onBlur={() => setTyping(null)}
         onChange={({ currentTarget: { valueAsNumber: typed, validity } }) => {
+          setTyping(null);
           const isOther = typed !== Number(size[k].toPrecision(3));
           if (validity.valid && Number.isFinite(typed) && isOther) {
             resize(index, k ? [size[0], typed] : [typed, size[1]]);

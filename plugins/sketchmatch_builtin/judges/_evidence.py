@@ -50,8 +50,9 @@ FARTHEST = 5.0
 say anything."""
 
 LINES = 0.25
-_OF_LINES = 23
-"""How many numbers a line has, with relations, beside that it is one."""
+_OF_PLACES, _RELATIONS = 11, 2
+"""How many numbers of lines tell places: those that are not of lines beside others. The last ones
+are of relations."""
 
 _MOST_BESIDE = 9.0
 """What others deviate at most, where deviations are compared with theirs."""
@@ -216,51 +217,42 @@ def scaled_lines(numbers: FloatArray, matched: BoolArray, of_lines: FloatArray) 
     return lines
 
 
-def place_numbers(known: Described, maps: Layers, bare: Layers) -> FloatArray:
+def place_numbers(known: Described, layers: Layers) -> FloatArray:
     """Return what says whether a sketch shows a place at all.
 
     Decoys are what the sketch is not: mirrored, or with things in each other's places. The best
     that they achieve on the map is what chance achieves there. Of decoys nothing but places, sizes
-    and shapes is known, so maps are compared with them by these alone.
-
-    Parameters
-    ----------
-    known
-        The maps.
-    maps, bare
-        What maps are worth, with relations and without.
+    and shapes is known, so these alone are compared.
     """
     measured = known.measured.at(slice(JUDGED))
-    count, few = known.drawn, min(known.drawn, _MOST_DRAWN)
-    values = worths(known, measured, bare, related=False)
-    top = float(values.max())
+    values = worths(known, measured, layers, related=False)
+    best = int(values.argmax())
+    top, maps = float(values[best]), known.maps[: len(values)]
     chance = [
-        float(worths(known, each, bare, related=False).max())
+        float(worths(known, each, layers, related=False).max())
         for each in known.decoys
         if len(each.lines)
     ] or [top + _NONE]
-    most, mean = top - max(chance), top - float(np.mean(chance))
+    shared = ((maps == maps[best]) & (maps[best] >= 0)).sum(axis=1)
+    other = shared <= max(1, int(measured.matched[best].sum()) // 4)
+    rival = float(values[other].max()) if other.any() else float(values.min()) - 4.0
+    most, mean, lead = top - max(chance), top - float(np.mean(chance)), top - rival
     at_first = measured.wholes[:, Whole.SCORE]
     first = float(at_first.max())
     by_chance = [float(each.wholes[:, Whole.SCORE].max(initial=_NONE)) for each in known.decoys]
     ahead = first - max(by_chance, default=first + _NONE)
-    leads = [_lead(known, measured, values)]
-    if known.related:
-        values = worths(known, measured, maps, related=True)
-        leads.append(_lead(known, measured, values))
-    else:
-        leads.append(0.0)
-    best = int(values.argmax())
-    lines = np.zeros((max(1, measured.matched[best].sum()), _OF_LINES))
-    numbers = line_numbers(measured, known.related)[best, measured.matched[best], 1:]
-    lines[: len(numbers), : numbers.shape[1]] = numbers
+    lines = line_numbers(measured, True)[best, measured.matched[best], 1:_OF_PLACES]
+    if not len(lines):
+        lines = np.zeros((1, lines.shape[1]))
+    if not known.related:
+        lines[:, -_RELATIONS:] = 0.0
+    count, few = known.drawn, min(known.drawn, _MOST_DRAWN)
     offset, bend, matched, missing, crowd = map_numbers(measured, count)[best, :5]
     return np.array(
         [
             *scene_numbers(known),
             known.related,
-            *(each / count * scale for each in (most, mean, ahead, *leads) for scale in (1.0, few)),
-            values[best] / count if known.related else 0.0,
+            *(each / count * scale for each in (most, mean, lead, ahead) for scale in (1.0, few)),
             first / count,
             matched / count,
             missing / count,
@@ -271,16 +263,6 @@ def place_numbers(known: Described, maps: Layers, bare: Layers) -> FloatArray:
             *lines.max(axis=0),
         ]
     )
-
-
-def _lead(known: Described, measured: Measured, values: FloatArray) -> float:
-    """Return by how much the best map is worth more than the best one that is another answer."""
-    best = int(values.argmax())
-    maps = known.maps[: len(values)]
-    shared = ((maps == maps[best]) & (maps[best] >= 0)).sum(axis=1)
-    other = shared <= max(1, int(measured.matched[best].sum()) // 4)
-    rival = float(values[other].max()) if other.any() else float(values.min()) - 4.0
-    return float(values[best]) - rival
 
 
 def weighed(known: Described, learned: Posterior, elsewhere: float | None = None) -> Weighed:
@@ -309,7 +291,7 @@ def weighed(known: Described, learned: Posterior, elsewhere: float | None = None
 
 def _elsewhere(known: Described, learned: Posterior) -> float:
     """Return how likely a sketch does not show the place of a map."""
-    numbers, layers = place_numbers(known, learned.maps, learned.bare), learned.place
+    numbers, layers = place_numbers(known, learned.bare), learned.place
     numbers = within(numbers, layers.of_places)
     hidden = np.maximum(numbers @ layers.first + layers.first_bias, 0.0)
     here = float(hidden @ layers.last + numbers @ layers.direct) + layers.constant

@@ -36,8 +36,7 @@ class Posterior(Judge):
     Whether the sketch shows this place at all follows from how far the best map exceeds what
     chance achieves on the same map: decoys, the sketch in the mirror, which nobody draws, and
     with its things in each other's places. Verifying by a model of chance agreement is what
-    star trackers do [3]_. How well its lines agree, relations among them, and how far it is ahead
-    of others count as well.
+    star trackers do [3]_.
 
     All of it was learned from simulated sketches, on the default relations. Others do not count:
     then it judges by places, sizes and shapes alone.
