@@ -10,7 +10,7 @@ import yaml
 from PIL import Image
 
 from tests.pace import wait_until
-from tests.web import KITCHEN, Hand
+from tests.web import KITCHEN, Hand, draw_kitchen
 
 ROOMS = [(0, 0, 90, 30), (0, 32, 40, 90), (42, 32, 64, 60), (42, 62, 64, 90), (66, 32, 90, 90)]
 DOORS = [(10, 30, 19, 32), (48, 30, 57, 32), (48, 60, 57, 62), (74, 30, 83, 32)]
@@ -21,6 +21,30 @@ def wait_for_answer(page: Any, things: int) -> None:
     """Wait until the page tells of so many things."""
     headline = page.get_by_test_id("headline")
     headline.get_by_text(re.compile(rf"(All|of) {things} things found")).wait_for()
+
+
+def kitchen_drawn(page: Any) -> Hand:
+    """Draw the kitchen, wait for the answer, and return the hand that drew it."""
+    hand = Hand(page)
+    draw_kitchen(hand)
+    wait_for_answer(page, 6)
+    return hand
+
+
+def name_the_stove_my_oven(page: Any, hand: Hand) -> None:
+    """Give the drawn stove a name of one's own."""
+    page.get_by_test_id("tool-name").click()
+    hand.tap(*KITCHEN["stove"][:2])
+    page.get_by_role("dialog").locator("input").fill("my oven")
+    page.keyboard.press("Enter")
+
+
+def keep_map_as(page: Any, name: str) -> None:
+    """Have the server keep the map under a name."""
+    page.get_by_test_id("open-places").click()
+    page.get_by_label("Keep it as").fill(name)
+    page.get_by_test_id("keep-map").click()
+    page.get_by_test_id("notice").get_by_text(name).wait_for()
 
 
 def said(page: Any) -> Any:

@@ -9,8 +9,16 @@ import pytest
 from PIL import Image, ImageColor
 
 from tests.pace import wait_until
-from tests.pad import copied_link, names, saved_text, strokes, wait_for_answer
-from tests.web import KITCHEN, Hand, answer, draw_kitchen
+from tests.pad import (
+    copied_link,
+    kitchen_drawn,
+    name_the_stove_my_oven,
+    names,
+    saved_text,
+    strokes,
+    wait_for_answer,
+)
+from tests.web import KITCHEN, Hand, answer
 
 pytestmark = [pytest.mark.timeout(300), pytest.mark.slow]
 
@@ -20,8 +28,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 def test_the_picture_of_both_sides_has_the_colours_and_numbers_of_the_page(pad, visit):
     page = visit(pad)
-    draw_kitchen(Hand(page))
-    wait_for_answer(page, 6)
+    kitchen_drawn(page)
     svg = ElementTree.fromstring(saved_text(page, "save-picture-svg"))
     sides = svg.findall(f"{SVG}svg")
     shown = []
@@ -57,9 +64,7 @@ def test_the_picture_of_both_sides_has_the_colours_and_numbers_of_the_page(pad, 
 
 def test_a_thing_is_made_as_large_as_somebody_types_and_stays_so(pad, visit):
     page = visit(pad)
-    hand = Hand(page)
-    draw_kitchen(hand)
-    wait_for_answer(page, 6)
+    hand = kitchen_drawn(page)
     hand.tap(*KITCHEN["bin"][:2])
     width, height = page.get_by_test_id("width"), page.get_by_test_id("height")
     before, high = float(width.input_value()), float(height.input_value())
@@ -100,13 +105,8 @@ def test_undo_and_redo_go_all_the_way_and_nothing_is_lost_between_fast_strokes(p
 
 def test_a_thing_is_erased_moved_and_named(pad, visit):
     page = visit(pad)
-    hand = Hand(page)
-    draw_kitchen(hand)
-    wait_for_answer(page, 6)
-    page.get_by_test_id("tool-name").click()
-    hand.tap(*KITCHEN["stove"][:2])
-    page.get_by_role("dialog").locator("input").fill("my oven")
-    page.keyboard.press("Enter")
+    hand = kitchen_drawn(page)
+    name_the_stove_my_oven(page, hand)
     page.get_by_test_id("pair-1").get_by_text("my oven").wait_for()
     page.get_by_test_id("tool-eraser").click()
     x, y, width, _ = KITCHEN["bin"]
@@ -132,13 +132,8 @@ def test_strokes_svg_and_excalidraw_are_saved_and_opened_again_with_route_and_na
     pad, visit, tmp_path
 ):
     page = visit(pad)
-    hand = Hand(page)
-    draw_kitchen(hand)
-    wait_for_answer(page, 6)
-    page.get_by_test_id("tool-name").click()
-    hand.tap(*KITCHEN["stove"][:2])
-    page.get_by_role("dialog").locator("input").fill("my oven")
-    page.keyboard.press("Enter")
+    hand = kitchen_drawn(page)
+    name_the_stove_my_oven(page, hand)
     page.get_by_test_id("tool-route").click()
     hand.draw([(-100, -20), (-90, 90), (60, 90)], closed=False)
     page.get_by_test_id("route").wait_for(state="attached")
@@ -156,8 +151,7 @@ def test_strokes_svg_and_excalidraw_are_saved_and_opened_again_with_route_and_na
 
 def test_a_link_opens_the_sketch_and_its_match_in_another_browser(pad, visit):
     page = visit(pad)
-    draw_kitchen(Hand(page))
-    wait_for_answer(page, 6)
+    kitchen_drawn(page)
     link = copied_link(page)
     assert link.startswith(f"{pad}#")
     other = visit(link, place=None)
@@ -189,8 +183,7 @@ SQUARE = [0, 0, 50, 0, 0, 50, -50, 0, 0, -50]
 )
 def test_a_broken_link_is_told_and_what_was_drawn_stays(pad, visit, said):
     page = visit(pad)
-    draw_kitchen(Hand(page))
-    wait_for_answer(page, 6)
+    kitchen_drawn(page)
     page.evaluate("(said) => { location.hash = said; location.reload(); }", link_of(said))
     page.get_by_test_id("notice").get_by_text("The link is broken").wait_for()
     wait_for_answer(page, 6)
@@ -247,8 +240,7 @@ def test_what_another_page_of_the_address_has_set_spoils_nothing(pad, visit):
 
 def test_a_file_that_falls_on_the_paper_is_opened(pad, visit):
     page = visit(pad)
-    draw_kitchen(Hand(page))
-    wait_for_answer(page, 6)
+    kitchen_drawn(page)
     saved = saved_text(page, "save-strokes")
     page.get_by_test_id("clear").click()
     page.get_by_test_id("show-me").wait_for()
@@ -283,8 +275,7 @@ def test_a_broken_sketch_is_refused_in_words_and_the_drawing_stays(pad, visit, t
 
 def test_each_tab_has_its_own_sheet_and_a_new_one_begins_with_the_latest(pad, visit):
     page = visit(pad)
-    draw_kitchen(Hand(page))
-    wait_for_answer(page, 6)
+    kitchen_drawn(page)
     other = visit(pad, place=None, context=page.context)
     wait_for_answer(other, 6)
     other.get_by_test_id("clear").click()
@@ -295,8 +286,7 @@ def test_each_tab_has_its_own_sheet_and_a_new_one_begins_with_the_latest(pad, vi
 
 def test_a_tab_that_was_duplicated_has_a_sheet_of_its_own(pad, visit):
     page = visit(pad)
-    draw_kitchen(Hand(page))
-    wait_for_answer(page, 6)
+    kitchen_drawn(page)
     with page.expect_popup() as opened:  # which has the same session storage
         page.evaluate("void window.open(location.href)")
     other = opened.value

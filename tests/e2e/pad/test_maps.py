@@ -14,6 +14,8 @@ from tests.pace import wait_until
 from tests.pad import (
     ROOMS,
     copied_link,
+    keep_map_as,
+    kitchen_drawn,
     labels,
     open_floor_as_rooms,
     said,
@@ -21,7 +23,7 @@ from tests.pad import (
     wait_for_answer,
 )
 from tests.tools import require
-from tests.web import KITCHEN, Hand, answer, draw_kitchen, serving_pad
+from tests.web import KITCHEN, Hand, answer, serving_pad
 
 pytestmark = [pytest.mark.timeout(300), pytest.mark.slow]
 
@@ -35,10 +37,7 @@ def test_a_map_is_kept_by_the_server_under_a_name_and_chosen_again(visit, tmp_pa
         title = page.locator(".map-pane .title")
         title.get_by_text(LIVING_ROOM_MAP.name).wait_for()
         things = page.locator(".floor .thing").count()
-        page.get_by_test_id("open-places").click()
-        page.get_by_label("Keep it as").fill("our flat")
-        page.get_by_test_id("keep-map").click()
-        page.get_by_test_id("notice").get_by_text("our flat").wait_for()
+        keep_map_as(page, "our flat")
         other = visit(url)
         other.get_by_test_id("open-places").click()
         other.get_by_test_id("stored-map").get_by_text("our flat").wait_for()
@@ -85,8 +84,7 @@ def test_what_is_wrong_with_the_servers_store_is_said_where_its_maps_would_be(vi
         page.get_by_test_id("open-places").click()
         page.get_by_test_id("store-trouble").get_by_text("of another version").wait_for()
         page.get_by_test_id("place-kitchen").click()
-        draw_kitchen(Hand(page))
-        wait_for_answer(page, 6)
+        kitchen_drawn(page)
 
 
 def test_things_of_the_map_are_merged_left_out_and_named_by_hand_and_that_is_taken_back(pad, visit):
@@ -126,9 +124,7 @@ def test_things_of_the_map_are_merged_left_out_and_named_by_hand_and_that_is_tak
 
 def test_a_mended_map_keeps_its_walls_and_what_was_said_and_the_page_keeps_it(pad, visit):
     page = visit(pad)
-    hand = Hand(page)
-    draw_kitchen(hand)
-    wait_for_answer(page, 6)
+    hand = kitchen_drawn(page)
     say_the_bin_is_the_bench(page)
     page.get_by_test_id("mend").click()
     mending = page.get_by_test_id("mending")
@@ -222,10 +218,7 @@ def test_a_floor_is_opened_as_rooms_and_two_that_are_drawn_as_one_are_told_so(vi
         radio.wait_for()
         assert radio.is_checked()
         page.keyboard.press("Escape")
-        page.get_by_test_id("open-places").click()
-        page.get_by_label("Keep it as").fill("ground floor")
-        page.get_by_test_id("keep-map").click()
-        page.get_by_test_id("notice").get_by_text("ground floor").wait_for()
+        keep_map_as(page, "ground floor")
         other = visit(url)
         other.get_by_test_id("open-places").click()
         other.get_by_test_id("stored-map").get_by_text("ground floor").click()

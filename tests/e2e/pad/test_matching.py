@@ -9,7 +9,7 @@ import pytest
 
 from tests import processes
 from tests.pace import wait_until
-from tests.pad import names, said, say_the_bin_is_the_bench, wait_for_answer
+from tests.pad import kitchen_drawn, names, said, say_the_bin_is_the_bench, wait_for_answer
 from tests.web import KITCHEN, Hand, answer, corners, draw_kitchen, serving_pad
 
 pytestmark = [pytest.mark.timeout(300), pytest.mark.slow]
@@ -17,8 +17,7 @@ pytestmark = [pytest.mark.timeout(300), pytest.mark.slow]
 
 def test_six_things_drawn_by_pointer_are_the_right_things_of_the_map(pad, visit):
     page = visit(pad)
-    draw_kitchen(Hand(page))
-    wait_for_answer(page, 6)
+    kitchen_drawn(page)
     assert answer(page) == names()
     # The same number and colour on both sides.
     for number, name in names().items():
@@ -31,8 +30,7 @@ def test_six_things_drawn_by_pointer_are_the_right_things_of_the_map(pad, visit)
 
 def test_what_is_pointed_at_or_focused_lights_up_on_both_sides(pad, visit):
     page = visit(pad)
-    draw_kitchen(Hand(page))
-    wait_for_answer(page, 6)
+    kitchen_drawn(page)
     for act in ("hover", "focus"):
         page.get_by_test_id("pair-3").__getattribute__(act)()
         lit = page.locator(".thing.lit")
@@ -42,9 +40,7 @@ def test_what_is_pointed_at_or_focused_lights_up_on_both_sides(pad, visit):
 
 def test_a_tap_on_the_map_says_what_a_thing_is_and_can_be_taken_back(pad, visit):
     page = visit(pad)
-    hand = Hand(page)
-    draw_kitchen(hand)
-    wait_for_answer(page, 6)
+    kitchen_drawn(page)
     say_the_bin_is_the_bench(page)
     assert answer(page)[6] == "bench"
     page.get_by_test_id("undo").click()
@@ -53,8 +49,7 @@ def test_a_tap_on_the_map_says_what_a_thing_is_and_can_be_taken_back(pad, visit)
 
 def test_a_thing_can_be_said_to_be_on_no_map_by_keyboard_alone(pad, visit):
     page = visit(pad)
-    draw_kitchen(Hand(page))
-    wait_for_answer(page, 6)
+    kitchen_drawn(page)
     page.get_by_test_id("pair-1").focus()
     page.keyboard.press("Enter")
     chooser = page.get_by_test_id("asking").locator("select")
@@ -126,9 +121,7 @@ def test_each_change_is_one_update_of_what_changed_and_one_stream_tells_what_com
 
 def test_what_a_person_said_holds_when_the_numbers_of_things_change(pad, visit):
     page = visit(pad)
-    hand = Hand(page)
-    draw_kitchen(hand)
-    wait_for_answer(page, 6)
+    hand = kitchen_drawn(page)
     say_the_bin_is_the_bench(page)
     page.get_by_test_id("tool-eraser").click()
     x, y, width, _ = KITCHEN["fridge"]
@@ -143,8 +136,7 @@ def test_what_a_person_said_holds_when_the_numbers_of_things_change(pad, visit):
 
 def test_other_readings_are_paged_through(pad, visit):
     page = visit(pad)
-    draw_kitchen(Hand(page))
-    wait_for_answer(page, 6)
+    kitchen_drawn(page)
     reading = page.get_by_test_id("reading")
     # The whole match, which comes a moment after the first answer, has readings of its own.
     page.get_by_test_id("cancel").wait_for(state="detached")
@@ -221,9 +213,7 @@ def test_what_is_drawn_while_the_server_is_away_is_kept_and_matched_when_it_is_b
 def test_a_server_that_begins_anew_is_told_the_whole_sketch_and_what_was_said(visit):
     with serving_pad() as (server, url):
         page = visit(url)
-        hand = Hand(page)
-        draw_kitchen(hand)
-        wait_for_answer(page, 6)
+        hand = kitchen_drawn(page)
         say_the_bin_is_the_bench(page)
         server.process.kill()
         server.process.wait()

@@ -7,18 +7,16 @@ import pytest
 import yaml
 
 from tests.pace import wait_until
-from tests.pad import names, saved_text, wait_for_answer
+from tests.pad import kitchen_drawn, names, saved_text, wait_for_answer
 from tests.rosbridge import rosbridge
-from tests.web import Hand, answer, draw_kitchen, serving_pad
+from tests.web import answer, serving_pad
 
 pytestmark = [pytest.mark.timeout(300), pytest.mark.slow]
 
 
 def test_a_route_is_carried_out_of_walls_with_its_deviation_and_saved_in_metres(pad, visit):
     page = visit(pad)
-    hand = Hand(page)
-    draw_kitchen(hand)
-    wait_for_answer(page, 6)
+    hand = kitchen_drawn(page)
     page.get_by_test_id("tool-route").click()
     hand.draw([(-100, -20), (-90, 90), (60, 90)], closed=False)
     route = page.get_by_test_id("route")
@@ -44,9 +42,7 @@ def test_a_route_is_carried_out_of_walls_with_its_deviation_and_saved_in_metres(
 
 def test_a_route_through_a_thing_is_led_around_it_and_the_page_says_so(pad, visit):
     page = visit(pad)
-    hand = Hand(page)
-    draw_kitchen(hand)
-    wait_for_answer(page, 6)
+    hand = kitchen_drawn(page)
     page.get_by_test_id("tool-route").click()
     hand.draw([(-90, -100), (40, 90)], closed=False)  # right through the island
     said = page.get_by_test_id("carried")
@@ -64,9 +60,7 @@ def test_a_route_through_a_thing_is_led_around_it_and_the_page_says_so(pad, visi
 def test_a_route_is_sent_to_a_robot_that_was_named_as_a_path_in_metres(visit):
     with rosbridge() as robot, serving_pad("--web-robots", robot.url) as (_, url):
         page = visit(url)
-        hand = Hand(page)
-        draw_kitchen(hand)
-        wait_for_answer(page, 6)
+        hand = kitchen_drawn(page)
         page.get_by_test_id("tool-route").click()
         hand.draw([(-100, -20), (-90, 90), (60, 90)], closed=False)
         page.get_by_test_id("route").wait_for(state="attached")
@@ -94,9 +88,7 @@ def test_what_a_robot_refuses_and_one_that_is_away_is_said(visit):
         away = "ws://127.0.0.1:9"
         with serving_pad("--web-robots", f"{robot.url},{away}") as (_, url):
             page = visit(url)
-            hand = Hand(page)
-            draw_kitchen(hand)
-            wait_for_answer(page, 6)
+            hand = kitchen_drawn(page)
             page.get_by_test_id("tool-route").click()
             hand.draw([(-100, -20), (-90, 90)], closed=False)
             page.get_by_test_id("send").click()
@@ -125,9 +117,7 @@ def test_the_page_reaches_no_robot_that_nobody_named(pad, browser):
 
 def test_a_zone_is_carried_named_saved_and_opened_again(pad, visit, tmp_path):
     page = visit(pad)
-    hand = Hand(page)
-    draw_kitchen(hand)
-    wait_for_answer(page, 6)
+    hand = kitchen_drawn(page)
     page.get_by_test_id("tool-zone").click()
     hand.box(-60, 40, 70, 50)
     zone = page.get_by_test_id("zone")
