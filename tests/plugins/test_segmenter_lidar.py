@@ -42,7 +42,7 @@ FOUND = {
     "tb4-warehouse": (28, 0, 0, 0, 0),
     "turtlebot3": (9, 0, 0, 0, 0),
     "husky-playpen": (18, 0, 0, 1, 1),
-    "josefgst-ros-map12": (18, 5, 0, 9, 5),
+    "josefgst-ros-map12": (18, 5, 0, 7, 3),
     "marrtino-montreal": (8, 1, 0, 1, 1),
     "nav2-depot": (18, 0, 0, 0, 0),
     "pmb2-small-office": (17, 0, 0, 0, 0),
@@ -156,16 +156,17 @@ def lost(before, after):
 
 
 # Of what was found without doubt: lost on cells of half the size, turned by 37° on these, and
-# turned by 37° on cells as large as they were. On the last, what stood two cells off a wall or
-# another thing may touch it: a leg of a bed, a bar of a table, an end of a shelf.
+# turned by 37° on cells as large as they were. On the last, the nearest cell decides what is free,
+# and so a gap may lose a cell: a bed's leg one cell off a wall touches it then, a chair three cells
+# off a shelf is two off, and of a crowd of specks some touch.
 LOST = {
-    "aws-small-house": (0, 0, 2),
-    "elsabot-downstairs": (0, 0, 0),
-    "tb4-warehouse": (0, 1, 0),
+    "aws-small-house": (0, 0, 1),
+    "elsabot-downstairs": (0, 0, 1),
+    "tb4-warehouse": (0, 0, 0),
     "turtlebot3": (0, 0, 0),
     "husky-playpen": (0, 0, 0),
     "josefgst-ros-map12": (1, 0, 0),
-    "marrtino-montreal": (0, 0, 1),
+    "marrtino-montreal": (0, 0, 0),
     "nav2-depot": (0, 0, 1),
     "pmb2-small-office": (0, 0, 0),
 }
@@ -175,12 +176,49 @@ LOST = {
 @pytest.mark.parametrize("name", LOST)
 def test_neither_turning_a_map_nor_smaller_cells_lose_what_is_found(name):
     grid = plain(grid_of(name))
-    sure = [item.polygon for item in found(grid) if not item.doubtful]
+    before = found(grid)
+    sure = [item.polygon for item in before if not item.doubtful]
     fine, _ = doubled(grid)
     changes = (doubled(grid), turned(fine), turned(grid))
     for (moved, back), most in zip(changes, LOST[name], strict=True):
         again = [back(item.polygon) for item in found(moved)]
         assert lost(sure, again) <= most
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LOST)
+def test_turning_a_map_on_smaller_cells_adds_nothing_without_doubt(name):
+    grid = plain(grid_of(name))
+    before = [item.polygon for item in found(grid)]
+    moved, back = turned(doubled(grid)[0])
+    assert lost([back(item.polygon) for item in found(moved) if not item.doubtful], before) == 0
+
+
+@pytest.mark.parametrize("degrees", range(0, 90, 4))
+def test_a_bar_a_cell_off_a_partition_stands_free_however_the_map_is_turned(degrees):
+    """Where the gap ends, its last cell may meet the room in a corner alone."""
+    partition, bar = (2, 60, 38, 2), (14, 63, 12, 2)
+    moved, back = turned(room(*BOXES, partition, bar), degrees)
+    middle = shapely.Point(64 * 0.05, 20 * 0.05)
+    (there,) = [item for item in found(moved) if back(item.polygon).distance(middle) < 0.1]
+    assert there.area == pytest.approx(0.06, abs=0.03)
+    assert there.certainty == 1.0
+
+
+@pytest.mark.parametrize("degrees", [0, 20, 37, 45, 70])
+def test_a_gap_between_two_corners_is_closed_however_the_map_is_turned(degrees):
+    """A ring is open where a side ends two cells off the end of the next one, and encloses all."""
+    sides = [(20, 30, 2, 20), (20, 48, 14, 2), (20, 30, 12, 2), (32, 34, 2, 16)]
+    moved, _ = turned(room(*BOXES, *sides), degrees)
+    assert max(item.area for item in found(moved)) == pytest.approx(0.69, abs=0.05)
+
+
+@pytest.mark.parametrize("degrees", [0, 20, 37, 45, 70])
+def test_a_gap_wider_than_what_is_closed_stays_open_however_the_map_is_turned(degrees):
+    halves = [(20, 40, 30, 15), (20, 62, 30, 15)]
+    moved, _ = turned(doubled(room(*BOXES, *halves))[0], degrees)
+    areas = sorted(item.area for item in found(moved, close_gaps=0.25))
+    assert areas[-2:] == pytest.approx([1.125, 1.125], rel=0.05)
 
 
 def slanted(degrees, gap=1, cells=160):
@@ -286,6 +324,13 @@ def test_speckle_makes_no_furniture():
 def test_a_box_at_a_wall_is_found_to_the_cell_and_doubted(box, certainty):
     assert more(box) == [(pytest.approx(box[2] * box[3] * 0.0025), certainty)]
     assert more(box, attached=0.0) == []
+
+
+def test_what_is_a_little_narrower_at_the_wall_leans_against_it():
+    box = room(*BOXES, (2, 50, 24, 18)).cells.copy()
+    box[2:5, 50:52] = box[2:5, 66:68] = 0
+    (leaning,) = [item for item in found(OccupancyGrid(box, 0.05)) if item.certainty < 1.0]
+    assert leaning.area == pytest.approx((24 * 18 - 12) * 0.0025, rel=0.03)
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ _STRAIGHT = math.cos(math.radians(30.0))
 # The share of width times depth that a box fills, after all that it lost.
 _FULL = 0.68
 # What is this much wider than where it meets the wall leans on nothing.
-_BELLY = 0.87
+_BELLY = 0.8
 # A neck is at most this share of how thick what hangs on it is somewhere.
 _NECK = 0.5
 # As a share of how wide it may be at the wall: how far a thing juts out at most.

@@ -32,6 +32,9 @@ __all__ = [
 
 Mask = NDArray[np.uint8]
 
+# In cells: wider gaps are closed by distances, which is soon done, but an odd one as the next even.
+_LARGEST_KERNEL = 20
+
 # What has more corners is simplified ring by ring.
 _CORNERS, _TRIANGLE = 50, 3
 
@@ -101,20 +104,53 @@ def holes(region: Mask) -> Mask:
 
 
 def closed(mask: Mask, gap: int) -> Mask:
-    """Return a mask with gaps of so many cells closed, and what is then enclosed filled."""
+    """Return a mask with gaps of so many cells closed, and what is then enclosed filled.
+
+    A gap is as wide as the disc that passes it, however it runs, and also between two corners.
+    """
     x, y, columns, rows = cv2.boundingRect(mask)
     if not rows:
         return mask
-    kernel = np.ones((gap + 1, gap + 1), np.uint8)
-    there, back = (gap // 2, gap // 2), (gap - gap // 2, gap - gap // 2)
-    grown = cv2.dilate(np.pad(mask[y : y + rows, x : x + columns], gap), kernel, anchor=there)
-    shrunk = cv2.erode(grown, kernel, anchor=back)
+    framed = np.pad(mask[y : y + rows, x : x + columns], gap)
+    shrunk = _closed_by_discs(framed, gap)
+    # Between small things a disc would pass in part.
+    for side in ((1, gap + 1), (gap + 1, 1)):
+        shrunk |= _closed_by(framed, np.ones(side, np.uint8))
     contours, _ = cv2.findContours(shrunk, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     filled = np.zeros(shrunk.shape, np.uint8)
     cv2.drawContours(filled, contours, -1, (1,), cv2.FILLED)
     result = np.zeros_like(mask)
     result[y : y + rows, x : x + columns] = filled[gap : gap + rows, gap : gap + columns]
     return result
+
+
+def _closed_by_discs(mask: Mask, gap: int) -> Mask:
+    """Return a mask with what discs cannot enter, or reach from outside."""
+    radius = (gap + 1) / 2.0
+    if gap <= _LARGEST_KERNEL:
+        at = np.arange(gap + 1) - gap / 2.0
+        disc = (np.hypot(at, at[:, None]) <= radius).astype(np.uint8)
+        return _closed_by(mask, disc, enclosed=True)
+    grown = _within(mask, radius)
+    return 1 - _within(1 - (grown | holes(grown)), radius)
+
+
+def _closed_by(mask: Mask, kernel: Mask, *, enclosed: bool = False) -> Mask:
+    """Return a mask grown by a kernel and shrunk again, and in between what it encloses filled."""
+    last = np.array(kernel.shape[::-1]) - 1
+    there = last // 2
+    grown = np.asarray(cv2.dilate(mask, kernel, anchor=there.tolist()), dtype=np.uint8)
+    if enclosed:
+        grown |= holes(grown)
+    # The middle of an even number of cells is one of two, on the way back the other.
+    shrunk = cv2.erode(grown, kernel, anchor=(last - there).tolist())
+    return np.asarray(shrunk, dtype=np.uint8)
+
+
+def _within(mask: Mask, radius: float) -> Mask:
+    """Return the cells that are at most so far from a mask."""
+    away = cv2.distanceTransform(1 - mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return (away <= radius).view(np.uint8)
 
 
 def refuse_more(count: int, most: int, remedy: str) -> None:

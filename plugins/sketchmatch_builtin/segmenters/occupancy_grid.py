@@ -212,7 +212,9 @@ class OccupancyGridSegmenter(Segmenter):
     def segment(self, source: OccupancyGrid) -> Segmentation:
         """Return what stands in the free regions, in metres in the map's frame."""
         free, corner = free_cells(source, self.params)
-        free = _with_slanted_gaps(free, _cells(self.params.min_size, source.resolution))
+        free = _with_slanted_gaps(
+            free, _occupied(source, free, corner), _cells(self.params.min_size, source.resolution)
+        )
         rooms = list(_rooms(free, self.params.region_share))
         things = sorted(
             (
@@ -245,11 +247,10 @@ class OccupancyGridSegmenter(Segmenter):
         self, free: Mask, held: Mask, at: tuple[int, int], grid: OccupancyGrid
     ) -> list[Thing]:
         """Return what stands in a room, in cells from the grid's lower left corner."""
-        params, cell, (x, y) = self.params, grid.resolution, at
+        params, cell = self.params, grid.resolution
         inside = closed(held, int(min(params.close_gaps / cell + 0.5, max(free.shape))))
-        rows, columns = free.shape
-        occupied = grid.cells[y : y + rows, x : x + columns] > _OCCUPIED
-        room = Room(free, inside, occupied.view(np.uint8), cell, _cells(params.min_size, cell))
+        small = _cells(params.min_size, cell)
+        room = Room(free, inside, _occupied(grid, free, at), cell, small)
         parts, least = Parts.of(room), (params.min_size / cell) ** 2
         leg, most = (params.leg_size / cell) ** 2, source_limits().max_objects
         if params.merge_distance is None:
@@ -277,29 +278,38 @@ class OccupancyGridSegmenter(Segmenter):
         return simplified(polygon, min(tolerance, coarsest))
 
 
+def _occupied(grid: OccupancyGrid, free: Mask, at: tuple[int, int]) -> Mask:
+    """Return where the laser met something, of as many cells as a mask has, from (x, y) on."""
+    (rows, columns), (x, y) = free.shape, at
+    return (grid.cells[y : y + rows, x : x + columns] > _OCCUPIED).view(np.uint8)
+
+
 def _cells(length: float, cell: float) -> float:
     """Return a length in cells, without what rounding adds: 0.3 / 0.1 is a little less than 3."""
     return round(length / cell, 9)
 
 
-def _with_slanted_gaps(free: Mask, shortest: float) -> Mask:
+def _with_slanted_gaps(free: Mask, occupied: Mask, shortest: float) -> Mask:
     """Return free cells with gaps one cell wide joined by sides, however they lie on the cells.
 
     Of a slanted gap the cells meet in corners alone, as those of a slanted wall do. It is a gap
-    where no two by two free cells hold either of them, and so many such cells follow each other.
+    where no two by two free cells hold either of them, and so many such cells follow each other;
+    at its end, one of them alone, if the laser met something on both sides.
     One of the two cells between is made free, beyond which there is nothing free.
     """
-    framed = np.pad(free, 2)
+    framed, met = np.pad(free, 2), np.pad(occupied, 2)
     square = np.ones((2, 2), np.uint8)
     wide = cv2.dilate(cv2.erode(framed, square, anchor=(1, 1)), square, anchor=(0, 0))
     thin = framed & (1 - np.asarray(wide, dtype=np.uint8))
-    corners = [*_meeting(thin, framed, 1), *_meeting(thin, framed, -1)]
+    corners = [(*each, aside) for aside in (1, -1) for each in _meeting(thin, framed, met, aside)]
     if not corners:
         return free
     _, gaps, sizes, _ = cv2.connectedComponentsWithStats(thin, connectivity=8)
+    sizes[0] = 0
     opened = framed.copy()
     for y, x, aside in corners:
-        if sizes[gaps[y, x], cv2.CC_STAT_AREA] < shortest:
+        gap = max(gaps[y, x], gaps[y + 1, x + aside])
+        if sizes[gap, cv2.CC_STAT_AREA] < shortest:
             continue
         if not framed[y - 1, x + aside] and not framed[y, x + 2 * aside]:
             opened[y, x + aside] = 1
@@ -308,14 +318,19 @@ def _with_slanted_gaps(free: Mask, shortest: float) -> Mask:
     return np.ascontiguousarray(opened[2:-2, 2:-2])
 
 
-def _meeting(thin: Mask, free: Mask, aside: int) -> Iterator[tuple[int, int, int]]:
-    """Yield (row, column) of cells that meet those below and aside in a corner alone."""
+def _meeting(thin: Mask, free: Mask, met: Mask, aside: int) -> Iterator[tuple[int, int]]:
+    """Yield (row, column) of free cells that meet those below and aside in a corner alone.
+
+    Both are thin, or one of them, where the laser met what lies on both sides.
+    """
     columns, cells = free.shape[1], np.flatnonzero(thin.view(np.bool_))
-    below = cells + columns
-    apart = 1 - (free.ravel()[cells + aside] | free.ravel()[below])
-    meeting = cells[(thin.ravel()[below + aside] & apart) > 0]
-    for y, x in zip(*(each.tolist() for each in np.divmod(meeting, columns)), strict=True):
-        yield y, x, aside
+    across = columns + aside
+    upper = np.unique(np.concatenate([cells, cells - across]))
+    is_thin, is_free, is_met = thin.ravel(), free.ravel(), met.ravel()
+    left, right = upper + columns, upper + aside
+    meeting = is_free[upper] & is_free[upper + across] & ~(is_free[left] | is_free[right])
+    meeting &= (is_thin[upper] & is_thin[upper + across]) | (is_met[left] & is_met[right])
+    yield from zip(*(each.tolist() for each in np.divmod(upper[meeting > 0], columns)), strict=True)
 
 
 def _rooms(free: Mask, share: float) -> Iterator[tuple[Mask, Mask, tuple[int, int]]]:
