@@ -34,6 +34,8 @@ Mask = NDArray[np.uint8]
 
 # In cells: wider gaps are closed by distances, which is soon done, but an odd one as the next even.
 _LARGEST_KERNEL = 20
+# In cells: the disc of so narrow a gap is a square, which closes all that a line does.
+_SQUARE = 2
 
 # What has more corners is simplified ring by ring.
 _CORNERS, _TRIANGLE = 50, 3
@@ -113,9 +115,10 @@ def closed(mask: Mask, gap: int) -> Mask:
         return mask
     framed = np.pad(mask[y : y + rows, x : x + columns], gap)
     shrunk = _closed_by_discs(framed, gap)
-    # Between small things a disc would pass in part.
-    for side in ((1, gap + 1), (gap + 1, 1)):
-        shrunk |= _closed_by(framed, np.ones(side, np.uint8))
+    if gap > _SQUARE:
+        # Between small things a disc would pass in part.
+        for side in ((1, gap + 1), (gap + 1, 1)):
+            shrunk |= _closed_by(framed, np.ones(side, np.uint8))
     contours, _ = cv2.findContours(shrunk, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     filled = np.zeros(shrunk.shape, np.uint8)
     cv2.drawContours(filled, contours, -1, (1,), cv2.FILLED)
