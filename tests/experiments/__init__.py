@@ -16,7 +16,7 @@ The thesis's figures, and so its scenes and sketches, are not available. What st
   ``report``, a ``document`` of these;
 - ``regions``: rooms that people drew of a real building, merged or left out on real floors;
 - ``learn``: price and probabilities of the engine, from ``drawings`` that no table is made of, and
-  what the judge goes by, from ``training``, ``halls``, ``anyones``, with those of a
+  what the judge goes by, from ``training``, ``halls``, ``floors``, ``anyones``, with those of a
   ``crowd``, and ``strangers``;
 - ``ceilings``: how much of what the judge gets wrong could be right; ``ceilings.md`` says it.
 """

@@ -1,16 +1,14 @@
 """What the engine knows of right and wrong maps, learned from sketches that no table is made of.
 
-Run it with ``python -m tests.experiments.learn``; it takes an hour or more and writes
-``learned.json`` beside this file, from which the numbers of
+Run it with ``python -m tests.experiments.learn``; it takes an hour or more and
+16 GB of memory, and writes ``learned.json`` beside this file, from which the numbers of
 :mod:`sketchmatch_builtin.judges.calibration` are copied and the report tells how they were chosen,
 and ``posterior.json`` beside that module:
 
 - ``odds``: price, and what makes probabilities of the thesis's ζ, which the judge ``confidence``
   has;
 - ``posterior``: what evidence counts for with the judge ``posterior``, by
-  :mod:`tests.experiments.posterior`: of places, from ordinary sketches alone; of maps, from these
-  and from sketches of harder kinds, among them anyone's of any place; and last, from the latter,
-  how likely the right map is not known;
+  :mod:`tests.experiments.posterior`, from sketches of many kinds of places and people;
 - and how well the probabilities of both hold on yet other sketches.
 
 ``--sketches 50`` learns from so many of each kind, to try it, and ``--into`` writes into another
@@ -32,10 +30,10 @@ from typing import Any, TypeVar
 from sketchmatch_builtin.judges import calibration
 from tests.experiments.anyones import anyones_drawing
 from tests.experiments.drawings import Drawing
+from tests.experiments.floors import floor_drawing
 from tests.experiments.odds import considered_by, errors, learned_odds
 from tests.experiments.posterior import (
     Known,
-    doubting,
     judged_errors,
     known_sketches,
     learned_posterior,
@@ -59,6 +57,7 @@ SKETCHES = {
     "training": 13000,
     "many": 300,
     "halls": 2300,
+    "floors": 5000,
     "inventive": 1500,
     "anything": 1500,
     "anyones": 16000,
@@ -73,6 +72,7 @@ _KINDS: dict[str, Callable[[int], Drawing]] = {
     "training": training_drawing,
     "many": partial(training_drawing, many=True),
     "halls": hall_drawing,
+    "floors": floor_drawing,
     "inventive": inventive_drawing,
     "anything": partial(inventive_drawing, anything=True),
     "anyones": anyones_drawing,
@@ -82,9 +82,6 @@ _KINDS: dict[str, Callable[[int], Drawing]] = {
 
 _OF_ODDS = {"odds", "check"}
 """What the odds are learned from, and checked with."""
-
-_OF_PLACES = ("training", "many", "strangers")
-"""Kinds from which is learned what a place is."""
 
 _AT_ONCE = 200
 
@@ -136,11 +133,8 @@ def _odds(counts: dict[str, int]) -> dict[str, Any]:
 def _posterior(counts: dict[str, int], kept: Path | None) -> tuple[str, dict[str, float]]:
     """Return what was learned, and its errors."""
     of = {kind: _known(kind, range(counts[kind]), kept) for kind in _KINDS}
-    anyones = [*of["anyones"], *of["exchanged"]]
-    harder = [*of["halls"], *of["inventive"], *of["anything"], *anyones]
-    learned = learned_posterior([*of["training"], *of["many"]], harder)
-    learned = doubting(learned, anyones, of["strangers"])
-    others = counts["strangers"]
+    strangers, others = of.pop("strangers"), counts["strangers"]
+    learned = learned_posterior([each for known in of.values() for each in known], strangers)
     checked = _known("strangers", range(others, others + counts["checked"]), kept)
     found = judged_errors(checked, learned)
     print(found)
@@ -155,7 +149,7 @@ def _known(kind: str, numbers: range, kept: Path | None) -> list[Known]:
 
 
 def _some(kind: str, kept: Path | None, numbers: range) -> list[Known]:
-    return known_sketches(kind, _KINDS[kind], numbers, kept, kind in _OF_PLACES)
+    return known_sketches(kind, _KINDS[kind], numbers, kept)
 
 
 def _all_of(do: Callable[[int], list[_Case]], part: str, count: int) -> list[_Case]:

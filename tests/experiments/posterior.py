@@ -26,7 +26,6 @@ from sketchmatch_builtin.alignment import Measured, Whole, sides_of
 from sketchmatch_builtin.histograms.constant import ConstantForce
 from sketchmatch_builtin.judges._described import described
 from sketchmatch_builtin.judges._evidence import (
-    JUDGED,
     Described,
     line_numbers,
     lost_numbers,
@@ -46,7 +45,6 @@ from tests.experiments.training import training_drawing
 
 __all__ = [
     "Known",
-    "doubting",
     "judged_errors",
     "knowing",
     "known_of",
@@ -57,8 +55,12 @@ __all__ = [
 
 _ENGINE = Engine(default_registry())
 
-_FEWEST = 4
-"""How many objects a sketch of a harder kind has at least that is learned from."""
+_SEEDS = {True: 1, False: 0}
+"""Of the fits of maps, with relations and without: that with which more of the strangers were
+right, of two."""
+
+_WEIGHED = 40
+"""Maps that are compared with the right one where it is among these: those that fit best."""
 
 _PENALTY = 1e-4
 _UNRELATED = 0.3
@@ -97,26 +99,20 @@ class Known:
     truth: IntArray
 
 
-def known_of(
-    number: int, draw: Callable[[int], Drawing] = training_drawing, chance: bool = True
-) -> list[Known]:
-    """Return a sketch in numbers: the one of that number, of a kind that somebody draws.
-
-    Without what chance achieves, it tells nothing of places.
-    """
+def known_of(number: int, draw: Callable[[int], Drawing] = training_drawing) -> list[Known]:
+    """Return a sketch in numbers: the one of that number, of a kind that somebody draws."""
     drawn = draw(number)
     scenes = drawn.scene, drawn.map
     compared = finish(_ENGINE.compare(scenes, ConstantForce(), CrossCorrelation()))
     swapped = compared.swapped
     sides = sides_of(scenes[::-1] if swapped else scenes, swapped, None, None, None)
     try:
-        found = described(scenes, sides, compared.table, chance=chance)
+        found = described(scenes, sides, compared.table)
     except ValueError:  # nothing fits at all
         return []
     found = replace(
         found,
-        maps=found.maps[:JUDGED],
-        measured=_in_half_the_room(found.measured.at(slice(JUDGED))),
+        measured=_in_half_the_room(found.measured),
         decoys=tuple(map(_in_half_the_room, found.decoys)),
     )
     right = np.flatnonzero((found.maps == drawn.truth).all(axis=1))
@@ -129,7 +125,6 @@ def known_sketches(
     draw: Callable[[int], Drawing],
     numbers: range,
     kept: Path | None = None,
-    chance: bool = True,
 ) -> list[Known]:
     """Return sketches of a kind in numbers.
 
@@ -137,7 +132,7 @@ def known_sketches(
     ----------
     name
         Of the kind.
-    draw, chance
+    draw
         As for :func:`known_of`.
     numbers
         Which ones.
@@ -148,7 +143,7 @@ def known_sketches(
     if file and file.exists():
         found: list[Known] = pickle.loads(file.read_bytes())
         return found
-    every = [known_of(number, draw, chance) for number in numbers]
+    every = [known_of(number, draw) for number in numbers]
     found = list(itertools.chain.from_iterable(every))
     if file:
         file.write_bytes(pickle.dumps(found))
@@ -160,30 +155,26 @@ def _in_half_the_room(measured: Measured) -> Measured:
     return Measured(lines, wholes, measured.matched)
 
 
-def learned_posterior(ordinary: Sequence[Known], more: Sequence[Known]) -> Posterior:
+def learned_posterior(cases: Sequence[Known], others: Sequence[Known]) -> Posterior:
     """Return what makes the truth likeliest.
 
     Parameters
     ----------
-    ordinary
-        Sketches of this place and of others, from which all is learned.
-    more
-        Sketches of harder kinds, from which is learned which map is right, but not what a place
-        is, or how often the right map is not known.
+    cases
+        Sketches of this place and of others.
+    others
+        Sketches of this place of another kind, of which as many right maps are not known as is
+        expected.
     """
-    told = _some_unrelated(ordinary)
+    told = _some_unrelated(cases)
     here = [each for each in told if not each.elsewhere]
     found = [each for each in here if each.right >= 0]
-    every = [
-        *found,
-        *(each for each in more if each.right >= 0 and len(each.truth) >= _FEWEST),
-    ]
-    maps = _rounded_layers(fitted_maps([_case(each, True) for each in every]))
     # Places are told by what is known of decoys as well, which is nothing of relations.
-    bare = _rounded_layers(fitted_maps([_case(each, False) for each in found]))
+    maps, bare = (
+        _rounded_layers(fitted_maps([_case(each, related) for each in found], _SEEDS[related]))
+        for related in (True, False)
+    )
     layers = {True: maps, False: bare}
-    labels = _labels(found, layers)
-    lost = _logit(_lost_numbers(here, layers), _unknown(here), np.ones(len(here)))
     luck = [
         float((each.described.maps[_worths(each, layers).argmax()] == each.truth).mean())
         for each in here
@@ -191,40 +182,37 @@ def learned_posterior(ordinary: Sequence[Known], more: Sequence[Known]) -> Poste
     ]
     place = _rounded_place(
         fitted_place(
-            np.array([place_numbers(each.described, bare) for each in told]),
+            np.array([place_numbers(each.described, bare, _worths(each, layers)) for each in told]),
             np.array([not each.elsewhere for each in told]),
             np.array([_OTHER_PLACES if _counts(each) else 1.0 for each in told]),
         )
     )
     return Posterior(
-        maps, bare, place, _rounded(labels), _rounded(lost), round(float(np.mean(luck)), 2)
+        maps,
+        bare,
+        place,
+        _rounded(_labels(found, layers)),
+        _rounded(_lost(here, others, layers)),
+        round(float(np.mean(luck)), 2),
     )
 
 
-def doubting(learned: Posterior, cases: Sequence[Known], others: Sequence[Known]) -> Posterior:
-    """Return what was learned, and how likely the right map is not known.
+def _lost(
+    cases: Sequence[Known], others: Sequence[Known], layers: dict[bool, Layers]
+) -> FloatArray:
+    """Return the weights of how likely the right map is not known.
 
-    Parameters
-    ----------
-    learned
-        What maps are worth.
-    cases
-        Sketches of this place of very many kinds, from which is learned where that is likely.
-    others
-        Sketches of another kind, of which as many are lost as are expected to be.
+    Where that is likely is learned from all, and how often it is so from the others.
     """
-    layers = {True: learned.maps, False: learned.bare}
-    told, checked = (
-        _some_unrelated([each for each in some if not each.elsewhere]) for some in (cases, others)
-    )
-    lost = _logit(_lost_numbers(told, layers), _unknown(told), np.ones(len(told)))
+    lost = _logit(_lost_numbers(cases, layers), _unknown(cases), np.ones(len(cases)))
+    checked = _some_unrelated([each for each in others if not each.elsewhere])
     odds, unknown = _lost_numbers(checked, layers) @ lost, _unknown(checked)
 
     def loss(shift: float) -> float:
         return float((np.logaddexp(0.0, odds + shift) - unknown * (odds + shift)).mean())
 
     lost[0] += minimize_scalar(loss, bounds=_SHIFTS, method="bounded").x
-    return learned._replace(lost=_rounded(lost))
+    return lost
 
 
 def knowing(first: Posterior, cases: Sequence[Known]) -> Posterior:
@@ -240,15 +228,16 @@ def knowing(first: Posterior, cases: Sequence[Known]) -> Posterior:
     here = [each for each in cases if not each.elsewhere]
     found = [_case(each, True) for each in here if each.right >= 0]
     maps = fitted_maps(found, start=first.maps)
+    known = {True: maps, False: first.bare}
     place = fitted_place(
-        np.array([place_numbers(each.described, first.bare) for each in cases]),
+        np.array(
+            [place_numbers(each.described, first.bare, _worths(each, known)) for each in cases]
+        ),
         np.array([not each.elsewhere for each in cases]),
         np.ones(len(cases)),
         start=first.place,
     )
-    lost = _logit(
-        _lost_numbers(here, {True: maps, False: first.bare}), _unknown(here), np.ones(len(here))
-    )
+    lost = _logit(_lost_numbers(here, known), _unknown(here), np.ones(len(here)))
     return first._replace(maps=maps, place=place, lost=lost)
 
 
@@ -313,12 +302,13 @@ def _counts(case: Known) -> bool:
 def _case(known: Known, related: bool) -> Case:
     """Return a sketch as the fit of maps wants it."""
     found = known.described
+    measured = found.measured.at(slice(_WEIGHED if known.right < _WEIGHED else None))
     return Case(
-        line_numbers(found.measured, related).astype(np.float32),
-        found.measured.matched,
-        map_numbers(found.measured, found.drawn),
+        line_numbers(measured, related).astype(np.float32),
+        measured.matched,
+        map_numbers(measured, found.drawn),
         scene_numbers(found),
-        found.measured.wholes[:, Whole.SCORE],
+        measured.wholes[:, Whole.SCORE],
         known.right,
     )
 

@@ -2,8 +2,9 @@
 
 How people draw is not known well enough to learn from one model of it, so each sketch has
 deviations of its own, and each map things, sizes and an order of its own; some are of
-:mod:`tests.experiments.people`, and others of :mod:`tests.experiments.halls`. The study measures
-with :mod:`tests.experiments.generators`, which are others.
+:mod:`tests.experiments.people`, and others of :mod:`tests.experiments.halls`. Rooms, which lie side
+by side, are those of :mod:`tests.experiments.floors`. The study measures with
+:mod:`tests.experiments.generators`, which are others.
 """
 
 from __future__ import annotations

@@ -19,7 +19,6 @@ from sketchmatch_builtin.judges._described import described
 from sketchmatch_builtin.judges._evidence import (
     AT_FIRST,
     FARTHEST,
-    JUDGED,
     LINES,
     Described,
     best_first,
@@ -39,7 +38,7 @@ from tests.plugins.test_align import seen_as, sloppy, strewn
 from tests.searching import relations_of
 from tests.strategies import random_table
 
-OF_LINE, OF_BARE, OF_MAP, OF_SCENE, PLACE, LOST = 24, 9, 8, 3, 38, 6
+OF_LINE, OF_BARE, OF_MAP, OF_SCENE, PLACE, LOST = 24, 9, 8, 3, 64, 6
 
 
 def learned(rng=None, scale=0.3, width=3, score=1.0, constant=2.0, lost=-2.0, luck=0.4):
@@ -414,6 +413,11 @@ def scored(*scores, n=4):
     return Measured(np.zeros((len(scores), n, len(Line))), wholes, matched)
 
 
+def numbers_of_place(known, numbers_=PLAIN):
+    values = worths(known, known.measured, numbers_.layers(known.related), known.related)
+    return place_numbers(known, numbers_.bare, values)
+
+
 def test_a_place_is_described_by_how_far_its_best_map_exceeds_chance_and_rivals():
     maps = np.array([[0, 1, 2, 3], [0, 1, 2, -1], [3, 2, 1, 0], [0, 3, 1, 2]])
     measured_ = scored(-1.0, -2.0, -8.0, -4.0)
@@ -422,7 +426,7 @@ def test_a_place_is_described_by_how_far_its_best_map_exceeds_chance_and_rivals(
     measured_.wholes[0, [Whole.OFFSET, Whole.BEND]] = 0.3, 0.7
     decoys = scored(-7.0, -5.0), scored(-9.0), scored()
     known = Described(maps, measured_, decoys, 4, 10, True)
-    found = place_numbers(known, PLAIN.bare)
+    found = numbers_of_place(known)
     assert found.shape == (PLACE,)
     np.testing.assert_allclose(found[:4], [math.log(4), math.log(10), 0.25, 1.0])
     # The second shares three lines with the best and is no rival; the fourth, with one, is.
@@ -430,13 +434,13 @@ def test_a_place_is_described_by_how_far_its_best_map_exceeds_chance_and_rivals(
     by_object = np.array([most, mean, lead, ahead]) / 4.0
     np.testing.assert_allclose(found[4:12], np.column_stack([by_object, 4.0 * by_object]).ravel())
     np.testing.assert_allclose(found[12:18], [-0.25, 1.0, 0.25, 0.5, 0.3, 0.7])
-    lines = line_numbers(measured_, True)[0, :, 1:11]
+    lines = line_numbers(measured_, True)[0, :, 1:]
     np.testing.assert_allclose(found[18:], [*lines.mean(axis=0), *lines.max(axis=0)])
 
 
 def test_a_map_without_rivals_or_decoys_leads_by_far():
     known = Described(np.array([[0, 1, 2, 3], [0, 1, 2, -1]]), scored(-1.0, -2.0), (), 4, 10, True)
-    found = place_numbers(known, PLAIN.bare)
+    found = numbers_of_place(known)
     assert found[5] == found[7] == found[11] == 30.0
     assert found[9] == pytest.approx(AT_FIRST * 1.0 + 4.0)
 
@@ -444,7 +448,7 @@ def test_a_map_without_rivals_or_decoys_leads_by_far():
 def test_differences_of_many_objects_count_as_those_of_sixteen():
     maps = np.arange(32)[None]
     known = Described(maps, scored(-1.0, n=32), (scored(-9.0, n=32),), 32, 40, True)
-    found = place_numbers(known, PLAIN.bare)
+    found = numbers_of_place(known)
     assert found[5] == pytest.approx(16.0 * found[4])
     assert found[4] == pytest.approx(AT_FIRST * 8.0 / 32.0)
 
@@ -453,20 +457,35 @@ def test_a_place_is_told_by_a_layer_and_what_is_direct():
     rng = np.random.default_rng(2)
     known, numbers_ = some_described(rng), learned(rng, 0.4, constant=0.3)
     place = numbers_.place
-    row = place_numbers(known, numbers_.bare)
+    row = numbers_of_place(known, numbers_)
     row = np.array([bounded(*each) for each in zip(row, *place.of_places, strict=True)])
     hidden = np.maximum(row @ place.first + place.first_bias, 0.0)
     odds = hidden @ place.last + row @ place.direct + 0.3
     assert weighed(known, numbers_).elsewhere == pytest.approx(1.0 / (1.0 + math.exp(odds)))
 
 
-def test_maps_beyond_those_that_are_weighed_have_no_share():
+def test_a_place_is_described_by_the_map_that_is_best_by_all_that_is_known():
+    maps = np.array([[0, 1, 2, 3], [3, 2, 1, 0]])
+    measured_ = scored(-5.0, -4.0)
+    measured_.lines[1, :, Line.RELATION] = 1.0
+    known = Described(maps, measured_, (scored(-9.0),), 4, 10, True)
+    by_score = numbers_of_place(known)
+    without = place_numbers(known, PLAIN.bare, np.array([2.0, 1.0]))
+    lines = line_numbers(measured_, True)[:, :, 1:].mean(axis=1)
+    np.testing.assert_allclose(by_score[18 : 18 + OF_LINE - 1], lines[1])
+    np.testing.assert_allclose(without[18 : 18 + OF_LINE - 1], lines[0])
+    # How far ahead of chance it is says the best without relations, whichever that is.
+    np.testing.assert_allclose(without[4:8], by_score[4:8])
+    assert without[9] == pytest.approx(1.0)
+
+
+def test_the_last_of_very_many_maps_is_the_likeliest_where_it_is_worth_most():
     rng = np.random.default_rng(0)
-    known = some_described(rng, maps=JUDGED + 5)
-    found = weighed(known, learned(rng, 0.3))
+    maps = np.array([rng.permutation(9)[:4] for _ in range(120)])
+    found = weighed(Described(maps, scored(*[-9.0] * 119, -1.0), (), 4, 9, True), PLAIN)
+    assert found.shares.argmax() == 119
+    assert (found.shares > 0.0).all()
     assert found.shares.sum() == pytest.approx(1.0)
-    assert (found.shares[:JUDGED] > 0.0).all()
-    assert (found.shares[JUDGED:] == 0.0).all()
 
 
 def test_labels_count_for_what_was_learned():
@@ -480,8 +499,9 @@ def test_labels_count_for_what_was_learned():
 def test_without_relations_lines_of_a_place_say_nothing_of_them():
     known = some_described(np.random.default_rng(4))
     unrelated = dataclasses.replace(known, related=False)
-    with_, without = (place_numbers(each, PLAIN.bare) for each in (known, unrelated))
-    apart = [3, 18 + 8, 18 + 9, 28 + 8, 28 + 9]
+    with_, without = (numbers_of_place(each) for each in (known, unrelated))
+    first, count = 18 + OF_BARE - 1, OF_LINE - OF_BARE
+    apart = [3, *range(first, first + count), *range(PLACE - count, PLACE)]
     np.testing.assert_array_equal(np.delete(with_, apart), np.delete(without, apart))
     np.testing.assert_array_equal(without[apart], 0.0)
     assert (with_[apart] != 0.0).all()
@@ -617,7 +637,7 @@ def test_a_sketch_of_this_place_exceeds_what_its_decoys_achieve():
         sides = sides_of((sketch, map_), False, None, None, None)
         table = random_table(np.random.default_rng(0), 6, 9)
         known = described((sketch, map_), sides, table, None, [np.arange(6)])
-        leads.append(place_numbers(known, PLAIN.bare)[5])
+        leads.append(numbers_of_place(known)[5])
     assert leads[0] > leads[1] + 3.0 * AT_FIRST
 
 

@@ -40,7 +40,6 @@ def described(
     partial: bool = True,
     related: bool = True,
     quick: bool = False,
-    chance: bool = True,
 ) -> Described:
     """Describe maps of a sketch, and of its decoys.
 
@@ -58,8 +57,6 @@ def described(
         Whether relations are those that were learned from.
     quick
         Whether nothing is laid upon the map here, and no decoys at all.
-    chance
-        Whether there are decoys, which tell whether this is the place.
     """
     laid = known_near_maps(sides, partial) if quick else known_maps(sides, partial=partial)
     found = [*met, *(each.partners for each in laid)]
@@ -68,7 +65,7 @@ def described(
     relations = relations_of(scenes, table, names, sides.swapped)
     known = measured(maps, sides.drawn, sides.mapped, relations)
     order = best_first(known)
-    decoys = _decoys(sides.drawn) if chance and not quick else []
+    decoys = [] if quick else _decoys(sides.drawn)
     return Described(
         maps[order],
         known.at(order),

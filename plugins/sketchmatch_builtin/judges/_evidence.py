@@ -20,7 +20,6 @@ from sketchmatch_builtin.judges.calibration import Layers, Posterior
 __all__ = [
     "AT_FIRST",
     "FARTHEST",
-    "JUDGED",
     "LINES",
     "Described",
     "Weighed",
@@ -37,9 +36,6 @@ __all__ = [
     "worths",
 ]
 
-JUDGED = 40
-"""How many maps are weighed: those that fit best at first sight."""
-
 _LABEL = 2.0
 """What a label that means the same, or does not, is worth at first sight."""
 
@@ -50,9 +46,8 @@ FARTHEST = 5.0
 say anything."""
 
 LINES = 0.25
-_OF_PLACES, _RELATIONS = 11, 2
-"""How many numbers of lines tell places: those that are not of lines beside others. The last ones
-are of relations."""
+_UNRELATED = 9
+"""How many numbers of lines there are without relations: the first ones."""
 
 _MOST_BESIDE = 9.0
 """What others deviate at most, where deviations are compared with theirs."""
@@ -217,35 +212,44 @@ def scaled_lines(numbers: FloatArray, matched: BoolArray, of_lines: FloatArray) 
     return lines
 
 
-def place_numbers(known: Described, layers: Layers) -> FloatArray:
-    """Return what says whether a sketch shows a place at all.
+def place_numbers(known: Described, bare: Layers, values: FloatArray) -> FloatArray:
+    """Return what says whether a sketch shows a place at all, shape (64,).
 
     Decoys are what the sketch is not: mirrored, or with things in each other's places. The best
     that they achieve on the map is what chance achieves there. Of decoys nothing but places, sizes
     and shapes is known, so these alone are compared.
+
+    Parameters
+    ----------
+    known
+        The maps.
+    bare
+        What maps are worth without relations.
+    values
+        Shape (c,): what maps are worth by all that is known.
     """
-    measured = known.measured.at(slice(JUDGED))
-    values = worths(known, measured, layers, related=False)
+    measured, maps = known.measured, known.maps
     best = int(values.argmax())
-    top, maps = float(values[best]), known.maps[: len(values)]
+    top = float(worths(known, measured, bare, related=False).max())
     chance = [
-        float(worths(known, each, layers, related=False).max())
+        float(worths(known, each, bare, related=False).max())
         for each in known.decoys
         if len(each.lines)
     ] or [top + _NONE]
     shared = ((maps == maps[best]) & (maps[best] >= 0)).sum(axis=1)
     other = shared <= max(1, int(measured.matched[best].sum()) // 4)
     rival = float(values[other].max()) if other.any() else float(values.min()) - 4.0
-    most, mean, lead = top - max(chance), top - float(np.mean(chance)), top - rival
+    most, mean = top - max(chance), top - float(np.mean(chance))
+    lead = float(values[best]) - rival
     at_first = measured.wholes[:, Whole.SCORE]
     first = float(at_first.max())
     by_chance = [float(each.wholes[:, Whole.SCORE].max(initial=_NONE)) for each in known.decoys]
     ahead = first - max(by_chance, default=first + _NONE)
-    lines = line_numbers(measured, True)[best, measured.matched[best], 1:_OF_PLACES]
+    lines = line_numbers(measured, True)[best, measured.matched[best], 1:]
     if not len(lines):
         lines = np.zeros((1, lines.shape[1]))
     if not known.related:
-        lines[:, -_RELATIONS:] = 0.0
+        lines[:, _UNRELATED - 1 :] = 0.0
     count, few = known.drawn, min(known.drawn, _MOST_DRAWN)
     offset, bend, matched, missing, crowd = map_numbers(measured, count)[best, :5]
     return np.array(
@@ -277,22 +281,20 @@ def weighed(known: Described, learned: Posterior, elsewhere: float | None = None
     elsewhere
         How likely the sketch does not show this place, where that is known.
     """
-    measured = known.measured.at(slice(JUDGED))
-    values = worths(known, measured, learned.layers(known.related), known.related)
-    labels = measured.wholes[:, [Whole.ALIKE, Whole.UNLIKE]] @ learned.labels
-    shares = np.zeros(len(known.maps))
-    shares[: len(values)] = np.exp(values + labels - (values + labels).max())
+    values = worths(known, known.measured, learned.layers(known.related), known.related)
+    labels = known.measured.wholes[:, [Whole.ALIKE, Whole.UNLIKE]] @ learned.labels
+    shares = np.exp(values + labels - (values + labels).max())
     shares /= shares.sum()
     lost = float(lost_numbers(known, shares, float(values.max())) @ learned.lost)
     if elsewhere is None:
-        elsewhere = _elsewhere(known, learned)
+        elsewhere = _elsewhere(known, learned, values)
     return Weighed(shares, _logistic(lost), elsewhere)
 
 
-def _elsewhere(known: Described, learned: Posterior) -> float:
+def _elsewhere(known: Described, learned: Posterior, values: FloatArray) -> float:
     """Return how likely a sketch does not show the place of a map."""
-    numbers, layers = place_numbers(known, learned.bare), learned.place
-    numbers = within(numbers, layers.of_places)
+    layers = learned.place
+    numbers = within(place_numbers(known, learned.bare, values), layers.of_places)
     hidden = np.maximum(numbers @ layers.first + layers.first_bias, 0.0)
     here = float(hidden @ layers.last + numbers @ layers.direct) + layers.constant
     return _logistic(-here)
