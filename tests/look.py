@@ -31,7 +31,7 @@ BY_EYE: dict[str, tuple[int, int]] = {
     "ogm/aws-small-house/map.yaml": (28, 26),
     "ogm/elsabot-downstairs/downstairs.yaml": (11, 12),
     "ogm/husky-playpen/playpen_map.yaml": (18, 19),
-    "ogm/josefgst-ros-map12/ros_map12.yaml": (18, 27),
+    "ogm/josefgst-ros-map12/ros_map12.yaml": (18, 25),
     "ogm/marrtino-montreal/montreal.yaml": (9, 9),
     "ogm/nav2-depot/depot.yaml": (21, 18),
     "ogm/pmb2-small-office/map.yaml": (17, 17),
