@@ -127,16 +127,17 @@ def _drawn(rooms: list[shapely.Polygon], rng: np.random.Generator) -> list[shape
         laid = np.column_stack([np.interp(points[:, k], *along[k]) for k in (0, 1)])
         return laid + bend * np.sin(2.0 * np.pi * laid @ wave.T + phase)
 
+    units = [math.sqrt(room.area) for room in rooms]
+    outlines = [
+        bent(shapely.get_coordinates(shapely.segmentize(_walled(room, thick), 0.3 * unit)))[:-1]
+        for room, unit in zip(rooms, units, strict=True)
+    ]
     care = 1.0
     while True:
         found = []
-        for room in rooms:
-            unit = math.sqrt(room.area)
-            outline = shapely.segmentize(_walled(room, thick), 0.3 * unit)
-            outline = shapely.transform(outline, bent)
-            corners = shapely.get_coordinates(outline)[:-1]
-            middle = corners.mean(axis=0)
-            corners = corners + care * trembling * unit * rng.normal(0.0, 1.0, corners.shape)
+        for outline, unit in zip(outlines, units, strict=True):
+            middle = outline.mean(axis=0)
+            corners = outline + care * trembling * unit * rng.normal(0.0, 1.0, outline.shape)
             scale = np.exp(care * sized * rng.normal(0.0, 1.0, 2))
             shift = care * moved * unit * rng.normal(0.0, 1.0, 2)
             found.append(shapely.Polygon((corners - middle) * scale + middle + shift))

@@ -245,13 +245,14 @@ def place_numbers(known: Described, bare: Layers, values: FloatArray) -> FloatAr
     first = float(at_first.max())
     by_chance = [float(each.wholes[:, Whole.SCORE].max(initial=_NONE)) for each in known.decoys]
     ahead = first - max(by_chance, default=first + _NONE)
-    lines = line_numbers(measured, True)[best, measured.matched[best], 1:]
+    answer = measured.at(slice(best, best + 1))
+    lines = line_numbers(answer, True)[answer.matched][:, 1:]
     if not len(lines):
         lines = np.zeros((1, lines.shape[1]))
     if not known.related:
         lines[:, _UNRELATED - 1 :] = 0.0
     count, few = known.drawn, min(known.drawn, _MOST_DRAWN)
-    offset, bend, matched, missing, crowd = map_numbers(measured, count)[best, :5]
+    offset, bend, matched, missing, crowd = map_numbers(answer, count)[0, :5]
     return np.array(
         [
             *scene_numbers(known),
