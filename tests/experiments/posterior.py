@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
@@ -59,14 +60,16 @@ _SEEDS = {True: 1, False: 0}
 """Of the fits of maps, with relations and without: that with which more of the strangers were
 right, of two."""
 
-_WEIGHED = 40
-"""Maps that are compared with the right one where it is among these: those that fit best."""
+_WEIGHED, _BEYOND = 40, 300
+"""Maps that are compared with the right one where it is among these, those that fit best; and where
+it is not. From a right one farther down nothing is learned of maps: those before it are mostly
+better by luck, and who learns from them knows the others less well."""
 
 _PENALTY = 1e-4
 _UNRELATED = 0.3
 """How many sketches are learned from as if nothing were known of relations."""
 
-_OTHER_PLACES = 6.0
+_OTHER_PLACES = 10.0
 """What a sketch of another place counts for: taking it for this one is the worse mistake."""
 
 _SHIFTS = -4.0, 4.0
@@ -167,46 +170,65 @@ def learned_posterior(cases: Sequence[Known], others: Sequence[Known]) -> Poster
         expected.
     """
     told = _some_unrelated(cases)
-    here = [each for each in told if not each.elsewhere]
-    found = [each for each in here if each.right >= 0]
+    met = _met(told)
     # Places are told by what is known of decoys as well, which is nothing of relations.
     maps, bare = (
-        _rounded_layers(fitted_maps([_case(each, related) for each in found], _SEEDS[related]))
+        _rounded_layers(fitted_maps([_case(each, related) for each in met], _SEEDS[related]))
         for related in (True, False)
     )
-    layers = {True: maps, False: bare}
+    every = _weighed(told, maps, bare)
+    here = [each for each in every if not each.known.elsewhere]
     luck = [
-        float((each.described.maps[_worths(each, layers).argmax()] == each.truth).mean())
+        float((each.known.described.maps[each.values.argmax()] == each.known.truth).mean())
         for each in here
-        if each.right < 0
+        if each.known.right < 0
     ]
     place = _rounded_place(
         fitted_place(
-            np.array([place_numbers(each.described, bare, _worths(each, layers)) for each in told]),
+            np.array([place_numbers(each.known.described, bare, each.values) for each in every]),
             np.array([not each.elsewhere for each in told]),
             np.array([_OTHER_PLACES if _counts(each) else 1.0 for each in told]),
         )
     )
+    checked = _weighed(_some_unrelated([each for each in others if not each.elsewhere]), maps, bare)
     return Posterior(
         maps,
         bare,
         place,
-        _rounded(_labels(found, layers)),
-        _rounded(_lost(here, others, layers)),
+        _rounded(_labels([each for each in here if each.known.right >= 0])),
+        _rounded(_lost(here, checked)),
         round(float(np.mean(luck)), 2),
     )
 
 
-def _lost(
-    cases: Sequence[Known], others: Sequence[Known], layers: dict[bool, Layers]
-) -> FloatArray:
+def _met(cases: Sequence[Known]) -> list[Known]:
+    """Return the sketches from which maps are learned."""
+    return [each for each in cases if 0 <= each.right < _BEYOND]
+
+
+class _Weighed(NamedTuple):
+    """A sketch, and what its maps are worth."""
+
+    known: Known
+    values: FloatArray
+
+
+def _weighed(cases: Sequence[Known], maps: Layers, bare: Layers) -> list[_Weighed]:
+    found = []
+    for each in cases:
+        of = each.described
+        values = worths(of, of.measured, maps if of.related else bare, of.related)
+        found.append(_Weighed(each, values))
+    return found
+
+
+def _lost(cases: Sequence[_Weighed], others: Sequence[_Weighed]) -> FloatArray:
     """Return the weights of how likely the right map is not known.
 
     Where that is likely is learned from all, and how often it is so from the others.
     """
-    lost = _logit(_lost_numbers(cases, layers), _unknown(cases), np.ones(len(cases)))
-    checked = _some_unrelated([each for each in others if not each.elsewhere])
-    odds, unknown = _lost_numbers(checked, layers) @ lost, _unknown(checked)
+    lost = _logit(_lost_numbers(cases), _unknown(cases), np.ones(len(cases)))
+    odds, unknown = _lost_numbers(others) @ lost, _unknown(others)
 
     def loss(shift: float) -> float:
         return float((np.logaddexp(0.0, odds + shift) - unknown * (odds + shift)).mean())
@@ -225,19 +247,16 @@ def knowing(first: Posterior, cases: Sequence[Known]) -> Posterior:
     cases
         Sketches of this place and of others, of the kinds that are to be judged.
     """
-    here = [each for each in cases if not each.elsewhere]
-    found = [_case(each, True) for each in here if each.right >= 0]
-    maps = fitted_maps(found, start=first.maps)
-    known = {True: maps, False: first.bare}
+    maps = fitted_maps([_case(each, True) for each in _met(cases)], start=first.maps)
+    every = _weighed(cases, maps, first.bare)
     place = fitted_place(
-        np.array(
-            [place_numbers(each.described, first.bare, _worths(each, known)) for each in cases]
-        ),
+        np.array([place_numbers(each.known.described, first.bare, each.values) for each in every]),
         np.array([not each.elsewhere for each in cases]),
         np.ones(len(cases)),
         start=first.place,
     )
-    lost = _logit(_lost_numbers(here, known), _unknown(here), np.ones(len(here)))
+    here = [each for each in every if not each.known.elsewhere]
+    lost = _logit(_lost_numbers(here), _unknown(here), np.ones(len(here)))
     return first._replace(maps=maps, place=place, lost=lost)
 
 
@@ -280,18 +299,17 @@ def _some_unrelated(cases: Sequence[Known]) -> list[Known]:
     ]
 
 
-def _lost_numbers(cases: Sequence[Known], layers: dict[bool, Layers]) -> FloatArray:
-    values = [_worths(each, layers) for each in cases]
+def _lost_numbers(cases: Sequence[_Weighed]) -> FloatArray:
     return np.array(
         [
-            lost_numbers(each.described, _shares(of_maps), float(of_maps.max()))
-            for each, of_maps in zip(cases, values, strict=True)
+            lost_numbers(known.described, _shares(values), float(values.max()))
+            for known, values in cases
         ]
     )
 
 
-def _unknown(cases: Sequence[Known]) -> FloatArray:
-    return np.array([each.right < 0 for each in cases], dtype=float)
+def _unknown(cases: Sequence[_Weighed]) -> FloatArray:
+    return np.array([each.known.right < 0 for each in cases], dtype=float)
 
 
 def _counts(case: Known) -> bool:
@@ -302,7 +320,7 @@ def _counts(case: Known) -> bool:
 def _case(known: Known, related: bool) -> Case:
     """Return a sketch as the fit of maps wants it."""
     found = known.described
-    measured = found.measured.at(slice(_WEIGHED if known.right < _WEIGHED else None))
+    measured = found.measured.at(slice(_WEIGHED if known.right < _WEIGHED else _BEYOND))
     return Case(
         line_numbers(measured, related).astype(np.float32),
         measured.matched,
@@ -313,22 +331,17 @@ def _case(known: Known, related: bool) -> Case:
     )
 
 
-def _worths(known: Known, layers: dict[bool, Layers]) -> FloatArray:
-    found = known.described
-    return worths(found, found.measured, layers[found.related], found.related)
-
-
-def _labels(cases: Sequence[Known], layers: dict[bool, Layers]) -> FloatArray:
+def _labels(cases: Sequence[_Weighed]) -> FloatArray:
     """Return what labels count for that mean the same, and that do not."""
     rng = np.random.default_rng(0)
-    rows, offsets = [], []
-    for each in cases:
+    rows = []
+    for each, _ in cases:
         names = _named(each, rng)
         lines = np.arange(len(each.truth))
         told = np.where(each.described.maps >= 0, names[lines, each.described.maps], 0)
         rows.append(np.column_stack([(told > 0).sum(axis=1), (told < 0).sum(axis=1)]).astype(float))
-        offsets.append(_worths(each, layers))
-    return _conditional(rows, np.array([each.right for each in cases]), offsets)
+    rights = np.array([each.known.right for each in cases])
+    return _conditional(rows, rights, [each.values for each in cases])
 
 
 def _named(case: Known, rng: np.random.Generator) -> IntArray:

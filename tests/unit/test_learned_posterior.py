@@ -485,10 +485,11 @@ def test_how_often_the_right_map_is_unknown_follows_from_what_the_best_is_worth(
         )
 
     def doubting(missing):
-        cases, others = (lost_where_nothing_fits(300, share) for share in (0.5, missing))
-        return first._replace(
-            lost=posterior._lost(cases, others, {True: first.maps, False: first.bare})
+        cases, others = (
+            posterior._weighed(lost_where_nothing_fits(300, share), first.maps, first.bare)
+            for share in (0.5, missing)
         )
+        return first._replace(lost=posterior._lost(cases, others))
 
     checked = lost_where_nothing_fits(150, 0.5)
     often = doubting(0.5)
@@ -647,20 +648,23 @@ def test_a_sketch_is_known_by_its_maps_and_which_of_them_is_right():
     assert others >= 2
 
 
-def case_with_right(right):
+def case_with_right(right, maps=400):
     rng = np.random.default_rng(0)
-    maps = np.array([rng.permutation(9)[:4] for _ in range(60)])
+    found = np.array([rng.permutation(9)[:4] for _ in range(maps)])
     known = Measured(
-        rng.random((60, 4, len(Line))), rng.random((60, len(Whole))), np.ones((60, 4), dtype=bool)
+        rng.random((maps, 4, len(Line))),
+        rng.random((maps, len(Whole))),
+        np.ones((maps, 4), dtype=bool),
     )
-    return Known(Described(maps, known, (), 4, 9, True), right, False, maps[right])
+    return Known(Described(found, known, (), 4, 9, True), right, False, found[right])
 
 
-@pytest.mark.parametrize(("right", "compared"), [(0, 40), (39, 40), (40, 60), (59, 60)])
-def test_the_right_map_is_compared_with_those_that_fit_best_or_with_all_where_it_does_not(
+@pytest.mark.parametrize(("right", "compared"), [(0, 40), (39, 40), (40, 300), (299, 300)])
+def test_the_right_map_is_compared_with_those_that_fit_best_or_with_more_where_it_does_not(
     right, compared
 ):
     known = case_with_right(right)
+    assert posterior._met([known]) == [known]
     case = posterior._case(known, related=True)
     assert case.right == right
     assert case.lines.shape == (compared, 4, 24)
@@ -668,6 +672,13 @@ def test_the_right_map_is_compared_with_those_that_fit_best_or_with_all_where_it
     np.testing.assert_array_equal(
         case.score, known.described.measured.wholes[:compared, Whole.SCORE]
     )
+
+
+def test_of_maps_nothing_is_learned_from_a_right_one_that_is_not_met_or_far_beyond_the_best():
+    unmet = replace(case_with_right(0), right=-1)
+    assert posterior._met([case_with_right(300), unmet, case_with_right(399)]) == []
+    # Where there are fewer, all are compared.
+    assert posterior._case(case_with_right(45, maps=60), related=True).lines.shape == (60, 4, 24)
 
 
 def test_other_places_count_more_where_a_sketch_shows_enough():

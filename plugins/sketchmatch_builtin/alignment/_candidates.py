@@ -41,6 +41,10 @@ __all__ = [
 GUESSES = 25_000
 """Poses to weigh; beyond, the pairs that were laid on others have met the right pose for sure."""
 
+MAPS = 1_000
+"""Maps to return at most: where somebody invents things, the right one may be beyond hundreds that
+seem to fit better. Where few fit, few are returned."""
+
 _Value = TypeVar("_Value")
 
 _FEWEST_PAIRS = 4
@@ -99,7 +103,7 @@ class Laid:
 
 
 def laid_maps(
-    sides: Sides, poses: int = 60, maps: int = 300, partial: bool = True, guesses: int = GUESSES
+    sides: Sides, poses: int = 60, maps: int = MAPS, partial: bool = True, guesses: int = GUESSES
 ) -> Generator[int, None, list[Laid]]:
     """Lay a sketch upon a map in every way that may be right.
 
@@ -179,7 +183,7 @@ def _found(laid: list[Laid], sides: Sides, maps: int, partial: bool) -> list[Lai
 
 
 def known_maps(
-    sides: Sides, poses: int = 60, maps: int = 300, partial: bool = True, guesses: int = GUESSES
+    sides: Sides, poses: int = 60, maps: int = MAPS, partial: bool = True, guesses: int = GUESSES
 ) -> list[Laid]:
     """Return what :func:`laid_maps` does, at once where a searcher asked for it just before."""
     key = _key(sides, poses, maps, partial, guesses)
