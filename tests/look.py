@@ -39,7 +39,7 @@ BY_EYE: dict[str, tuple[int, int]] = {
     "ogm/turtlebot3/map.yaml": (9, 9),
     "floors-ipa/Freiburg101_scan.png": (12, 10),
     "floors-ipa/Freiburg52_scan.png": (10, 9),
-    "floors-ipa/lab_a_scan.png": (46, 63),
+    "floors-ipa/lab_a_scan.png": (46, 60),
     "floors-ipa/lab_c_scan.png": (17, 20),
     "floors-ipa/lab_intel.png": (26, 27),
     "floors-ipa/office_a.png": (27, 30),

@@ -141,6 +141,45 @@ def test_a_corridor_that_narrows_a_little_stays_whole():
     assert len(found.scene) == 6
 
 
+def between_rooms(*corridors, degrees):
+    """Areas of what is found of corridors between four closed rooms, in m²."""
+    cells = free(walls(12.2, 12.2), *corridors)
+    rooms = [(x, y, 4.4, 4.4) for x in (0.2, 7.6) for y in (0.2, 7.6)]
+    grid = OccupancyGrid(free(cells, *rooms), CELL)
+    grid = turned(grid, degrees)[0] if degrees else grid
+    found = sorted(areas(segmented(grid, door_width=1.7)))
+    closed = [area for area in found if area == pytest.approx(19.4, rel=0.01)]
+    assert len(closed) == 4
+    return [area for area in found if area not in closed]
+
+
+UP, ACROSS = (5.4, 0.2, 1.6, 11.8), (0.2, 5.4, 11.8, 1.6)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 37.0])
+@pytest.mark.parametrize(
+    ("corridors", "area"),
+    [
+        ([UP, ACROSS], 35.2),
+        ([(5.4, 0.2, 1.6, 5.4), ACROSS], 27.2),
+        ([(5.4, 1.2, 1.6, 5.8), (0.2, 5.4, 6.8, 1.6)], 17.6),
+    ],
+    ids=["crossing", "meeting", "bending"],
+)
+def test_corridors_a_little_narrower_than_a_doorway_are_one_where_they_meet(
+    corridors, area, degrees
+):
+    assert between_rooms(*corridors, degrees=degrees) == pytest.approx([area], rel=0.06)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 37.0])
+def test_a_lobby_at_the_end_of_a_corridor_is_a_room(degrees):
+    found = between_rooms(
+        (5.4, 2.0, 1.6, 8.4), (5.0, 0.2, 2.4, 2.4), (5.0, 9.8, 2.4, 2.4), degrees=degrees
+    )
+    assert found == pytest.approx([6.2, 6.2, 10.2], rel=0.06)
+
+
 @pytest.mark.parametrize("size", [0.5, 1.0])
 def test_the_width_of_doorways_is_found_from_the_map(size):
     """Whole and at half its size, where a door of 0.45 m is as wide beside its rooms."""
@@ -435,11 +474,11 @@ FLOORS = {
     "Freiburg101_scan": 20,
     "Freiburg52_scan": 17,
     "lab_a_scan": 90,
-    "lab_c_scan": 29,
+    "lab_c_scan": 30,
     "lab_intel": 44,
     "office_a": 49,
     "office_c": 68,
-    "office_e": 59,
+    "office_e": 63,
     "office_g": 72,
     "office_i": 54,
 }
@@ -448,17 +487,20 @@ FLOORS = {
 
 TURNED = {
     "Freiburg101_scan": (10, 10),
-    "Freiburg52_scan": (9, 8),
-    "lab_a_scan": (63, 63),
+    "Freiburg52_scan": (9, 9),
+    "lab_a_scan": (60, 60),
     "lab_c_scan": (20, 20),
     "lab_intel": (27, 26),
-    "office_a": (30, 29),
+    "office_a": (30, 27),
     "office_c": (34, 34),
     "office_e": (37, 37),
     "office_g": (36, 36),
     "office_i": (27, 27),
 }
 """How many rooms are found, and how many of these on the floor turned by 37°."""
+
+MORE_TURNED = {"office_a": 5}
+"""How many rooms more there are then: parts of its corridors, which are as wide as a doorway."""
 
 
 @pytest.mark.slow
@@ -471,9 +513,10 @@ def test_turning_a_floor_by_37_degrees_loses_few_rooms(name):
     count, kept = TURNED[name]
     assert len(before) == count
     assert lost(before, after) <= count - kept
+    assert lost(after, before) <= MORE_TURNED.get(name, 0)
 
 
-MORE = {"Freiburg52_scan": 1, "lab_intel": 1, "office_a": 1}
+MORE = {"lab_intel": 1, "office_a": 1}
 """How many rooms more are found on cells of half the size: of places as wide as a doorway."""
 
 

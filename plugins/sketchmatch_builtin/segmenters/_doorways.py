@@ -32,6 +32,10 @@ _Widths = NDArray[np.float32]
 
 # Of the wider part's width: a passage as wide as this is no doorway, but the same corridor.
 _SAME_WIDTH = 0.88
+# A place where corridors meet covers at most so many of the largest discs within it; of that disc's
+# width is each corridor, two as wide cross at 0.71 of it; and where a corridor ends in such a place
+# it is as wide as elsewhere, but for what cells make of it.
+_ROUND, _CROSSED, _MOUTH = 1.6, 0.65, 0.92
 # Of the mean distance to a wall, which in a square room is a sixth of its side: half that side.
 _DOORWAY = 3.0
 # A ray of a laser is nowhere twice this share of a doorway wide.
@@ -242,7 +246,27 @@ def _joined(labels: Labels, width: _Widths) -> Labels:
     np.maximum.at(widest, labels.reshape(-1), width.reshape(-1))
     pairs, passage = passages(labels, width)
     same = passage >= _SAME_WIDTH * widest[pairs].max(axis=1)
+    same |= _at_crossings(np.bincount(labels.reshape(-1)), widest, pairs, passage)
     return groups(count, pairs[same].T).astype(np.int32)[labels]
+
+
+def _at_crossings(
+    areas: IntArray, widest: _Widths, pairs: IntArray, passage: FloatArray
+) -> NDArray[np.bool_]:
+    """Return which pairs are a place where corridors meet or bend, and one of these.
+
+    A larger disc fits there than into any of them, so that they may be cut off.
+    """
+    sides = []
+    for place, corridor in (pairs.T, pairs.T[::-1]):
+        leads = areas[place] <= _ROUND * np.pi * widest[place] ** 2
+        leads &= passage >= _CROSSED * widest[place]
+        sides.append((place, leads & (passage >= _MOUTH * widest[corridor])))
+    count = np.zeros(len(areas), np.int64)
+    for place, leads in sides:
+        np.add.at(count, place[leads], 1)
+    found = [leads & (count[place] >= 2) for place, leads in sides]
+    return np.asarray(np.logical_or(*found))
 
 
 def passages(labels: Labels, width: _Widths) -> tuple[IntArray, FloatArray]:
