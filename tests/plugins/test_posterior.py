@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sketchmatch import match
 from sketchmatch.api import Candidate, JudgeProblem
 from sketchmatch.model import Confidence, RelationTable, Scene, SceneObject
 from sketchmatch.testing import judging_problem
-from sketchmatch_builtin.alignment import Line, Measured, Things, Whole, sides_of
+from sketchmatch_builtin.alignment import Line, Measured, Things, Whole, known_maps, sides_of
 from sketchmatch_builtin.alignment._poses import TOLERANCES
 from sketchmatch_builtin.judges import _described, _evidence
 from sketchmatch_builtin.judges import posterior as module
@@ -32,6 +33,7 @@ from sketchmatch_builtin.judges._evidence import (
 from sketchmatch_builtin.judges.calibration import POSTERIOR, Layers, PlaceLayers
 from sketchmatch_builtin.judges.calibration import Posterior as Learned
 from sketchmatch_builtin.judges.posterior import Posterior
+from tests.experiments.generators import sample
 from tests.interpreted import examples
 from tests.oracle import aligning
 from tests.plugins.test_align import seen_as, sloppy, strewn
@@ -653,6 +655,17 @@ def test_objects_in_one_place_are_judged_all_the_same():
     posed = problem(scene, scene, [[0, 1], [1, 0]])
     judgement = judge(posed, learned(np.random.default_rng(0), 0.1))
     assert_sound(judgement, posed)
+
+
+def test_a_right_map_is_found_that_hundreds_seem_to_fit_better_than():
+    """Two of eight things are invented, and others of sixty lie about where they are drawn."""
+    drawn = sample("plain", 7037, objects=60, missing=2, extra=2)
+    sides = sides_of((drawn.scene, drawn.map), False, None, None, None)
+    at_first = [each.partners.tolist() for each in known_maps(sides)]
+    assert at_first.index(drawn.truth.tolist()) > 300
+    found = match(drawn.scene, drawn.map)
+    assert found.object_map == {k: int(j) for k, j in enumerate(drawn.truth) if j >= 0}
+    assert found.probability > 0.5
 
 
 def test_it_is_the_default_and_finds_partial_maps():
