@@ -415,18 +415,27 @@ def _surround(
     three of them are nearer than twice the spacing.
     """
     near, angles = 4.0 * square(u) * drawn.spacing**2, np.empty(partners.size)
+    low, high = complex(np.inf, np.inf), complex(-np.inf, -np.inf)
+    for i in range(partners.size):
+        if partners[i] >= 0:
+            place = mapped.places[partners[i]]
+            low = complex(min(low.real, place.real), min(low.imag, place.imag))
+            high = complex(max(high.real, place.real), max(high.imag, place.imag))
     for j in range(used.size):
-        if used[j]:
+        # What is beside all of them is not amid them.
+        beyond = _beyond(mapped.places[j], low, high)
+        if used[j] or square(beyond) >= near:
             continue
         count, close = 0, 0
         for i in range(partners.size):
             if partners[i] >= 0:
                 way = mapped.places[partners[i]] - mapped.places[j]
                 close += square(way) < near
-                angles[count] = np.arctan2(way.imag, way.real)
+                if beyond == 0.0:
+                    angles[count] = np.arctan2(way.imag, way.real)
                 count += 1
         row[Whole.CROWD] += close >= _FEWEST_AROUND
-        if count < _FEWEST_AROUND:
+        if count < _FEWEST_AROUND or beyond != 0.0:
             continue
         around = angles[:count]
         sort_values(around)
@@ -434,6 +443,15 @@ def _surround(
         for i in range(1, count):
             gap = max(gap, around[i] - around[i - 1])
         row[Whole.MISSING] += min(1.0, max(0.0, (np.pi - gap) / (0.25 * np.pi)))
+
+
+@kernel
+def _beyond(place: complex, low: complex, high: complex) -> complex:
+    """Return how far a place is from a box along either axis."""
+    return complex(
+        max(low.real - place.real, place.real - high.real, 0.0),
+        max(low.imag - place.imag, place.imag - high.imag, 0.0),
+    )
 
 
 @kernel
