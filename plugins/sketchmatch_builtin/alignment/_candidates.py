@@ -329,26 +329,31 @@ def _keep_better(found: dict[bytes, Laid], laid: Laid) -> None:
 
 def _varied(laid: list[Laid], sides: Sides, most: int) -> list[Laid]:
     """Return these maps and what single changes make of the best of them, the best so many."""
-    maps = np.empty((_CHANGES, len(sides.drawn.places)), dtype=np.int64)
+    if not laid:
+        return []
+    changed = np.empty((_CHANGES, len(sides.drawn.places)), dtype=np.int64)
     losses = np.empty(_CHANGES)
-    found = [*laid]
-    for each in laid[:_VARIED]:
+    maps = [np.stack([each.partners for each in laid])]
+    scores = [np.array([each.score for each in laid])]
+    of = [*range(len(laid))]
+    for k, each in enumerate(laid[:_VARIED]):
         left = _LOSS - (laid[0].score - each.score)
         if left <= 0.0:
             break
         worths = _worths(each, sides)
-        count = vary(worths, TOLERANCES.omission, each.partners, left, maps, losses)
+        count = vary(worths, TOLERANCES.omission, each.partners, left, changed, losses)
         best = np.argsort(losses[:count], kind="stable")[:most]
-        found += [
-            Laid(partners, each.pose, each.score - loss)
-            for partners, loss in zip(maps[best], losses[best].tolist(), strict=True)
-        ]
-    found.sort(key=lambda each: -each.score)
+        maps.append(changed[best])
+        scores.append(each.score - losses[best])
+        of += [k] * len(best)
+    partners, worth = np.concatenate(maps), np.concatenate(scores)
     different: dict[bytes, Laid] = {}
-    for each in found:
-        different.setdefault(each.partners.tobytes(), each)
-        if len(different) == most:
-            break
+    for k in np.argsort(-worth, kind="stable").tolist():
+        key = partners[k].tobytes()
+        if key not in different:
+            different[key] = Laid(partners[k], laid[of[k]].pose, float(worth[k]))
+            if len(different) == most:
+                break
     return [*different.values()]
 
 

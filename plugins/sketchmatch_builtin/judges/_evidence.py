@@ -196,8 +196,10 @@ def worths(known: Described, measured: Measured, layers: Layers, related: bool) 
     scene = within(scene_numbers(known), layers.of_scenes)
     whole = within(map_numbers(measured, known.drawn), layers.of_maps)
     width = lines.shape[2]
-    hidden = lines @ layers.first[:width] + (scene @ layers.first[width:] + layers.first_bias)
-    summed = LINES * np.maximum(hidden, 0.0).sum(axis=1)
+    # One product of two matrices, where there would be one for each map.
+    hidden = lines.reshape(-1, width) @ layers.first[:width]
+    hidden += scene @ layers.first[width:] + layers.first_bias
+    summed = LINES * np.maximum(hidden, 0.0, out=hidden).reshape(*lines.shape[:2], -1).sum(axis=1)
     among = np.hstack([whole, np.broadcast_to(scene, (len(whole), len(scene))), summed])
     second = np.maximum(among @ layers.second + layers.second_bias, 0.0)
     score = AT_FIRST * measured.wholes[:, Whole.SCORE]

@@ -137,11 +137,11 @@ def _as_certain(shares: FloatArray, maps: IntArray, mapped: Scene) -> FloatArray
 
 def _lines(maps: list[IntArray], likely: FloatArray, table: RelationTable) -> FloatArray:
     """Return how likely each template object has each partner, or, last, none."""
-    lines = np.zeros((table.template_objects, table.argument_objects + 1))
-    rows = np.arange(len(lines))
-    for k in np.flatnonzero(likely).tolist():
-        lines[rows, maps[k]] += likely[k]
-    return lines
+    shape = table.template_objects, table.argument_objects + 1
+    columns = np.stack(maps) % shape[1]  # −1 is the last one
+    cells = shape[1] * np.arange(shape[0]) + columns
+    added = np.bincount(cells.reshape(-1), np.repeat(likely, shape[0]), math.prod(shape))
+    return np.asarray(added.reshape(shape))
 
 
 def _state_known(lines: FloatArray, problem: JudgeProblem) -> None:
