@@ -65,8 +65,9 @@ SKETCHES = {
     "strangers": 1600,
     "checked": 1200,
 }
-"""How many there are. ``checked`` are further ``strangers``, by which the networks' width and decay
-and the number of ``exchanged`` were chosen."""
+"""How many there are. ``checked`` are further ``strangers``, by which were chosen the networks'
+width and decay, the number of ``exchanged``, what other places count for, and how many maps are
+learned from."""
 
 _KINDS: dict[str, Callable[[int], Drawing]] = {
     "training": training_drawing,

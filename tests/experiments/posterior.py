@@ -57,8 +57,8 @@ __all__ = [
 _ENGINE = Engine(default_registry())
 
 _SEEDS = {True: 1, False: 0}
-"""Of the fits of maps, with relations and without: that with which more of the strangers were
-right, of two."""
+"""Of the fits of maps, with relations and without: of two, that with which more of the strangers
+were right, when as many maps were weighed as are learned from."""
 
 _WEIGHED, _BEYOND = 40, 300
 """Maps that are compared with the right one where it is among these, those that fit best; and where
