@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
+from scipy.special import logsumexp
 
 from sketchmatch.model import BoolArray, FloatArray, IntArray
 from sketchmatch.pipeline.engine import Engine
@@ -74,6 +75,9 @@ _OTHER_PLACES = 10.0
 
 _SHIFTS = -4.0, 4.0
 """How far the odds of the right map's not being known may be shifted."""
+
+_SHARPER = 0.5, 2.0
+"""How much more, or less, what speaks for maps may count than was learned."""
 
 _LABELLED, _RIGHTLY, _WORDS = 0.7, 0.9, 0.5
 """How many objects have a label, how many of these the right one, and how many words there are for
@@ -166,14 +170,20 @@ def learned_posterior(cases: Sequence[Known], others: Sequence[Known]) -> Poster
     cases
         Sketches of this place and of others.
     others
-        Sketches of this place of another kind, of which as many right maps are not known as is
-        expected.
+        Sketches of this place of another kind: of these as many right maps are not known as is
+        expected, and as sure may be who tells the others.
     """
     told = _some_unrelated(cases)
     met = _met(told)
     # Places are told by what is known of decoys as well, which is nothing of relations.
     maps, bare = (
-        _rounded_layers(fitted_maps([_case(each, related) for each in met], _SEEDS[related]))
+        _rounded_layers(
+            _as_sharp_as_for(
+                _met(others),
+                fitted_maps([_case(each, related) for each in met], _SEEDS[related]),
+                related,
+            )
+        )
         for related in (True, False)
     )
     every = _weighed(told, maps, bare)
@@ -199,6 +209,24 @@ def learned_posterior(cases: Sequence[Known], others: Sequence[Known]) -> Poster
         _rounded(_lost(here, checked)),
         round(float(np.mean(luck)), 2),
     )
+
+
+def _as_sharp_as_for(others: Sequence[Known], layers: Layers, related: bool) -> Layers:
+    """Return layers that tell right maps from wrong ones as surely as they do for others.
+
+    Who learns from many kinds of people is less sure of each than one of these deserves.
+    """
+    found = [
+        (worths(each.described, each.described.measured, layers, related), each.right)
+        for each in others
+    ]
+
+    def loss(by: float) -> float:
+        return float(np.mean([logsumexp(by * values) - by * values[k] for values, k in found]))
+
+    by = float(minimize_scalar(loss, bounds=_SHARPER, method="bounded").x)
+    last, direct, score = by * layers.last, by * layers.direct, by * layers.score
+    return layers._replace(last=last, direct=direct, score=score)
 
 
 def _met(cases: Sequence[Known]) -> list[Known]:

@@ -11,7 +11,7 @@ import shapely
 
 from sketchmatch.model import Scene
 from sketchmatch_builtin.alignment import Line, Measured, Whole
-from sketchmatch_builtin.judges._evidence import Described, weighed
+from sketchmatch_builtin.judges._evidence import Described, weighed, worths
 from sketchmatch_builtin.judges.calibration import posterior_of
 from tests.experiments import (
     anyones,
@@ -499,6 +499,25 @@ def test_how_often_the_right_map_is_unknown_follows_from_what_the_best_is_worth(
     seldom = doubting(0.02)
     assert seldom.lost[0] < often.lost[0] - 1.0
     assert doubts(seldom, checked, True) > 2.0 * doubts(seldom, checked, False)
+
+
+@pytest.mark.parametrize("sharper", [0.7, 1.0, 1.6])
+def test_maps_are_told_as_surely_as_those_of_others(sharper):
+    rng = np.random.default_rng(0)
+    layers = learned_posterior(made_up(rng, 60), made_up(rng, 50)).maps
+    others = []
+    for each in made_up(rng, 1500, elsewhere=0.0):
+        of = each.described
+        values = sharper * worths(of, of.measured, layers, True)
+        shares = np.exp(values - values.max())
+        others.append(replace(each, right=int(rng.choice(8, p=shares / shares.sum()))))
+    found = posterior._as_sharp_as_for(others, layers, related=True)
+    assert found.score / layers.score == pytest.approx(sharper, abs=0.15)
+    of = others[0].described
+    np.testing.assert_allclose(
+        worths(of, of.measured, found, True),
+        found.score / layers.score * worths(of, of.measured, layers, True),
+    )
 
 
 @pytest.mark.slow
