@@ -347,14 +347,20 @@ def _varied(laid: list[Laid], sides: Sides, most: int) -> list[Laid]:
         scores.append(each.score - losses[best])
         of += [k] * len(best)
     partners, worth = np.concatenate(maps), np.concatenate(scores)
-    different: dict[bytes, Laid] = {}
+    known: set[bytes] = set()
+    chosen = []
     for k in np.argsort(-worth, kind="stable").tolist():
         key = partners[k].tobytes()
-        if key not in different:
-            different[key] = Laid(partners[k], laid[of[k]].pose, float(worth[k]))
-            if len(different) == most:
+        if key not in known:
+            known.add(key)
+            chosen.append(k)
+            if len(chosen) == most:
                 break
-    return [*different.values()]
+    # A copy of these alone, so that the others are let go.
+    return [
+        Laid(each, laid[of[k]].pose, float(worth[k]))
+        for each, k in zip(partners[chosen], chosen, strict=True)
+    ]
 
 
 def _pairs(drawn: Things, most: int | None = None) -> IntArray:
