@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
-from scipy.special import logsumexp
 
 from sketchmatch.model import BoolArray, FloatArray, IntArray
 from sketchmatch.pipeline.engine import Engine
@@ -40,7 +39,7 @@ from sketchmatch_builtin.judges._evidence import (
 from sketchmatch_builtin.judges.calibration import Layers, PlaceLayers, Posterior
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
 from tests.experiments.drawings import Drawing
-from tests.experiments.logits import significant
+from tests.experiments.logits import log_shares, significant
 from tests.experiments.networks import Case, fitted_maps, fitted_place
 from tests.experiments.reliability import reliability
 from tests.experiments.training import training_drawing
@@ -186,7 +185,7 @@ def learned_posterior(cases: Sequence[Known], others: Sequence[Known]) -> Poster
         )
         for related in (True, False)
     )
-    every = _weighed(told, maps, bare)
+    every = _valued(told, maps, bare)
     here = [each for each in every if not each.known.elsewhere]
     luck = [
         float((each.known.described.maps[each.values.argmax()] == each.known.truth).mean())
@@ -200,7 +199,7 @@ def learned_posterior(cases: Sequence[Known], others: Sequence[Known]) -> Poster
             np.array([_OTHER_PLACES if _counts(each) else 1.0 for each in told]),
         )
     )
-    checked = _weighed(_some_unrelated([each for each in others if not each.elsewhere]), maps, bare)
+    checked = _valued(_some_unrelated([each for each in others if not each.elsewhere]), maps, bare)
     return Posterior(
         maps,
         bare,
@@ -222,7 +221,7 @@ def _as_sharp_as_for(others: Sequence[Known], layers: Layers, related: bool) -> 
     ]
 
     def loss(by: float) -> float:
-        return float(np.mean([logsumexp(by * values) - by * values[k] for values, k in found]))
+        return -float(np.mean([log_shares(by * values[None])[0, k] for values, k in found]))
 
     by = float(minimize_scalar(loss, bounds=_SHARPER, method="bounded").x)
     last, direct, score = by * layers.last, by * layers.direct, by * layers.score
@@ -234,23 +233,23 @@ def _met(cases: Sequence[Known]) -> list[Known]:
     return [each for each in cases if 0 <= each.right < _BEYOND]
 
 
-class _Weighed(NamedTuple):
+class _Valued(NamedTuple):
     """A sketch, and what its maps are worth."""
 
     known: Known
     values: FloatArray
 
 
-def _weighed(cases: Sequence[Known], maps: Layers, bare: Layers) -> list[_Weighed]:
+def _valued(cases: Sequence[Known], maps: Layers, bare: Layers) -> list[_Valued]:
     found = []
     for each in cases:
         of = each.described
         values = worths(of, of.measured, maps if of.related else bare, of.related)
-        found.append(_Weighed(each, values))
+        found.append(_Valued(each, values))
     return found
 
 
-def _lost(cases: Sequence[_Weighed], others: Sequence[_Weighed]) -> FloatArray:
+def _lost(cases: Sequence[_Valued], others: Sequence[_Valued]) -> FloatArray:
     """Return the weights of how likely the right map is not known.
 
     Where that is likely is learned from all, and how often it is so from the others.
@@ -276,7 +275,7 @@ def knowing(first: Posterior, cases: Sequence[Known]) -> Posterior:
         Sketches of this place and of others, of the kinds that are to be judged.
     """
     maps = fitted_maps([_case(each, True) for each in _met(cases)], start=first.maps)
-    every = _weighed(cases, maps, first.bare)
+    every = _valued(cases, maps, first.bare)
     place = fitted_place(
         np.array([place_numbers(each.known.described, first.bare, each.values) for each in every]),
         np.array([not each.elsewhere for each in cases]),
@@ -327,7 +326,7 @@ def _some_unrelated(cases: Sequence[Known]) -> list[Known]:
     ]
 
 
-def _lost_numbers(cases: Sequence[_Weighed]) -> FloatArray:
+def _lost_numbers(cases: Sequence[_Valued]) -> FloatArray:
     return np.array(
         [
             lost_numbers(known.described, _shares(values), float(values.max()))
@@ -336,7 +335,7 @@ def _lost_numbers(cases: Sequence[_Weighed]) -> FloatArray:
     )
 
 
-def _unknown(cases: Sequence[_Weighed]) -> FloatArray:
+def _unknown(cases: Sequence[_Valued]) -> FloatArray:
     return np.array([each.known.right < 0 for each in cases], dtype=float)
 
 
@@ -359,7 +358,7 @@ def _case(known: Known, related: bool) -> Case:
     )
 
 
-def _labels(cases: Sequence[_Weighed]) -> FloatArray:
+def _labels(cases: Sequence[_Valued]) -> FloatArray:
     """Return what labels count for that mean the same, and that do not."""
     rng = np.random.default_rng(0)
     rows = []

@@ -486,7 +486,7 @@ def test_how_often_the_right_map_is_unknown_follows_from_what_the_best_is_worth(
 
     def doubting(missing):
         cases, others = (
-            posterior._weighed(lost_where_nothing_fits(300, share), first.maps, first.bare)
+            posterior._valued(lost_where_nothing_fits(300, share), first.maps, first.bare)
             for share in (0.5, missing)
         )
         return first._replace(lost=posterior._lost(cases, others))

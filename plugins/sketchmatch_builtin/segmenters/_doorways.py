@@ -262,9 +262,8 @@ def _at_crossings(
         leads = areas[place] <= _ROUND * np.pi * widest[place] ** 2
         leads &= passage >= _CROSSED * widest[place]
         sides.append((place, leads & (passage >= _MOUTH * widest[corridor])))
-    count = np.zeros(len(areas), np.int64)
-    for place, leads in sides:
-        np.add.at(count, place[leads], 1)
+    met = np.concatenate([place[leads] for place, leads in sides])
+    count = np.bincount(met, minlength=len(areas))
     found = [leads & (count[place] >= 2) for place, leads in sides]
     return np.asarray(np.logical_or(*found))
 
