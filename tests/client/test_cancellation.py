@@ -1,6 +1,7 @@
 """A task or scope that is cancelled cancels its call on the server, and nothing else."""
 
 import asyncio
+import socket
 
 import anyio
 import grpc
@@ -108,3 +109,35 @@ def test_a_scope_cancels_the_wait_between_attempts(server):
             return scope.cancelled_caught
 
     assert anyio.run(main)
+
+
+async def asked(client):
+    await client.segment(IMAGE)
+
+
+async def gone_through(client):
+    async for _ in client.events(IMAGE, IMAGE):
+        pass
+
+
+@pytest.mark.parametrize("call", [asked, gone_through])
+def test_a_scope_may_cancel_at_any_step_of_calls_that_fail(call):
+    """gRPC answers some cancellations with its own, of which a scope knows nothing."""
+
+    async def main():
+        async with AsyncClient(nobody, retries=1000) as client:
+            for steps in [*range(40)] * 20:
+                with anyio.CancelScope() as scope:
+                    async with anyio.create_task_group() as group:
+                        group.start_soon(cancel_after, scope, steps)
+                        await call(client)
+                assert scope.cancelled_caught
+
+    async def cancel_after(scope, steps):
+        for _ in range(steps):
+            await asyncio.sleep(0)
+        scope.cancel()
+
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        nobody = f"127.0.0.1:{free.getsockname()[1]}"
+    anyio.run(main)

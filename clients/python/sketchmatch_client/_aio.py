@@ -39,7 +39,7 @@ from sketchmatch_client.errors import (
     NotFoundError,
     ServerUnavailableError,
     SketchmatchError,
-    translated_errors,
+    async_translated_errors,
 )
 from sketchmatch_client.sources import YAxis
 from sketchmatch_proto.v1.catalog_service_pb2 import (
@@ -300,7 +300,7 @@ class AsyncClient:
         check: grpc.aio.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(
             CHECK_HEALTH
         )
-        with translated_errors(self._address):
+        async with async_translated_errors(self._address):
             try:
                 answer = await check(health_request(name), timeout=self._limit(timeout))
             except grpc.RpcError as error:
@@ -343,7 +343,7 @@ class AsyncClient:
         attempts = Attempts(self._retries, limit)
         while True:
             try:
-                with translated_errors(self._address):
+                async with async_translated_errors(self._address):
                     call = self._begun(course, attempts.limit)
                     try:
                         async for response in call:
@@ -379,7 +379,7 @@ class AsyncClient:
         attempts = Attempts(self._retries if retries is None else retries, self._limit(timeout))
         while True:
             try:
-                with translated_errors(self._address):
+                async with async_translated_errors(self._address):
                     return await method(request, timeout=attempts.limit, metadata=self._metadata)
             except SketchmatchError as error:
                 pause = attempts.pause_after(error)

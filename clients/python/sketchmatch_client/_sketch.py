@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING, Self, Unpack
 
 from sketchmatch_client import sources
 from sketchmatch_client._requests import MatchOptions, Pins, match_request
-from sketchmatch_client.errors import NotFoundError, refused_as, translated_errors
+from sketchmatch_client.errors import (
+    NotFoundError,
+    async_translated_errors,
+    refused_as,
+    translated_errors,
+)
 from sketchmatch_proto.v1.match_service_pb2 import MatchRequest
 from sketchmatch_proto.v1.sketch_service_pb2 import (
     CreateSketchRequest,
@@ -148,7 +153,7 @@ class AsyncSketch:
     ) -> AsyncGenerator[WatchSketchResponse, None]:
         """Yield what comes of the sketch until it ends; see :meth:`Sketch.watch`."""
         client = self._client
-        with translated_errors(client._address):
+        async with async_translated_errors(client._address):
             call = client._drawing.WatchSketch(
                 WatchSketchRequest(sketch_id=self.id),
                 timeout=client._limit(timeout),

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from typing import Any, TypeVar
 
 import grpc
@@ -23,6 +24,7 @@ __all__ = [
     "ServerUnavailableError",
     "SketchmatchError",
     "StoreError",
+    "async_translated_errors",
     "refused_as",
     "translated_errors",
 ]
@@ -128,6 +130,20 @@ def translated_errors(address: str) -> Iterator[None]:
         yield
     except grpc.RpcError as error:
         raise _translated(error, address) from error
+
+
+@asynccontextmanager
+async def async_translated_errors(address: str) -> AsyncIterator[None]:
+    """As :func:`translated_errors`, for calls of ``grpc.aio``."""
+    try:
+        with translated_errors(address):
+            yield
+    except asyncio.CancelledError:
+        # gRPC may put a cancellation of its own in place of the one that came, and then anyio's
+        # scope, which knows its own by their text, lets it out. A scope that is left cancels again
+        # at the next step of the loop; here that step is.
+        await asyncio.sleep(0)
+        raise
 
 
 @contextmanager
