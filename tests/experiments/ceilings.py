@@ -10,7 +10,10 @@ per cent of its sketches:
 - how often one answers it that knows the other generator in the same way;
 - how often the first two take the right place for another one, or another one for this;
 - the expected calibration error of what these say of the map, and what chance alone makes of it
-  with so many sketches, were each probability what the one that knows says.
+  with so many sketches, were each probability what the one that knows says;
+- all that of the arms together. How many things are invented nobody tells a judge: its
+  probabilities can hold of sketches with none, one and two together, as often as each comes, not of
+  each by itself, unless these can be told apart.
 
 A judge that knows has seen ``--learned`` sketches of each arm; with more it gets a little better.
 Nothing of it is kept: what the engine has is learned from none of these sketches. ``--out`` writes
@@ -20,9 +23,10 @@ the table into a file, as ``ceilings.md`` beside this one was.
 from __future__ import annotations
 
 import argparse
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
 from pathlib import Path
 
 from sketchmatch_builtin.judges._evidence import weighed
@@ -36,7 +40,7 @@ from tests.experiments.posterior import Known, knowing, known_sketches
 from tests.experiments.reliability import by_chance, reliability
 from tests.experiments.runs import each_of
 
-__all__ = ["Tally", "ceilings", "table"]
+__all__ = ["Tally", "ceilings", "table", "together"]
 
 _FIRST, _LEARNED_FROM = 9000, 100_000
 _SKETCHES, _LEARNED = 120, 150
@@ -72,6 +76,11 @@ class Tally:
     right: int
     maps: tuple[tuple[float, bool], ...]
     places: tuple[float, ...]
+
+    def __add__(self, other: Tally) -> Tally:
+        return Tally(
+            *(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True))
+        )
 
     @classmethod
     def of(cls, cases: Sequence[Known], judge: Posterior, sketches: int) -> Tally:
@@ -179,6 +188,52 @@ def table(found: dict[tuple[Arm, str], tuple[Tally, ...]]) -> Table:
     )
 
 
+def together(found: dict[tuple[Arm, str], tuple[Tally, ...]]) -> Table:
+    """Return what holds of all sketches of each generator, of the judge and of the one that knows.
+
+    All arms are to have sketches of the place and sketches of others.
+    """
+    kinds = [*dict.fromkeys(kind for _, kind in found)]
+    columns = [_of_all(found, kind, judge) for kind in kinds for judge in (0, 1)]
+    names = (
+        "weighed, %",
+        "right, %",
+        "this place refused, %",
+        "another accepted, %",
+        f"another above {_SURE:g}, %",
+        "error",
+        "error by chance",
+    )
+    return Table(
+        "All arms together",
+        ("", *(name for kind in kinds for name in (kind, "who knows"))),
+        tuple(zip(names, *columns, strict=True)),
+    )
+
+
+def _of_all(
+    found: dict[tuple[Arm, str], tuple[Tally, ...]], kind: str, judge: int
+) -> tuple[str, ...]:
+    """Return a column: what a judge says of all sketches of a generator."""
+    here, there = (
+        reduce(
+            operator.add,
+            (every[judge] for (arm, of), every in found.items() if (arm.wrong_place, of) == side),
+        )
+        for side in ((False, kind), (True, kind))
+    )
+    shares = (
+        here.among / here.sketches,
+        here.right / here.sketches,
+        sum(place < _LIKELY for place in here.places) / here.sketches,
+        sum(place > _LIKELY for place in there.places) / there.sketches,
+        sum(place > _SURE for place in there.places) / there.sketches,
+    )
+    maps = here.maps + there.maps
+    errors = reliability(maps).error, by_chance([said for said, _ in maps])
+    return (*(f"{100 * share:.1f}" for share in shares), *(f"{error:.3f}" for error in errors))
+
+
 def _cells(arm: Arm, both: tuple[Tally, Tally], others: Sequence[Tally]) -> list[str]:
     wanted, sketches = _WANTED.get(arm.name), both[0].sketches
     parts = [f"{wanted}" if wanted else "–"]
@@ -210,6 +265,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     sketches = range(given.first, given.first + given.sketches)
     learned = range(_LEARNED_FROM, _LEARNED_FROM + given.learned)
+    tallies = ceilings(given.kinds, sketches, learned, given.kept)
     found = markdown(
         Heading("Ceilings", 1),
         Paragraph(
@@ -217,7 +273,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             f"the first with number {given.first}. The judge that knows has seen {given.learned} "
             "others of each arm of the generator."
         ),
-        table(ceilings(given.kinds, sketches, learned, given.kept)),
+        table(tallies),
+        together(tallies),
     )
     print(found, end="")
     if given.out:

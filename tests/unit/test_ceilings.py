@@ -7,7 +7,7 @@ import pytest
 from sketchmatch_builtin.judges.calibration import POSTERIOR
 from tests.experiments import ceilings, networks
 from tests.experiments.arms import ARMS, Arm
-from tests.experiments.ceilings import Tally, main, table
+from tests.experiments.ceilings import Tally, main, table, together
 from tests.experiments.posterior import known_of
 from tests.experiments.runs import each_of
 from tests.experiments.training import training_drawing
@@ -40,6 +40,26 @@ def test_a_table_has_a_line_for_each_arm_and_says_of_places_only_what_holds_of_t
     )  # fmt: skip
     assert second[:8] == (other.name, "plain", "4", "–", "–", "–", "–", "–")
     assert second[8:12] == ("50.0", "75.0", "0.0", "75.0")
+
+
+def test_all_arms_of_a_generator_are_counted_together():
+    part, more, other = ARMS["parts"][0], ARMS["parts"][1], ARMS["places"][0]
+    two = Tally(2, 2, 1, ((0.9, True), (0.9, False)), (0.9, 0.4))
+    knows = Tally(2, 2, 2, ((1.0, True), (1.0, True)), (1.0, 1.0))
+    away = Tally(2, 0, 0, ((0.3, False),), (0.96,))  # the other one fits nowhere
+    found = {
+        (part, "plain"): (two, knows, two),
+        (other, "plain"): (away, Tally(2, 0, 0, ((0.0, False),), (0.1,))),
+        (more, "plain"): (knows, knows, knows),
+        (part, "memory"): (two, two),
+        (other, "memory"): (away, away),
+    }
+    columns = [*zip(*together(found).rows, strict=True)]
+    assert together(found).header == ("", "plain", "who knows", "memory", "who knows")
+    # (|2 * .9 - 1| + |2 * 1 - 2| + .3) / 5
+    assert columns[1][:6] == ("100.0", "75.0", "25.0", "50.0", "50.0", "0.220")
+    assert columns[2] == ("100.0", "100.0", "0.0", "0.0", "0.0", "0.000", "0.000")
+    assert columns[3][:6] == ("100.0", "50.0", "50.0", "50.0", "50.0", "0.367")
 
 
 @pytest.mark.slow
