@@ -474,6 +474,14 @@ def test_badge_of_a_covered_object_is_clear_of_what_covers_it():
     assert shapes[1].distance(shapely.Point(place.x, place.y)) > 14
 
 
+def test_badge_of_a_wholly_covered_object_is_beside_it():
+    rooms = [shapely.box(x, y, x + 100, y + 100) for x in (100, 200) for y in (100, 200)]
+    floor = shapely.box(100, 100, 300, 300)
+    for shapes in ([floor, *rooms], [floor, floor]):
+        place = badge_places(shapes, (14.0, 14.0), (0, 0, 400, 400))[0]
+        assert 14 < floor.distance(shapely.Point(place.x, place.y)) < 30
+
+
 def test_badge_of_a_tiny_object_in_a_corner_stays_in_bounds():
     place = badge_places([shapely.box(0, 0, 1, 1)], (14.0, 14.0), (0, 0, 400, 400))[0]
     assert place.x >= 14

@@ -96,9 +96,11 @@ def _deepest(
         return nowhere
     free = (shape if cover is None else shape.difference(cover)).simplify(0.3)
     parts = [part for part in shapely.get_parts(free) if part.geom_type == "Polygon"]
-    part = max(parts, key=lambda item: item.area, default=shape)
+    part = max(parts, key=lambda item: item.area, default=shapely.Polygon())
+    if part.is_empty or not part.is_valid:
+        return nowhere
     x0, y0, x1, y1 = part.bounds
-    if min(x1 - x0, y1 - y0) < 4.0 or not part.is_valid:
+    if min(x1 - x0, y1 - y0) < 4.0:
         return nowhere
     point, middle = polylabel(part, 1.0), part.centroid
     depth = part.boundary.distance(point)
