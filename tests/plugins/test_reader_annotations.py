@@ -59,6 +59,24 @@ def test_labelme_masks_lie_at_their_corner():
     assert objects(found) == [("L", 5.0, (11, -24, 14, -21))]
 
 
+def test_labelme_shapes_of_one_label_and_group_are_one_object():
+    found = labelme(
+        shape("polygon", [[0, 0], [4, 0], [4, 4], [0, 4]], "sofa", group_id=0),
+        shape("polygon", [[9, 0], [10, 0], [10, 1], [9, 1]], "lamp", group_id=0),
+        shape("rectangle", [[4, 0], [6, 4]], "sofa", group_id=0),
+        shape("rectangle", [[20, 0], [26, 4]], "sofa", group_id=1),
+        shape("rectangle", [[40, 0], [43, 4]], "sofa", group_id=None),
+        shape("rectangle", [[50, 0], [52, 4]], "sofa"),
+        shape("rectangle", [[0, 9], [9, 99]], "__ignore__"),
+    )
+    assert [item[:2] for item in objects(found)] == [
+        ("sofa", 24.0), ("lamp", 1.0), ("sofa", 24.0), ("sofa", 12.0), ("sofa", 8.0),
+    ]  # fmt: skip
+    assert found.notes == (
+        "Left out because they enclose no area or are no objects: shapes labelled __ignore__ (1).",
+    )
+
+
 def test_labelme_points_and_lines_are_left_out_with_a_note():
     found = labelme(
         shape("line", [[0, 0], [1, 1]]),

@@ -60,8 +60,8 @@ class Areas:
         self._parts += largest.area < (1.0 - _SPECK) * sum(part.area for part in parts)
         self._found.append((largest, label))
 
-    def add_runs(self, runs: IntArray, label: str, field: str, *, columns: bool) -> None:
-        """Take pixels as one object, given as runs along rows or columns: line, begin and end.
+    def of_runs(self, runs: IntArray, field: str, *, columns: bool) -> Any:
+        """Return the area of pixels given as runs along rows or columns: line, begin and end.
 
         Raises
         ------
@@ -80,7 +80,7 @@ class Areas:
         check_vertices(
             _VERTICES_OF_ELEMENT * self._runs, field, f"and the masks before have {self._runs} runs"
         )
-        self.add(runs_area(merged, columns=columns), label)
+        return runs_area(merged, columns=columns)
 
     def check_pixels(self, width: int, height: int, field: str) -> None:
         """Refuse a mask, before it is unpacked, that with all before has too many pixels."""

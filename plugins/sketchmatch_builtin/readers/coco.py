@@ -84,7 +84,7 @@ class CocoReader(Reader):
             mask = annotation.get("segmentation")
             if isinstance(mask, dict):
                 at = f"{field}.segmentation"
-                areas.add_runs(_mask(mask, at), name, at, columns=True)
+                areas.add(areas.of_runs(_mask(mask, at), at, columns=True), name)
             else:
                 areas.add(_area(annotation, field), name)
         return areas.polygon_set()

@@ -124,7 +124,7 @@ def _add(areas: Areas, shape: _Shape) -> None:
             turn = math.radians(_number(shape, "rotation", "0"))
             areas.add(area_within(ellipse(x, y, rx, ry, turn)), label)
         case "mask":
-            areas.add_runs(_mask(shape), label, f"{field}.rle", columns=False)
+            areas.add(areas.of_runs(_mask(shape), f"{field}.rle", columns=False), label)
         case _:
             areas.leave_out(_NO_AREA[element.tag])
 

@@ -8,6 +8,7 @@ from io import BytesIO
 from typing import Any
 
 import numpy as np
+import shapely
 
 from sketchmatch.api import InvalidInputError, Reader, Reason
 from sketchmatch.api.documents import (
@@ -27,6 +28,7 @@ from ._areas import Areas, area_within, box, check_elements, ellipse, within_rea
 __all__ = ["LabelmeReader"]
 
 _POLYGON = Reason.INVALID_POLYGON
+_IGNORED = "__ignore__"
 _NO_AREA = {
     "point": "points",
     "points": "points",
@@ -40,7 +42,8 @@ class LabelmeReader(Reader):
     """Reads what labelme, or one of the tools that write its format, drew on a picture.
 
     Polygons, rectangles, circles, turned rectangles and masks are objects with their labels, in
-    pixels; points and lines are left out with a note.
+    pixels; those of one label and one ``group_id`` are parts of one object. Points and lines are
+    left out with a note, and so is what is labelled ``__ignore__``.
 
     References
     ----------
@@ -66,32 +69,46 @@ class LabelmeReader(Reader):
         shapes = sequence(document.get("shapes"), "shapes", _POLYGON, "a list of shapes")
         check_elements(len(shapes), "shapes", "shapes")
         areas = Areas()
-        for k, shape in enumerate(shapes):
-            _add(areas, mapping(shape, f"shapes[{k}]", _POLYGON, "a shape"), f"shapes[{k}]")
+        objects: dict[tuple[str, str], list[Any]] = {}
+        for k, each in enumerate(shapes):
+            field = f"shapes[{k}]"
+            shape = mapping(each, field, _POLYGON, "a shape")
+            label, group = plain_name(shape.get("label")), plain_name(shape.get("group_id"))
+            area = _area(areas, shape, field)
+            if label == _IGNORED:
+                areas.leave_out(f"shapes labelled {_IGNORED}")
+            elif area is not None:
+                # A shape without group is an object of its own.
+                objects.setdefault((label, f"group {group}" if group else field), []).append(area)
+        for (label, _), parts in objects.items():
+            areas.add(parts[0] if len(parts) == 1 else shapely.union_all(parts), label)
         return areas.polygon_set()
 
 
-def _add(areas: Areas, shape: dict[str, Any], field: str) -> None:
-    kind, label = shape.get("shape_type") or "polygon", plain_name(shape.get("label"))
+def _area(areas: Areas, shape: dict[str, Any], field: str) -> Any | None:
+    """Return the area of a shape; None, and counted as left out, where it is of a kind without."""
+    kind = shape.get("shape_type") or "polygon"
     points = _points(shape.get("points"), f"{field}.points")
     match kind:
         case "polygon" | "rotation" | "oriented_rectangle":
-            areas.add(area_within(points), label)
+            return area_within(points)
         case "rectangle" if len(points) >= 2:
-            areas.add(area_within(box(*points.min(axis=0), *points.max(axis=0))), label)
+            return area_within(box(*points.min(axis=0), *points.max(axis=0)))
         case "circle" if len(points) == 2:
             radius = float(np.hypot(*(points[1] - points[0])))
             x, y = points[0]
-            areas.add(area_within(ellipse(x, y, radius, radius)), label)
+            return area_within(ellipse(x, y, radius, radius))
         case "mask" if len(points) == 2:
             at = f"{field}.mask"
-            areas.add_runs(_mask(areas, shape.get("mask"), points[0], at), label, at, columns=False)
+            runs = _mask(areas, shape.get("mask"), points[0], at)
+            return areas.of_runs(runs, at, columns=False)
         case "rectangle" | "circle" | "mask":
             raise InvalidInputError(
                 _POLYGON, f"{field}.points", f"is a list of {len(points)}; give two for a {kind}"
             )
         case _ if isinstance(kind, str) and kind in _NO_AREA:
             areas.leave_out(_NO_AREA[kind])
+            return None
         case _:
             raise InvalidInputError(
                 _POLYGON,
