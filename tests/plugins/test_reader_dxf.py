@@ -9,6 +9,7 @@ import pytest
 from sketchmatch.api import InvalidInputError, Reason
 from sketchmatch.model.limits import SourceLimits, limited_to
 from sketchmatch_builtin.readers.dxf import DxfReader
+from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
 from tests.pace import within
 
 ezdxf = pytest.importorskip("ezdxf", reason="ezdxf is not installed")
@@ -54,8 +55,11 @@ def test_closed_polylines_are_objects_in_metres_and_open_ones_are_left_out(drawi
     assert found.polygons[0].rings[0].max(axis=0).tolist() == [2.0, 1.0]
     assert found.notes == (
         "The objects are on several layers, of which FILE#LAYER,… chooses some: 0 (2), FURN (1).",
-        "Left out because they enclose no area or are no objects: open or empty lines (2).",
     )
+    assert [line.round(6).tolist() for line in found.lines] == [
+        [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]],
+        [[0.5, 0.0], [0.509, 0.009]],
+    ]
 
 
 def test_lines_and_arcs_that_meet_all_around_are_an_object_of_their_layer(drawing):
@@ -77,7 +81,46 @@ def test_lines_and_arcs_that_meet_all_around_are_an_object_of_their_layer(drawin
     assert [polygon.label for polygon in found.polygons] == ["", "FURN"]
     sizes = [area(polygon) for polygon in found.polygons]
     assert sizes == pytest.approx([2.0 + np.pi / 2, 1.0], rel=1e-3)
-    assert found.notes[1].endswith("no objects: open or empty lines (5).")
+    assert len(found.notes) == 1
+    assert sorted((line[0].round(3).tolist(), len(line)) for line in found.lines) == [
+        ([5.0, 0.0], 2), ([9.0, 0.0], 2), ([9.0, 1.0], 2), ([9.0, 2.0], 2), ([20.0, 0.0], 3),
+    ]  # fmt: skip
+
+
+def test_lines_of_no_length_are_left_out_with_a_note(drawing):
+    space = drawing.modelspace()
+    space.add_lwpolyline(SQUARE, close=True)
+    space.add_line((5, 5), (5, 5))
+    found = read(drawing)
+    assert found.lines == ()
+    assert found.notes == (
+        "Left out because they enclose no area or are no objects: empty lines (1).",
+    )
+
+
+def test_walls_that_are_single_lines_part_rooms_named_by_what_is_written_in_them(drawing):
+    space = drawing.modelspace()
+    house = [(0, 0), (9000, 0), (9000, 6000), (0, 6000)]
+    space.add_lwpolyline(house, close=True, dxfattribs={"layer": "WALLS"})
+    space.add_line((0, 3000), (9000, 3000))
+    space.add_lwpolyline([(4000, 3000), (4000, 4200), (4050, 4200), (4050, 6000)])
+    for name, x, y in (
+        ("living room", 4500, 1600),
+        ("kitchen\\P12 m²", 1500, 4500),
+        ("bath", 6000, 4000),
+        ("ground floor", 4500, 9000),
+    ):
+        space.add_mtext(name).set_location((x, y))
+    found = read(drawing)
+    assert [polygon.label for polygon in found.polygons] == ["WALLS"]
+    rooms = RoomSegmenter().segment(found)
+    areas = {item.label: item.area for item in rooms.scene.objects}
+    assert areas == {
+        "kitchen 12 m²": pytest.approx(12.0, rel=0.05),
+        "bath": pytest.approx(15.0, rel=0.05),
+        "living room": pytest.approx(27.0, rel=0.05),
+    }
+    assert rooms.warnings == ()
 
 
 def test_bulges_circles_ellipses_and_splines_are_as_large_as_they_are(drawing):
@@ -137,9 +180,22 @@ def test_the_text_in_a_shape_is_its_name(drawing):
     space.add_lwpolyline([(-9000, -9000), (9000, -9000), (9000, 9000), (-9000, 9000)], close=True)
     space.add_lwpolyline(SQUARE, close=True)
     space.add_text("desk").set_placement((100, 100))
-    space.add_mtext("of\\POtto").set_location((100, 500))
+    space.add_mtext("of\\POtto").set_location((100, 400))
     space.add_text("room").set_placement((-5000, 100))
     assert [polygon.label for polygon in read(drawing).polygons] == ["room", "desk of Otto"]
+
+
+def test_texts_all_over_a_shape_are_of_parts_of_it(drawing):
+    space = drawing.modelspace()
+    space.add_lwpolyline(SQUARE, close=True, dxfattribs={"layer": "house"})
+    space.add_text("hall").set_placement((100, 500))
+    space.add_text("bath").set_placement((1800, 500))
+    found = read(drawing)
+    assert [polygon.label for polygon in found.polygons] == ["house"]
+    assert [(item.name, item.point, item.kind) for item in found.landmarks] == [
+        ("hall", (0.1, 0.5), "room"),
+        ("bath", (1.8, 0.5), "room"),
+    ]
 
 
 def test_layers_are_chosen_by_name_or_by_being_switched_on(drawing):

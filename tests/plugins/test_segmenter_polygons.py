@@ -28,6 +28,14 @@ def test_every_polygon_is_an_object_in_its_order():
     assert found.warnings == ()
 
 
+def test_open_lines_are_told_to_be_left_out_and_whose_walls_they_may_be():
+    square, lines = LabelledPolygon((np.array(SQUARE, float),)), (np.zeros((2, 2)), np.ones((3, 2)))
+    found = PolygonSegmenter().segment(PolygonSet((square, square), lines=lines))
+    assert found.warnings == ("Left out because they enclose no area: open lines (2).",)
+    with pytest.raises(InvalidInputError, match=r"segmenter rooms, to which its open lines \(2\)"):
+        PolygonSegmenter().segment(PolygonSet((square,), lines=lines))
+
+
 @pytest.mark.parametrize(
     ("rings", "field", "words"),
     [

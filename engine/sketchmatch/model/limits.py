@@ -172,9 +172,10 @@ def check_source(source: Source, field: str = "") -> None:
     match source:
         case StrokeSet(strokes):
             check_vertices(sum(len(stroke.points) for stroke in strokes), field)
-        case PolygonSet(polygons):
+        case PolygonSet(polygons, lines=lines):
             check_objects(len(polygons), field)
-            check_vertices(sum(len(ring) for item in polygons for ring in item.rings), field)
+            rings = [ring for item in polygons for ring in item.rings]
+            check_vertices(sum(map(len, [*rings, *lines])), field)
         case OccupancyGrid(cells):
             check_pixels(cells.shape[1], cells.shape[0], field)
         case Image(pixels):

@@ -69,6 +69,25 @@ class Stroke:
             object.__setattr__(self, "times", times)
 
 
+@dataclass(frozen=True)
+class Landmark:
+    """A thing that whoever made a map gave a name and a place.
+
+    Attributes
+    ----------
+    name
+        For people.
+    point
+        (x, y) in the map's frame, in metres.
+    kind
+        What sort of thing it is, such as ``"door"`` or ``"room"``; empty if nobody said.
+    """
+
+    name: str
+    point: tuple[float, float]
+    kind: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class StrokeSet:
     """The strokes of a sketch in the order they were drawn.
@@ -116,31 +135,18 @@ class PolygonSet:
         The polygons.
     notes
         What whoever read the file left out or had to decide, as in :class:`StrokeSet`.
+    lines
+        What encloses nothing, each of shape (k, 2), y up: walls, to who looks for rooms.
+    landmarks
+        Names that are written in the drawing, of kind ``"room"``.
     """
 
     polygons: tuple[LabelledPolygon, ...]
     notes: tuple[str, ...] = ()
+    lines: tuple[FloatArray, ...] = ()
+    landmarks: tuple[Landmark, ...] = ()
 
     field = "polygon_set"
-
-
-@dataclass(frozen=True)
-class Landmark:
-    """A thing that whoever made a map gave a name and a place.
-
-    Attributes
-    ----------
-    name
-        For people.
-    point
-        (x, y) in the map's frame, in metres.
-    kind
-        What sort of thing it is, such as ``"door"`` or ``"room"``; empty if nobody said.
-    """
-
-    name: str
-    point: tuple[float, float]
-    kind: str = ""
 
 
 @dataclass(frozen=True, eq=False)

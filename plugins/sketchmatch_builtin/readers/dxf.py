@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import islice
 from typing import Any, NamedTuple
 
@@ -14,7 +16,8 @@ import shapely
 
 from sketchmatch.api import InvalidInputError, Reader, Reason
 from sketchmatch.api.documents import listed
-from sketchmatch.model import FloatArray, PolygonSet
+from sketchmatch.model import FloatArray, Landmark, PolygonSet
+from sketchmatch.model.arrays import frozen_floats
 from sketchmatch.model.labels import cleaned_label
 from sketchmatch.model.limits import check_vertices, source_limits
 
@@ -38,6 +41,8 @@ _DEEPEST = 50
 _FILLED = 0.5
 # Ends of lines within this share of all lines of the layer are one place.
 _JOINED = 1e-5
+# Texts that are farther apart than this share of the shape around them are of parts of it.
+_ALL_OVER = 1 / 3
 # Two areas that share this much are one, drawn as an outline and as a hatch.
 _SAME = 0.95
 _CLOSED = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE"}
@@ -47,6 +52,14 @@ _LINES_OF_BLOCKS = {*_CLOSED, *_PIECES, "SOLID", "TRACE", "3DFACE"}
 _TEXTS = {"TEXT", "MTEXT"}
 _NAMING = ("NAME", "LABEL")
 _BINARY = b"AutoCAD Binary DXF"
+
+
+class _Text(NamedTuple):
+    """What is written, and where."""
+
+    words: str
+    x: float
+    y: float
 
 
 class _Shape(NamedTuple):
@@ -64,10 +77,12 @@ class DxfReader(Reader):
     Closed polylines with their arcs, circles, ellipses, closed splines and hatches are objects, and
     so are lines, arcs and open curves of a layer that meet end to end all around an area, and each
     insert of a block: what its closed shapes cover, or the convex hull of all its lines where that
-    is little. A hatch in an outline of its own is one object. The model space is read,
+    is little. A hatch in an outline of its own is one object. What meets around nothing is a line,
+    a wall to the segmenter ``rooms``, and texts are names of rooms to it. The model space is read,
     and in it the layers that are switched on, or those named as in ``plan.dxf#FURNITURE,DOORS``.
-    The name of an object is the text in it, or else that of its block, or else of its layer. Where
-    the drawing says its unit (``$INSUNITS``), lengths become metres.
+    The name of an object is the text in it, or else that of its block, or else of its layer; texts
+    that are all over it name parts of it. Where the drawing says its unit (``$INSUNITS``), lengths
+    become metres.
 
     Needs the package ezdxf: ``pip install 'sketchmatch[dxf]'``.
 
@@ -109,22 +124,32 @@ def _read(drawing: Any, part: str) -> PolygonSet:
         if _key(each.dxf.get("layer", "0")) in chosen and not each.dxf.get("invisible", 0)
     ]
     left_out: Counter[str] = Counter()
+    lines: list[FloatArray] = []
     most = _SHAPES_OF_OBJECT * source_limits().max_objects
-    found = list(islice(_shapes(drawing, entities, left_out), most + 1))
+    found = list(islice(_shapes(drawing, entities, left_out, lines), most + 1))
     if len(found) > most:
         raise _too_many(found, f"more than {most}")
     shapes = _without_doubles(found)
-    check_vertices(int(sum(shapely.get_num_coordinates(each.area) for each in shapes)), "")
+    corners = int(sum(shapely.get_num_coordinates(each.area) for each in shapes))
+    check_vertices(corners + sum(map(len, lines)), "")
     _check_count(shapes)
     factor, notes = _metres(drawing)
     areas = Areas()
-    names = _texts_in(shapes, [each for each in entities if each.dxftype() in _TEXTS])
+    texts = _texts(entities)
+    names = _names(shapes, texts)
     for k, shape in enumerate(shapes):
         scaled = shapely.transform(shape.area, lambda points: points * factor)
         areas.add(scaled, names.get(k) or shape.name or _layer_name(shape.layer))
     for what, count in left_out.items():
         areas.leave_out(what, count)
-    return areas.polygon_set(*notes, *_note_on_layers(shapes, part), upwards=1.0)
+    found_areas = areas.polygon_set(*notes, *_note_on_layers(shapes, part), upwards=1.0)
+    return replace(
+        found_areas,
+        lines=tuple(frozen_floats(line * factor) for line in lines),
+        landmarks=tuple(
+            Landmark(text.words, (text.x * factor, text.y * factor), "room") for text in texts
+        ),
+    )
 
 
 def _drawing(data: bytes) -> Any:
@@ -193,7 +218,10 @@ def _metres(drawing: Any) -> tuple[float, tuple[str, ...]]:
         return 1.0, ("The drawing does not say its unit: lengths are taken as they are.",)
 
 
-def _shapes(drawing: Any, entities: Iterable[Any], left_out: Counter[str]) -> Iterator[_Shape]:
+def _shapes(
+    drawing: Any, entities: Iterable[Any], left_out: Counter[str], lines: list[FloatArray]
+) -> Iterator[_Shape]:
+    """Yield what encloses an area; count what is nothing, and add what is left of lines."""
     sizes = _Sizes(drawing)
     pieces: dict[str, list[FloatArray]] = {}
     for each in entities:
@@ -212,19 +240,19 @@ def _shapes(drawing: Any, entities: Iterable[Any], left_out: Counter[str]) -> It
             if area is not None:
                 yield _Shape(area, "", layer, kind in _HATCHES)
             elif not len(points):
-                left_out["open or empty lines"] += 1
+                left_out["empty lines"] += 1
             else:
                 pieces.setdefault(layer, []).append(points)
         elif kind not in _TEXTS:
             left_out[f"elements of type {kind[:40]}"] += 1
-    for layer, lines in pieces.items():
-        loops, rest = _loops(lines)
-        left_out["open or empty lines"] += rest
+    for layer, open_ in pieces.items():
+        loops, rest = _loops(open_)
+        lines += rest
         yield from (_Shape(area, "", layer, False) for area in loops)
 
 
-def _loops(lines: list[FloatArray]) -> tuple[list[Any], int]:
-    """Return the areas around which lines go end to end, and how many other lines they make."""
+def _loops(lines: list[FloatArray]) -> tuple[list[Any], list[FloatArray]]:
+    """Return the areas around which lines go end to end, and what the others make."""
     lines = [within_reach(line) for line in lines]
     grid = _JOINED * float(np.ptp(np.concatenate(lines), axis=0).max())
     # Only ends that are equal are joined.
@@ -239,9 +267,15 @@ def _loops(lines: list[FloatArray]) -> tuple[list[Any], int]:
         )
     )
     parts = shapely.get_parts(chains)
-    areas = [area_within(shapely.get_coordinates(part)) for part in parts[shapely.is_closed(parts)]]
-    loops = [area for area in areas if area.area > 0.0]
-    return loops, len(parts) - len(loops)
+    loops, rest = [], []
+    for part in parts:
+        points = shapely.get_coordinates(part)
+        area = area_within(points) if part.is_closed else shapely.Polygon()
+        if area.area > 0.0:
+            loops.append(area)
+        else:
+            rest.append(points)
+    return loops, rest
 
 
 def _single(insert: Any) -> Iterator[Any]:
@@ -421,18 +455,33 @@ def _same(one: Any, other: Any) -> bool:
     return bool(shared >= _SAME * outlines[0].union(outlines[1]).area)
 
 
-def _texts_in(shapes: list[_Shape], texts: Iterable[Any]) -> dict[int, str]:
-    """Return the texts that lie in shapes, each in the smallest around it."""
-    placed = [each for each in texts if each.dxf.get("insert") is not None]
-    places = np.array([(each.dxf.insert.x, each.dxf.insert.y) for each in placed]).reshape(-1, 2)
-    left = np.arange(len(placed))
+def _texts(entities: Iterable[Any]) -> list[_Text]:
+    """Return what is written, and where."""
+    found = []
+    for each in entities:
+        if each.dxftype() in _TEXTS and each.dxf.get("insert") is not None:
+            x, y = float(each.dxf.insert.x), float(each.dxf.insert.y)
+            words = cleaned_label(each.plain_text())
+            if words and max(abs(x), abs(y)) < math.inf:
+                found.append(_Text(words, x, y))
+    return found
+
+
+def _names(shapes: list[_Shape], texts: list[_Text]) -> dict[int, str]:
+    """Return the names of shapes: the texts in each, and in no smaller one, unless all over it."""
+    places = np.array([(text.x, text.y) for text in texts]).reshape(-1, 2)
+    left = np.arange(len(texts))
     names: dict[int, str] = {}
     for k in sorted(range(len(shapes)), key=lambda k: float(shapes[k].area.area)):
-        shapely.prepare(shapes[k].area)
-        inside = shapely.contains_xy(shapes[k].area, places[left])
-        if inside.any():
-            names[k] = " ".join(placed[i].plain_text() for i in left[inside])
-            left = left[~inside]
+        area = shapes[k].area
+        shapely.prepare(area)
+        inside = left[shapely.contains_xy(area, places[left])]
+        if not len(inside):
+            continue
+        left = np.setdiff1d(left, inside)
+        x0, y0, x1, y1 = area.bounds
+        if (np.ptp(places[inside], axis=0) <= _ALL_OVER * np.array([x1 - x0, y1 - y0])).all():
+            names[k] = " ".join(texts[i].words for i in inside)
     return names
 
 

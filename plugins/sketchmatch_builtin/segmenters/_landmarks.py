@@ -9,7 +9,7 @@ import shapely
 
 from sketchmatch.model import Landmark
 
-__all__ = ["ROOM", "labels_of"]
+__all__ = ["ROOM", "labels_of", "left_over"]
 
 ROOM = "room"
 """The kind of landmark that names a room, and no thing in it."""
@@ -23,8 +23,8 @@ def labels_of(
     landmarks: Iterable[Landmark],
     reach: float,
     doubtful: Sequence[bool] | None = None,
-) -> tuple[list[str], tuple[str, ...]]:
-    """Return a label for each object, empty if it has no name, and a warning about names left.
+) -> tuple[list[str], list[Landmark]]:
+    """Return a label for each object, empty if it has no name, and the names that none has.
 
     A name goes to the object in which its place lies, or else to the nearest within reach; of
     several that could have it, or of several names for one object, the nearest are joined first,
@@ -44,7 +44,7 @@ def labels_of(
     named = tuple(landmarks)
     labels, left = [""] * len(polygons), set(range(len(named)))
     if not named or not polygons:
-        return labels, ()
+        return labels, [*named]
     points = shapely.points([item.point for item in named])
     objects = np.array(polygons, dtype=object)
     k, j = shapely.STRtree(objects).query(points, predicate="dwithin", distance=reach)
@@ -55,14 +55,25 @@ def labels_of(
         if k[pair] in left and not labels[j[pair]]:
             labels[j[pair]] = named[k[pair]].name
             left.remove(k[pair])
-    return labels, _left_over([named[k].name for k in sorted(left)], reach)
+    return labels, [named[k] for k in sorted(left)]
 
 
-def _left_over(names: list[str], reach: float) -> tuple[str, ...]:
+def left_over(landmarks: Sequence[Landmark], where: str, what: str) -> tuple[str, ...]:
+    """Return a warning about names that no object has, or nothing if there are none.
+
+    Parameters
+    ----------
+    landmarks
+        The names.
+    where
+        Where no object is, such as ``"around"``.
+    what
+        What has the names, such as ``"the drawing"``.
+    """
+    names = [item.name for item in landmarks]
     if not names:
         return ()
     shown = [name if name.isprintable() else repr(name) for name in names[:_MOST_NAMED]]
     listed = ", ".join(name[:_LONGEST_NAME] for name in shown)
     more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-    near = f"within {reach:g} m of" if reach else "around"
-    return (f"No object is left {near} {listed}{more}, which the map's file names.",)
+    return (f"No object is left {where} {listed}{more}, which {what} names.",)

@@ -54,8 +54,8 @@ def drawn(source: StrokeSet | PolygonSet | Image, door_width: float | None) -> P
     Parameters
     ----------
     source
-        Strokes and outlines that are walls, or a picture of free space and walls, of which either
-        is darker.
+        Strokes, lines and outlines that are walls, or a picture of free space and walls, of which
+        either is darker.
     door_width
         Widest doorway in the drawing's unit, or None to find it from the drawing.
     """
@@ -76,7 +76,7 @@ def _lines(source: StrokeSet | PolygonSet) -> list[FloatArray]:
     if isinstance(source, StrokeSet):
         return [stroke.points for stroke in source.strokes]
     rings = [ring for polygon in source.polygons for ring in polygon.rings]
-    return [np.concatenate([ring, ring[:1]]) for ring in rings if len(ring)]
+    return [*source.lines, *(np.concatenate([ring, ring[:1]]) for ring in rings if len(ring))]
 
 
 def _of_lines(lines: Sequence[FloatArray], field: str) -> tuple[Mask, float, tuple[float, float]]:

@@ -28,7 +28,7 @@ from sketchmatch_builtin.segmenters._cells import (
     refuse_more,
     simplified,
 )
-from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of
+from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of, left_over
 from sketchmatch_builtin.segmenters._standing import (
     Parts,
     Room,
@@ -231,17 +231,19 @@ class OccupancyGridSegmenter(Segmenter):
             largest = max(int(np.count_nonzero(room)) for room, _, _ in rooms)
             raise _too_few(len(things), largest, source, self.params)
         rings = [in_map(shapely.get_coordinates(thing.outline), source) for thing in things]
+        reach = self.params.label_reach
         labels, unplaced = labels_of(
             [shapely.Polygon(ring) for ring in rings],
             [item for item in source.landmarks if item.kind != ROOM],
-            self.params.label_reach,
+            reach,
             [thing.certainty < DOUBTFUL for thing in things],
         )
         objects = [
             SceneObject.from_rings([ring], name, thing.certainty)
             for ring, name, thing in zip(rings, labels, things, strict=True)
         ]
-        return Segmentation(Scene(tuple(objects)), unplaced)
+        near = f"within {reach:g} m of" if reach else "around"
+        return Segmentation(Scene(tuple(objects)), left_over(unplaced, near, "the map's file"))
 
     def _things(
         self, free: Mask, held: Mask, at: tuple[int, int], grid: OccupancyGrid

@@ -38,12 +38,17 @@ class PolygonSegmenter(Segmenter):
 
     def segment(self, source: PolygonSet) -> Segmentation:
         """Return the polygons as objects, in their order."""
-        count = len(source.polygons)
+        count, lines = len(source.polygons), len(source.lines)
         if count < 2:
+            remedy = "a match compares relations between objects, so give at least two"
+            if lines:
+                remedy += (
+                    f", or take the segmenter rooms, to which its open lines ({lines}) are walls"
+                )
             raise InvalidInputError(
                 Reason.TOO_FEW_OBJECTS,
                 "polygons",
-                f"holds {'no polygon' if not count else 'one polygon'}; "
-                "a match compares relations between objects, so give at least two",
+                f"holds {'no polygon' if not count else 'one polygon'}; {remedy}",
             )
-        return Segmentation(Scene(objects_of(source.polygons)))
+        left_out = f"Left out because they enclose no area: open lines ({lines})."
+        return Segmentation(Scene(objects_of(source.polygons)), (left_out,) if lines else ())

@@ -39,7 +39,7 @@ from sketchmatch_builtin.segmenters._cells import (
     simplified,
 )
 from sketchmatch_builtin.segmenters._doorways import Labels, divided, doorway, parts_that_meet
-from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of
+from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of, left_over
 from sketchmatch_builtin.segmenters._leaves import divided_at_openings
 from sketchmatch_builtin.segmenters._plans import Plan, drawn
 from sketchmatch_builtin.segmenters._widths import divided_by_width
@@ -82,12 +82,13 @@ class RoomSegmenter(Segmenter):
     more than four million cells is looked at in cells twice as large, or larger, as long as a
     doorway is 20 of these wide.
 
-    In a drawing walls are strokes, the borders of polygons, or one of two shades of a picture, in
-    which either the walls or the free space may be dark; what joins the picture's border is
-    outside. No metres are known there, and so all is measured by the drawing itself: free
+    In a drawing walls are strokes, the borders of polygons and open lines, or one of two shades of
+    a picture, in which either the walls or the free space may be dark; what joins the picture's
+    border is outside. No metres are known there, and so all is measured by the drawing itself: free
     space is cut where it becomes less than half as wide [2]_, at doors as where a corridor opens
     into a hall. A match may take another cut of it, where it becomes less than 0.4 or 0.6 times as
-    wide. A text of an SVG document, and a label that one line alone has, name the room around them.
+    wide. A text of the drawing, and else a label that one line alone has, name the room around
+    them; where polygons come with texts, as from DXF, their labels are of layers and blocks.
 
     Rooms come in reading order: by their highest point from the top down, then from the left.
     One that the map's file names, with the type ``room`` and a place in it, has that name.
@@ -241,7 +242,8 @@ class RoomSegmenter(Segmenter):
             0.0,
         )
         objects = map(SceneObject.from_rings, rooms_in_map, labels)
-        return Segmentation(Scene(tuple(objects)), unplaced, passages=passages)
+        warnings = left_over(unplaced, "around", "the map's file")
+        return Segmentation(Scene(tuple(objects)), warnings, passages=passages)
 
     def _plan(self, source: StrokeSet | PolygonSet | Image) -> Plan:
         """Return the free cells of a drawing, furniture among them."""
@@ -274,11 +276,11 @@ class RoomSegmenter(Segmenter):
         area = self._least(plan)
         found, passages = self._outlines(plan.free, parts, area, plan.cell, path, cut)
         rooms = [[plan.cell * ring + plan.corner for ring in _rings(room)] for room in found]
-        labels, unplaced = labels_of(
-            [shapely.Polygon(outer, inner) for outer, *inner in rooms], _names(source), 0.0
+        labels, warnings = _named(
+            [shapely.Polygon(outer, inner) for outer, *inner in rooms], source
         )
         objects = map(SceneObject.from_rings, rooms, labels)
-        return Segmentation(Scene(tuple(objects)), unplaced, passages=passages)
+        return Segmentation(Scene(tuple(objects)), warnings, passages=passages)
 
     def _outlines(
         self,
@@ -307,19 +309,43 @@ class RoomSegmenter(Segmenter):
         return [found[k] for k in order], tuple((a, b) for a, b in meeting.tolist())
 
 
-def _names(source: StrokeSet | PolygonSet | Image) -> list[Landmark]:
-    """Return the names that a drawing gives to places: of each outline, in its middle."""
+def _named(
+    rooms: list[shapely.Polygon], source: StrokeSet | PolygonSet | Image
+) -> tuple[list[str], tuple[str, ...]]:
+    """Return what a drawing calls each room, and a warning about names written among the rooms.
+
+    What is written counts first, then what single lines are called. Beside the rooms titles are
+    written, and several names in one.
+    """
     if isinstance(source, Image):
-        return []
+        return [""] * len(rooms), ()
+    labels, unplaced = labels_of(rooms, source.landmarks, 0.0)
+    free = [k for k, label in enumerate(labels) if not label]
+    if isinstance(source, StrokeSet) or not source.landmarks:
+        for k, label in zip(
+            free, labels_of([rooms[k] for k in free], _called(source), 0.0)[0], strict=True
+        ):
+            labels[k] = label
+    hull = shapely.convex_hull(shapely.union_all(rooms))
+    taken = shapely.union_all([room for room, label in zip(rooms, labels, strict=True) if label])
+    lost = hull - taken
+    return labels, left_over(
+        [item for item in unplaced if lost.contains(shapely.Point(item.point))],
+        "around",
+        "the drawing",
+    )
+
+
+def _called(source: StrokeSet | PolygonSet) -> list[Landmark]:
+    """Return what outlines are called, each in its middle."""
     lines = (
         [(stroke.label, stroke.points) for stroke in source.strokes]
         if isinstance(source, StrokeSet)
         else [(polygon.label, polygon.rings[0]) for polygon in source.polygons if polygon.rings]
     )
-    written = list(source.landmarks) if isinstance(source, StrokeSet) else []
     given = Counter(label for label, _ in lines)
     # What several lines are called is a layer or a kind of line, and no room.
-    return written + [
+    return [
         Landmark(label, (float(x), float(y)), ROOM)
         for label, points in lines
         if label and given[label] == 1 and len(points)
