@@ -6,7 +6,7 @@ import pytest
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
-from sketchmatch.io.geojson import decode_geojson
+from sketchmatch.io.geojson import decode_geojson, polygons_of
 from sketchmatch.io.scene_files import encode_geojson
 from sketchmatch.model import PolygonSet, Scene
 
@@ -219,3 +219,54 @@ def test_a_file_is_read_by_its_suffix(tmp_path):
     source = read_source(path)
     assert isinstance(source, PolygonSet)
     assert len(source.polygons) == 2
+
+
+def unit(x, **properties):
+    square = [[x, 0], [x + 1, 0], [x + 1, 1], [x, 0]]
+    geometry = {"type": "Polygon", "coordinates": [square]}
+    return {"type": "Feature", "id": f"u{x}", "properties": properties, "geometry": geometry}
+
+
+def building(*units):
+    return {"type": "FeatureCollection", "features": list(units), "crs": None}
+
+
+def test_a_name_in_several_languages_is_the_first_of_them_that_says_something():
+    found = polygons_of(
+        building(
+            unit(0, name={"ru": "", "en": "hall"}, alt_name={"en": "lobby"}),
+            unit(2, name=None, alt_name={"de": "Flur"}),
+            unit(4, name={}, category="stairs"),
+        )
+    )
+    assert [each.label for each in found.polygons] == ["hall", "Flur", "u4"]
+
+
+def test_of_a_building_of_several_levels_one_is_chosen():
+    house = building(
+        unit(0, level="0"),
+        unit(2, level="0;1"),
+        unit(4, level=1),
+        unit(6, level_id="roof", level="9"),
+        unit(8),
+    )
+    every = polygons_of(house)
+    assert [each.label for each in every.polygons] == ["u0", "u2", "u4", "u6", "u8"]
+    assert every.notes == (
+        "The objects are on several levels, of which FILE#LEVEL chooses one: "
+        "0 (2), 1 (2), roof (1).",
+    )
+    chosen = polygons_of(house, "1")
+    assert [each.label for each in chosen.polygons] == ["u2", "u4"]
+    assert chosen.notes == ()
+    assert polygons_of(building(unit(0, level=1), unit(2))).notes == ()
+    with pytest.raises(InvalidInputError, match=r"no level '9'; choose one of '0', '1', 'roof'"):
+        polygons_of(house, "9")
+    with pytest.raises(InvalidInputError, match="has no part '1', nor any other"):
+        polygons_of(building(unit(0)), "1")
+
+
+def test_a_level_of_a_file_is_read_by_its_name(tmp_path):
+    file = tmp_path / "house.geojson"
+    file.write_text(json.dumps(building(unit(0, level=0), unit(2, level=1))), encoding="utf-8")
+    assert [each.label for each in read_source(f"{file}#1").polygons] == ["u2"]

@@ -181,13 +181,14 @@ def _of_kind(kind: FileKind, name: str, data: bytes, part: str) -> Source:
         source: Source = kind.reader.read(data, part)
     elif kind.source is OccupancyGrid:
         source = decode_bag(Path(name).suffix.lower(), data, part)
+    elif kind.source is PolygonSet:
+        source = polygons_of(kind.document, part)
     else:
         no_parts(part)
         if kind.document is None:
             source = _KINDS[Path(name).suffix.lower()][1](data)
         else:
-            decode = strokes_of if kind.source is StrokeSet else polygons_of
-            source = decode(kind.document)
+            source = strokes_of(kind.document)
     check_source(source)
     return source
 

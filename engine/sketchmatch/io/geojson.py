@@ -2,8 +2,10 @@
 
 A ``FeatureCollection``, ``Feature``, ``GeometryCollection``, ``Polygon`` or ``MultiPolygon``, or
 several of them in a list, in a line each, or as a text sequence (RFC 8142); each polygon becomes
-one object. A feature's property ``label``, or else ``name``, or else its ``id``, is its label, and
-its property ``certainty``, above 0 and up to 1, how sure it is that it is one thing.
+one object. A feature's property ``label``, or else ``name`` or ``alt_name``, or else its ``id``, is
+its label; a name in several languages, as IMDF has them, is the first of them. Its property
+``certainty``, above 0 and up to 1, is how sure it is that it is one thing. Of a building of several
+levels, which features name in ``level_id`` or ``level``, ``plan.geojson#1`` chooses one.
 Heights (a third coordinate) are ignored, and rings need not repeat their first point.
 
 A feature whose geometry is null or empty has no place; points and lines are no areas. Both are left
@@ -22,23 +24,26 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from sketchmatch.api.documents import (
     check_values,
+    listed,
     load_json,
     mapping,
+    no_parts,
     number,
     plain_name,
     sequence,
     shown,
 )
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model import FloatArray, LabelledPolygon, PolygonSet
 from sketchmatch.model.arrays import frozen_floats
+from sketchmatch.model.labels import cleaned_label
 
 __all__ = ["decode_geojson", "is_geojson", "load_sequence", "polygons_of"]
 
@@ -57,8 +62,17 @@ _RECORD_SEPARATOR = "\x1e"
 # Degrees. A place in metres is larger than that, and a globe's place mostly smaller.
 _SPAN = 0.1
 _EARTH_RADIUS = 6_371_008.8
-_Remarks = list[tuple[str, str]]
+_MOST_LEVELS = 12
 _DEGREES = re.compile(r"CRS84|EPSG:+4326\b|EPSG:[\d.]*:4326\b|WGS ?84", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """What is read, and what there is to say of it."""
+
+    level: str
+    remarks: list[tuple[str, str]] = field(default_factory=list)
+    levels: Counter[str] = field(default_factory=Counter)
 
 
 def decode_geojson(text: str) -> PolygonSet:
@@ -112,22 +126,23 @@ def is_geojson(document: Any) -> bool:
     return isinstance(kind, str) and kind in _TYPES
 
 
-def polygons_of(document: Any) -> PolygonSet:
-    """Return the polygons of a parsed document, as :func:`decode_geojson` does."""
-    remarks: _Remarks = []
+def polygons_of(document: Any, level: str = "") -> PolygonSet:
+    """Return the polygons of a parsed document, as :func:`decode_geojson` does, or of one level."""
+    reading = _Reading(level)
     members = document if isinstance(document, list) and document else [document]
     paths = [f"[{k}]" for k in range(len(members))] if members is document else [""]
     try:
         polygons = tuple(
             polygon
             for member, path in zip(members, paths, strict=True)
-            for polygon in _polygons(member, path, "", remarks)
+            for polygon in _polygons(member, path, "", reading)
         )
     except RecursionError:
         raise InvalidInputError(
             _POLYGON, "", "is nested too deeply; give its polygons as features"
         ) from None
-    found = PolygonSet(polygons, _notes(remarks))
+    _check_level(reading)
+    found = PolygonSet(polygons, (*_notes(reading.remarks), *_note_on_levels(reading)))
     return _in_metres(found) if _in_degrees(found, members[0]) else found
 
 
@@ -139,33 +154,29 @@ def _is_json(line: str) -> bool:
     return True
 
 
-def _polygons(value: Any, field: str, label: str, remarks: _Remarks) -> Iterator[LabelledPolygon]:
+def _polygons(value: Any, field: str, label: str, reading: _Reading) -> Iterator[LabelledPolygon]:
     """Yield the polygons of any GeoJSON object; ``field`` is its path."""
     item = mapping(value, field, _POLYGON, "a GeoJSON object")
     kind, at = item.get("type"), _path(field, "coordinates")
     match kind:
         case "FeatureCollection":
-            yield from _members(item, field, "features", label, remarks)
+            yield from _members(item, field, "features", label, reading)
         case "GeometryCollection":
-            yield from _members(item, field, "geometries", label, remarks)
-        case "Feature" if item.get("geometry", 0) is None:
-            remarks.append((field, "nowhere"))
+            yield from _members(item, field, "geometries", label, reading)
         case "Feature":
-            name, sure = _label(item), _certainty(item)
-            for each in _polygons(item.get("geometry"), _path(field, "geometry"), name, remarks):
-                yield replace(each, certainty=sure)
+            yield from _of_feature(item, field, reading)
         case str() if kind in _GEOMETRIES and item.get("coordinates") == []:
-            remarks.append((field, "nowhere"))
+            reading.remarks.append((field, "nowhere"))
         case "Polygon":
             yield _polygon(item.get("coordinates"), at, label)
         case "MultiPolygon":
             for k, part in enumerate(sequence(item.get("coordinates"), at, _POLYGON, "polygons")):
                 yield _polygon(part, f"{at}[{k}]", label)
         case "LineString" if _is_ring(item.get("coordinates")):
-            remarks.append((field, "a closed line"))
+            reading.remarks.append((field, "a closed line"))
             yield LabelledPolygon((_ring(item["coordinates"], at),), label)
         case str() if kind in _GEOMETRIES:
-            remarks.append((field, _GEOMETRIES[kind]))
+            reading.remarks.append((field, _GEOMETRIES[kind]))
         case _:
             raise InvalidInputError(
                 _POLYGON,
@@ -175,19 +186,63 @@ def _polygons(value: Any, field: str, label: str, remarks: _Remarks) -> Iterator
             )
 
 
+def _of_feature(item: dict[str, Any], field: str, reading: _Reading) -> Iterator[LabelledPolygon]:
+    if not _on_level(item, reading):
+        return
+    if item.get("geometry", 0) is None:
+        reading.remarks.append((field, "nowhere"))
+        return
+    name, sure = _label(item), _certainty(item)
+    for each in _polygons(item.get("geometry"), _path(field, "geometry"), name, reading):
+        yield replace(each, certainty=sure)
+
+
 def _members(
-    item: dict[str, Any], field: str, key: str, label: str, remarks: _Remarks
+    item: dict[str, Any], field: str, key: str, label: str, reading: _Reading
 ) -> Iterator[LabelledPolygon]:
     at = _path(field, key)
     for k, member in enumerate(sequence(item.get(key), at, _POLYGON, f"a list of {key}")):
-        yield from _polygons(member, f"{at}[{k}]", label, remarks)
+        yield from _polygons(member, f"{at}[{k}]", label, reading)
 
 
 def _label(feature: dict[str, Any]) -> str:
     properties = feature.get("properties")
     given = properties if isinstance(properties, dict) else {}
-    names = (given.get("label"), given.get("name"), feature.get("id"))
-    return next((name for name in map(plain_name, names) if name), "")
+    keys = ("label", "name", "alt_name")
+    names = (name for key in keys for name in _in_any_language(given.get(key)))
+    return next((name for name in map(plain_name, (*names, feature.get("id"))) if name), "")
+
+
+def _in_any_language(name: Any) -> Iterable[Any]:
+    return name.values() if isinstance(name, dict) else (name,)
+
+
+def _on_level(feature: dict[str, Any], reading: _Reading) -> bool:
+    """Whether a feature is on the level that is read, if one is; its levels are counted."""
+    properties = feature.get("properties")
+    given = properties if isinstance(properties, dict) else {}
+    level = plain_name(given.get("level_id")) or plain_name(given.get("level"))
+    levels = {each.strip() for each in level.split(";")} - {""}
+    reading.levels.update(levels)
+    return not reading.level or reading.level in levels
+
+
+def _check_level(reading: _Reading) -> None:
+    if reading.level not in ("", *reading.levels):
+        if not reading.levels:
+            no_parts(reading.level)
+        raise InvalidInputError(
+            Reason.INVALID_FILE,
+            "",
+            f"has no level {quoted(reading.level)}; choose one of {listed(sorted(reading.levels))}",
+        )
+
+
+def _note_on_levels(reading: _Reading) -> Iterator[str]:
+    if not reading.level and len(reading.levels) > 1:
+        most = reading.levels.most_common(_MOST_LEVELS)
+        counts = ", ".join(f"{cleaned_label(level)} ({count})" for level, count in most)
+        yield f"The objects are on several levels, of which FILE#LEVEL chooses one: {counts}."
 
 
 def _certainty(feature: dict[str, Any]) -> float:
@@ -228,7 +283,7 @@ def _path(field: str, key: str) -> str:
     return f"{field}.{key}" if field else key
 
 
-def _notes(remarks: _Remarks) -> tuple[str, ...]:
+def _notes(remarks: list[tuple[str, str]]) -> tuple[str, ...]:
     """Say of each kind of remark how many things it is about, and where the first one is."""
     counts = Counter(kind for _, kind in remarks)
     first = {kind: field for field, kind in reversed(remarks)}
