@@ -160,6 +160,24 @@ def test_what_lies_inside_an_object_is_a_mark_if_it_is_small(side, objects):
     assert len(found.scene) == objects
 
 
+@pytest.mark.parametrize(("beside", "objects"), [([], 4), ([box(99, 40, 30, 30)], 2)])
+def test_what_is_small_beside_the_walls_around_all_is_no_mark_in_them(beside, objects):
+    walls = box(0, 0, 90, 90)
+    things = [box(5, 5, 20, 20), box(40, 5, 20, 20), box(70, 5, 9, 9)]
+    assert len(found_in(walls, *things, *beside).scene) == objects
+
+
+@pytest.mark.parametrize("names", [("", "desk", ""), ("", "", "desk"), ("desk", "table", "")])
+def test_an_outline_drawn_again_is_called_as_any_of_them_the_first_before_all(names):
+    outlines = [box(0, 0, 10, 10), box(0.1, 0.1, 9.8, 9.8), box(0.2, 0.2, 9.6, 9.6)]
+    drawn = [Stroke(np.array(box(20, 0, 9, 9), float), label="bed")]
+    drawn += [
+        Stroke(np.array(line, float), label=name)
+        for line, name in zip(outlines, names, strict=True)
+    ]
+    assert StrokeSegmenter().segment(StrokeSet(tuple(drawn))).scene.labels == ("bed", "desk")
+
+
 @pytest.mark.parametrize(("gap", "objects"), [(0.56, 3), (1.2, 2)])  # open by 7 and by 15 %
 def test_a_chain_inside_an_object_is_a_mark_if_it_is_loose(gap, objects):
     upper = [(3, 5 + gap), (3, 7), (7, 7), (7, 5 + gap)]

@@ -9,7 +9,7 @@ import shapely
 
 from ._strokes_trace import SAMPLES, Trace, span_of
 
-__all__ = ["along_others", "hosts", "places", "repeated", "typical_span"]
+__all__ = ["along_others", "frame_of", "hosts", "places", "repeated", "typical_span"]
 
 # A stroke within this share of its own span of another line is drawn over that.
 _ALONG = 0.06
@@ -19,6 +19,8 @@ _ALONG_OUTLINE = 0.08
 _SAME = 0.7
 # Share of a stroke's points beside an outline that is drawn over it.
 _BESIDE = 0.9
+# Share of the other outlines, and how many of them, that lie in a frame.
+_FRAMED, _FEWEST_FRAMED = 0.9, 3
 # Share of an outline's area, or of a stroke's points, within an object that lies in it.
 _WITHIN = 0.8
 
@@ -75,6 +77,29 @@ def hosts(outlines: Sequence[shapely.Polygon]) -> list[int | None]:
         ):
             found[k] = j
     return found
+
+
+def frame_of(outlines: Sequence[shapely.Polygon], within: Sequence[int | None]) -> int | None:
+    """Return the outline in which all that is drawn lies, as in the walls of a room, or None.
+
+    Parameters
+    ----------
+    outlines
+        All there are.
+    within
+        Of each, as from :func:`hosts`.
+    """
+    if not outlines:
+        return None
+    frame = max(range(len(outlines)), key=lambda k: outlines[k].area)
+    inside = 0
+    for k in range(len(outlines)):
+        host = within[k]
+        while host not in (None, frame):
+            host = within[host]
+        inside += host == frame
+    framed = inside >= max(_FEWEST_FRAMED, _FRAMED * (len(outlines) - 1))
+    return frame if framed else None
 
 
 def _meeting(outlines: Sequence[shapely.Polygon], share: float) -> list[tuple[int, int]]:

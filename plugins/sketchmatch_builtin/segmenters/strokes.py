@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Literal
 
@@ -17,7 +18,7 @@ from sketchmatch.model import FloatArray, Scene, SceneObject, Stroke, StrokeSet
 
 from ._strokes_chains import closed_chains
 from ._strokes_drawing import DOT, FLICK, LONGHAND, ROUTE, TANGLED, Drawing, Outline
-from ._strokes_marks import along_others, hosts, places, repeated, typical_span
+from ._strokes_marks import along_others, frame_of, hosts, places, repeated, typical_span
 from ._strokes_outline import areas_of, enclosed_by, own_gap, tangled, total_of
 from ._strokes_trace import LATELY, LONGEST, traced
 
@@ -111,7 +112,8 @@ class StrokeSegmenter(Segmenter):
             le=1.0,
             description=(
                 "Size of the smallest object, as a share of the typical one's; what is smaller "
-                "is a dot or a flick and left out. Inside another object it is three times this."
+                "is a dot or a flick and left out. Inside another object it is three times this. "
+                "An outline around all the others is not counted as typical."
             ),
         )
         route: Literal["auto", "never"] = Field(
@@ -211,10 +213,13 @@ class StrokeSegmenter(Segmenter):
     def _objects(self, drawing: Drawing, outlines: list[Outline]) -> list[Outline]:
         """Return the outlines that are objects, and explain the others."""
         areas = [outline.area for outline in outlines]
-        smallest = self._smallest(outlines)
+        first_of, within = repeated(areas), hosts(areas)
+        outlines = _named_alike(outlines, first_of)
+        frame = frame_of(areas, within)
+        smallest = self._smallest([each for k, each in enumerate(outlines) if k != frame])
         mark = min(_MARK * smallest, _second_largest(outlines))
         objects = []
-        for outline, first, around in zip(outlines, repeated(areas), hosts(areas), strict=True):
+        for outline, first, around in zip(outlines, first_of, within, strict=True):
             members, name = outline.strokes, drawing.named(outline.strokes)
             if outline.span < smallest:
                 drawing.explain(members, FLICK)
@@ -272,6 +277,15 @@ def _object(outline: Outline) -> SceneObject:
 @lru_cache(maxsize=LATELY)
 def _met_lately(ring: bytes, label: str) -> SceneObject:
     return SceneObject.from_rings([np.frombuffer(ring).reshape(-1, 2)], label)
+
+
+def _named_alike(outlines: list[Outline], first_of: Sequence[int | None]) -> list[Outline]:
+    """Return outlines of which those without a label have that of one that repeats them."""
+    labels = [outline.label for outline in outlines]
+    for outline, first in zip(outlines, first_of, strict=True):
+        if first is not None:
+            labels[first] = labels[first] or outline.label
+    return [replace(each, label=label) for each, label in zip(outlines, labels, strict=True)]
 
 
 def _retraces(outline: Outline, host: Outline) -> bool:
