@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import PIL.Image
 import pytest
 from google.protobuf.json_format import Parse
@@ -179,6 +180,24 @@ def test_an_overlay_that_cannot_be_written_is_refused_before_the_match(command_l
     assert done.returncode == ExitCode.INVALID_INPUT
     assert done.stdout == ""
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_an_overlay_never_takes_the_place_of_what_is_read(command_line, tmp_path):
+    shade = np.full((40, 60), 254, np.uint8)
+    shade[10:20, 10:20] = shade[25:33, 40:52] = 0
+    PIL.Image.fromarray(shade).save(tmp_path / "office.png")
+    yaml = "image: office.png\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n"
+    map_ = tmp_path / "office.yaml"
+    map_.write_text(f"{yaml}occupied_thresh: 0.65\nfree_thresh: 0.2\n", encoding="utf-8")
+    before = (tmp_path / "office.png").read_bytes()
+    for given, drawn in ((map_, "office.png"), (tmp_path, "office.png")):
+        done = command_line("segment", given, "--overlay", tmp_path / drawn)
+        assert done.returncode == ExitCode.INVALID_INPUT
+        assert "office.png', which is read here, and would be lost" in done.stderr
+    assert (tmp_path / "office.png").read_bytes() == before
+    for _ in range(2):  # what was drawn before may be drawn again
+        done = command_line("segment", map_, "--overlay", tmp_path / "scene.png")
+        assert done.returncode == 0, done.stderr
 
 
 def test_the_seed_decides_the_search(command_line, where):

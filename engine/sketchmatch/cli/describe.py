@@ -65,7 +65,7 @@ def describe(
     if plot is not None:
         from sketchmatch.cli import pictures
 
-        pictures.check_path(plot, "--plot")
+        pictures.check_path(plot, scene, field="--plot")
     from sketchmatch.cli import inspection
 
     names = {"segmenter": segmenter, "histogram": histogram}

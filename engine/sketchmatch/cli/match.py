@@ -81,7 +81,7 @@ def match(
         problem = "is for a server, and none is asked; give --server, or drop it"
         raise InvalidInputError(Reason.INVALID_FIELD, "--keep-running", problem)
     if overlay is not None:
-        pictures.check_path(overlay)
+        pictures.check_path(overlay, sketch, map_)
     known = options.parse_pins(pin, no_pin)
     chosen: MatchOptions = {
         **search.chosen(),

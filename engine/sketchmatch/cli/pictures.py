@@ -11,7 +11,8 @@ import numpy as np
 from sketchmatch.cli.display import doubt, facts, likely
 from sketchmatch.cli.options import say
 from sketchmatch.cli.sources import is_kept
-from sketchmatch.io.files import read_map_files
+from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.io.files import file_and_part, read_map_files
 from sketchmatch.io.ros_bag import bag_and_topic, is_bag, read_bag
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene, SceneObject, StrokeSet
 from sketchmatch.model.arrays import frozen_floats
@@ -43,7 +44,28 @@ __all__ = [
     "scene_of",
 ]
 
-check_path = check_picture_path
+
+def check_path(path: Path, *given: Path | None, field: str = "--overlay") -> None:
+    """Refuse a path that no picture can be saved under, and one of what is given, or part of it.
+
+    Parameters
+    ----------
+    path
+        Where the picture shall be.
+    given
+        The files that are read.
+    field
+        What an error calls the path.
+    """
+    check_picture_path(path, field)
+    for each in filter(None, given) if path.is_file() else ():
+        file, _ = file_and_part(each)
+        files = read_map_files(file) if file.exists() else None
+        if (file.exists() and path.samefile(file)) or (
+            files and path.read_bytes() == files.picture
+        ):
+            problem = f"is {str(path)!r}, which is read here, and would be lost; give another name"
+            raise InvalidInputError(Reason.INVALID_FILE, field, problem)
 
 
 def draw_match(match: Match, map_path: Path, target: Path, metres: bool) -> None:

@@ -49,7 +49,7 @@ def segment(
 
     options.refuse_config(config, server)
     if overlay is not None:
-        pictures.check_path(overlay)
+        pictures.check_path(overlay, file)
     if out is not None:
         scene_files.check_scene_path(out, "--out")
     parameters = options.parse_settings(settings, ("segmenter",)).get("segmenter", {})

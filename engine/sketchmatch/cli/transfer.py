@@ -108,7 +108,7 @@ def transfer(
     options.refuse_config(config, server)
     files.check_targets(out, keepout, waypoints)
     if overlay is not None:
-        pictures.check_path(overlay)
+        pictures.check_path(overlay, sketch, map_)
     known = options.parse_pins(pin, no_pin)
     forth = direction is _Direction.SKETCH_TO_MAP
     carried.check_keepout(keepout, map_ if forth else sketch)
@@ -195,7 +195,7 @@ def carry(
     options.refuse_config(config, server)
     files.check_targets(out, keepout, waypoints)
     if overlay is not None:
-        pictures.check_path(overlay)
+        pictures.check_path(overlay, old, new)
     carried.check_keepout(keepout, new)
     known = options.parse_pins(pin, no_pin)
     given = files.read_features(features) + carried.named_in(old)
