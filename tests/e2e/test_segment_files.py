@@ -171,6 +171,23 @@ def test_files_of_other_tools_are_read_by_whoever_answers(command_line, where, t
     assert (tmp_path / "x.png").stat().st_size > 0
 
 
+PLAN = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 900 600">
+<path fill="none" stroke="black" d="M0 0H900V600H0ZM0 300H900M400 0V300"/>
+<text x="300" y="450">living room</text><text x="100" y="150">kitchen</text></svg>"""
+
+
+def test_what_is_written_in_a_drawn_plan_names_its_rooms(command_line, where, tmp_path):
+    plan, picture = tmp_path / "plan.svg", tmp_path / "plan.png"
+    plan.write_text(PLAN, encoding="utf-8")
+    options = ("--segmenter", "rooms", "--overlay", picture, *where)
+    done = command_line("segment", plan, *options)
+    assert done.returncode == 0, done.stderr
+    assert [line.split("\t")[1] for line in done.stdout.splitlines()[1:]] == [
+        "kitchen", "", "living room",
+    ]  # fmt: skip
+    assert picture.stat().st_size > 0
+
+
 def test_a_fault_in_a_file_of_another_tool_begins_with_its_path(command_line, where, tmp_path):
     file = tmp_path / "labels.json"
     file.write_text('{"shapes": [{"points": 3}]}')

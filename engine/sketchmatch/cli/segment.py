@@ -57,7 +57,7 @@ def segment(
         source = sources.source_of(file)
         found = asked.segment(source, segmenter=segmenter, params=parameters, profile=profile)
     if overlay is not None:
-        pictures.draw_segmentation(found, file, overlay, pen=source.HasField("stroke_set"))
+        pictures.draw_segmentation(found, file, overlay, pen=sources.is_drawn(source))
     if out is not None:
         content = sources.content_of(file) if scene_files.is_of_a_map(out) else ""
         scene_files.save_scene(out, pictures.scene_of(found.scene), "--out", content)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "content_of",
     "in_metres",
+    "is_drawn",
     "is_kept",
     "source_of",
     "source_or_stored",
@@ -109,7 +110,9 @@ def source_of(path: Path, side: str = "") -> Source:
             note = f"{path.name} is read as a drawing; for a robot's map give its .yaml"
             say_notes(side, [note], verbose=True)
         return sources.image(read_bytes(file))
-    if (source := read_here(path)) is None:
+    source = read_here(path)
+    # Messages of strokes have no room for what is written beside them.
+    if source is None or (isinstance(source, StrokeSet) and source.landmarks):
         return sources.file(read_bytes(file), name=file.name, part=part)
     # The messages of what is decoded already have no room for notes.
     say_notes(side, getattr(source, "notes", ()), verbose=True)
@@ -132,6 +135,11 @@ def source_of(path: Path, side: str = "") -> Source:
             return packed
         case Image():
             raise AssertionError("pictures pass as they are")
+
+
+def is_drawn(source: Source) -> bool:
+    """Whether a source is of strokes."""
+    return source.HasField("stroke_set") or source.file.name.lower().endswith(".svg")
 
 
 def content_of(path: Path) -> str:
