@@ -607,3 +607,34 @@ LONG = 100_000
 def test_a_long_value_is_looked_at_once(body):
     with within(2.0):
         assert boxes(body + DESK)[-1] == near([PLACE])[0]
+
+
+MARKER = '<marker id="tip"><path d="M0 0L4 2L0 4"/></marker>'
+LINE = '<path class="d" d="M100 100H300" stroke="red" fill="none" {}/>'
+
+
+@pytest.mark.parametrize(
+    ("style", "attributes", "read"),
+    [
+        ("", 'marker-start="url(#tip)" marker-end="url(#tip)"', False),
+        (".d{marker-start:url(#tip);marker-end:url('#tip')}", "", False),
+        (".d{marker-end:url(#tip)}", "", True),
+        ("", 'marker-start="url(#none)" marker-end="url(#tip)"', True),
+        (".d{marker-start:none}", 'marker-start="url(#tip)" marker-end="url(#tip)"', True),
+    ],
+)
+def test_a_line_with_arrowheads_at_both_ends_says_a_length(style, attributes, read):
+    body = f"<style>{style}</style>{MARKER}{KEPT}{LINE.format(attributes)}"
+    found = decoded(body)
+    assert len(found.strokes) == 1 + read
+    note = "<path> on line 1 of the file is marked as a length is, with arrowheads at both ends"
+    assert found.notes == (() if read else (f"{note}: left out.",))
+
+
+def test_of_lengths_the_first_is_named_and_outlines_are_none():
+    ends = 'marker-start="url(#tip)" marker-end="url(#tip)"'
+    lines = '<line x2="9" stroke="red"/><line x2="8" fill="none"/><polyline points="0 0 0 9" stroke="red"/>'
+    found = decoded(f"{MARKER}<g {ends}>{DESK}{KEPT}{lines}</g>")
+    assert len(found.strokes) == 2
+    (note,) = found.notes
+    assert note.startswith("<line> on line 1 of the file and 1 more are marked")

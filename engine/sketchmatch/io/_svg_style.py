@@ -35,6 +35,7 @@ _PAINTS = {"fill", "stroke"}
 _INHERITED = {
     *_PAINTS,
     *{"visibility", "color", "fill-rule", "fill-opacity", "stroke-opacity", "stroke-width"},
+    *{"marker-start", "marker-end"},
 }
 _TRANSFORMS = {"transform", "translate", "rotate", "scale", "transform-origin", "transform-box"}
 _GEOMETRY = {"x", "y", "width", "height", "cx", "cy", "r", "rx", "ry", "d"}
@@ -83,6 +84,8 @@ class Look:
         As shares and in user units.
     fill_rule
         Whether it is ``evenodd``.
+    marker_start, marker_end
+        Identities of what its ends are drawn with, or empty.
     displayed
         Whether anything of it is shown, that is neither ``display`` nor ``opacity`` hides it.
     clip_path
@@ -103,6 +106,8 @@ class Look:
     stroke_opacity: float = 1.0
     stroke_width: float = 1.0
     fill_rule: bool = False
+    marker_start: str = ""
+    marker_end: str = ""
     displayed: bool = True
     clip_path: str = ""
     overflow: bool = False
@@ -409,6 +414,11 @@ def _width(text: str) -> float:
     return length(text, 100.0)
 
 
+def _target(text: str) -> str:
+    match = _URL.match(text)
+    return match[1].strip().removeprefix("#") if match else ""
+
+
 _VALUES: dict[str, Any] = {
     **dict.fromkeys(_PAINTS, _paint_text),
     **dict.fromkeys(_SHARES, _share),
@@ -416,6 +426,8 @@ _VALUES: dict[str, Any] = {
     "stroke-width": _width,
     "visibility": lambda text: _VISIBLE[text.lower()],
     "fill-rule": lambda text: _RULES[text.lower()],
+    "marker-start": _target,
+    "marker-end": _target,
 }
 
 
@@ -428,11 +440,6 @@ def _inherited(look: Look) -> Look:
 
 def _attribute(name: str) -> str:
     return "visible" if name == "visibility" else name.replace("-", "_")
-
-
-def _target(text: str) -> str:
-    match = _URL.match(text)
-    return match[1].strip().removeprefix("#") if match else ""
 
 
 def _counted(root: ElementTree.Element) -> tuple[int, Counter[tuple[str, str]], int]:

@@ -17,9 +17,10 @@ A shape's label is the first that it has of: its ``<title>``, ``aria-label``, ``
 ``path123``); or else that of the innermost group with one of all these but an ``id`` which is no
 layer.
 
-Paper is no shape: a filled rectangle without a line that covers the whole page, or lies under all
-else. Of a shape that is drawn once filled and once as a line, the line is taken; of the paths with
-which Excalidraw draws one, its hatching or filling first, the last: the outline, every line of
+A line with an arrowhead, or another marker, at both of its ends says how long something is, and is
+no shape. Paper is none: a filled rectangle without a line that covers the whole page, or lies under
+all else. Of a shape that is drawn once filled and once as a line, the line is taken; of the paths
+with which Excalidraw draws one, its hatching or filling first, the last: the outline, every line of
 which is drawn twice. A pen stroke that was exported as the outline of its ink becomes the line
 again (:mod:`sketchmatch.io._svg_ink`).
 
@@ -135,9 +136,19 @@ def decode_svg(data: bytes) -> StrokeSet:
             for shape in shapes
             for points in _lines(shape, tolerance)
         ),
-        tuple(f"{each.place} was taken for the paper: all else lies on it." for each in ground),
+        (
+            *(f"{each.place} was taken for the paper: all else lies on it." for each in ground),
+            *_note_on_dimensions(drawing.dimensions),
+        ),
         tuple(drawing.names),
     )
+
+
+def _note_on_dimensions(places: list[str]) -> Iterator[str]:
+    if places:
+        others = f" and {len(places) - 1} more are" if len(places) > 1 else " is"
+        ends = "arrowheads at both ends: left out"
+        yield f"{places[0]}{others} marked as a length is, with {ends}."
 
 
 def _document(data: bytes) -> tuple[ElementTree.Element, list[int]]:
@@ -245,6 +256,7 @@ class _Drawing:
         self.background = self._styles.background(root)
         self.page: Box | None = None
         self.names: list[Landmark] = []
+        self.dimensions: list[str] = []
 
     def shapes(self) -> Iterator[_Shape]:
         """Yield the shapes that are shown, in the order they are drawn."""
@@ -270,7 +282,9 @@ class _Drawing:
                 elif look.visible and (fill is not None or stroke is not None):
                     shape = self._shape(element, inner, fill, stroke, f"shapes[{count}]")
                     count += 1
-                    if shape.subpaths and _meet(shape.box, inner.clip):
+                    if self._says_a_length(look, shape):
+                        self.dimensions.append(shape.place)
+                    elif shape.subpaths and _meet(shape.box, inner.clip):
                         yield shape
                 continue
             if label := _groups_label(element):
@@ -283,6 +297,15 @@ class _Drawing:
             children, inner = self._children(element, inner)
             self._visit(len(children))
             stack.extend((child, inner) for child in reversed(children))
+
+    def _says_a_length(self, look: Look, shape: _Shape) -> bool:
+        """Whether a shape is an open line, both ends of which are marked."""
+        ends = (self._named.get(look.marker_start), self._named.get(look.marker_end))
+        marked = all(end is not None and tag_of(end) == "marker" for end in ends)
+        return marked and shape.stroke is not None and not any(map(_is_closed, shape.subpaths))
+
+    def _place(self, element: ElementTree.Element) -> str:
+        return f"{named_element(element)} on line {self._lines[element]} of the file"
 
     def _visit(self, count: int) -> None:
         self._visited += count
@@ -307,7 +330,7 @@ class _Drawing:
             stroke,
             look.fill_rule,
             pen,
-            f"{named_element(element)} on line {line} of the file",
+            self._place(element),
             _box(subpaths),
         )
 
@@ -626,6 +649,10 @@ def _rectangular(shape: _Shape) -> bool:
     x0, y0, x1, y1 = shape.box
     share = abs(signed_area(_ends(shape.subpaths[0]))) / max((x1 - x0) * (y1 - y0), 1e-300)
     return 1.0 - _ROUNDED <= share <= 1.0 + _ROUNDED
+
+
+def _is_closed(subpath: Subpath) -> bool:
+    return bool((subpath[0][0] == subpath[-1][-1]).all())
 
 
 def _ends(subpath: Subpath) -> FloatArray:
