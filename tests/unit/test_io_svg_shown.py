@@ -639,3 +639,17 @@ def test_of_lengths_the_first_is_named_and_outlines_are_none():
     assert len(found.strokes) == 2
     (note,) = found.notes
     assert note.startswith("<line> on line 1 of the file and 1 more are marked")
+
+
+def test_what_is_written_is_read_where_it_is_seen():
+    texts = "".join(
+        f'<text x="{k}" y="5" style="{style}">room {k}</text>'
+        for k, style in enumerate(
+            ("", "display:none", "visibility:hidden", "opacity:0", "fill:red")
+        )
+    )
+    found = decoded(KEPT + texts).landmarks
+    assert [(item.name, item.point) for item in found] == [
+        ("room 0", (0.0, -5.0)),
+        ("room 4", (4.0, -5.0)),
+    ]

@@ -268,7 +268,7 @@ class _Drawing:
             if not look.displayed or not _for_us(element):
                 continue
             if tag_of(element) == "text":
-                self.names.extend(_written(element, outer.matrix))
+                self.names.extend(_written(element, outer.matrix) if look.visible else ())
                 continue
             inner = replace(
                 outer, look=look, size=(None, None), matrix=self._placed(element, look, outer)
