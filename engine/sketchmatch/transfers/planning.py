@@ -1,10 +1,10 @@
 """Routes kept out of obstacles: planned again where the warp leads into one.
 
-A part of a route that comes too near to obstacles is replaced by the cheapest way between its ends
-(scikit-image's ``MCP_Geometric``, Dijkstra's algorithm on cells), which stays near the carried
-route and rather in the middle of free space, and then is pulled smooth. Objects are passed on the
-side on which they were drawn: the way that led past one on the other side is closed, and planned
-again.
+A part of a route that comes too near to obstacles, and a little before and behind it, is replaced
+by the cheapest way between its ends (scikit-image's ``MCP_Geometric``, Dijkstra's algorithm on
+cells), which stays near the carried route and rather in the middle of free space, and then is
+pulled smooth. Objects are passed on the side on which they were drawn: the way that led past one
+on the other side is closed, and planned again, as long as that does not make it far longer.
 """
 
 from __future__ import annotations
@@ -38,6 +38,11 @@ _SLACK = 0.5
 _PARTS = 16
 """Into how many parts a leg is cut where it is pulled smooth."""
 _MOST_BARRIERS = 6
+_DETOUR = 2.0
+"""How much longer a way may be for the sake of the sides on which it passes objects."""
+_LEAD = 3.0
+"""Radii, or three times so many cells: how far before an obstacle, and behind it, a way may leave
+the carried one, so that it does not turn at a corner."""
 _MOST_STRETCHES = 8
 _MANY_CELLS = 400_000
 """Four times more than these are first searched by blocks, about so many."""
@@ -133,16 +138,22 @@ def kept_clear(
     if first > 0:
         changes.append(_moved(way, 0, first, ChangeReason.MOVED_START, "begins", unit))
     done = way.part(first, first)
-    at = first
+    at = joint = first
+    lead = _LEAD * max(radius, 3.0 * obstacles.resolution)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way.points, axis=0).T))])
     while at < last:
         if clear[at + 1]:
             blocked = np.flatnonzero(~clear[at + 1 : last + 1])
             until = at + int(blocked[0]) if blocked.size else last
             done, at = done + way.part(at + 1, until), until
             continue
+        leave = max(joint, int(np.searchsorted(along, along[at] - lead)))
         # What is clear may be the hollow of a thing of which only the outline was seen.
-        for beyond in _reappearing(clear, at):
-            found, sides = yield from _around(way, at, beyond, obstacles, radius, landmarks)
+        for beyond in _reappearing(clear[: last + 1], along, at, 2.0 * lead):
+            again = int(np.searchsorted(along, along[beyond] + lead, side="right")) - 1
+            still = np.flatnonzero(~clear[beyond : min(again, last) + 1])
+            again = beyond + int(still[0]) - 1 if still.size else min(again, last)
+            found, sides = yield from _around(way, leave, again, obstacles, radius, landmarks)
             if found is not None:
                 break
         if found is None:
@@ -153,13 +164,13 @@ def kept_clear(
             end = len(done.points) - 1
             changes.append(Change(ChangeReason.UNREACHABLE, end, end, sentence))
             return _finished(done, changes)
-        begin = len(done.points) - 1
-        done = done + found
+        begin = len(done.points) - 1 - (at - leave)
+        done = done.part(0, begin) + found
         named = _named(way.part(at, beyond), landmarks)
         sentence = f"Led around{named}, to stay {kept:.6g} {unit} away from obstacles."
         changes.append(Change(ChangeReason.OBSTACLE, begin, len(done.points) - 1, sentence))
         changes += [replace(each, first=begin, last=len(done.points) - 1) for each in sides]
-        at = beyond
+        at = joint = again
     if last < len(way.points) - 1:
         end = len(done.points) - 1
         moved = _moved(way, len(way.points) - 1, last, ChangeReason.MOVED_END, "ends", unit)
@@ -167,10 +178,17 @@ def kept_clear(
     return _finished(done, changes)
 
 
-def _reappearing(clear: BoolArray, at: int) -> list[int]:
-    """Return where stretches that are clear begin after a point that ends one."""
+def _reappearing(clear: BoolArray, along: FloatArray, at: int, long: float) -> list[int]:
+    """Return where stretches that are clear begin after a point that ends one, long ones first.
+
+    Between two obstacles near each other the way need not return to the carried one.
+    """
     begins = at + 1 + np.flatnonzero(clear[at + 1 :] & ~clear[at:-1])
-    return [int(k) for k in begins[:_MOST_STRETCHES]]
+    ends = np.append(np.flatnonzero(clear[at + 1 : -1] & ~clear[at + 2 :]) + at + 1, len(clear) - 1)
+    ends = ends[np.searchsorted(ends, begins)]
+    short = (along[ends] - along[begins] < long) & (ends < len(clear) - 1)
+    order = np.argsort(short[:_MOST_STRETCHES], kind="stable")
+    return [int(k) for k in begins[order]]
 
 
 def _finished(done: Way, changes: list[Change]) -> tuple[Way | None, tuple[Change, ...]]:
@@ -206,28 +224,28 @@ def _around(
     """Return a way from one clear point to another, without the first, and what is odd of it."""
     carried = way.part(first, last)
     wanted = [_swept(carried.drawn, place) for place in landmarks.drawn]
+
+    def on_other_side(line: FloatArray) -> list[int]:
+        places = enumerate(landmarks.carried)
+        return [k for k, place in places if abs(_swept(line, place) - wanted[k]) > math.pi]
+
     barriers: list[FloatArray] = []
     closed: set[int] = set()
     found = line = yield from _planned(carried, obstacles, radius, barriers)
-    while found is not None and len(closed) < _MOST_BARRIERS:
-        wrong = [
-            k
-            for k, place in enumerate(landmarks.carried)
-            if k not in closed and abs(_swept(found, place) - wanted[k]) > math.pi
-        ]
-        if not wrong:
-            line = found
-            break
-        closed.update(wrong)
-        barriers += [_barrier(carried, landmarks, k, obstacles) for k in wrong]
-        found = yield from _planned(carried, obstacles, radius, barriers)
     if line is None:
         return None, []
-    odd = [
-        landmarks.names[k]
-        for k, place in enumerate(landmarks.carried)
-        if abs(_swept(line, place) - wanted[k]) > math.pi
-    ]
+    odd = on_other_side(line)
+    longest = _DETOUR * _length(line) + max(_MARGIN, 8.0 * radius)
+    while found is not None and len(closed) < _MOST_BARRIERS:
+        wrong = on_other_side(found)
+        if len(wrong) < len(odd) and _length(found) <= longest:
+            line, odd = found, wrong
+        more = set(wrong) - closed
+        if not more:
+            break
+        closed |= more
+        barriers += [_barrier(carried, landmarks, k, obstacles) for k in sorted(more)]
+        found = yield from _planned(carried, obstacles, radius, barriers)
     smooth = _smoothed(line, obstacles, radius)
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(smooth, axis=0).T))])
     shares = along / along[-1] if along[-1] else along
@@ -238,9 +256,17 @@ def _around(
         np.interp(shares, places, carried.sources),
         np.stack([np.interp(shares, places, column) for column in carried.drawn.T], axis=1),
     )
-    sentence = "Passes {} on another side than drawn: on that side there is no way."
-    changes = [Change(ChangeReason.OTHER_SIDE, 0, 0, sentence.format(name)) for name in odd]
+    sentence = (
+        "Passes {} on another side than drawn: on that side there is no way, or a far longer one."
+    )
+    changes = [
+        Change(ChangeReason.OTHER_SIDE, 0, 0, sentence.format(landmarks.names[k])) for k in odd
+    ]
     return planned.part(1, len(smooth) - 1), changes
+
+
+def _length(line: FloatArray) -> float:
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
 def _swept(line: FloatArray, place: FloatArray) -> float:
