@@ -243,4 +243,57 @@ def test_a_map_is_mended_in_the_file_that_was_saved_beside_it(command_line, wher
     beside.write_text(json.dumps(document), encoding="utf-8")
     wrong = command_line("segment", room, *where)
     assert wrong.returncode == 2
-    assert "objects.polygons[0] crosses itself" in wrong.stderr
+    assert "living_room.objects.geojson: polygons[0] crosses itself" in wrong.stderr
+
+
+def test_what_people_say_of_another_content_is_never_replaced_unasked(command_line, tmp_path):
+    map_, beside = tmp_path / "office.yaml", tmp_path / "office.objects.geojson"
+    shutil.copy(LIVING_ROOM_MAP, map_)
+    (picture,) = LIVING_ROOM_MAP.parent.glob(f"{LIVING_ROOM_MAP.stem}.p*")
+    shutil.copy(picture, tmp_path / picture.name)
+    save = ("segment", map_, "--out", beside)
+    assert command_line(*save).returncode == 0
+    assert command_line(*save).returncode == 0, "what is read for the map may be saved again"
+    document = json.loads(beside.read_text(encoding="utf-8"))
+    for feature in document["features"]:
+        feature["properties"] |= {"label": "by hand", "map": "sha256:0000000000000000"}
+    beside.write_text(json.dumps(document), encoding="utf-8")
+    done = command_line(*save)
+    assert done.returncode == 2
+    assert "not of this content of the map, and would be lost" in done.stderr
+    assert "by hand" in beside.read_text(encoding="utf-8")
+    assert command_line(*save, "--segmenter", "occupancy-grid").returncode == 0
+    assert "by hand" not in beside.read_text(encoding="utf-8")
+    beside.write_text("{", encoding="utf-8")
+    done = command_line("segment", map_)
+    assert f"{beside} is not JSON" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("option", "name"),
+    [
+        ("--out", "drawn.geojson"),
+        ("--keepout", "map.yaml"),
+        ("--keepout", "office.yaml"),
+        ("--waypoints", "office.yaml"),
+    ],
+)
+def test_what_is_carried_never_takes_the_place_of_what_is_read(
+    command_line, tmp_path, option, name
+):
+    shades = np.full((60, 80), 254, np.uint8)
+    for x, y, width, height in ((10, 10, 12, 8), (40, 15, 9, 20), (60, 40, 8, 8), (20, 40, 16, 6)):
+        shades[y : y + height, x : x + width] = 0
+    (tmp_path / "map.pgm").write_bytes(b"P5 80 60 255\n" + shades.tobytes())
+    (tmp_path / "office.yaml").write_text(
+        "image: map.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.2\n"
+    )
+    line = {"type": "LineString", "coordinates": [[1, 0.5], [3, 0.5]]}
+    (tmp_path / "drawn.geojson").write_text(json.dumps(line))
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    given = [tmp_path / each for each in ("drawn.geojson", "office.yaml", "office.yaml")]
+    done = command_line("carry", *given, option, tmp_path / name)
+    assert done.returncode == 2
+    assert "which is read here, and would be lost" in done.stderr
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before

@@ -1,6 +1,7 @@
 """Objects of a robot's map that people mended, in a file beside it."""
 
 import json
+import re
 import shutil
 
 import numpy as np
@@ -126,15 +127,19 @@ def test_that_of_another_content_is_said_and_ignored(mended):
     (office.parent / "office.pgm").write_bytes(picture(*BOXES, (30, 50, 4, 4)))
     assert len(read_scene(office)) == 4
     assert notes(office) == (
-        "office.objects.geojson is of another content of the map and was ignored; save it anew "
-        "with `sketchmatch segment office.yaml --out office.objects.geojson`",
+        "office.objects.geojson is of another content of the map and was ignored; replace it, and "
+        "what is in it, with `sketchmatch segment office.yaml --segmenter occupancy-grid "
+        "--out office.objects.geojson`",
     )
 
 
 def test_one_that_says_of_no_map_is_ignored(mended):
     office, _, edit = mended
     edit(lambda features: [each["properties"].pop("map") for each in features])
-    assert "is of another content" in notes(office)[0]
+    assert "does not say by a property map of which content" in notes(office)[0]
+    content = re.search(r"give a feature map=(sha256:[0-9a-f]{16})", notes(office)[0])[1]
+    edit(lambda features: features[0]["properties"].update(map=content))
+    assert notes(office) == (SAID.format("office.objects.geojson"),)
 
 
 def test_one_that_a_caller_says_is_of_this_map_need_not_say_so_itself(office):

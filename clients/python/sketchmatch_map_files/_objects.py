@@ -66,8 +66,10 @@ def find_objects(
         text = _text_of(path)
         if text is None:
             continue
+        said: set[str] = set()
         try:
-            mine = is_of(json.loads(text), content)
+            said = _contents(json.loads(text))
+            mine = content in said
         except (ValueError, RecursionError):
             # Whoever reads it says what is wrong with it.
             mine = path == own
@@ -75,11 +77,18 @@ def find_objects(
             note = f"objects are those of {path.name} beside the map, unless a segmenter is chosen"
             return text, (note,)
         if path == own:
-            stale = (
-                f"{own.name} is of another content of the map and was ignored; save it anew with "
-                f"`sketchmatch segment {file.name} --out {own.name}`",
-            )
+            stale = (_ignored(own.name, file.name, "" if said else content),)
     return None, stale
+
+
+def _ignored(own: str, file: str, content: str) -> str:
+    """Return what is said of a file that is not read; the content is one that it fails to name."""
+    why, remedy = "is of another content of the map", ""
+    if content:
+        why = "does not say by a property map of which content of the map it is"
+        remedy = f"give a feature map={content}, or "
+    anew = f"`sketchmatch segment {file} --segmenter occupancy-grid --out {own}`"
+    return f"{own} {why} and was ignored; {remedy}replace it, and what is in it, with {anew}"
 
 
 def _candidates(own: Path) -> Iterator[Path]:

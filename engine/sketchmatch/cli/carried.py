@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sketchmatch.cli import output
+from sketchmatch.cli import output, sources
 from sketchmatch.cli.display import doubt, say_notes
 from sketchmatch.cli.options import say
 from sketchmatch.cli.pictures import grid_in, grouped, matched_pairs, scene_of
@@ -27,6 +27,7 @@ from sketchmatch_proto.v1.transfer_service_pb2 import TransferResponse
 __all__ = [
     "Carriage",
     "check_keepout",
+    "check_spared",
     "draw",
     "messages",
     "named_in",
@@ -126,6 +127,23 @@ def places_of(path: Path | None) -> Iterator[None]:
             raise
         problem = str(error).removeprefix(error.field).lstrip()
         raise InvalidInputError(Reason.INVALID_FILE, f"{path}: {error.field}", problem) from None
+
+
+def check_spared(
+    targets: tuple[Path | None, Path | None, Path | None], given: Iterable[Path | None]
+) -> None:
+    """Refuse to save a file with features, a mask or waypoints under the path of what is read."""
+    out, keepout, waypoints = targets
+    picture = None if keepout is None else keepout.with_suffix(".pgm")
+    read = tuple(given)
+    for path, field in (
+        (out, "--out"),
+        (keepout, "--keepout"),
+        (picture, "--keepout"),
+        (waypoints, "--waypoints"),
+    ):
+        if path is not None:
+            sources.check_spared(path, field, *read)
 
 
 def check_keepout(keepout: Path | None, target: Path) -> None:

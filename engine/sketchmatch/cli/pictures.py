@@ -10,9 +10,8 @@ import numpy as np
 
 from sketchmatch.cli.display import doubt, facts, likely
 from sketchmatch.cli.options import say
-from sketchmatch.cli.sources import is_kept
-from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.io.files import file_and_part, read_map_files
+from sketchmatch.cli.sources import check_spared, is_kept
+from sketchmatch.io.files import read_map_files
 from sketchmatch.io.ros_bag import bag_and_topic, is_bag, read_bag
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene, SceneObject, StrokeSet
 from sketchmatch.model.arrays import frozen_floats
@@ -58,14 +57,7 @@ def check_path(path: Path, *given: Path | None, field: str = "--overlay") -> Non
         What an error calls the path.
     """
     check_picture_path(path, field)
-    for each in filter(None, given) if path.is_file() else ():
-        file, _ = file_and_part(each)
-        files = read_map_files(file) if file.exists() else None
-        if (file.exists() and path.samefile(file)) or (
-            files and path.read_bytes() == files.picture
-        ):
-            problem = f"is {str(path)!r}, which is read here, and would be lost; give another name"
-            raise InvalidInputError(Reason.INVALID_FILE, field, problem)
+    check_spared(path, field, *given)
 
 
 def draw_match(match: Match, map_path: Path, target: Path, metres: bool) -> None:

@@ -8,12 +8,18 @@ from pathlib import Path
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch_client import InvalidRequestError
+from sketchmatch_map_files import OBJECTS_SUFFIX
 
 __all__ = ["places_in"]
 
 _KINDS = ("stroke_set", "polygon_set", "occupancy_grid", "map_server_map", "image", "file")
 _WHOLE = ("", "cells", "pixels", "data", "yaml")
 _ABOUT_PICTURES = ("INVALID_IMAGE", "LIMIT_EXCEEDED")
+
+
+def _with_objects(map_: Path) -> Path:
+    """Return the file with a map's objects: the one of its name, of which most faults are."""
+    return map_.with_name(f"{map_.stem}{OBJECTS_SUFFIX}") if map_.suffix else map_
 
 
 @contextmanager
@@ -37,5 +43,9 @@ def places_in(**files: Path) -> Iterator[None]:
         place = place.removeprefix("yaml.")
         # What is found in a map's picture, or is not, is found in the map.
         whole = place in _WHOLE or (place == "image" and error.reason not in _ABOUT_PICTURES)
-        field = str(files[side]) if whole else f"{files[side]}: {place}"
+        file = files[side]
+        if kind == "map_server_map" and place.partition(".")[0] == "objects":
+            file, place = _with_objects(file), place.partition(".")[2]
+            whole = not place
+        field = str(file) if whole else f"{file}: {place}"
         raise InvalidInputError(Reason(error.reason), field, problem) from None

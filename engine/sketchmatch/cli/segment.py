@@ -52,6 +52,8 @@ def segment(
         pictures.check_path(overlay, file)
     if out is not None:
         scene_files.check_scene_path(out, "--out")
+        if not segmenter:
+            sources.check_objects_spared(out, file)
     parameters = options.parse_settings(settings, ("segmenter",)).get("segmenter", {})
     with places.places_in(source=file), answerer(server, config, access) as asked:
         source = sources.source_of(file)

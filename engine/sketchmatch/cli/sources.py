@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sketchmatch.api.documents import decode_text, load_json
 from sketchmatch.cli.display import say_notes
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io.files import (
@@ -13,15 +14,18 @@ from sketchmatch.io.files import (
     read_here,
     read_map_files,
 )
+from sketchmatch.io.scene_files import is_of_a_map
 from sketchmatch.model import Image, OccupancyGrid, PolygonSet, StrokeSet
 from sketchmatch_client import Client, sources
-from sketchmatch_map_files import PICTURE_SUFFIXES
+from sketchmatch_map_files import PICTURE_SUFFIXES, is_of
 from sketchmatch_proto.v1.source_pb2 import MapServerMap, Source
 
 if TYPE_CHECKING:
     from sketchmatch.cli.answering import Answerer
 
 __all__ = [
+    "check_objects_spared",
+    "check_spared",
     "content_of",
     "in_metres",
     "is_drawn",
@@ -135,6 +139,48 @@ def source_of(path: Path, side: str = "") -> Source:
             return packed
         case Image():
             raise AssertionError("pictures pass as they are")
+
+
+def check_spared(path: Path, field: str, *given: Path | None) -> None:
+    """Refuse to save under the path of what is read, or of the picture of a map that is.
+
+    Parameters
+    ----------
+    path, field
+        Where something shall be saved, and what an error calls it.
+    given
+        The files that are read.
+
+    Raises
+    ------
+    InvalidInputError
+        If one of them would be lost.
+    """
+    for each in filter(None, given) if path.is_file() else ():
+        file, _ = file_and_part(each)
+        files = read_map_files(file) if file.exists() else None
+        if (file.exists() and path.samefile(file)) or (
+            files and path.read_bytes() == files.picture
+        ):
+            problem = f"is {str(path)!r}, which is read here, and would be lost; give another name"
+            raise InvalidInputError(Reason.INVALID_FILE, field, problem)
+
+
+def check_objects_spared(out: Path, map_: Path) -> None:
+    """Refuse to replace what people say a map's objects are, where it is not read for the map.
+
+    Raises
+    ------
+    InvalidInputError
+        If it would be lost.
+    """
+    content = content_of(map_) if is_of_a_map(out) and out.is_file() else ""
+    if content and not is_of(load_json(decode_text(read_bytes(out))), content):
+        problem = (
+            f"is {str(out)!r}, which is not of this content of the map, and would be lost; give "
+            "another name, or say --segmenter occupancy-grid to begin anew"
+        )
+        raise InvalidInputError(Reason.INVALID_FILE, "--out", problem)
 
 
 def is_drawn(source: Source) -> bool:

@@ -107,6 +107,7 @@ def transfer(
 
     options.refuse_config(config, server)
     files.check_targets(out, keepout, waypoints)
+    carried.check_spared((out, keepout, waypoints), (sketch, map_, features))
     if overlay is not None:
         pictures.check_path(overlay, sketch, map_)
     known = options.parse_pins(pin, no_pin)
@@ -194,6 +195,7 @@ def carry(
 
     options.refuse_config(config, server)
     files.check_targets(out, keepout, waypoints)
+    carried.check_spared((out, keepout, waypoints), (old, new, features))
     if overlay is not None:
         pictures.check_path(overlay, old, new)
     carried.check_keepout(keepout, new)
