@@ -215,7 +215,8 @@ def test_too_few_objects_says_how_many_strokes_were_left_out():
     assert caught.value.reason == Reason.TOO_FEW_OBJECTS
     assert str(caught.value) == (
         "strokes hold one closed outline (2 strokes were left out: open wider than 25% of the "
-        "size, or only a line), and a match needs two; draw around each object with one stroke"
+        "size, or only a line, or far smaller, or a mark in it, or the same again), and a match "
+        "needs two; draw around each object with one stroke"
     )
     with pytest.raises(InvalidInputError, match="strokes hold no closed outline, and a match"):
         segmented()

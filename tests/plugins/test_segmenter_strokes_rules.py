@@ -160,11 +160,40 @@ def test_what_lies_inside_an_object_is_a_mark_if_it_is_small(side, objects):
     assert len(found.scene) == objects
 
 
-@pytest.mark.parametrize(("beside", "objects"), [([], 4), ([box(99, 40, 30, 30)], 2)])
-def test_what_is_small_beside_the_walls_around_all_is_no_mark_in_them(beside, objects):
-    walls = box(0, 0, 90, 90)
-    things = [box(5, 5, 20, 20), box(40, 5, 20, 20), box(70, 5, 9, 9)]
-    assert len(found_in(walls, *things, *beside).scene) == objects
+THINGS = [box(5, 5, 20, 20), box(40, 5, 20, 20), box(70, 5, 9, 9)]
+WALLS = box(0, 0, 90, 90)
+
+
+@pytest.mark.parametrize(
+    ("around", "objects"),
+    [
+        ([WALLS], 4),
+        ([WALLS, box(100, 0, 90, 90), *[np.add(each, (100, 0)) for each in THINGS]], 8),  # rooms
+        ([WALLS, box(-5, -5, 200, 100), box(120, 40, 12, 12)], 6),  # within a page
+        ([WALLS, box(-3, -3, 96, 96)], 4),  # a double line
+        ([WALLS, box(100, 60, 30, 30), box(105, 65, 9, 9), box(105, 78, 9, 9)], 7),  # a legend
+        ([box(0, 0, 80, 26), box(100, 0, 60, 60)], 4),  # less than three times as large as things
+        ([box(0, 0, 90, 90), *[box(300 * k, 300, 99, 99) for k in range(4)]], 5),  # a large thing
+    ],
+)
+def test_what_is_small_beside_walls_around_it_is_no_mark_in_them(around, objects):
+    assert len(found_in(*around, *THINGS).scene) == objects
+
+
+def test_a_route_within_walls_is_one_and_a_line_of_a_things_span_is_a_mark():
+    route, leg = [(2, 50), (50, 40), (88, 50)], [(42, 7), (58, 20)]
+    found = found_in(WALLS, *THINGS, leg, route)
+    assert found.route.tolist() == np.array(route, float).tolist()
+    assert any("strokes[4] was left out: inside strokes[2]" in each for each in found.warnings)
+
+
+@pytest.mark.parametrize(("lines", "is_route"), [(3, True), (4, False)])
+def test_of_many_straight_lines_across_the_sketch_none_is_the_route(lines, is_route):
+    paper = [[(-300, -200 * k), (400, -200 * k)] for k in range(1, lines + 1)]
+    found = found_in(box(0, 60, 20, 20), box(60, 60, 20, 20), *paper)
+    assert (found.route is not None) == is_route
+    bent = [(-300, 40), (30, 300), (100, 120), (400, 40)]
+    assert found_in(*[box(0, 60, 20, 20), box(60, 60, 20, 20)], bent, *paper).route is not None
 
 
 @pytest.mark.parametrize("names", [("", "desk", ""), ("", "", "desk"), ("desk", "table", "")])

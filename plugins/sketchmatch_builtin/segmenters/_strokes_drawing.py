@@ -43,6 +43,8 @@ class Outline:
         Share of its length that is gaps between strokes.
     parted
         Whether they enclose more, apart from it.
+    frame
+        Whether it is around other things, as walls are.
     """
 
     strokes: tuple[int, ...]
@@ -50,6 +52,7 @@ class Outline:
     label: str
     open: float
     parted: bool
+    frame: bool = False
 
     @cached_property
     def span(self) -> float:

@@ -9,7 +9,15 @@ import shapely
 
 from ._strokes_trace import SAMPLES, Trace, span_of
 
-__all__ = ["along_others", "frame_of", "hosts", "places", "repeated", "typical_span"]
+__all__ = [
+    "along_others",
+    "are_straight",
+    "frames",
+    "hosts",
+    "places",
+    "repeated",
+    "typical_span",
+]
 
 # A stroke within this share of its own span of another line is drawn over that.
 _ALONG = 0.06
@@ -19,8 +27,11 @@ _ALONG_OUTLINE = 0.08
 _SAME = 0.7
 # Share of a stroke's points beside an outline that is drawn over it.
 _BESIDE = 0.9
-# Share of the other outlines, and how many of them, that lie in a frame.
-_FRAMED, _FEWEST_FRAMED = 0.9, 3
+# What is around so many others, so many times as large as is typical of what is around nothing,
+# and has this share of the whole sketch's span, is no thing among them.
+_FRAMED, _LARGER, _SPREAD = 3, 3.0, 0.3
+# A line is straight that leaves its chord by no more than this share of it.
+_STRAIGHT = 0.02
 # Share of an outline's area, or of a stroke's points, within an object that lies in it.
 _WITHIN = 0.8
 
@@ -79,27 +90,39 @@ def hosts(outlines: Sequence[shapely.Polygon]) -> list[int | None]:
     return found
 
 
-def frame_of(outlines: Sequence[shapely.Polygon], within: Sequence[int | None]) -> int | None:
-    """Return the outline in which all that is drawn lies, as in the walls of a room, or None.
+def frames(spans: Sequence[float], within: Sequence[int | None], whole: float) -> frozenset[int]:
+    """Return the outlines that are around other things rather than things: walls, a page, a box.
 
     Parameters
     ----------
-    outlines
-        All there are.
+    spans
+        Of the outlines.
     within
-        Of each, as from :func:`hosts`.
+        In which other one each lies, as from :func:`hosts`.
+    whole
+        The span of all that is drawn.
     """
-    if not outlines:
-        return None
-    frame = max(range(len(outlines)), key=lambda k: outlines[k].area)
-    inside = 0
-    for k in range(len(outlines)):
+    inside = [0] * len(spans)
+    for k in range(len(spans)):
         host = within[k]
-        while host not in (None, frame):
+        while host is not None:
+            inside[host] += 1
             host = within[host]
-        inside += host == frame
-    framed = inside >= max(_FEWEST_FRAMED, _FRAMED * (len(outlines) - 1))
-    return frame if framed else None
+    typical = typical_span([span for span, count in zip(spans, inside, strict=True) if not count])
+    least = max(_LARGER * typical, _SPREAD * whole)
+    return frozenset(k for k, span in enumerate(spans) if inside[k] >= _FRAMED and span >= least)
+
+
+def are_straight(strokes: Sequence[Trace]) -> list[bool]:
+    """Return for each stroke whether it is a straight line."""
+    chords = [stroke.samples[-1] - stroke.samples[0] for stroke in strokes]
+    return [
+        bool(
+            np.abs((stroke.samples - stroke.samples[0]) @ (-chord[1], chord[0])).max()
+            <= _STRAIGHT * (chord @ chord)
+        )
+        for stroke, chord in zip(strokes, chords, strict=True)
+    ]
 
 
 def _meeting(outlines: Sequence[shapely.Polygon], share: float) -> list[tuple[int, int]]:

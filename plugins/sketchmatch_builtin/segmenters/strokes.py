@@ -18,7 +18,15 @@ from sketchmatch.model import FloatArray, Scene, SceneObject, Stroke, StrokeSet
 
 from ._strokes_chains import closed_chains
 from ._strokes_drawing import DOT, FLICK, LONGHAND, ROUTE, TANGLED, Drawing, Outline
-from ._strokes_marks import along_others, frame_of, hosts, places, repeated, typical_span
+from ._strokes_marks import (
+    along_others,
+    are_straight,
+    frames,
+    hosts,
+    places,
+    repeated,
+    typical_span,
+)
 from ._strokes_outline import areas_of, enclosed_by, own_gap, tangled, total_of
 from ._strokes_trace import LATELY, LONGEST, traced
 
@@ -40,6 +48,8 @@ _LOOSE = 0.1
 _RETRACED = 0.25
 # Span of an unlabelled route as a share of the sketch's.
 _ACROSS = 0.5
+# So many straight lines across the sketch are of its paper.
+_LINED = 4
 _ROUTE = re.compile(r"\b(route|path)\b", re.IGNORECASE)
 
 
@@ -113,7 +123,7 @@ class StrokeSegmenter(Segmenter):
             description=(
                 "Size of the smallest object, as a share of the typical one's; what is smaller "
                 "is a dot or a flick and left out. Inside another object it is three times this. "
-                "An outline around all the others is not counted as typical."
+                "Outlines that are around others, as walls and pages are, are not typical."
             ),
         )
         route: Literal["auto", "never"] = Field(
@@ -215,8 +225,10 @@ class StrokeSegmenter(Segmenter):
         areas = [outline.area for outline in outlines]
         first_of, within = repeated(areas), hosts(areas)
         outlines = _named_alike(outlines, first_of)
-        frame = frame_of(areas, within)
-        smallest = self._smallest([each for k, each in enumerate(outlines) if k != frame])
+        whole = drawing.span if outlines else 0.0
+        around_things = frames([outline.span for outline in outlines], within, whole)
+        outlines = [replace(each, frame=k in around_things) for k, each in enumerate(outlines)]
+        smallest = self._smallest(outlines)
         mark = min(_MARK * smallest, _second_largest(outlines))
         objects = []
         for outline, first, around in zip(outlines, first_of, within, strict=True):
@@ -244,7 +256,7 @@ class StrokeSegmenter(Segmenter):
 
     def _smallest(self, outlines: list[Outline]) -> float:
         """Return the least span of an object: a match needs two, so two are large enough."""
-        typical = typical_span([outline.span for outline in outlines])
+        typical = typical_span([outline.span for outline in outlines if not outline.frame])
         return min(self.params.min_size * typical, _second_largest(outlines))
 
     def _without_marks(
@@ -257,7 +269,7 @@ class StrokeSegmenter(Segmenter):
         for k, border, around in zip(left, along, within, strict=True):
             if border is not None:
                 drawing.explain([k], drawing.again(objects[border].strokes))
-            elif around is not None:
+            elif around is not None and not objects[around].frame:
                 drawing.explain([k], drawing.inside(objects[around].strokes))
             elif drawing.strokes[k].span < smallest:
                 drawing.explain([k], FLICK)
@@ -312,6 +324,10 @@ def _route_across(drawing: Drawing, left: list[int]) -> int | None:
     """Return the last of the strokes left that leads across much of the sketch, or None."""
     least = _ACROSS * drawing.span if left else 0.0
     across = [k for k in left if drawing.strokes[k].span > least]
+    straight = are_straight([drawing.strokes[k] for k in across])
+    # Nobody goes along many straight lines: they are those of the paper.
+    if sum(straight) >= _LINED:
+        across = [k for k, line in zip(across, straight, strict=True) if not line]
     if not across:
         return None
     drawing.explain(across[-1:], ROUTE)
@@ -350,7 +366,10 @@ def _why_open(points: FloatArray) -> str:
 def _too_few(found: int, left_out: int, max_gap: float) -> InvalidInputError:
     outlines = "no closed outline" if not found else "one closed outline"
     strokes = "1 stroke was" if left_out == 1 else f"{left_out} strokes were"
-    lost = f" ({strokes} left out: open wider than {max_gap:.0%} of the size, or only a line)"
+    lost = (
+        f" ({strokes} left out: open wider than {max_gap:.0%} of the size, or only a line"
+        f"{', or far smaller, or a mark in it, or the same again' if found else ''})"
+    )
     return InvalidInputError(
         Reason.TOO_FEW_OBJECTS,
         "strokes",
