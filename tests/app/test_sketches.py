@@ -83,6 +83,26 @@ def test_nobody_has_more_sketches_than_one_may_and_all_together_may():
     with_sketches(scenario, of_one=2, sketches=3)
 
 
+def test_who_begins_too_many_loses_the_one_that_is_idle_longest(monkeypatch):
+    async def scenario(sketches):
+        watched, idle, late = await made(sketches), await made(sketches), await made(sketches)
+        events = sketches.watch(WatchSketchRequest(sketch_id=watched), ANNA)
+        assert await anext(events)
+        with pytest.raises(TooBusyError, match=r"the limit; delete one; .* again in (59|60) s"):
+            await made(sketches)
+        monkeypatch.setattr("sketchmatch.app.sketches._SPARED", 0.02)
+        await asyncio.sleep(0.03)
+        await sketches.update(UpdateSketchRequest(sketch_id=late), ANNA)
+        made_last = await made(sketches)
+        with pytest.raises(NotFoundError):
+            await sketches.update(UpdateSketchRequest(sketch_id=idle), ANNA)
+        for name in (watched, late, made_last):
+            await sketches.update(UpdateSketchRequest(sketch_id=name), ANNA)
+        await events.aclose()
+
+    with_sketches(scenario, of_one=3, sketches=9)
+
+
 def test_a_sketch_ends_that_nobody_draws_or_watches():
     async def scenario(sketches):
         drawn, watched = await made(sketches), await made(sketches)

@@ -242,8 +242,9 @@ def test_a_judge_may_answer_a_map_that_nobody_met():
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_probabilities_of_lines_are_read_from_sketch_to_map(swapped):
-    lines = np.round(np.random.default_rng(1).uniform(0.5, 1.0, (4, 6)), 3)
-    best = [3, 0, 4, 1]
+    rng, best = np.random.default_rng(1), [3, 0, 4, 1]
+    lines = np.round(rng.uniform(0.0, 0.05, (4, 6)), 3)
+    lines[np.arange(4), best] = np.round(rng.uniform(0.5, 0.75, 4), 3)
     Told.says = lambda _: Judgement((JudgedMap(best, 0.5),), lines, 0.25)
     result = matched(*drawn(4, 5)[:: -1 if swapped else 1])
     assert result.probability == 0.5
@@ -435,7 +436,7 @@ def test_probabilities_that_contradict_each_other_are_put_down_to_the_judge(
     maps_ = (JudgedMap([3, 0, 4, 1], probability), JudgedMap([0, 1, 2, 3]))
     table = None
     if lines is not None:
-        table = np.eye(4, 6)
+        table = max(0.0, 1.0 - lines) * np.eye(4, 6)
         table[2, 4] = table[0, 3] = table[1, 0] = table[3, 1] = lines
     Told.says = lambda _: Judgement(maps_, table, elsewhere)
     if not words:
@@ -443,6 +444,23 @@ def test_probabilities_that_contradict_each_other_are_put_down_to_the_judge(
         return
     with pytest.raises(PluginError, match=f"judge told of acme 1.0 failed .*{words}"):
         matched(*drawn(4, 5))
+
+
+def test_of_several_maps_and_of_several_partners_one_is_right_at_most():
+    def told(probabilities, row):
+        table = np.zeros((4, 6))
+        table[1] = row
+        maps_ = ([3, 0, 4, 1], [0, 1, 2, 3], [1, 0, 2, 3])
+        judged = tuple(map(JudgedMap, maps_, probabilities))
+        Told.says = lambda _: Judgement(judged, table if row else None)
+        return matched(*drawn(4, 5))
+
+    assert told((0.5, 0.3, 0.2), None).probability == 0.5
+    assert told((None, None, None), [0.5, 0.2, 0.1, 0.1, 0.0, 0.1]).probability is None
+    with pytest.raises(PluginError, match=r"its 3 maps are right with 1.1 together, of which one"):
+        told((0.5, 0.3, 0.3), None)
+    with pytest.raises(PluginError, match=r"object 1 are right with 1.1 together, of which one"):
+        told((None, None, None), [0.5, 0.2, 0.1, 0.1, 0.0, 0.2])
 
 
 # ζ of a map of some objects ----------------------------------------------------------------------

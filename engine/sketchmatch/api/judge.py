@@ -129,11 +129,12 @@ class Judgement:
     ----------
     maps
         All different, the answer first and then the next best ones; all that are about as likely,
-        however few the caller wants to see.
+        however few the caller wants to see. One at most is right: their probabilities are 1
+        together, or less.
     lines
         Shape (N, N' + 1): how likely each template object's partner is each argument object, and,
-        last, none of them, as where the sketch shows another place. None where unknown. No map is
-        likelier than one of its lines.
+        last, none of them, as where the sketch shows another place: 1 together, or less. None
+        where unknown. No map is likelier than one of its lines.
     elsewhere
         How likely the sketch does not show this place at all; None where unknown.
     """

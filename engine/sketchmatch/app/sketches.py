@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import secrets
 import time
 from collections.abc import AsyncGenerator, Coroutine, Mapping
@@ -62,6 +63,8 @@ _log = logging.getLogger(__name__)
 
 _REVISIONS = 256
 _LONGEST_NAME = 64
+# Seconds for which a sketch that nobody draws or watches is kept, although its creator begins more.
+_SPARED = 60.0
 _SLOW = 0.1
 """Seconds after which the progress of a search is worth telling."""
 
@@ -270,11 +273,36 @@ class Sketches:
     def _check_room(self, caller: Caller) -> None:
         if self._closed:
             raise ServerStoppingError("the server is about to stop")
-        theirs = sum(1 for each in self._all.values() if each.caller.name == caller.name)
-        if theirs >= self._limits.of_one:
-            raise TooBusyError(f"you have {theirs} sketches in progress, the limit; delete one")
+        theirs = {name: each for name, each in self._all.items() if each.caller.name == caller.name}
+        if len(theirs) >= self._limits.of_one:
+            self._drop_one(theirs)
         if len(self._all) >= self._limits.sketches:
             raise TooBusyError(f"there are {len(self._all)} sketches in progress, the limit")
+
+    def _drop_one(self, theirs: dict[str, _Sketch]) -> None:
+        """End the sketch that nobody drew or watched for longest, if that is long enough.
+
+        Whoever made it may have ended since, and then nobody knows its name.
+        """
+        idle = {name: each.touched for name, each in theirs.items() if not each.watchers}
+        if not idle:
+            raise TooBusyError(
+                f"you have {len(theirs)} sketches in progress, the limit, and watch all; delete one"
+            )
+        name = min(idle, key=idle.__getitem__)
+        seconds = time.monotonic() - idle[name]
+        if seconds < _SPARED:
+            raise TooBusyError(
+                f"you have {len(theirs)} sketches in progress, the limit; delete one",
+                max(1, math.ceil(_SPARED - seconds)),
+            )
+        self._end(
+            name,
+            NotFoundError(
+                f"nobody drew or watched the sketch for {seconds:.0f} s, and its creator began "
+                "more than the limit; create another"
+            ),
+        )
 
     def _sketch(self, name: str, caller: Caller) -> _Sketch:
         """Return a sketch of a caller."""

@@ -40,6 +40,7 @@ __all__ = [
 
 # Probabilities that should be the same may come from different sums.
 _ROUNDING = 1e-9
+_SUMMED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,6 +261,13 @@ def check_probabilities(judgement: Judgement, problem: JudgeProblem) -> None:
     table = problem.table
     if lines is not None:
         checked_array(lines, (table.template_objects, table.argument_objects + 1), most=1.0)
+        sums = lines.sum(axis=1)
+        if sums.max() > 1.0 + _SUMMED:
+            k = int(sums.argmax())
+            raise ValueError(
+                f"its lines of template object {k} are right with {sums[k]:g} together, of which "
+                "one at most is"
+            )
     if elsewhere is not None:
         _check_probability("elsewhere", elsewhere)
     for each in judgement.maps:
@@ -278,6 +286,13 @@ def check_probabilities(judgement: Judgement, problem: JudgeProblem) -> None:
                     f"its map is right with probability {each.probability:g}, and one of its "
                     f"lines with {least:g}"
                 )
+
+    together = sum(float(each.probability or 0.0) for each in judgement.maps)
+    if together > 1.0 + _SUMMED:
+        raise ValueError(
+            f"its {len(judgement.maps)} maps are right with {together:g} together, of which one at "
+            "most is"
+        )
 
 
 def _considered(rival: Rival, whole: Part, goal: Goal) -> Generator[float, None, Considered]:
