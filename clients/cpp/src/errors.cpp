@@ -129,8 +129,8 @@ Failure unavailable(const std::string& message, const std::string& address) {
     remedy = "it does not encrypt: ask it without certificates and tls";
   } else if (contains(message, "Socket closed")) {
     remedy =
-        "it ends links at once, as one does that wants encryption or a certificate of the client; "
-        "else start it, or check the address";
+        "it ended the link, as one does that stops, or wants encryption or a certificate of the "
+        "client; start it, or check the address";
   }
   return {Failure::Kind::unavailable,
           "the sketchmatch server at " + address + " is not available; " + remedy + " (" + message +

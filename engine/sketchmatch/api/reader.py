@@ -74,5 +74,6 @@ class Reader(ABC):
         Raises
         ------
         InvalidInputError
-            With a path within the file, if it cannot be used or has no such part.
+            With a path within the file, if it cannot be used or has no such part. Whatever else is
+            raised is put down to the reader.
         """

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.registry import discover
 from sketchmatch.registry.discovery import ENTRY_POINT_GROUP
+from sketchmatch.testing.conformance import readers
 from sketchmatch.testing.conformance.checking import plugin_checks
 from sketchmatch.testing.conformance.contract import (
     TIME_LIMIT,
@@ -219,13 +220,17 @@ def _live(connection: Connection, distribution: str, first: int, time_limit: flo
     os.dup2(2, 1)  # standard output is the caller's; what a plugin prints is no part of it
     registry = discover(_entries(distribution))
     checks = [
-        (item, check)
+        (item.kind, item.name, check)
         for item in sorted(registry.algorithms, key=lambda item: (item.kind, item.name))
         for check in plugin_checks(item.algorithm, time_limit)
+    ] + [
+        ("reader", item.name, PluginCheck.of(contract, item.reader, time_limit))
+        for item in sorted(registry.readers, key=lambda item: item.name)
+        for contract in readers.CONTRACTS
     ]
-    planned = (_planned(item.kind, item.name, check) for item, check in checks)
+    planned = (_planned(kind, name, check) for kind, name, check in checks)
     connection.send(_Plan(registry.problems, tuple(planned)))
-    for _, check in checks[first:]:
+    for _, _, check in checks[first:]:
         result = check.result()
         connection.send(result)
         if result.overdue:  # it may go on, and be in the way of all others

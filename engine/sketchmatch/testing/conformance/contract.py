@@ -40,7 +40,7 @@ Contract = Callable[[type[Any]], None]
 Its name is the check's, its docstring says what it demands.
 """
 
-_METHODS = ("segment", "describe", "compare", "combine", "search", "judge")
+_METHODS = ("segment", "describe", "compare", "combine", "search", "judge", "read")
 _READ_ONLY = re.compile(r"read.?only", re.IGNORECASE)
 
 
