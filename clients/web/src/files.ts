@@ -18,6 +18,8 @@ import { contentOf } from "./maps";
 import { texts } from "./texts";
 
 const LARGEST_LINK = 32 << 20;
+const APART = 4;
+const MOST_STEPS = 1000;
 const ROUTE_NAMES = new Set(["route", "path"]);
 
 /** Return strokes as our JSON has them; zones stand beside, for they are no things. */
@@ -91,13 +93,32 @@ export function inkOf(outlines: readonly { points: Xy[]; label: string }[], rout
   ];
 }
 
+/**
+ * Return points no farther apart than a pen reports them: ink follows them with a lag, which would
+ * round the corners of what has few points.
+ */
+function closeTogether(points: readonly InkPoint[]): InkPoint[] {
+  return points.flatMap((to, k): InkPoint[] => {
+    const from = points[k - 1];
+    if (!from) return [to];
+    const far = Math.hypot(to[0] - from[0], to[1] - from[1]);
+    const steps = Math.min(Math.max(Math.ceil(far / APART), 1), MOST_STEPS);
+    return Array.from({ length: steps }, (_, step) => between(from, to, (step + 1) / steps));
+  });
+}
+
+function between(from: InkPoint, to: InkPoint, share: number): InkPoint {
+  const at = (k: 0 | 1 | 2 | 3) => (1 - share) * from[k] + share * to[k];
+  return [at(0), at(1), at(2), at(3)];
+}
+
 /** Return the outline of a stroke's ink. */
 export function inkOutline(
   stroke: Pick<Stroke, "points" | "pressed" | "kind">,
   last: boolean,
 ): Xy[] {
   return getStroke(
-    stroke.points.map(([x, y, , pressure]) => [x, y, pressure]),
+    closeTogether(stroke.points).map(([x, y, , pressure]) => [x, y, pressure]),
     {
       size: stroke.kind === "thing" ? 5 : 3.5,
       thinning: stroke.kind === "thing" ? 0.45 : 0,

@@ -2,10 +2,13 @@
 
 import base64
 import json
+import re
 import zlib
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
+import shapely
 from PIL import Image, ImageColor
 
 from tests.pace import wait_until
@@ -147,6 +150,23 @@ def test_strokes_svg_and_excalidraw_are_saved_and_opened_again_with_route_and_na
         assert answer(page) == names()
         page.get_by_test_id("pair-1").get_by_text("my oven").wait_for()
         page.get_by_test_id("route").wait_for(state="attached")
+
+
+def test_ink_follows_what_was_drawn_elsewhere_with_few_points(pad, visit, tmp_path):
+    page = visit(pad)
+    corners = [[0, 0], [300, 0], [300, 200], [0, 200], [0, 0]]
+    strokes = [{"points": [[x + 400 * k, y] for x, y in corners]} for k in range(2)]
+    file = tmp_path / "boxes.json"
+    file.write_text(json.dumps({"y_axis": "down", "strokes": strokes}), encoding="utf-8")
+    page.get_by_test_id("sketch-file").set_input_files(file)
+    page.get_by_test_id("sketch-thing-1").wait_for(state="attached")
+    svg = ElementTree.fromstring(saved_text(page, "save-picture-svg"))
+    inks = [path.get("d") for path in svg.find(f"{SVG}svg").iter(f"{SVG}path")]
+    outlines = [each for each in inks if each.startswith("M") and "Q" in each]
+    assert len(outlines) == 2
+    for d in outlines:
+        ink = shapely.MultiPoint(np.array(re.findall(r"[-\d.]+", d), float).reshape(-1, 2))
+        assert ink.convex_hull.area > 0.98 * ink.envelope.area
 
 
 def test_a_link_opens_the_sketch_and_its_match_in_another_browser(pad, visit):
