@@ -3,6 +3,7 @@
 import re
 import sqlite3
 from contextlib import ExitStack
+from types import SimpleNamespace
 
 import pytest
 
@@ -92,6 +93,14 @@ def test_a_full_file_says_so_keeps_what_it_had_and_takes_more_after_a_deletion(r
     database.work(lambda file: file.execute("DELETE FROM things"))
     put(database, "table", bytes(250_000))
     assert names(database) == ["table"]
+
+
+@pytest.mark.parametrize(("free", "words"), [(1000, "its disk is full"), (1 << 30, "is full; del")])
+def test_a_full_disk_is_told_from_a_limit_that_is_met(reopened, monkeypatch, free, words):
+    usage = SimpleNamespace(free=free)
+    monkeypatch.setattr("sketchmatch.app.store.shutil.disk_usage", lambda _: usage)
+    with pytest.raises(StoreError, match=words):
+        put(reopened(max_bytes=400_000), "chair", bytes(600_000))
 
 
 def test_a_damaged_file_is_said_and_another_is_made_once_it_is_moved_away(things):

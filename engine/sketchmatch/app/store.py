@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import shutil
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -20,6 +21,8 @@ _PAGE_BYTES = 4096
 _FEWEST_PAGES = 64
 _PATIENCE_SECONDS = 2.0
 _FULL = frozenset({sqlite3.SQLITE_FULL})
+# With less room on the disk it is not the limit that was met.
+_LEAST_FREE = 1 << 20
 _DAMAGED = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
 _TAKEN = frozenset({sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED})
 
@@ -212,10 +215,20 @@ def _inode(path: Path) -> int | None:
         return None
 
 
+def _free_bytes(path: Path) -> int:
+    """Return how much room there is on the disk of a file."""
+    try:
+        return shutil.disk_usage(path.parent).free
+    except OSError:
+        return 0
+
+
 def _said(path: Path, error: sqlite3.Error) -> StoreError:
     """Return what is wrong with a file, in a sentence."""
     code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
-    if code in _FULL:
+    if code in _FULL and _free_bytes(path) < _LEAST_FREE:
+        fault = "cannot grow: its disk is full; make room there"
+    elif code in _FULL:
         fault = "is full; delete what is not needed, or allow it more bytes"
     elif code in _DAMAGED:
         fault = "is damaged; move it away, and another is made"
