@@ -194,8 +194,8 @@ _UNTRUSTED = re.compile(
 )
 _REMEDIES = {
     "WRONG_VERSION_NUMBER": "it does not encrypt: ask it without certificates and tls",
-    "Socket closed": "it ended the link, as one does that stops, or wants encryption or a certificate "
-    "of the client; start it, or check the address",
+    "Socket closed": "it ended the link, as one does that stops, or wants encryption or a "
+    "certificate of the client; start it, or check the address",
 }
 
 
