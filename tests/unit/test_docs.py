@@ -5,12 +5,21 @@ import re
 import numpy as np
 
 import sketchmatch
-from sketchmatch.api import Judge, JudgedMap, Judgement, Reader, hookimpl
-from sketchmatch.api.documents import decode_text, load_json
+from sketchmatch.api import (
+    InvalidInputError,
+    Judge,
+    JudgedMap,
+    Judgement,
+    Reader,
+    Reason,
+    documents,
+    hookimpl,
+)
 from sketchmatch.io.files import _JSON_SUFFIXES, _KINDS
 from sketchmatch.model import LabelledPolygon, PolygonSet, Scene
 from sketchmatch.registry import OWN_DISTRIBUTION, Kind, default_registry
 from sketchmatch.testing import check_plugin
+from sketchmatch.testing.conformance.readers import CONTRACTS
 from sketchmatch_map_files import PICTURE_SUFFIXES
 from tests.tools import ROOT
 
@@ -48,11 +57,11 @@ def test_the_reader_that_is_shown_reads():
     text = CONTRIBUTING.split("\n## Reading files of another kind\n")[1].split("\n## ")[0]
     (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
     names = {
-        "Reader": Reader,
-        "PolygonSet": PolygonSet,
-        "LabelledPolygon": LabelledPolygon,
-        "load_json": load_json,
-        "decode_text": decode_text,
+        **{name: getattr(documents, name) for name in documents.__all__},
+        **{
+            each.__name__: each for each in (Reader, PolygonSet, LabelledPolygon, InvalidInputError)
+        },
+        "INVALID": Reason.INVALID_POLYGON,
         "np": np,
         "hookimpl": hookimpl,
     }
@@ -60,6 +69,8 @@ def test_the_reader_that_is_shown_reads():
     (reader,) = names["sketchmatch_register_readers"]()
     found = reader().read(b'{"boxes": [[0, 0, 2, 1]]}')
     assert found.polygons[0].rings[0].tolist() == [[0, 0], [2, 0], [2, 1], [0, 1]]
+    for contract in CONTRACTS:
+        contract(reader)
 
 
 def test_the_judge_that_is_shown_keeps_the_contracts():
