@@ -8,6 +8,7 @@ A source is data as it came, checked for its form alone; a segmenter turns it in
 from __future__ import annotations
 
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,8 +144,9 @@ class PolygonSet:
 
     polygons: tuple[LabelledPolygon, ...]
     notes: tuple[str, ...] = ()
-    lines: tuple[FloatArray, ...] = ()
-    landmarks: tuple[Landmark, ...] = ()
+    # By name alone: classes that derive from this one have fields of their own in third place.
+    lines: tuple[FloatArray, ...] = dataclass_field(default=(), kw_only=True)
+    landmarks: tuple[Landmark, ...] = dataclass_field(default=(), kw_only=True)
 
     field = "polygon_set"
 
