@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +27,7 @@ from sketchmatch_proto.v1.transfer_service_pb2 import TransferResponse
 __all__ = [
     "Carriage",
     "check_keepout",
-    "check_spared",
+    "check_targets",
     "draw",
     "messages",
     "named_in",
@@ -129,13 +129,12 @@ def places_of(path: Path | None) -> Iterator[None]:
         raise InvalidInputError(Reason.INVALID_FILE, f"{path}: {error.field}", problem) from None
 
 
-def check_spared(
-    targets: tuple[Path | None, Path | None, Path | None], given: Iterable[Path | None]
+def check_targets(
+    out: Path | None, keepout: Path | None, waypoints: Path | None, *given: Path | None
 ) -> None:
-    """Refuse to save a file with features, a mask or waypoints under the path of what is read."""
-    out, keepout, waypoints = targets
+    """Refuse paths that nothing can be saved under, and those of what is given."""
+    files.check_targets(out, keepout, waypoints)
     picture = None if keepout is None else keepout.with_suffix(".pgm")
-    read = tuple(given)
     for path, field in (
         (out, "--out"),
         (keepout, "--keepout"),
@@ -143,7 +142,7 @@ def check_spared(
         (waypoints, "--waypoints"),
     ):
         if path is not None:
-            sources.check_spared(path, field, *read)
+            sources.check_spared(path, field, *given)
 
 
 def check_keepout(keepout: Path | None, target: Path) -> None:

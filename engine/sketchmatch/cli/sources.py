@@ -158,10 +158,10 @@ def check_spared(path: Path, field: str, *given: Path | None) -> None:
     """
     for each in filter(None, given) if path.is_file() else ():
         file, _ = file_and_part(each)
-        files = read_map_files(file) if file.exists() else None
-        if (file.exists() and path.samefile(file)) or (
-            files and path.read_bytes() == files.picture
-        ):
+        if not file.exists():
+            continue
+        files = read_map_files(file)
+        if path.samefile(file) or (files and path.read_bytes() == files.picture):
             problem = f"is {str(path)!r}, which is read here, and would be lost; give another name"
             raise InvalidInputError(Reason.INVALID_FILE, field, problem)
 

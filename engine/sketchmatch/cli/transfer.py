@@ -106,8 +106,7 @@ def transfer(
     from sketchmatch.transfers import files
 
     options.refuse_config(config, server)
-    files.check_targets(out, keepout, waypoints)
-    carried.check_spared((out, keepout, waypoints), (sketch, map_, features))
+    carried.check_targets(out, keepout, waypoints, sketch, map_, features)
     if overlay is not None:
         pictures.check_path(overlay, sketch, map_)
     known = options.parse_pins(pin, no_pin)
@@ -194,8 +193,7 @@ def carry(
     from sketchmatch_client import InvalidRequestError
 
     options.refuse_config(config, server)
-    files.check_targets(out, keepout, waypoints)
-    carried.check_spared((out, keepout, waypoints), (old, new, features))
+    carried.check_targets(out, keepout, waypoints, old, new, features)
     if overlay is not None:
         pictures.check_path(overlay, old, new)
     carried.check_keepout(keepout, new)

@@ -205,9 +205,13 @@ def _members(
         yield from _polygons(member, f"{at}[{k}]", label, reading)
 
 
-def _label(feature: dict[str, Any]) -> str:
+def _properties(feature: dict[str, Any]) -> dict[str, Any]:
     properties = feature.get("properties")
-    given = properties if isinstance(properties, dict) else {}
+    return properties if isinstance(properties, dict) else {}
+
+
+def _label(feature: dict[str, Any]) -> str:
+    given = _properties(feature)
     keys = ("label", "name", "alt_name")
     names = (name for key in keys for name in _in_any_language(given.get(key)))
     return next((name for name in map(plain_name, (*names, feature.get("id"))) if name), "")
@@ -219,8 +223,7 @@ def _in_any_language(name: Any) -> Iterable[Any]:
 
 def _on_level(feature: dict[str, Any], reading: _Reading) -> bool:
     """Whether a feature is on the level that is read, if one is; its levels are counted."""
-    properties = feature.get("properties")
-    given = properties if isinstance(properties, dict) else {}
+    given = _properties(feature)
     level = plain_name(given.get("level_id")) or plain_name(given.get("level"))
     levels = {each.strip() for each in level.split(";")} - {""}
     reading.levels.update(levels)
@@ -247,8 +250,7 @@ def _note_on_levels(reading: _Reading) -> Iterator[str]:
 
 def _certainty(feature: dict[str, Any]) -> float:
     """Return the certainty that a scene was saved with; what others call so may be anything."""
-    properties = feature.get("properties")
-    given = properties.get("certainty") if isinstance(properties, dict) else None
+    given = _properties(feature).get("certainty")
     if not isinstance(given, int | float) or isinstance(given, bool):
         return 1.0
     return float(given) if 0.0 < given <= 1.0 else 1.0

@@ -140,7 +140,7 @@ def kept_clear(
     done = way.part(first, first)
     at = joint = first
     lead = _LEAD * max(radius, 3.0 * obstacles.resolution)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way.points, axis=0).T))])
+    along = _along(way.points)
     while at < last:
         if clear[at + 1]:
             blocked = np.flatnonzero(~clear[at + 1 : last + 1])
@@ -235,10 +235,10 @@ def _around(
     if line is None:
         return None, []
     odd = on_other_side(line)
-    longest = _DETOUR * _length(line) + max(_MARGIN, 8.0 * radius)
+    longest = _DETOUR * _along(line)[-1] + max(_MARGIN, 8.0 * radius)
     while found is not None and len(closed) < _MOST_BARRIERS:
         wrong = on_other_side(found)
-        if len(wrong) < len(odd) and _length(found) <= longest:
+        if len(wrong) < len(odd) and _along(found)[-1] <= longest:
             line, odd = found, wrong
         more = set(wrong) - closed
         if not more:
@@ -247,7 +247,7 @@ def _around(
         barriers += [_barrier(carried, landmarks, k, obstacles) for k in sorted(more)]
         found = yield from _planned(carried, obstacles, radius, barriers)
     smooth = _smoothed(line, obstacles, radius)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(smooth, axis=0).T))])
+    along = _along(smooth)
     shares = along / along[-1] if along[-1] else along
     # A part of a planned way was drawn where as large a part of the carried one was.
     places = np.linspace(0.0, 1.0, len(carried.points))
@@ -265,8 +265,9 @@ def _around(
     return planned.part(1, len(smooth) - 1), changes
 
 
-def _length(line: FloatArray) -> float:
-    return float(np.hypot(*np.diff(line, axis=0).T).sum())
+def _along(line: FloatArray) -> FloatArray:
+    """Return how far along a line each of its points is."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
 
 
 def _swept(line: FloatArray, place: FloatArray) -> float:

@@ -102,8 +102,8 @@ class Areas:
 
     def polygon_set(self, *notes: str, upwards: float = -1.0) -> PolygonSet:
         """Return the objects, y turned up, with notes on what is missing."""
-        if left_out := +self._left_out:
-            counts = ", ".join(f"{what} ({count})" for what, count in left_out.items())
+        if self._left_out:
+            counts = ", ".join(f"{what} ({count})" for what, count in self._left_out.items())
             notes = (*notes, f"Left out because they enclose no area or are no objects: {counts}.")
         if self._parts:
             notes = (

@@ -54,14 +54,6 @@ _NAMING = ("NAME", "LABEL")
 _BINARY = b"AutoCAD Binary DXF"
 
 
-class _Text(NamedTuple):
-    """What is written, and where."""
-
-    words: str
-    x: float
-    y: float
-
-
 class _Shape(NamedTuple):
     """One area of the drawing, the name that it brings and how it was drawn."""
 
@@ -142,12 +134,11 @@ def _read(drawing: Any, part: str) -> PolygonSet:
         areas.add(scaled, names.get(k) or shape.name or _layer_name(shape.layer))
     for what, count in left_out.items():
         areas.leave_out(what, count)
-    found_areas = areas.polygon_set(*notes, *_note_on_layers(shapes, part), upwards=1.0)
     return replace(
-        found_areas,
+        areas.polygon_set(*notes, *_note_on_layers(shapes, part), upwards=1.0),
         lines=tuple(frozen_floats(line * factor) for line in lines),
         landmarks=tuple(
-            Landmark(text.words, (text.x * factor, text.y * factor), "room") for text in texts
+            replace(each, point=(each.point[0] * factor, each.point[1] * factor)) for each in texts
         ),
     )
 
@@ -455,21 +446,21 @@ def _same(one: Any, other: Any) -> bool:
     return bool(shared >= _SAME * outlines[0].union(outlines[1]).area)
 
 
-def _texts(entities: Iterable[Any]) -> list[_Text]:
-    """Return what is written, and where."""
+def _texts(entities: Iterable[Any]) -> list[Landmark]:
+    """Return what is written, and where, in the drawing's unit."""
     found = []
     for each in entities:
         if each.dxftype() in _TEXTS and each.dxf.get("insert") is not None:
             x, y = float(each.dxf.insert.x), float(each.dxf.insert.y)
             words = cleaned_label(each.plain_text())
             if words and max(abs(x), abs(y)) < math.inf:
-                found.append(_Text(words, x, y))
+                found.append(Landmark(words, (x, y), "room"))
     return found
 
 
-def _names(shapes: list[_Shape], texts: list[_Text]) -> dict[int, str]:
+def _names(shapes: list[_Shape], texts: list[Landmark]) -> dict[int, str]:
     """Return the names of shapes: the texts in each, and in no smaller one, unless all over it."""
-    places = np.array([(text.x, text.y) for text in texts]).reshape(-1, 2)
+    places = np.array([text.point for text in texts]).reshape(-1, 2)
     left = np.arange(len(texts))
     names: dict[int, str] = {}
     for k in sorted(range(len(shapes)), key=lambda k: float(shapes[k].area.area)):
@@ -481,7 +472,7 @@ def _names(shapes: list[_Shape], texts: list[_Text]) -> dict[int, str]:
         left = np.setdiff1d(left, inside)
         x0, y0, x1, y1 = area.bounds
         if (np.ptp(places[inside], axis=0) <= _ALL_OVER * np.array([x1 - x0, y1 - y0])).all():
-            names[k] = " ".join(texts[i].words for i in inside)
+            names[k] = " ".join(texts[i].name for i in inside)
     return names
 
 

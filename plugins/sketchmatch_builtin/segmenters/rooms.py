@@ -322,10 +322,11 @@ def _named(
     labels, unplaced = labels_of(rooms, source.landmarks, 0.0)
     free = [k for k, label in enumerate(labels) if not label]
     if isinstance(source, StrokeSet) or not source.landmarks:
-        for k, label in zip(
-            free, labels_of([rooms[k] for k in free], _called(source), 0.0)[0], strict=True
-        ):
+        called, _ = labels_of([rooms[k] for k in free], _called(source), 0.0)
+        for k, label in zip(free, called, strict=True):
             labels[k] = label
+    if not unplaced:
+        return labels, ()
     hull = shapely.convex_hull(shapely.union_all(rooms))
     taken = shapely.union_all([room for room, label in zip(rooms, labels, strict=True) if label])
     lost = hull - taken

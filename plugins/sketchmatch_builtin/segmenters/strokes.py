@@ -227,7 +227,8 @@ class StrokeSegmenter(Segmenter):
         outlines = _named_alike(outlines, first_of)
         whole = drawing.span if outlines else 0.0
         around_things = frames([outline.span for outline in outlines], within, whole)
-        outlines = [replace(each, frame=k in around_things) for k, each in enumerate(outlines)]
+        for k in around_things:
+            outlines[k] = replace(outlines[k], frame=True)
         smallest = self._smallest(outlines)
         mark = min(_MARK * smallest, _second_largest(outlines))
         objects = []
@@ -293,11 +294,11 @@ def _met_lately(ring: bytes, label: str) -> SceneObject:
 
 def _named_alike(outlines: list[Outline], first_of: Sequence[int | None]) -> list[Outline]:
     """Return outlines of which those without a label have that of one that repeats them."""
-    labels = [outline.label for outline in outlines]
+    named = [*outlines]
     for outline, first in zip(outlines, first_of, strict=True):
-        if first is not None:
-            labels[first] = labels[first] or outline.label
-    return [replace(each, label=label) for each, label in zip(outlines, labels, strict=True)]
+        if first is not None and not named[first].label:
+            named[first] = replace(named[first], label=outline.label)
+    return named
 
 
 def _retraces(outline: Outline, host: Outline) -> bool:
