@@ -501,7 +501,8 @@ def test_labels_keep_apart_or_are_left_out():
 
 def test_text_is_printable_and_cut_to_fit():
     assert printable("Tür\n → 2,5 m²") == "Tur -> 2,5 m2"
-    assert printable("机器人") == "???"
+    assert printable("机器人 — кухня, مطبخ") == "JiQiRen - kukhnya, mtbkh"
+    assert printable("ζ × 2 ± 1°\u202e\x07") == "zeta x 2 ± 1°"
     canvas = Canvas((100.0, 100.0), 100, WHITE)
     text = canvas.truncated("a very long label", 15.0, 60.0)
     assert text.endswith("…")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import unicodedata
 from collections.abc import Sequence
 from functools import cache
 from itertools import product
 
 import numpy as np
+from anyascii import anyascii
 from PIL import Image, ImageChops, ImageDraw, ImageFont
 
 from sketchmatch.model import FloatArray
@@ -18,10 +18,10 @@ __all__ = ["Box", "Canvas", "printable"]
 
 Box = tuple[float, float, float, float]
 
-# Pillow's own font has few glyphs beyond ASCII.
+# Pillow's own font has few glyphs beyond ASCII. These signs are spelled as here.
 _SPELLED = {
-    "×": "x", "−": "-", "–": "-", "—": "-", "→": "->", "↔": "<->", "ζ": "zeta", "Ω": "Omega",
-    "θ": "theta", "σ": "sigma", "ß": "ss", "ø": "o", "Ø": "O", "æ": "ae", "œ": "oe", "ł": "l",
+    "×": "x", "−": "-", "→": "->", "↔": "<->",
+    "ζ": "zeta", "Ω": "Omega", "θ": "theta", "σ": "sigma",
 }  # fmt: skip
 _GLYPHS = frozenset("°±´·»«‘’“”…©™")
 
@@ -228,15 +228,21 @@ class Canvas:
 def printable(text: str) -> str:
     """Return the text on one line in the glyphs that Pillow's own font has.
 
+    What is written in other letters is spelled in Latin ones.
+
     Examples
     --------
-    >>> printable("Küche → 3 m")
-    'Kuche -> 3 m'
+    >>> printable("Küche → 3 m"), printable("кухня")
+    ('Kuche -> 3 m', 'kukhnya')
     """
-    spelled = "".join(_SPELLED.get(char, char) for char in " ".join(text.split()))
-    plain = unicodedata.normalize("NFKD", spelled) if not spelled.isascii() else spelled
-    kept = (char for char in plain if not unicodedata.combining(char))
-    return "".join(char if " " <= char <= "~" or char in _GLYPHS else "?" for char in kept)
+    one_line = " ".join(text.split())
+    if one_line.isascii():
+        spelled = one_line
+    else:
+        spelled = "".join(
+            char if char in _GLYPHS else _SPELLED.get(char) or anyascii(char) for char in one_line
+        )
+    return "".join(char for char in spelled if char.isprintable())
 
 
 @cache
