@@ -10,6 +10,7 @@ import shapely
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import Image, LabelledPolygon, OccupancyGrid, PolygonSet, Stroke, StrokeSet
+from sketchmatch_builtin.segmenters._swings import doors_apart
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
 from tests.experiments.regions import HALVES, RSI, Tally, drawing, robot_map
@@ -305,3 +306,105 @@ def test_what_is_smaller_than_the_smallest_place_is_of_the_next():
     cells = free_cells((10, 10, 90, 90), (100, 40, 9, 4))
     assert len(places(cells)) == 1
     assert places(cells)[0] == pytest.approx(8136, rel=0.01)
+
+
+HALL = [
+    [(0, 0), (9, 0), (9, 7), (0, 7), (0, 4)],
+    [(0, 3.2), (0, 0)],
+    [(0, 4.3), (1, 4.3)],
+    [(1.8, 4.3), (3, 4.3)],
+    [(0, 2.8), (1.2, 2.8)],
+    [(2.0, 2.8), (5, 2.8)],
+    [(5.8, 2.8), (9, 2.8)],
+    [(3, 7), (3, 4.0)],
+    [(3, 3.2), (3, 0)],
+]
+"""A hall 1.5 wide, entered from the left, with three rooms around it and one behind."""
+
+HALL_AREAS = [3 * 1.5, 3 * 2.7, 3 * 2.8, 6 * 2.8, 6 * 4.2]
+
+
+def quarter(hinge, leaf, tip, steps=12):
+    """An arc around a hinge, from the leaf's direction to the tip's, both unit vectors."""
+    turn = np.linspace(0.0, np.pi / 2, steps)[:, None]
+    return np.array(hinge) + 0.8 * (np.cos(turn) * np.array(leaf) + np.sin(turn) * np.array(tip))
+
+
+def doors(kind):
+    """The doors of HALL: into the hall, where two of them meet, and into the room behind."""
+    lines = []
+    for hinge, leaf, tip in (
+        ((0, 4.0), (1, 0), (0, -1)),
+        ((1, 4.3), (0, -1), (1, 0)),
+        ((2, 2.8), (0, 1), (-1, 0)),
+        ((3, 3.2), (1, 0), (0, 1)),
+        ((5, 2.8), (0, -1), (1, 0)),
+    ):
+        start, along, aside = (np.array(each, dtype=float) for each in (hinge, leaf, tip))
+        arc, end = quarter(hinge, leaf, tip), start + 0.8 * along
+        box = [start, end, end + 0.05 * aside, start + 0.05 * aside, start]
+        lines += {
+            "apart": [[start, end], arc],
+            "one line": [np.vstack([start, arc])],
+            "closed": [np.vstack([start, arc, start])],
+            "thick": [box, arc[::-1]],
+            "ajar": [[start, arc[5]], arc[5:]],
+            "coarse": [[end, start], quarter(hinge, leaf, tip, 4)],
+        }[kind]
+    return lines
+
+
+@pytest.mark.parametrize("kind", ["apart", "one line", "closed", "thick", "ajar", "coarse"])
+@pytest.mark.parametrize("degrees", [0.0, 31.0])
+def test_doors_drawn_with_their_swings_end_rooms_and_cut_none(kind, degrees):
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    lines = [np.array(line) @ [[c, s], [-s, c]] for line in [*HALL, *doors(kind)]]
+    scene = segmented(strokes(lines))
+    assert sorted(item.area for item in scene.scene.objects) == pytest.approx(HALL_AREAS, rel=0.1)
+    # The hall opens into three rooms, and the room behind into one of them.
+    assert len(scene.passages) == 4
+
+
+def test_a_hand_drawn_swing_is_a_door():
+    rng = np.random.default_rng(2)
+    lines = [line + rng.normal(0.0, 0.012, np.shape(line)) for line in [*HALL, *doors("apart")]]
+    found = sorted(areas(strokes(lines)))
+    assert found == pytest.approx(HALL_AREAS, rel=0.12)
+
+
+def test_a_leaf_that_is_drawn_as_it_closes_is_where_the_room_ends():
+    swings = [[(1, 4.3), (1.8, 4.3)], quarter((1, 4.3), (0, -1), (1, 0))]
+    left, (leaf,) = doors_apart([np.array(line, dtype=float) for line in [*HALL, *swings]])
+    assert len(left) == len(HALL)
+    assert leaf == pytest.approx(np.array([[0.92, 4.3], [1.88, 4.3]]))
+
+
+def test_a_turned_hall_whose_widest_discs_fit_apart_from_each_other_is_one_room():
+    # Their middles lie on a line, of which at 31 degrees few cells are as far from both sides.
+    c, s = np.cos(np.radians(31.0)), np.sin(np.radians(31.0))
+    lines = [np.array(line) @ [[c, s], [-s, c]] for line in WALLS]
+    assert sorted(areas(strokes(lines))) == pytest.approx(AREAS, rel=0.08)
+
+
+def test_a_round_wall_is_no_door():
+    turn = np.linspace(0.0, np.pi / 2, 30)
+    shower = [(3 - 0.9 * np.cos(t), 7 - 0.9 * np.sin(t)) for t in turn]
+    left, closed = doors_apart([np.array(line, dtype=float) for line in [*HALL, shower]])
+    assert len(left) == len(HALL) + 1
+    assert closed == []
+
+
+def test_a_door_of_which_both_sides_are_drawn_closes_where_a_wall_is():
+    wall, beyond = np.array([[0.0, 0], [4, 0]]), np.array([[4.8, 0.0], [9, 0]])
+    swing = np.vstack([(4, 0), quarter((4, 0), (0, 1), (1, 0)), (4, 0)])
+    left, (leaf,) = doors_apart([wall, swing, beyond])
+    assert [line.tolist() for line in left] == [wall.tolist(), beyond.tolist()]
+    assert leaf == pytest.approx(np.array([[3.92, 0], [4.88, 0]]), abs=1e-6)
+
+
+def test_doors_are_not_looked_for_in_a_scribble_without_end():
+    rng = np.random.default_rng(0)
+    scribble = [np.cumsum(rng.normal(size=(2001, 2)), axis=0) for _ in range(100)]
+    left, closed = doors_apart(scribble)
+    assert len(left) == 100
+    assert closed == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from sketchmatch.api import InvalidInputError, Reason
 from sketchmatch.model import FloatArray, Image, PolygonSet, StrokeSet
 from sketchmatch_builtin.segmenters._cells import Mask
 from sketchmatch_builtin.segmenters._doorways import divided, doorway
+from sketchmatch_builtin.segmenters._swings import doors_apart
 
 __all__ = ["Plan", "drawn"]
 
@@ -33,7 +35,9 @@ class Plan:
     Attributes
     ----------
     free
-        1 where a cell is free, in a frame of cells that are not.
+        1 where a cell is free, in a frame of cells that are not, while all doors are closed.
+    doors
+        1 where doors that are drawn close, and a cell is free while they are open.
     cell
         Side of a cell in the drawing's unit.
     corner
@@ -43,6 +47,7 @@ class Plan:
     """
 
     free: Mask
+    doors: Mask
     cell: float
     corner: tuple[float, float]
     door: float
@@ -60,44 +65,55 @@ def drawn(source: StrokeSet | PolygonSet | Image, door_width: float | None) -> P
         Widest doorway in the drawing's unit, or None to find it from the drawing.
     """
     if isinstance(source, Image):
-        figure, cell, corner = _of_picture(source)
+        walls, cell, corner = _of_picture(source)
+        closed = np.zeros_like(walls)
     else:
-        figure, cell, corner = _of_lines(_lines(source), source.field)
+        lines, leaves = doors_apart(_lines(source))
+        (walls, closed), cell, corner = _of_lines((lines, leaves))
     door = None if door_width is None else door_width / cell
-    free, width = _between(figure, door)
+    free, width = _between(walls | closed, door)
     # Walls have less room between their borders than what lies between them.
-    if isinstance(source, Image) and np.count_nonzero(figure) > np.count_nonzero(free):
-        free, width = figure, doorway(figure, math.inf) if door is None else door
-    return Plan(free, cell, corner, width)
+    if isinstance(source, Image) and np.count_nonzero(walls) > np.count_nonzero(free):
+        free, width = walls, doorway(walls, math.inf) if door is None else door
+    return Plan(free, closed & (1 - walls), cell, corner, width)
 
 
 def _lines(source: StrokeSet | PolygonSet) -> list[FloatArray]:
     """Return lines that are walls, each of shape (k, 2)."""
     if isinstance(source, StrokeSet):
-        return [stroke.points for stroke in source.strokes]
-    rings = [ring for polygon in source.polygons for ring in polygon.rings]
-    return [*source.lines, *(np.concatenate([ring, ring[:1]]) for ring in rings if len(ring))]
-
-
-def _of_lines(lines: Sequence[FloatArray], field: str) -> tuple[Mask, float, tuple[float, float]]:
-    """Return the cells that lines go through, in free space all around."""
+        lines, path = [stroke.points for stroke in source.strokes], "strokes"
+    else:
+        rings = [ring for polygon in source.polygons for ring in polygon.rings]
+        closed = [np.concatenate([ring, ring[:1]]) for ring in rings if len(ring)]
+        lines, path = [*source.lines, *closed], "polygons"
     points = np.concatenate([np.zeros((0, 2)), *lines])
-    path = "strokes" if field == "stroke_set" else "polygons"
     if not len(points) or not (np.abs(points) < _LARGEST).all():
         what = "hold no point" if not len(points) else "hold a point that is no plain number"
         raise InvalidInputError(Reason.TOO_FEW_OBJECTS, path, f"{what}; draw the walls of rooms")
-    low, size = points.min(axis=0), np.ptp(points, axis=0)
-    if 0.0 < size.max() < _SMALLEST:
+    span = float(np.ptp(points, axis=0).max())
+    if 0.0 < span < _SMALLEST:
         raise InvalidInputError(
-            Reason.TOO_FEW_OBJECTS, path, f"are {size.max():g} wide; draw them in a usual unit"
+            Reason.TOO_FEW_OBJECTS, path, f"are {span:g} wide; draw them in a usual unit"
         )
+    return lines
+
+
+def _of_lines(
+    layers: Sequence[Sequence[FloatArray]],
+) -> tuple[list[Mask], float, tuple[float, float]]:
+    """Return the cells that lines of each layer go through, in free space all around."""
+    points = np.concatenate([*itertools.chain(*layers)])
+    low, size = points.min(axis=0), np.ptp(points, axis=0)
     cell = float(size.max()) / _SIDE or 1.0
     margin = round(_MARGIN * _SIDE)
     columns, rows = (np.ceil(size / cell).astype(int) + 2 * margin + 1).tolist()
-    walls = np.zeros((rows, columns), np.uint8)
-    corners = [np.floor((line - low) / cell).astype(np.int32) + margin for line in lines]
-    cv2.polylines(walls, corners, False, (1,), thickness=2)
-    return walls, cell, (float(low[0]) - margin * cell, float(low[1]) - margin * cell)
+    masks = []
+    for lines in layers:
+        mask = np.zeros((rows, columns), np.uint8)
+        corners = [np.floor((line - low) / cell).astype(np.int32) + margin for line in lines]
+        cv2.polylines(mask, corners, False, (1,), thickness=2)
+        masks.append(mask)
+    return masks, cell, (float(low[0]) - margin * cell, float(low[1]) - margin * cell)
 
 
 def _of_picture(source: Image) -> tuple[Mask, float, tuple[float, float]]:

@@ -21,6 +21,7 @@ _Widths = NDArray[np.float32]
 
 # Widths that differ by a smaller factor are the same.
 _STEP = 1.16
+_NEARLY = 0.999 / _STEP
 # Of the square of its greatest half width: what has a smaller area is a doorway, or a corner.
 _SMALLEST = 2.0
 # Of the square of its chord: what a half disc covers at most.
@@ -125,11 +126,14 @@ class _Places:
         Shape (places + 1,), half of the width of each where it is widest, in cells.
     within
         Shape (places + 1,), the flat index of a cell where a disc of each that was added fits.
+    meeting
+        Shape (2, k), places that touch and are not one as yet.
     """
 
     labels: _Labels
     widest: FloatArray = field(default_factory=lambda: np.zeros(1))
     within: IntArray = field(default_factory=lambda: np.zeros(1, np.int64))
+    meeting: IntArray = field(default_factory=lambda: np.zeros((2, 0), np.int64))
 
     def add(
         self,
@@ -140,7 +144,7 @@ class _Places:
         share: float,
     ) -> None:
         """Add cells of a width; ``way`` tells among which cells that a disc fits the nearest is."""
-        if not new.any():
+        if not (new.any() or self.meeting.size):
             return
         parts, ways = _parts(new, way)
         before = len(self.widest)
@@ -150,15 +154,20 @@ class _Places:
         cell_of[way.reshape(-1)[cells]] = cells
         within = np.append(self.within, cell_of[ways])
         widest = np.append(self.widest, np.full(len(ways), width))
-        reached = way.reshape(-1)[within]
-        a, b = _touching(self.labels, parts)
-        joined = (reached[a] == reached[b]) & (width >= share * widest[a])
-        group = groups(len(widest), np.stack([a, b])[:, joined]).astype(np.int32)
+        labels = self.labels + parts
+        meeting = np.concatenate([self.meeting, _touching(labels, new)], axis=1)
+        first, second = way.reshape(-1)[within][meeting]
+        least, most = np.sort(widest[meeting], axis=0)
+        # The widest discs of one place may fit in spots apart from each other, and cover it all.
+        joined = (first == second) & (width >= np.where(least > width, _NEARLY, share) * most)
+        group = groups(len(widest), meeting[:, joined]).astype(np.int32)
         self.widest = np.zeros(group.max() + 1)
         np.maximum.at(self.widest, group, widest)
         self.within = np.zeros(len(self.widest), np.int64)
         self.within[group] = within
-        self.labels = group[self.labels + parts]
+        self.labels = group[labels]
+        apart = np.sort(group[meeting], axis=0)
+        self.meeting = np.unique(apart[:, apart[0] != apart[1]], axis=1).astype(np.int64)
 
 
 def _parts(new: NDArray[np.bool_], way: _Labels) -> tuple[_Labels, IntArray]:
@@ -171,16 +180,14 @@ def _parts(new: NDArray[np.bool_], way: _Labels) -> tuple[_Labels, IntArray]:
     return labels, found % most
 
 
-def _touching(labels: _Labels, parts: _Labels) -> IntArray:
-    """Return which labels and parts share a side or a corner, shape (2, k)."""
-    columns, sides = labels.shape[1], np.ones((3, 3), np.uint8)
-    near = cv2.dilate((labels > 0).view(np.uint8), sides)
-    cells = np.flatnonzero((near > 0) & (parts > 0))
+def _touching(labels: _Labels, new: NDArray[np.bool_]) -> IntArray:
+    """Return which labels share a side or a corner at new cells, shape (2, k), each pair once."""
+    columns = labels.shape[1]
+    cells = np.flatnonzero(new)
     around = [row + column for row in (-columns, 0, columns) for column in (-1, 0, 1)]
     beside = labels.reshape(-1)[cells[:, None] + np.array(around)]
-    known = beside > 0
-    parted = np.broadcast_to(parts.reshape(-1)[cells, None], known.shape)
-    most = int(parts.max()) + 1
-    return np.stack(
-        np.divmod(np.unique(beside[known].astype(np.int64) * most + parted[known]), most)
-    )
+    own = np.broadcast_to(labels.reshape(-1)[cells, None], beside.shape)
+    other = (beside > 0) & (beside != own)
+    low, high = np.sort(np.stack([beside[other], own[other]]), axis=0).astype(np.int64)
+    most = int(labels.max()) + 1
+    return np.stack(np.divmod(np.unique(low * most + high), most))

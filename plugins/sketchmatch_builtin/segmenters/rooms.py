@@ -86,7 +86,8 @@ class RoomSegmenter(Segmenter):
     a picture, in which either the walls or the free space may be dark; what joins the picture's
     border is outside. No metres are known there, and so all is measured by the drawing itself: free
     space is cut where it becomes less than half as wide [2]_, at doors as where a corridor opens
-    into a hall. A match may take another cut of it, where it becomes less than 0.4 or 0.6 times as
+    into a hall. A door that is drawn, a leaf and the arc that it turns through, is closed: it is
+    no wall, and a room ends there. A match may take another cut of it, where it becomes less than 0.4 or 0.6 times as
     wide. A text of the drawing, and else a label that one line alone has, name the room around
     them; where polygons come with texts, as from DXF, their labels are of layers and blocks.
 
@@ -274,7 +275,7 @@ class RoomSegmenter(Segmenter):
             cut = f"at passages of up to {width:.2g}"
         path = {"stroke_set": "strokes", "polygon_set": "polygons", "image": "pixels"}[source.field]
         area = self._least(plan)
-        found, passages = self._outlines(plan.free, parts, area, plan.cell, path, cut)
+        found, passages = self._outlines(plan.free | plan.doors, parts, area, plan.cell, path, cut)
         rooms = [[plan.cell * ring + plan.corner for ring in _rings(room)] for room in found]
         labels, warnings = _named(
             [shapely.Polygon(outer, inner) for outer, *inner in rooms], source
