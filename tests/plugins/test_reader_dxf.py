@@ -110,13 +110,17 @@ def test_walls_that_are_single_lines_part_rooms_named_by_what_is_written_in_them
         ("bath", 6000, 4000),
         ("ground floor", 4500, 9000),
     ):
-        space.add_mtext(name).set_location((x, y))
+        space.add_mtext(name, dxfattribs={"char_height": 250}).set_location((x, y))
+    space.add_text("bathtub", height=120).set_placement((6500, 4500))
     found = read(drawing)
     assert [polygon.label for polygon in found.polygons] == ["WALLS"]
+    sizes = {item.name: item.size for item in found.landmarks}
+    assert sizes["bath"] == pytest.approx(0.25)
+    assert sizes["bathtub"] == pytest.approx(0.12)
     rooms = RoomSegmenter().segment(found)
     areas = {item.label: item.area for item in rooms.scene.objects}
     assert areas == {
-        "kitchen 12 m²": pytest.approx(12.0, rel=0.05),
+        "kitchen": pytest.approx(12.0, rel=0.05),
         "bath": pytest.approx(15.0, rel=0.05),
         "living room": pytest.approx(27.0, rel=0.05),
     }

@@ -9,7 +9,16 @@ import shapely
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
-from sketchmatch.model import Image, LabelledPolygon, OccupancyGrid, PolygonSet, Stroke, StrokeSet
+from sketchmatch.model import (
+    Image,
+    LabelledPolygon,
+    Landmark,
+    OccupancyGrid,
+    PolygonSet,
+    Stroke,
+    StrokeSet,
+)
+from sketchmatch_builtin.segmenters._landmarks import names_of_rooms
 from sketchmatch_builtin.segmenters._swings import doors_apart
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
@@ -148,6 +157,51 @@ def test_texts_of_an_svg_plan_name_its_rooms(tmp_path):
     assert sorted(item.label for item in rooms) == ["", "", "", "bath", "living room"]
     bath = next(item for item in rooms if item.label == "bath")
     assert bath.polygon.contains(shapely.Point(10, -20))
+
+
+@pytest.mark.parametrize(
+    ("written", "name"),
+    [
+        ("12 m²", ""),
+        ("3,50 m", ""),
+        ("15'6\" x 15'6\"", ""),
+        ("16 м²", ""),
+        ("120 sq ft", ""),
+        ("3.5 x 4", ""),
+        ("ca. 18,5 qm", ""),
+        ("Bad, 5.6 m²", "Bad"),
+        ("Балкон 4 м²", "Балкон"),
+        ("Kitchen (12 m2)", "Kitchen"),
+        ("101", "101"),
+        ("Bath 2", "Bath 2"),
+        ("1 car", "1 car"),
+        ("in", "in"),
+        ("X", "X"),
+    ],
+)
+def test_measures_are_no_names(written, name):
+    found = names_of_rooms([Landmark(written, (1.0, 2.0), "room", 3.0)])
+    assert found == ([Landmark(name, (1.0, 2.0), "room", 3.0)] if name else [])
+
+
+def test_what_is_written_largest_names_a_room(tmp_path):
+    paths = "".join(
+        f'<path fill="none" stroke="black" d="M{" L".join(f"{x} {9 - y}" for x, y in line)}"/>'
+        for line in WALLS
+    )
+    texts = (
+        '<text x="2" y="2" style="font-size:.3px">queen bed</text>'
+        '<text x="2" y="2" font-size=".2">12 m²</text>'
+        '<g transform="scale(.02)" font-size="30"><text x="20" y="20">bedroom</text></g>'
+        '<text x="6" y="2.1" font-size=".3">sofa<tspan font-size=".6"> corner</tspan></text>'
+        '<text x="6" y="2" font-size=".5">living</text>'
+        '<text x="9" y="3" font-size="nonsense">shelf</text>'
+    )
+    path = tmp_path / "plan.svg"
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{paths}{texts}</svg>', "utf-8")
+    scene = segmented(read_source(path)).scene
+    labels = {item.label for item in scene.objects if item.label}
+    assert labels == {"bedroom", "sofa corner", "shelf"}
 
 
 def test_polygons_are_walls():

@@ -35,7 +35,7 @@ _PAINTS = {"fill", "stroke"}
 _INHERITED = {
     *_PAINTS,
     *{"visibility", "color", "fill-rule", "fill-opacity", "stroke-opacity", "stroke-width"},
-    *{"marker-start", "marker-end"},
+    *{"marker-start", "marker-end", "font-size"},
 }
 _TRANSFORMS = {"transform", "translate", "rotate", "scale", "transform-origin", "transform-box"}
 _GEOMETRY = {"x", "y", "width", "height", "cx", "cy", "r", "rx", "ry", "d"}
@@ -86,6 +86,8 @@ class Look:
         Whether it is ``evenodd``.
     marker_start, marker_end
         Identities of what its ends are drawn with, or empty.
+    font_size
+        In user units.
     displayed
         Whether anything of it is shown, that is neither ``display`` nor ``opacity`` hides it.
     clip_path
@@ -108,6 +110,7 @@ class Look:
     fill_rule: bool = False
     marker_start: str = ""
     marker_end: str = ""
+    font_size: float = 16.0
     displayed: bool = True
     clip_path: str = ""
     overflow: bool = False
@@ -414,6 +417,10 @@ def _width(text: str) -> float:
     return length(text, 100.0)
 
 
+def _font_size(text: str) -> float:
+    return length(text, None)
+
+
 def _target(text: str) -> str:
     match = _URL.match(text)
     return match[1].strip().removeprefix("#") if match else ""
@@ -424,6 +431,7 @@ _VALUES: dict[str, Any] = {
     **dict.fromkeys(_SHARES, _share),
     "color": _paint_text,
     "stroke-width": _width,
+    "font-size": _font_size,
     "visibility": lambda text: _VISIBLE[text.lower()],
     "fill-rule": lambda text: _RULES[text.lower()],
     "marker-start": _target,

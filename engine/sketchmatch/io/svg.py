@@ -268,7 +268,7 @@ class _Drawing:
             if not look.displayed or not _for_us(element):
                 continue
             if tag_of(element) == "text":
-                self.names.extend(_written(element, outer.matrix) if look.visible else ())
+                self.names.extend(self._written(element, look, outer.matrix))
                 continue
             inner = replace(
                 outer, look=look, size=(None, None), matrix=self._placed(element, look, outer)
@@ -297,6 +297,25 @@ class _Drawing:
             children, inner = self._children(element, inner)
             self._visit(len(children))
             stack.extend((child, inner) for child in reversed(children))
+
+    def _written(self, text: ElementTree.Element, look: Look, matrix: Any) -> Iterator[Landmark]:
+        """Yield what a text says, where it begins and how large it is, unless that is not known."""
+        name = _spaced(" ".join("".join(text.itertext()).split()))
+        placed = [text, *(part for part in text if tag_of(part) == "tspan")]
+        try:
+            own = svgelements.Matrix(text.get("transform", "")) * matrix
+            x, y = (
+                next((float(part.get(axis, "").split()[0]) for part in placed if part.get(axis)), 0)
+                for axis in ("x", "y")
+            )
+            point = own.point_in_matrix_space((x, y))
+        except (ValueError, IndexError, TypeError):
+            return
+        scale = math.sqrt(abs(own.a * own.d - own.b * own.c))
+        looks = [look, *(self._styles.look(part, look) for part in placed[1:])]
+        size = scale * max(each.font_size for each in looks)
+        if look.visible and name and all(map(math.isfinite, (point.x, point.y, size))):
+            yield Landmark(name, (float(point.x), -float(point.y)), "room", size)
 
     def _says_a_length(self, look: Look, shape: _Shape) -> bool:
         """Whether a shape is an open line, both ends of which are marked."""
@@ -511,23 +530,6 @@ def _for_us(element: ElementTree.Element) -> bool:
         each.strip().lower().startswith("en") for each in languages.split(",")
     )
     return english and "requiredExtensions" not in element.attrib
-
-
-def _written(text: ElementTree.Element, matrix: Any) -> Iterator[Landmark]:
-    """Yield what a text says and where it begins, unless that cannot be read."""
-    name = _spaced(" ".join("".join(text.itertext()).split()))
-    placed = [text, *(part for part in text if tag_of(part) == "tspan")]
-    try:
-        own = svgelements.Matrix(text.get("transform", ""))
-        x, y = (
-            next((float(part.get(axis, "").split()[0]) for part in placed if part.get(axis)), 0.0)
-            for axis in ("x", "y")
-        )
-        point = (own * matrix).point_in_matrix_space((x, y))
-    except (ValueError, IndexError, TypeError):
-        return
-    if name and math.isfinite(point.x) and math.isfinite(point.y):
-        yield Landmark(name, (float(point.x), -float(point.y)), "room")
 
 
 def _label(element: ElementTree.Element) -> str:

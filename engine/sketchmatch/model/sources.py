@@ -82,11 +82,14 @@ class Landmark:
         (x, y) in the map's frame, in metres.
     kind
         What sort of thing it is, such as ``"door"`` or ``"room"``; empty if nobody said.
+    size
+        How high its letters are written, in the map's or the drawing's unit; 0 if nobody wrote.
     """
 
     name: str
     point: tuple[float, float]
     kind: str = ""
+    size: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

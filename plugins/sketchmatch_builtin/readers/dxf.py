@@ -138,7 +138,13 @@ def _read(drawing: Any, part: str) -> PolygonSet:
         areas.polygon_set(*notes, *_note_on_layers(shapes, part), upwards=1.0),
         lines=tuple(frozen_floats(line * factor) for line in lines),
         landmarks=tuple(
-            replace(each, point=(each.point[0] * factor, each.point[1] * factor)) for each in texts
+            Landmark(
+                each.name,
+                (each.point[0] * factor, each.point[1] * factor),
+                each.kind,
+                each.size * factor,
+            )
+            for each in texts
         ),
     )
 
@@ -454,7 +460,9 @@ def _texts(entities: Iterable[Any]) -> list[Landmark]:
             x, y = float(each.dxf.insert.x), float(each.dxf.insert.y)
             words = cleaned_label(each.plain_text())
             if words and max(abs(x), abs(y)) < math.inf:
-                found.append(Landmark(words, (x, y), "room"))
+                height = "char_height" if each.dxftype() == "MTEXT" else "height"
+                size = float(each.dxf.get(height, 0.0))
+                found.append(Landmark(words, (x, y), "room", size))
     return found
 
 

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import shapely
 
 from sketchmatch.model import Landmark
 
-__all__ = ["ROOM", "labels_of", "left_over"]
+__all__ = ["ROOM", "labels_of", "left_over", "names_of_rooms"]
 
 ROOM = "room"
 """The kind of landmark that names a room, and no thing in it."""
 
 _MOST_NAMED = 8
 _LONGEST_NAME = 40
+# Letters are larger that are so many times as high.
+_LARGER, _LEAST = 1.1, 1e-100
+# What a measure is made of: numbers, and what says that these are no number of a room.
+_UNITS = r"(?:[cm]?[mм][²2]?|qm|sqm|sq\.?\s?(?:m|ft|feet)\.?|кв\.?\s?м\.?|ft[²2]?|feet|in|㎡)"
+_SIGNS = r"(?:['\"′″’”]|[x×✕*]|by)"
+_UNIT = re.compile(rf"{_UNITS}|{_SIGNS}|\d[.,]\d", re.IGNORECASE)
+_MEASURE = re.compile(
+    rf"(?:\d+(?:[.,/⁄]\d+)*|{_UNITS}|{_SIGNS}|[½¼¾]|ca\.?|[\s~≈=±+:;,.()/-])+", re.IGNORECASE
+)
+# An area behind a name.
+_AREA = re.compile(rf"[\s,;:(/·|–-]+(?:ca\.?\s*)?\d+(?:[.,]\d+)?\s?{_UNITS}\)?$", re.IGNORECASE)
 
 
 def labels_of(
@@ -28,7 +42,7 @@ def labels_of(
 
     A name goes to the object in which its place lies, or else to the nearest within reach; of
     several that could have it, or of several names for one object, the nearest are joined first,
-    and what lies within the same object by how near its middle is.
+    and of what lies within the same object what is written largest, then nearest to its middle.
 
     Parameters
     ----------
@@ -51,11 +65,24 @@ def labels_of(
     away = shapely.distance(points[k], objects[j])
     last = (away > 0.0) & np.asarray(doubtful or [False] * len(polygons))[j]
     middle = shapely.distance(points[k], shapely.centroid(objects[j]))
-    for pair in np.lexsort((middle, away, last)).tolist():
+    size = np.array([item.size for item in named])[k]
+    small = -np.round(np.log(np.maximum(size, _LEAST)) / math.log(_LARGER))
+    for pair in np.lexsort((middle, small, away, last)).tolist():
         if k[pair] in left and not labels[j[pair]]:
             labels[j[pair]] = named[k[pair]].name
             left.remove(k[pair])
     return labels, [named[k] for k in sorted(left)]
+
+
+def names_of_rooms(written: Iterable[Landmark]) -> list[Landmark]:
+    """Return what is written in a plan without measures, such as ``12 m²`` or ``3.5 x 4``."""
+    found = []
+    for item in written:
+        measured = _MEASURE.fullmatch(item.name) and _UNIT.search(item.name)
+        name = _AREA.sub("", item.name).strip()
+        if name and not (measured and re.search(r"\d", item.name)):
+            found.append(replace(item, name=name))
+    return found
 
 
 def left_over(landmarks: Sequence[Landmark], where: str, what: str) -> tuple[str, ...]:

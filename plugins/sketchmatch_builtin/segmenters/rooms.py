@@ -39,7 +39,12 @@ from sketchmatch_builtin.segmenters._cells import (
     simplified,
 )
 from sketchmatch_builtin.segmenters._doorways import Labels, divided, doorway, parts_that_meet
-from sketchmatch_builtin.segmenters._landmarks import ROOM, labels_of, left_over
+from sketchmatch_builtin.segmenters._landmarks import (
+    ROOM,
+    labels_of,
+    left_over,
+    names_of_rooms,
+)
 from sketchmatch_builtin.segmenters._leaves import divided_at_openings
 from sketchmatch_builtin.segmenters._plans import Plan, drawn
 from sketchmatch_builtin.segmenters._widths import divided_by_width
@@ -87,9 +92,10 @@ class RoomSegmenter(Segmenter):
     border is outside. No metres are known there, and so all is measured by the drawing itself: free
     space is cut where it becomes less than half as wide [2]_, at doors as where a corridor opens
     into a hall. A door that is drawn, a leaf and the arc that it turns through, is closed: it is
-    no wall, and a room ends there. A match may take another cut of it, where it becomes less than 0.4 or 0.6 times as
-    wide. A text of the drawing, and else a label that one line alone has, name the room around
-    them; where polygons come with texts, as from DXF, their labels are of layers and blocks.
+    no wall, and a room ends there. A match may take another cut of it, where it becomes less than
+    0.4 or 0.6 times as wide. A text of the drawing, and else a label that one line alone has, name
+    the room around them; of several texts the largest does, and measures are none. Where polygons
+    come with texts, as from DXF, their labels are of layers and blocks.
 
     Rooms come in reading order: by their highest point from the top down, then from the left.
     One that the map's file names, with the type ``room`` and a place in it, has that name.
@@ -320,7 +326,7 @@ def _named(
     """
     if isinstance(source, Image):
         return [""] * len(rooms), ()
-    labels, unplaced = labels_of(rooms, source.landmarks, 0.0)
+    labels, unplaced = labels_of(rooms, names_of_rooms(source.landmarks), 0.0)
     free = [k for k, label in enumerate(labels) if not label]
     if isinstance(source, StrokeSet) or not source.landmarks:
         called, _ = labels_of([rooms[k] for k in free], _called(source), 0.0)
