@@ -206,3 +206,32 @@ def test_what_a_pad_exported_is_what_was_drawn(name):
     for item, (x0, y0, x1, y1) in zip(found.scene.objects, THINGS.values(), strict=True):
         thing = shapely.box(x0, -y1, x1, -y0)
         assert item.polygon.intersection(thing).area > 0.93 * item.polygon.union(thing).area
+
+
+def walls(*holes):
+    outline = "M0 0H100V70H0z"
+    path = f'<path fill="#333" fill-rule="evenodd" d="{outline}{"".join(holes)}"/>'
+    document = f'<svg xmlns="http://www.w3.org/2000/svg">{path}</svg>'
+    return [stroke.points.tolist() for stroke in decode_svg(document.encode()).strokes]
+
+
+def test_ink_around_several_holes_is_walls_and_read_as_their_sides():
+    rooms = ["M5 5H45V65H5z", "M50 5H95V30H50z", "M50 35H95V65H50z"]
+    outer, *inner = walls(*rooms)
+    assert outer == [[0, 0], [100, 0], [100, -70], [0, -70], [0, 0]]
+    assert sorted(map(min, inner)) == [[5, -65], [50, -65], [50, -30]]
+    assert [len(ring) for ring in inner] == [5, 5, 5]
+
+
+def test_a_hole_that_winds_around_walls_is_no_pen_stroke():
+    # Three rooms, open to each other at the lower end of the walls between them.
+    comb = "M3 3H30V60H36V3H63V60H69V3H97V67H3z"
+    outer, inner = walls(comb)
+    assert len(outer) == 5
+    assert [30, -60] in inner
+    assert len(inner) == 13
+
+
+def test_a_ring_of_ink_around_one_hole_is_still_the_loop_in_its_middle():
+    (loop,) = walls("M4 4H96V66H4z")
+    assert np.ptp(loop, axis=0) == pytest.approx([96, 66], abs=0.5)

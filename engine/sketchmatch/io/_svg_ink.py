@@ -29,6 +29,8 @@ _GAP, _ROUND = 0.5, 0.3
 _MOST, _FAR = 0.9, 3.0
 # A ring of ink is a line around something if its width is at most this share of its extent.
 _WIDEST_RING = 0.25
+# From so many holes on, or if all is so many times as long as around it, it is walls of rooms.
+_FEWEST_ROOMS, _WINDING = 3, 2.5
 # Where ends are looked for first, places compared for that, and how often the search is refined.
 _STARTS, _PLACES, _ROUNDS = 96, 24, 8
 _FEWEST, _MOST_POINTS = 48, 1000
@@ -54,10 +56,16 @@ def pen_lines(rings: list[FloatArray], corners: list[int], evenodd: bool) -> lis
         For each ribbon the line in its middle, for a ring of ink the lines in its middle, for all
         else its outline; nothing for holes.
     """
-    middles = [_middle(ring, count) for ring, count in zip(rings, corners, strict=True)]
-    lines = [[] if middle is None else [middle] for middle in middles]
-    others = [k for k, middle in enumerate(middles) if middle is None]
-    for k, outlines in zip(others, _outlines([rings[k] for k in others], evenodd), strict=True):
+    inked, holes = _nested(rings, evenodd)
+    lines: list[list[FloatArray]] = [[] for _ in rings]
+    others = []
+    for k in inked:
+        middle = None if holes[k] else _middle(rings[k], corners[k])
+        if middle is None:
+            others.append(k)
+        else:
+            lines[k] = [middle]
+    for k, outlines in zip(others, _outlines(rings, others, holes), strict=True):
         lines[k] = outlines
     return lines
 
@@ -126,10 +134,10 @@ def _at(ring: FloatArray, way: FloatArray, shares: FloatArray) -> FloatArray:
     return np.stack([np.interp(along, way, x), np.interp(along, way, y)], axis=-1)
 
 
-def _outlines(rings: list[FloatArray], evenodd: bool) -> list[list[FloatArray]]:
-    """Return for each ring the outlines of what it bounds from outside."""
+def _nested(rings: list[FloatArray], evenodd: bool) -> tuple[list[int], dict[int, list[int]]]:
+    """Return which rings bound ink from outside, the largest first, and the holes in each."""
     if len(rings) < 2 or len(rings) > _MOST_RINGS:
-        return [[ring] for ring in rings]
+        return [*range(len(rings))], {k: [] for k in range(len(rings))}
     areas = [signed_area(ring) for ring in rings]
     order = sorted(range(len(rings)), key=lambda k: -abs(areas[k]))
     polygons = [shapely.Polygon(ring) if len(ring) > 3 else shapely.Polygon() for ring in rings]
@@ -153,40 +161,48 @@ def _outlines(rings: list[FloatArray], evenodd: bool) -> list[list[FloatArray]]:
             around[k].append(j)
     winding: dict[int, int] = {}
     holes: dict[int, list[int]] = {k: [] for k in order}
-    outlines: list[list[FloatArray]] = [[] for _ in rings]
+    inked = []
     for k in order:
         parent = max(around[k], key=lambda j: rank[j], default=None)
         outside = winding[parent] if parent is not None else 0
         winding[k] = outside + (1 if evenodd or areas[k] >= 0.0 else -1)
-        inked, was_inked = (n % 2 != 0 if evenodd else n != 0 for n in (winding[k], outside))
-        if inked and not was_inked:
-            outlines[k] = [rings[k]]
-        elif was_inked and not inked and parent is not None:
+        is_inked, was_inked = (n % 2 != 0 if evenodd else n != 0 for n in (winding[k], outside))
+        if is_inked and not was_inked:
+            inked.append(k)
+        elif was_inked and not is_inked and parent is not None:
             holes[parent].append(k)
-    inked_rings = [k for k in order if outlines[k]]
+    return inked, holes
+
+
+def _outlines(
+    rings: list[FloatArray], which: list[int], holes: dict[int, list[int]]
+) -> list[list[FloatArray]]:
+    """Return for some rings, each with its holes, the outlines of what they bound."""
     shapes = [
-        shapely.Polygon(rings[k], [rings[j] for j in holes[k]] if holes[k] else None)
-        for k in inked_rings
+        shapely.Polygon(rings[k], [rings[j] for j in holes[k]] if holes[k] else None) for k in which
     ]
-    for k, shape in zip(inked_rings, shapes, strict=True):
-        if holes[k]:
-            outlines[k] = _around(shape, rings[k])
-    for group in _overlapping(shapes):
-        first, *others = sorted(inked_rings[k] for k in group)
-        whole = shapely.union_all([shapely.make_valid(shapes[k]) for k in group])
+    outlines = [
+        _around(shape, rings[k]) if holes[k] else [rings[k]]
+        for k, shape in zip(which, shapes, strict=True)
+    ]
+    for group in _overlapping(shapes) if len(rings) <= _MOST_RINGS else []:
+        first, *others = sorted(group, key=lambda n: which[n])
+        whole = shapely.union_all([shapely.make_valid(shapes[n]) for n in group])
         outlines[first] = [
             line
             for part in shapely.get_parts(whole)
             if isinstance(part, shapely.Polygon)
             for line in _around(part, shapely.get_coordinates(part.exterior))
         ]
-        for k in others:
-            outlines[k] = []
+        for n in others:
+            outlines[n] = []
     return outlines
 
 
 def _overlapping(shapes: list[shapely.Polygon]) -> list[list[int]]:
     """Return the groups of shapes that touch, two or more each, as they look like one."""
+    if not shapes:
+        return []
     first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
     group = list(range(len(shapes)))
 
@@ -205,12 +221,17 @@ def _overlapping(shapes: list[shapely.Polygon]) -> list[list[int]]:
 
 
 def _around(shape: shapely.Polygon, outline: FloatArray) -> list[FloatArray]:
-    """Return the lines in the middle of rings of ink; of another shape with holes its outline."""
+    """Return the lines in the middle of rings of ink; of another shape with holes its outline.
+
+    Around several holes, or one that winds, ink is walls: what bounds it are its sides.
+    """
     outer = shapely.Polygon(shape.exterior)
     width = 2.0 * shape.area / shape.length
     x0, y0, x1, y1 = shape.bounds
     if not shape.interiors or not 0.0 < width <= _WIDEST_RING * min(x1 - x0, y1 - y0):
         return [outline]
+    if len(shape.interiors) >= _FEWEST_ROOMS or shape.length > _WINDING * outer.length:
+        return [outline, *map(shapely.get_coordinates, shape.interiors)]
     # Ends of the line that stick out, and lines from ring to ring, are as thin as it is and vanish.
     rings = shapely.buffer(shapely.buffer(outer, -0.75 * width), 0.25 * width)
     parts = [part for part in shapely.get_parts(rings) if part.area > width**2]
