@@ -19,6 +19,7 @@ from sketchmatch.model import (
     StrokeSet,
 )
 from sketchmatch_builtin.segmenters._landmarks import names_of_rooms
+from sketchmatch_builtin.segmenters._plan_things import paper
 from sketchmatch_builtin.segmenters._swings import doors_apart
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
@@ -462,3 +463,69 @@ def test_doors_are_not_looked_for_in_a_scribble_without_end():
     left, closed = doors_apart(scribble)
     assert len(left) == 100
     assert closed == []
+
+
+def box(x, y, width, height):
+    corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height), (x, y)]
+    return [(float(a), float(b)) for a, b in corners]
+
+
+def named(lines, *names):
+    places = tuple(Landmark(name, point, "room", size) for name, point, size in names)
+    return StrokeSet(strokes(lines).strokes, (), places)
+
+
+def test_furniture_is_of_the_room_that_it_stands_in():
+    things = [
+        box(4, 4, 2, 1.2),  # a sofa in the middle of the large room
+        box(4, 4.9, 2, 0.3),
+        box(7, 6.0, 2, 1),  # a bed at its wall
+        box(0, 6.4, 2.2, 0.6),  # a kitchen's counter along two walls
+        box(7, 0.5, 1, 1),
+    ]
+    lines = [*HALL, *doors("apart"), *things]
+    names = [("living", (4.5, 5.9), 0.4), ("sofa", (5, 4.5), 0.3), ("bed 1", (7.5, 1), 0.3)]
+    scene = segmented(named(lines, *names)).scene
+    assert sorted(item.area for item in scene.objects) == pytest.approx(HALL_AREAS, rel=0.1)
+    labels = {item.label: item.area for item in scene.objects if item.label}
+    assert labels == {
+        "living": pytest.approx(6 * 4.2, rel=0.1),
+        "bed 1": pytest.approx(6 * 2.8, rel=0.1),
+    }
+
+
+def test_closed_lines_side_by_side_are_rooms_however_small():
+    boxes = [box(0, 0, 9, 4), box(0, 4, 4, 3), box(4, 4, 1.5, 1.5), box(4, 5.5, 1.5, 1.5)]
+    found = areas(strokes([*boxes, box(5.5, 4, 3.5, 3)]))
+    assert sorted(found) == pytest.approx([2.25, 2.25, 10.5, 12, 36], rel=0.06)
+
+
+def test_named_outlines_apart_in_a_place_without_a_name_are_rooms():
+    tents = [box(3.0 * k + 1, 1, 2, 2) for k in range(4)]
+    field = [box(0, 0, 13.5, 9), [(0, 4.5), (6, 4.5)], [(7.5, 4.5), (13.5, 4.5)]]
+    names = [(f"tent {k + 1}", (3.0 * k + 2, 2.0), 0.3) for k in range(4)]
+    scene = segmented(named([*tents, *field], *names)).scene
+    labels = sorted(item.label for item in scene.objects if item.label)
+    assert labels == ["tent 1", "tent 2", "tent 3", "tent 4"]
+    # Without names they stand about.
+    assert len(segmented(strokes([*tents, *field])).scene) == 2
+
+
+@pytest.mark.parametrize("degrees", [0.0, 8.0])
+def test_ruled_paper_is_no_wall(degrees):
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    across = [[(x, -1.0), (x, 8.0)] for x in np.arange(-1.0, 10.1, 0.5)]
+    down = [[(-1.0, y), (10.0, y)] for y in np.arange(-1.0, 8.1, 0.5)]
+    lines = [*across, *down, *HALL, *doors("apart")]
+    found = areas(strokes([np.array(line) @ [[c, s], [-s, c]] for line in lines]))
+    assert sorted(found) == pytest.approx(HALL_AREAS, rel=0.1)
+
+
+def test_walls_are_no_paper_if_they_are_few_or_at_other_distances():
+    grid = [np.array([(x, 0.0), (x, 5.0)]) for x in range(20)]
+    assert paper(grid) == frozenset(range(20))
+    assert paper(grid[:7]) == frozenset()
+    uneven = [line + np.array([0.3 * (k % 3), 0.0]) for k, line in enumerate(grid)]
+    assert paper(uneven) == frozenset()
+    assert paper([line * (1.0, 1.0 + k / 10) for k, line in enumerate(grid)]) == frozenset()
+    assert paper([grid[0]] * 20) == frozenset()

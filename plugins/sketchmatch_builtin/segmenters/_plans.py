@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -16,7 +16,7 @@ from sketchmatch_builtin.segmenters._cells import Mask
 from sketchmatch_builtin.segmenters._doorways import divided, doorway
 from sketchmatch_builtin.segmenters._swings import doors_apart
 
-__all__ = ["Plan", "drawn"]
+__all__ = ["Plan", "drawn", "lines_of"]
 
 # Cells along the longer side of what lines are drawn into, or a picture is made smaller to.
 _SIDE = 1000
@@ -53,7 +53,13 @@ class Plan:
     door: float
 
 
-def drawn(source: StrokeSet | PolygonSet | Image, door_width: float | None) -> Plan:
+def drawn(
+    source: StrokeSet | PolygonSet | Image,
+    door_width: float | None,
+    *,
+    left_out: Container[int] = (),
+    side: int = _SIDE,
+) -> Plan:
     """Return the free cells of a drawn plan.
 
     Parameters
@@ -63,13 +69,18 @@ def drawn(source: StrokeSet | PolygonSet | Image, door_width: float | None) -> P
         either is darker.
     door_width
         Widest doorway in the drawing's unit, or None to find it from the drawing.
+    left_out
+        Which lines are no walls.
+    side
+        Cells along the longer side of what lines are drawn into.
     """
     if isinstance(source, Image):
         walls, cell, corner = _of_picture(source)
         closed = np.zeros_like(walls)
     else:
-        lines, leaves = doors_apart(_lines(source))
-        (walls, closed), cell, corner = _of_lines((lines, leaves))
+        given = [line for k, line in enumerate(lines_of(source)) if k not in left_out]
+        lines, leaves = doors_apart(given)
+        (walls, closed), cell, corner = _of_lines((lines, leaves), side)
     door = None if door_width is None else door_width / cell
     free, width = _between(walls | closed, door)
     # Walls have less room between their borders than what lies between them.
@@ -78,7 +89,7 @@ def drawn(source: StrokeSet | PolygonSet | Image, door_width: float | None) -> P
     return Plan(free, closed & (1 - walls), cell, corner, width)
 
 
-def _lines(source: StrokeSet | PolygonSet) -> list[FloatArray]:
+def lines_of(source: StrokeSet | PolygonSet) -> list[FloatArray]:
     """Return lines that are walls, each of shape (k, 2)."""
     if isinstance(source, StrokeSet):
         lines, path = [stroke.points for stroke in source.strokes], "strokes"
@@ -99,13 +110,13 @@ def _lines(source: StrokeSet | PolygonSet) -> list[FloatArray]:
 
 
 def _of_lines(
-    layers: Sequence[Sequence[FloatArray]],
+    layers: Sequence[Sequence[FloatArray]], side: int
 ) -> tuple[list[Mask], float, tuple[float, float]]:
     """Return the cells that lines of each layer go through, in free space all around."""
     points = np.concatenate([*itertools.chain(*layers)])
     low, size = points.min(axis=0), np.ptp(points, axis=0)
-    cell = float(size.max()) / _SIDE or 1.0
-    margin = round(_MARGIN * _SIDE)
+    cell = float(size.max()) / side or 1.0
+    margin = round(_MARGIN * side)
     columns, rows = (np.ceil(size / cell).astype(int) + 2 * margin + 1).tolist()
     masks = []
     for lines in layers:

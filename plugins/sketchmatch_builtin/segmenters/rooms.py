@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import cast
@@ -46,7 +47,8 @@ from sketchmatch_builtin.segmenters._landmarks import (
     names_of_rooms,
 )
 from sketchmatch_builtin.segmenters._leaves import divided_at_openings
-from sketchmatch_builtin.segmenters._plans import Plan, drawn
+from sketchmatch_builtin.segmenters._plan_things import paper, standing, things_in
+from sketchmatch_builtin.segmenters._plans import Plan, drawn, lines_of
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 
 __all__ = ["RoomSegmenter"]
@@ -63,6 +65,10 @@ _FURNITURE, _SMALLEST = 2.0, 2.0
 # cuts, a coarser and a finer one.
 _NARROW = 0.5
 _OTHERWISE_NARROW = (0.4, 0.6)
+# Cells along the longer side of a drawing in which rooms are looked for without what is in them.
+_COARSE_SIDE = 400
+# Rooms of a plan.
+_FEWEST = 2
 # Of its longer side: half the width from which a room counts.
 _NARROWEST = 0.006
 # Of all rooms: the smallest.
@@ -92,10 +98,12 @@ class RoomSegmenter(Segmenter):
     border is outside. No metres are known there, and so all is measured by the drawing itself: free
     space is cut where it becomes less than half as wide [2]_, at doors as where a corridor opens
     into a hall. A door that is drawn, a leaf and the arc that it turns through, is closed: it is
-    no wall, and a room ends there. A match may take another cut of it, where it becomes less than
-    0.4 or 0.6 times as wide. A text of the drawing, and else a label that one line alone has, name
-    the room around them; of several texts the largest does, and measures are none. Where polygons
-    come with texts, as from DXF, their labels are of layers and blocks.
+    no wall, and a room ends there. Small closed strokes are furniture if they stand free in a room,
+    or at its walls while rooms open into each other; parallel lines evenly apart are ruled paper. A
+    match may take another cut of it, where it becomes less than 0.4 or 0.6 times as wide. A text of
+    the drawing, and else a label that one line alone has, name the room around them; of several
+    texts the largest does, and measures are none. Where polygons come with texts, as from DXF,
+    their labels are of layers and blocks.
 
     Rooms come in reading order: by their highest point from the top down, then from the left.
     One that the map's file names, with the type ``room`` and a place in it, has that name.
@@ -254,8 +262,44 @@ class RoomSegmenter(Segmenter):
 
     def _plan(self, source: StrokeSet | PolygonSet | Image) -> Plan:
         """Return the free cells of a drawing, furniture among them."""
-        plan, furniture = drawn(source, self.params.door_width), self.params.furniture
-        longest = plan.door if furniture is None else furniture / plan.cell
+        width = self.params.door_width
+        left_out = self._things(source) if isinstance(source, StrokeSet) else frozenset()
+        return self._emptied(drawn(source, width, left_out=left_out))
+
+    def _things(self, source: StrokeSet) -> frozenset[int]:
+        """Return the lines of a drawing that are things in its rooms, or its paper."""
+        lines, names = lines_of(source), source.landmarks
+        ruled = paper(lines)
+        free, touching = things_in(lines, names)
+        if not (free or touching):
+            return ruled
+        plan, rooms = self._coarse(source, {*ruled, *touching, *itertools.chain(*free)})
+        count = int(rooms.max())
+        if count < _FEWEST:
+            return ruled
+        cells = np.array([plan.cell, *plan.corner])
+        found = ruled.union(standing(free, lines, names, rooms, cells))
+        opening = np.unique(parts_that_meet(plan.free | plan.doors, rooms))
+        # Where rooms open into each other, what bounds one is more than a line, or has gaps; but
+        # of a line that bounds a wall more rooms are found without it.
+        if touching and 2 * len(opening) > count:
+            found |= {*touching} if count <= self._coarse(source, found)[1].max() else set()
+        return found
+
+    def _coarse(self, source: StrokeSet, left_out: Container[int]) -> tuple[Plan, Labels]:
+        """Return a plan in larger cells without some lines, and the number of each cell's room."""
+        width = self.params.door_width
+        plan = self._emptied(drawn(source, width, left_out=left_out, side=_COARSE_SIDE))
+        (parts,) = self._by_width(plan, [_NARROW])
+        _, labels, statistics, _ = cv2.connectedComponentsWithStats(parts, connectivity=8)
+        large = statistics[:, cv2.CC_STAT_AREA] >= self._cells(plan)
+        large[0] = False
+        return plan, np.where(large, np.cumsum(large), 0).astype(np.int32)[labels]
+
+    def _emptied(self, plan: Plan) -> Plan:
+        """Return a plan without the things that stand free."""
+        longest = self.params.furniture
+        longest = plan.door if longest is None else longest / plan.cell
         return replace(plan, free=_furnished(plan.free, longest))
 
     def _by_width(self, plan: Plan, shares: Sequence[float]) -> list[Mask]:
@@ -304,7 +348,7 @@ class RoomSegmenter(Segmenter):
         large[0] = False
         which = np.flatnonzero(large)
         refuse_more(len(which), source_limits().max_objects, "raise min_area")
-        if len(which) < 2:
+        if len(which) < _FEWEST:
             raise _too_few(len(which), path, area, cut)
         tolerance = self.params.tolerance
         labels = np.where(large, np.cumsum(large), 0).astype(np.int32)[parts]

@@ -1,0 +1,164 @@
+"""Things that are drawn in a floor plan, such as furniture: closed lines that bound no room."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from sketchmatch.model import FloatArray, Landmark
+from sketchmatch_builtin.segmenters._doorways import Labels
+from sketchmatch_builtin.segmenters._merging import groups
+
+__all__ = ["Things", "paper", "standing", "things_in"]
+
+# Of the area of the hull of all that is drawn: the largest thing.
+_LARGEST = 0.06
+# Of the square of the way around it: the least area. What is longer than seven times its width is
+# a wall.
+_THICK = 0.027
+# A closed line has at least so many points, the first of them twice.
+_CORNERS = 4
+# Of the span of all: what is nearer to each other touches.
+_NEAR = 0.003
+# So many parallel lines are of paper: as long as the longest, at like distances, in radians of one
+# direction; of the longest, and of the usual distance.
+_RULED, _AS_LONG, _PARALLEL, _LIKE = 8, 0.98, 0.005, 0.03
+# Of the distances between them: those that are so many times the usual one.
+_EVEN = 0.9
+
+
+class Things(NamedTuple):
+    """Lines that may be things.
+
+    Attributes
+    ----------
+    free
+        The lines of each thing that touches nothing else.
+    touching
+        Those that touch other lines, and have no name in them.
+    """
+
+    free: list[list[int]]
+    touching: list[int]
+
+
+def paper(lines: Sequence[FloatArray]) -> frozenset[int]:
+    """Return which lines, each of shape (k, 2), are of ruled paper: parallel, and evenly apart."""
+    which = [k for k, line in enumerate(lines) if len(line) == 2 and (line[0] != line[1]).any()]
+    if len(which) < _RULED:
+        return frozenset()
+    ends = np.array([lines[k] for k in which])
+    steps = ends[:, 1] - ends[:, 0]
+    lengths = np.hypot(*steps.T)
+    # A line is the same from either end.
+    direction = np.arctan2(steps[:, 1], steps[:, 0]) % math.pi
+    found: set[int] = set()
+    for k in np.argsort(-lengths).tolist():
+        turned = np.abs((direction - direction[k] + math.pi / 2.0) % math.pi - math.pi / 2.0)
+        same = (turned <= _PARALLEL) & (lengths >= _AS_LONG * lengths[k])
+        same &= lengths <= lengths[k] / _AS_LONG
+        if which[k] in found or same.sum() < _RULED:
+            continue
+        across = np.array([-steps[k, 1], steps[k, 0]]) / lengths[k]
+        gaps = np.diff(np.sort(ends[same].mean(axis=1) @ across))
+        usual = float(np.median(gaps))
+        even = (
+            np.abs(gaps / usual - np.round(gaps / usual)) <= _LIKE if usual else np.array([False])
+        )
+        if even.mean() >= _EVEN:
+            found.update(which[j] for j in np.flatnonzero(same))
+    return frozenset(found)
+
+
+def things_in(lines: Sequence[FloatArray], names: Sequence[Landmark]) -> Things:
+    """Return which lines, each of shape (k, 2), may be things: small closed ones, no thin walls.
+
+    Parameters
+    ----------
+    lines
+        The lines of a plan.
+    names
+        What is written in it.
+    """
+    closed = [k for k, line in enumerate(lines) if _is_closed(line)]
+    if not closed:
+        return Things([], [])
+    outlines = np.array([shapely.Polygon(lines[k]) for k in closed], dtype=object)
+    whole = shapely.MultiPoint(np.concatenate(lines))
+    areas = shapely.area(outlines)
+    small = (areas > 0.0) & (areas <= _LARGEST * whole.convex_hull.area)
+    small &= areas >= _THICK * shapely.length(outlines) ** 2
+    which, outlines = np.array(closed)[small], outlines[small]
+    rest = [line for k, line in enumerate(lines) if k not in set(which.tolist())]
+    near = _NEAR * float(np.ptp(shapely.get_coordinates(whole), axis=0).max())
+    walls = [shapely.LineString(line) for line in rest if len(line) > 1]
+    pairs = shapely.STRtree(outlines).query(outlines, "dwithin", near)
+    group = groups(len(outlines), pairs)
+    touches = np.zeros(len(outlines), dtype=bool)
+    touches[shapely.STRtree(walls).query(outlines, "dwithin", near)[0]] = True
+    touching = np.isin(group, group[touches])
+    written = shapely.MultiPoint([item.point for item in names])
+    free = [which[~touching & (group == k)].tolist() for k in np.unique(group[~touching])]
+    return Things(free, which[touching & ~shapely.intersects(outlines, written)].tolist())
+
+
+def standing(
+    free: Sequence[Sequence[int]],
+    lines: Sequence[FloatArray],
+    names: Sequence[Landmark],
+    rooms: Labels,
+    cells: FloatArray,
+) -> list[int]:
+    """Return the lines of free things that stand in a room.
+
+    Of several with names in a place without one of its own, these are rooms.
+
+    Parameters
+    ----------
+    free
+        As in :class:`Things`.
+    lines, names
+        Of the plan.
+    rooms
+        The number of each cell's room without all things, 0 for none.
+    cells
+        The side of a cell, and where the first one is: (side, x, y).
+    """
+    hulls = [shapely.Polygon(lines[k]) for each in free for k in each]
+    things = shapely.union_all(shapely.make_valid(hulls))
+    spots = [shapely.Point(item.point) for item in names]
+    own = Counter(
+        _room_at(np.array([item.point]), rooms, cells)
+        for item, spot in zip(names, spots, strict=True)
+        if not things.intersects(spot)
+    )
+    where = [_room_at(np.concatenate([lines[k] for k in each]), rooms, cells) for each in free]
+    named = Counter(
+        room
+        for room, each in zip(where, free, strict=True)
+        if any(shapely.Polygon(lines[k]).intersects(spot) for k in each for spot in spots)
+    )
+    return [
+        k
+        for room, each in zip(where, free, strict=True)
+        if room and (named[room] < 2 or own[room])
+        for k in each
+    ]
+
+
+def _is_closed(line: FloatArray) -> bool:
+    return len(line) >= _CORNERS and bool((line[0] == line[-1]).all())
+
+
+def _room_at(points: FloatArray, rooms: Labels, cells: FloatArray) -> int:
+    """Return the room in which most of some points are, or 0."""
+    column, row = ((points - cells[1:]) / cells[0]).astype(int).T
+    rows, columns = rooms.shape
+    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    count = np.bincount(rooms[row[inside], column[inside]], minlength=1)
+    return int(count.argmax())
