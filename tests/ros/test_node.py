@@ -365,7 +365,28 @@ def test_what_cannot_be_carried_aborts_and_keeps_the_object_map(carrying, carrie
     assert handle.status == "aborted"
     assert (result.error, result.error_field) == ("the objects are mirrored", "object_map")
     assert len(result.object_map.objects) == 2
-    assert sent(carrying, "route") == []
+    assert sent(carrying, "object_map") == [result.object_map]
+
+
+def test_what_cannot_be_carried_takes_away_what_an_earlier_sketch_had_left(
+    carrying, carrier, monkeypatch
+):
+    first = GoalHandle(carrying.action_server, with_zone(goal()))
+    carrying.action_server.execute(first)
+    assert sent(carrying, "route")[-1].poses
+    assert any(sent(carrying, "keepout_mask")[-1].data)
+    carrier.error = InvalidRequestError("the zone crosses itself", "INVALID_FIELD", "features[0]")
+    order = []
+    for topic, publisher in carrying.publishers.items():
+        monkeypatch.setattr(publisher, "publish", lambda sent, to=topic: order.append((to, sent)))
+    handle = GoalHandle(carrying.action_server, with_zone(goal()))
+    result = carrying.action_server.execute(handle)
+    assert (handle.status, result.error) == ("aborted", "the zone crosses itself")
+    told = {topic.removeprefix("/sketchmatch/"): message for topic, message in order}
+    assert told["route"].poses == []
+    assert not any(told["keepout_mask"].data)
+    # Whoever hears of the new objects has no way of the former sketch any more.
+    assert [*told] == ["route", "keepout_mask", "keepout_filter_info", "object_map", "markers"]
 
 
 def test_routes_are_carried_onto_the_map_that_the_server_keeps(carrying, carrier, server):

@@ -180,10 +180,8 @@ class SketchmatchNode(LifecycleNode):
                 is_cancelled=lambda: goal_handle.is_cancel_requested,
             )
             answer = conversions.object_map(match, self._header(grid))
-            self._answers.publish(answer)
-            self._markers.publish(conversions.markers(answer))
-            self._last = last = _Matched(sketch, map_, match.object_map, grid)
-            self._publish_carried(last, conversions.drawn_features(goal.sketch, match))
+            matched = _Matched(sketch, map_, match.object_map, grid)
+            self._publish(matched, answer, conversions.drawn_features(goal.sketch, match))
         except SketchmatchError as error:
             if isinstance(error, CallCancelledError) and goal_handle.is_cancel_requested:
                 goal_handle.canceled()
@@ -210,17 +208,29 @@ class SketchmatchNode(LifecycleNode):
             response.error = str(error)
             return response
 
-    def _publish_carried(self, last: _Matched, drawn: Features) -> None:
-        """Publish routes and zones; empty ones take the place of those of an earlier sketch."""
-        if self._carry is None:
-            return
-        empty = not (drawn.routes or drawn.zones)
-        carried = drawn if empty else self._carried(last, drawn)
-        header = self._header(last.grid)
-        route = next(iter(carried.routes), ())
-        self._route.publish(conversions.route_path(route, header))
-        self._mask.publish(conversions.keepout_mask(carried.zones, last.grid))
-        self._filter.publish(conversions.filter_info(self._mask.topic_name, header))
+    def _publish(self, last: _Matched, answer: ObjectMap, drawn: Features) -> None:
+        """Publish an answer, and its routes and zones before it.
+
+        Where there are none, or they cannot be carried, empty ones take the place of those of an
+        earlier sketch, which nobody may go by any more.
+        """
+        carried, error = Features(), None
+        if self._carry is not None and (drawn.routes or drawn.zones):
+            try:
+                carried = self._carried(last, drawn)
+            except SketchmatchError as problem:
+                error = problem
+        self._last = last
+        if self._carry is not None:
+            header = self._header(last.grid)
+            route = next(iter(carried.routes), ())
+            self._route.publish(conversions.route_path(route, header))
+            self._mask.publish(conversions.keepout_mask(carried.zones, last.grid))
+            self._filter.publish(conversions.filter_info(self._mask.topic_name, header))
+        self._answers.publish(answer)
+        self._markers.publish(conversions.markers(answer))
+        if error is not None:
+            raise error
 
     def _carried(self, last: _Matched, drawn: Features) -> Features:
         def carry(map_: Source) -> Features:
