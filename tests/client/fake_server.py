@@ -48,12 +48,19 @@ class FakeServer(
     transfer_service_pb2_grpc.TransferServiceServicer,
     catalog_service_pb2_grpc.CatalogServiceServicer,
 ):
-    """Answers every method, keeps the requests, fails if ``error`` is set."""
+    """Answers every method, keeps the requests, fails if ``error`` is set.
+
+    Each of ``times`` is how long a caller would wait; requests of the kind ``holds`` wait until
+    ``released`` is set.
+    """
 
     def __init__(self) -> None:
         self.address = ""
         self.requests: list[Message] = []
         self.authorizations: list[str | None] = []
+        self.times: list[float] = []
+        self.holds: type[Message] | None = None
+        self.released = Event()
         self.events = EVENTS
         self.endless = False
         self.cancelled = Event()
@@ -144,6 +151,9 @@ class FakeServer(
     def _take(self, request, context) -> None:
         self.requests.append(request)
         self.authorizations.append(dict(context.invocation_metadata()).get("authorization"))
+        self.times.append(context.time_remaining())
+        if self.holds is not None and isinstance(request, self.holds):
+            self.released.wait(60)
         if self.error and len(self.requests) <= self.fails:
             (code,) = (code for code in grpc.StatusCode if code.value[0] == self.error.code)
             packed = self.error.SerializeToString() if self.error.details else None
@@ -166,6 +176,7 @@ def running(*options: tuple[str, int]) -> Iterator[FakeServer]:
     try:
         yield fake
     finally:
+        fake.released.set()
         server.stop(grace=None).wait()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sketchmatch_client import InvalidRequestError, NotFoundError, sources
-from sketchmatch_proto.v1 import scene_service_pb2
+from sketchmatch_proto.v1 import scene_service_pb2, transfer_service_pb2
 from tests.client.fake_server import EVENTS, reason, running, violation
 from tests.contract.golden import golden
 from tests.pace import wait_until
@@ -418,6 +418,54 @@ def test_more_of_the_latest_sketch_is_carried_on_demand(carrying, carrier):
     assert (found.error, found.routes[0].header.frame_id) == ("", "site")
     carrier.error = InvalidRequestError("it folds", "INVALID_FIELD", "object_map")
     assert carrying.services["~/carry"](wanted).error == "it folds"
+
+
+@pytest.fixture
+def transferring(ros, server):
+    """An active node that has the server carry, and keep its map."""
+    made = ros.node.SketchmatchNode(ros.carrying.carry)
+    made.parameters |= {"address": server.address, "timeout": 45.0}
+    made.go("configure", "inactive")
+    made.go("activate", "active")
+    made.subscriptions["map"].callback(room())
+    server.kept = put("kept")
+    return made
+
+
+def test_every_call_ends_after_the_timeout(transferring, server):
+    handle, _ = executed(transferring)
+    assert handle.status == "succeeded"
+    assert [kind for kind, _ in asked(server)] == ["PutScene", "Match", "Transfer"]
+    assert server.times == pytest.approx([45, 45, 45], abs=5)
+
+
+@pytest.mark.parametrize(
+    ("held", "kinds"),
+    [
+        (scene_service_pb2.PutSceneRequest, ["PutScene"]),
+        (transfer_service_pb2.TransferRequest, ["PutScene", "Match", "Transfer"]),
+    ],
+)
+@pytest.mark.parametrize("end", ["canceled", "aborted"])
+def test_a_goal_that_is_over_waits_for_no_call_and_leaves_all_as_it_was(
+    transferring, server, held, kinds, end
+):
+    server.holds = held
+    handle = GoalHandle(transferring.action_server, with_zone(goal()))
+    results = []
+    worker = Thread(target=lambda: results.append(transferring.action_server.execute(handle)))
+    worker.start()
+    wait_until(lambda: any(isinstance(each, held) for each in server.requests), "nothing is asked")
+    if end == "canceled":
+        handle.cancel()
+    else:
+        transferring.go("deactivate", "inactive")
+    worker.join(20)
+    assert handle.status == end
+    assert results[0].error == "the goal was cancelled before its end"
+    assert {topic: each.sent for topic, each in transferring.publishers.items() if each.sent} == {}
+    server.released.set()
+    assert [kind for kind, _ in asked(server)] == kinds
 
 
 def test_zones_are_refused_where_nothing_carries_them(node):

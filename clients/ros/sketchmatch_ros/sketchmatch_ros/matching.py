@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from sketchmatch_client import (
+    CallCancelledError,
     Client,
     Match,
     MatchCall,
@@ -40,14 +42,11 @@ class Options:
         Seconds after which the best match so far is the answer.
     seed
         Of everything random.
-    timeout
-        Seconds after which a call is given up.
     """
 
     profile: str = ""
     time_budget: float = 0.0
     seed: int = 0
-    timeout: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -119,7 +118,7 @@ class KeptMap:
         self._kept: Source | None = None
         self._ours = ""
 
-    def keep(self, map_: Source, profile: str, timeout: float) -> Source:
+    def keep(self, map_: Source, profile: str) -> Source:
         """Have the server keep a map in place of the one before, and return how it is named.
 
         Where the server keeps none, and of rooms, which are cut to fit each sketch, it is the map.
@@ -130,7 +129,7 @@ class KeptMap:
                 self._of, self._kept = (map_, profile), None
                 # What is wrong with the map or the server a match will tell.
                 with suppress(SketchmatchError):
-                    self._put(map_, profile, timeout, before)
+                    self._put(map_, profile, before)
                 if before != self._ours:
                     self._delete(before)
             return self._kept or map_
@@ -152,10 +151,8 @@ class KeptMap:
             self._delete(self._ours)
         self.forget()
 
-    def _put(self, map_: Source, profile: str, timeout: float, before: str) -> None:
-        put = self._client.put_scene(
-            map_, profile=profile or None, title="a robot's map", timeout=timeout or None
-        )
+    def _put(self, map_: Source, profile: str, before: str) -> None:
+        put = self._client.put_scene(map_, profile=profile or None, title="a robot's map")
         name = put.stored_scene.name
         if put.created or name == before:  # what was there already is somebody else's to delete
             self._ours = name
@@ -169,19 +166,17 @@ class KeptMap:
 
 
 class Matching:
-    """Matches that go on, each of which can be stopped.
+    """Matches with the latest map, and carries to it, until a goal is over.
 
     Parameters
     ----------
     client
-        Asks the server.
+        Asks the server; its timeout is that of every call.
     """
 
     def __init__(self, client: Client) -> None:
         self._client = client
         self._map = KeptMap(client)
-        self._lock = threading.Lock()
-        self._running: set[MatchCall] = set()
 
     def match(
         self,
@@ -190,33 +185,41 @@ class Matching:
         options: Options,
         *,
         on_progress: Callable[[Progress], object],
-        is_cancelled: Callable[[], bool],
+        is_over: Callable[[], bool],
     ) -> Match:
-        """Match, and tell how far it is; the search ends soon after ``is_cancelled`` says so.
+        """Match, and tell how far it is; the search ends soon after ``is_over`` says so.
 
         Raises
         ------
         CallCancelledError
-            If it was cancelled or stopped.
+            If it was over before its end.
         SketchmatchError
             As the client's calls do.
         """
 
         def matched(source: Source) -> Match:
-            return self._matched(sketch, source, options, on_progress, is_cancelled)
+            return self._matched(sketch, source, options, on_progress, is_over)
 
-        kept = self._map.keep(map_, options.profile, options.timeout)
+        kept = _unless(is_over, lambda: self._map.keep(map_, options.profile))
         return self._unless_lost(matched, kept, map_)
 
-    def carried(self, carry: Callable[[Source], Features], map_: Source) -> Features:
+    def carried(
+        self, carry: Callable[[Source], Features], map_: Source, is_over: Callable[[], bool]
+    ) -> Features:
         """Return what is carried onto a map, which the server may keep.
 
         Raises
         ------
+        CallCancelledError
+            If ``is_over`` said so before its end.
         SketchmatchError
             As ``carry`` does.
         """
-        return self._unless_lost(carry, self._map.named(map_), map_)
+        return _unless(is_over, lambda: self._unless_lost(carry, self._map.named(map_), map_))
+
+    def close(self) -> None:
+        """Have the server keep no map any more."""
+        self._map.close()
 
     def _unless_lost(self, ask: Callable[[Source], T], kept: Source, map_: Source) -> T:
         """Ask with the map itself where the server does not keep it any more."""
@@ -234,53 +237,31 @@ class Matching:
         map_: Source,
         options: Options,
         on_progress: Callable[[Progress], object],
-        is_cancelled: Callable[[], bool],
+        is_over: Callable[[], bool],
     ) -> Match:
         call = self._client.events(
             sketch,
             map_,
-            timeout=options.timeout or None,
             profile=options.profile or None,
             time_budget=options.time_budget or None,
             seed=options.seed,
         )
-        with self._known(call), _stopped_when(is_cancelled, call):
+        with _stopped_when(is_over, call):
             return call.result(on_progress)
-
-    def close(self) -> None:
-        """Stop all that go on, and have the server keep no map any more."""
-        self.stop()
-        self._map.close()
-
-    def stop(self) -> None:
-        """Stop all that go on."""
-        with self._lock:
-            for call in self._running:
-                call.cancel()
-
-    @contextmanager
-    def _known(self, call: MatchCall) -> Iterator[None]:
-        with self._lock:
-            self._running.add(call)
-        try:
-            yield
-        finally:
-            with self._lock:
-                self._running.discard(call)
 
 
 @contextmanager
-def _stopped_when(is_cancelled: Callable[[], bool], call: MatchCall) -> Iterator[None]:
+def _stopped_when(is_over: Callable[[], bool], call: MatchCall) -> Iterator[None]:
     """Look, from a thread of its own, whether a call shall be stopped.
 
     What asks for it may not stop it itself: a goal of ROS is being cancelled only after those who
     were asked have agreed, and one that ends before may not say that it was.
     """
-    over = threading.Event()
+    ended = threading.Event()
 
     def look() -> None:
-        while not over.wait(_LOOK_SECONDS):
-            if is_cancelled():
+        while not ended.wait(_LOOK_SECONDS):
+            if is_over():
                 call.cancel()
                 return
 
@@ -289,5 +270,26 @@ def _stopped_when(is_cancelled: Callable[[], bool], call: MatchCall) -> Iterator
     try:
         yield
     finally:
-        over.set()
+        ended.set()
         watcher.join()
+
+
+def _unless(is_over: Callable[[], bool], work: Callable[[], T]) -> T:
+    """Return what ``work`` does in a thread of its own, or raise soon after ``is_over`` says so.
+
+    Calls that have one answer cannot be stopped: they are left to their timeout.
+    """
+    answer: Future[T] = Future()
+
+    def run() -> None:
+        try:
+            answer.set_result(work())
+        except BaseException as error:
+            answer.set_exception(error)
+
+    if not is_over():
+        threading.Thread(target=run, daemon=True).start()
+        while not is_over():
+            if wait([answer], _LOOK_SECONDS).done:
+                return answer.result()
+    raise CallCancelledError("the goal was cancelled before its end")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import rclpy
@@ -83,6 +83,7 @@ class SketchmatchNode(LifecycleNode):
                 self._said("address"),
                 token_file=self._said("token_file") or None,
                 root_certificates=self._said("root_certificates") or None,
+                timeout=self._said("timeout") or None,
             )
         except SketchmatchError as error:
             self.get_logger().error(f"cannot be configured: {error}")
@@ -122,7 +123,6 @@ class SketchmatchNode(LifecycleNode):
     def on_deactivate(self, state: object) -> TransitionCallbackReturn:
         """Take no more goals, and stop those that go on."""
         self._active = False
-        self._matching.stop()
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: object) -> TransitionCallbackReturn:
@@ -170,6 +170,10 @@ class SketchmatchNode(LifecycleNode):
         """Match, publish the answer, and end the goal."""
         goal, grid, map_ = goal_handle.request, self._grid, self._map
         answer = ObjectMap()
+
+        def is_over() -> bool:
+            return goal_handle.is_cancel_requested or not self._active
+
         try:
             sketch = conversions.sketch_source(goal.sketch)
             match = self._matching.match(
@@ -177,11 +181,12 @@ class SketchmatchNode(LifecycleNode):
                 map_,
                 self._options(goal),
                 on_progress=lambda now: goal_handle.publish_feedback(conversions.feedback(now)),
-                is_cancelled=lambda: goal_handle.is_cancel_requested,
+                is_over=is_over,
             )
             answer = conversions.object_map(match, self._header(grid))
             matched = _Matched(sketch, map_, match.object_map, grid)
-            self._publish(matched, answer, conversions.drawn_features(goal.sketch, match))
+            drawn = conversions.drawn_features(goal.sketch, match)
+            self._publish(matched, answer, drawn, is_over)
         except SketchmatchError as error:
             if isinstance(error, CallCancelledError) and goal_handle.is_cancel_requested:
                 goal_handle.canceled()
@@ -203,22 +208,27 @@ class SketchmatchNode(LifecycleNode):
             conversions.upright(request.zones, request.y_axis),
         )
         try:
-            return conversions.carried(self._carried(last, drawn), self._header(last.grid))
+            found = self._carried(last, drawn, is_over=lambda: not self._active)
+            return conversions.carried(found, self._header(last.grid))
         except SketchmatchError as error:
             response.error = str(error)
             return response
 
-    def _publish(self, last: _Matched, answer: ObjectMap, drawn: Features) -> None:
+    def _publish(
+        self, last: _Matched, answer: ObjectMap, drawn: Features, is_over: Callable[[], bool]
+    ) -> None:
         """Publish an answer, and its routes and zones before it.
 
         Where there are none, or they cannot be carried, empty ones take the place of those of an
-        earlier sketch, which nobody may go by any more.
+        earlier sketch, which nobody may go by any more. A goal that is over leaves all as it was.
         """
         carried, error = Features(), None
         if self._carry is not None and (drawn.routes or drawn.zones):
             try:
-                carried = self._carried(last, drawn)
+                carried = self._carried(last, drawn, is_over)
             except SketchmatchError as problem:
+                if is_over():
+                    raise
                 error = problem
         self._last = last
         if self._carry is not None:
@@ -232,12 +242,12 @@ class SketchmatchNode(LifecycleNode):
         if error is not None:
             raise error
 
-    def _carried(self, last: _Matched, drawn: Features) -> Features:
+    def _carried(self, last: _Matched, drawn: Features, is_over: Callable[[], bool]) -> Features:
         def carry(map_: Source) -> Features:
             radius = self._said("radius")
             return self._carry(self._client, last.sketch, map_, last.partners, drawn, radius)
 
-        return self._matching.carried(carry, last.map_)
+        return self._matching.carried(carry, last.map_, is_over)
 
     def _header(self, grid: OccupancyGrid) -> Header:
         return Header(stamp=self.get_clock().now().to_msg(), frame_id=grid.header.frame_id)
@@ -247,7 +257,6 @@ class SketchmatchNode(LifecycleNode):
             profile=goal.profile or self._said("profile"),
             time_budget=goal.time_budget or self._said("time_budget"),
             seed=goal.seed,
-            timeout=self._said("timeout"),
         )
 
     def _said(self, parameter: str) -> object:
