@@ -60,7 +60,8 @@ def test_a_drawn_route_and_a_zone_are_carried_where_they_were_drawn(ros):
         point, stroke = message("geometry_msgs/msg/Point"), message("sketchmatch_msgs/msg/Stroke")
         way = [point(x=x, y=y) for x, y in [(6.0, 1.0), (6.0, 4.0), (5.0, 8.0)]]
         goal.sketch.strokes.append(stroke(points=way, label="route"))
-        area = [point(x=x, y=y) for x, y in [(7.0, 8.0), (9.0, 8.0), (9.0, 10.0), (7.0, 10.0)]]
+        corners = [(7.0, 8.0), (9.0, 8.0), (9.0, 10.0), (7.0, 10.0), (7.1, 7.9)]  # past the start
+        area = [point(x=x, y=y) for x, y in corners]
         goal.sketch.zones = [stroke(points=area)]
         handle = GoalHandle(node.action_server, goal)
         result = node.action_server.execute(handle)

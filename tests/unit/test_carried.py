@@ -87,6 +87,19 @@ def test_points_routes_and_zones_are_carried_in_their_order_with_names_and_speed
     assert [len(each) for each in found[2].deviations] == [len(ring) for ring in area.rings]
 
 
+def test_a_zone_that_was_mended_tells_which_of_the_given_points_are_left():
+    drawn = [*box(1, 1, 4, 4), (1.2, 0.8)]
+    (found,) = finish(
+        carried([Feature("zone", (np.array(drawn),))], course_between(SCENE, TURNED, SAME))
+    )
+    outline, numbers = found.feature.points, found.sources[0]
+    assert len(outline) == len(numbers) == len(found.deviations[0])
+    assert outline[numbers == 2] == pytest.approx(np.array([[-10.0, 10.0]]), abs=1e-6)
+    assert np.floor(numbers).tolist() == sorted(np.floor(numbers))
+    assert {1, 2, 3} <= set(numbers.tolist())
+    assert 0 < numbers.min() < numbers.max() < 4  # the beginning and the end were cut
+
+
 def test_a_straight_line_gets_no_more_points_than_it_needs():
     feature = route((1, 2), (8, 2), (8, 8))
     (found,) = finish(carried([feature], course_between(SCENE, TURNED, SAME)))

@@ -288,10 +288,18 @@ def _result(feature: Feature, ways: Sequence[Way], course: Course) -> Carried:
     if feature.speeds is not None:
         speeds = feature.speeds[np.floor(ways[0].sources).astype(int)]
     there = _there(feature, tuple(way.points for way in ways), speeds)
-    deviations = tuple(course.warp.deviations(way.drawn) for way in ways)
-    return Carried(
-        feature.kind, feature.name, there, deviations, tuple(way.sources for way in ways)
-    )
+    deviations, sources = [], []
+    for kept, given, way in zip(there.numbers, feature.numbers, ways, strict=True):
+        drawn = np.stack([_between(kept, column) for column in way.drawn.T], axis=1)
+        deviations.append(course.warp.deviations(drawn))
+        around = np.append(given, math.floor(given[-1]) + 1.0)  # a zone ends where it began
+        sources.append(_between(_between(kept, way.sources), around))
+    return Carried(feature.kind, feature.name, there, tuple(deviations), tuple(sources))
+
+
+def _between(numbers: FloatArray, values: FloatArray) -> FloatArray:
+    """Return values by their number; one with a fraction lies between two of them."""
+    return np.interp(numbers, np.arange(len(values), dtype=np.float64), values)
 
 
 def _there(

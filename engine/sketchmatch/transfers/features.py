@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -12,6 +12,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import FloatArray
 from sketchmatch.model.arrays import frozen_floats
 from sketchmatch.model.labels import cleaned_label
+from sketchmatch.transfers.mending import mended
 
 __all__ = ["Carried", "Change", "ChangeReason", "Feature", "FeatureKind"]
 
@@ -37,11 +38,15 @@ class Feature:
         Which of them it is.
     rings
         One line of one point; or one line of two or more, the route in its order; or the outline of
-        a zone and its holes, each of three or more. Each of shape (k, 2), y up.
+        a zone and its holes, each of three or more. Each of shape (k, 2), y up. Where an outline
+        crosses itself near its ends, as hands close one, its tails are cut.
     name
         For people.
     speeds
         Shape (k,), how fast a route is driven from each of its points on, or None.
+    numbers
+        For each ring, shape (k,): which given point each of its points is, or comes after; with a
+        fraction where tails were cut.
 
     Raises
     ------
@@ -53,6 +58,7 @@ class Feature:
     rings: tuple[FloatArray, ...]
     name: str = ""
     speeds: FloatArray | None = None
+    numbers: tuple[FloatArray, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         kind = FeatureKind(self.kind)
@@ -61,7 +67,12 @@ class Feature:
         if len(self.rings) < 1 or (kind is not FeatureKind.ZONE and len(self.rings) > 1):
             raise _refused("rings", f"are {len(self.rings)}; give a {kind} one line of points")
         rings = tuple(self._checked(ring, k) for k, ring in enumerate(self.rings))
-        object.__setattr__(self, "rings", rings)
+        if kind is FeatureKind.ZONE:
+            rings, numbers = zip(*map(mended, rings), strict=True)
+        else:
+            numbers = tuple(np.arange(len(ring), dtype=np.float64) for ring in rings)
+        object.__setattr__(self, "rings", tuple(map(frozen_floats, rings)))
+        object.__setattr__(self, "numbers", tuple(map(frozen_floats, numbers)))
         if kind is FeatureKind.ZONE and not shapely.Polygon(rings[0], rings[1:]).is_valid:
             raise _refused("rings", "cross themselves or each other; draw a zone without crossing")
         if self.speeds is not None:
