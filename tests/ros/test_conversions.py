@@ -5,12 +5,17 @@ from array import array
 
 import numpy as np
 import pytest
+import shapely
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from shapely.affinity import rotate, translate
 
 from sketchmatch_client import InvalidRequestError, Match, MatchCollector, Progress, ServerBusyError
 from sketchmatch_proto.v1 import match_pb2
 from sketchmatch_proto.v1.source_pb2 import Y_AXIS_DOWN, Y_AXIS_UP
 from sketchmatch_views import PAIR_COLOURS
 from tests.contract.golden import golden
+from tests.pace import within
 from tests.ros.messages import message, read, wire
 
 POINT = "geometry_msgs/msg/Point"
@@ -211,6 +216,35 @@ def test_a_cell_that_a_zone_only_touches_is_kept_out_of(ros):
     sliver = [(0.1, 0.1), (1.9, 0.1), (1.9, 0.15), (0.1, 0.15)]
     mask = ros.conversions.keepout_mask([sliver], grid(np.zeros((3, 5))))
     assert occupied(mask) == {(0, 0), (0, 1), (0, 2), (0, 3)}
+
+
+COORDINATES = st.one_of(st.integers(-6, 30).map(lambda k: k / 4), st.floats(-2.0, 7.0))
+
+
+@given(
+    corners=st.lists(st.tuples(COORDINATES, COORDINATES), min_size=3, max_size=6),
+    yaw=st.sampled_from([0.0, 0.7, -2.0]),
+)
+def test_a_mask_forbids_each_cell_that_a_zone_reaches_into_and_no_other(ros, corners, yaw):
+    zone = shapely.Polygon(corners)
+    assume(zone.is_valid and zone.area > 0)
+    at = (0.25, -0.5)
+    mask = ros.conversions.keepout_mask([corners], grid(np.zeros((9, 12)), at=at, yaw=yaw))
+    forbidden = occupied(mask)
+    for row, column in np.ndindex(9, 12):
+        x, y = column * 0.5, row * 0.5
+        cell = translate(rotate(shapely.box(x, y, x + 0.5, y + 0.5), yaw, (0, 0), True), *at)
+        if zone.intersection(cell).area > 1e-9:
+            assert (row, column) in forbidden
+        elif zone.distance(cell) > 1e-9:
+            assert (row, column) not in forbidden
+
+
+def test_a_zone_of_a_whole_country_is_soon_drawn(ros):
+    zone = [(0.0, 0.0), (2e6, 0.0), (2e6, 1.0)]
+    with within(2):
+        mask = ros.conversions.keepout_mask([zone], grid(np.zeros((20, 30))))
+    assert occupied(mask) == {(0, column) for column in range(30)}
 
 
 def test_a_turned_map_has_its_zones_turned_back(ros):

@@ -193,7 +193,7 @@ def keepout_mask(zones: Iterable[Sequence[XY]], grid: OccupancyGrid) -> Occupanc
     Parameters
     ----------
     zones
-        The outline of each, in the map's frame. A cell that an outline passes or whose middle is
+        The outline of each, in the map's frame. A cell that an outline goes through or that is
         within one is occupied, all others are free: whoever keeps out may not cut a corner.
     grid
         The map, of which header and info are taken.
@@ -202,9 +202,8 @@ def keepout_mask(zones: Iterable[Sequence[XY]], grid: OccupancyGrid) -> Occupanc
     cells = array("b", bytes(info.width * info.height))
     for zone in filter(None, zones):
         outline = [_in_cells(point, info) for point in zone]
-        for row, column in chain(_inside(outline, info), _along(outline)):
-            if 0 <= row < info.height and 0 <= column < info.width:
-                cells[row * info.width + column] = _OCCUPIED
+        for row, column in chain(_inside(outline, info), _along(outline, info)):
+            cells[row * info.width + column] = _OCCUPIED
     return OccupancyGrid(header=grid.header, info=info, data=cells)
 
 
@@ -273,10 +272,14 @@ def _inside(outline: Sequence[XY], info: MapMetaData) -> Iterator[tuple[int, int
                 yield row, column
 
 
-def _along(outline: Sequence[XY]) -> Iterator[tuple[int, int]]:
-    """Yield (row, column) of the cells that an outline passes, by steps of a quarter of a cell."""
-    for (ax, ay), (bx, by) in zip(outline, [*outline[1:], *outline[:1]], strict=True):
-        steps = max(1, math.ceil(4 * math.hypot(bx - ax, by - ay)))
-        for k in range(steps):
-            share = k / steps
-            yield math.floor(ay + share * (by - ay)), math.floor(ax + share * (bx - ax))
+def _along(outline: Sequence[XY], info: MapMetaData) -> Iterator[tuple[int, int]]:
+    """Yield (row, column) of the cells that an outline goes through, beyond their edges."""
+    for start, end in zip(outline, [*outline[1:], *outline[:1]], strict=True):
+        (ax, ay), (bx, by) = sorted((start, end), key=lambda point: point[1])
+        run, rise = bx - ax, by - ay
+        for row in range(max(0, math.floor(ay)), min(info.height, math.ceil(by))):
+            enters = max(0.0, (row - ay) / rise) if rise else 0.0
+            leaves = min(1.0, (row + 1 - ay) / rise) if rise else 1.0
+            left, right = sorted((ax + enters * run, ax + leaves * run))
+            for column in range(max(0, math.floor(left)), min(info.width, math.ceil(right))):
+                yield row, column
