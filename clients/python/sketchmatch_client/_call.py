@@ -61,7 +61,8 @@ class MatchCall(Generator[MatchResponse, None, None]):
         """
         request = self._course.request
         if not self._ended and self._course.match_id and (request is None or request.keep_running):
-            self._cancelling = self._cancel(self._course.match_id)
+            with translated_errors(self._address):
+                self._cancelling = self._cancel(self._course.match_id)
         self._end(CallCancelledError("the match was cancelled before its end"))
 
     def close(self) -> None:
@@ -148,7 +149,8 @@ class MatchCall(Generator[MatchResponse, None, None]):
             if self._attempts is None:
                 self._attempts = self._begun()
             if self._call is None and not self._ended:
-                self._call = self._begin(self._course, self._attempts.limit)
+                with translated_errors(self._address):
+                    self._call = self._begin(self._course, self._attempts.limit)
             return None if self._ended else self._call
 
     def _starts_again(self, error: SketchmatchError) -> bool:

@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager, contextmanager
 from typing import Any, TypeVar
 
 import grpc
+import grpc.aio
 from google.protobuf.message import DecodeError, Message
 from google.rpc import error_details_pb2, status_pb2
 
@@ -116,7 +117,7 @@ class NotSupportedError(SketchmatchError):
 
 
 class CallCancelledError(SketchmatchError):
-    """The call was cancelled from elsewhere."""
+    """The call was cancelled from elsewhere, or the client is closed."""
 
 
 class ServerFailedError(SketchmatchError):
@@ -130,6 +131,10 @@ def translated_errors(address: str) -> Iterator[None]:
         yield
     except grpc.RpcError as error:
         raise _translated(error, address) from error
+    except (ValueError, grpc.aio.UsageError) as error:
+        if isinstance(error, SketchmatchError) or not _CLOSED.search(str(error)):
+            raise
+        raise CallCancelledError(_closed(address)) from error
 
 
 @asynccontextmanager
@@ -165,10 +170,20 @@ _OTHERS: dict[grpc.StatusCode, type[SketchmatchError]] = {
 }
 
 
+# What gRPC says of a channel that was closed: before a call by Python's errors, in one by a status.
+_CLOSED = re.compile(r"channel (is )?closed|closed channel", re.IGNORECASE)
+
+
+def _closed(address: str) -> str:
+    return f"the client of the server at {address} is closed; open a new one"
+
+
 def _translated(error: grpc.RpcError, address: str) -> SketchmatchError:
     code = error.code()
     details = _details(error)
     message = error.details() or f"the server at {address} reports {code.name}"
+    if code is grpc.StatusCode.CANCELLED and _CLOSED.search(message):
+        message = _closed(address)
     reason = _reason(details)
     match code:
         case grpc.StatusCode.INVALID_ARGUMENT:
