@@ -115,6 +115,22 @@ def test_a_match_that_is_done_again_tells_no_less_than_was_known():
     assert course.take(WatchMatchResponse(event=result)) == result
 
 
+def test_progress_without_confidence_is_told_after_the_search_too():
+    course = Course(MatchRequest())
+    events = [progress(0.5), progress(), progress(0.5), progress()]
+    assert [course.take(event) for event in events] == events
+
+
+def test_a_match_that_is_done_again_and_caught_up_tells_all_its_progress():
+    course = Course(MatchRequest())
+    accepted = MatchResponse(accepted=MatchAccepted(match_id="m1"), number=1)
+    first = [accepted, progress(0.5), progress()]
+    assert [course.take(event) for event in first] == first
+    again = [accepted, progress(), progress(0.5), progress(), progress(0.4), progress(0.6)]
+    told = [course.take(event) for event in again]
+    assert told == [None, None, progress(0.5), progress(), None, progress(0.6)]
+
+
 @pytest.mark.parametrize(
     ("error", "watches"),
     [(LOST, True), (INTERRUPTED, False), (NotFoundError("none", "NOT_FOUND"), False)],

@@ -12,6 +12,7 @@ from sketchmatch_client.errors import (
     SketchmatchError,
     refused_as,
 )
+from sketchmatch_proto.v1.match_pb2 import MatchProgress
 from sketchmatch_proto.v1.match_service_pb2 import (
     MatchRequest,
     MatchResponse,
@@ -46,6 +47,7 @@ class Course:
         self._resumes = request is None
         self._told: set[str] = set()
         self._best = -math.inf
+        self._again = False
 
     @property
     def watching(self) -> WatchMatchRequest | None:
@@ -66,15 +68,24 @@ class Course:
             self.match_id = event.accepted.match_id
         self._after = event.number
         if kind in self._told and kind in _TOLD_ONCE:
+            self._again = True
             return None
         self._told.add(kind)
-        if kind == "progress":
-            known = event.progress.HasField("confidence")
-            confidence = event.progress.confidence if known else -math.inf
-            if confidence < self._best:
-                return None  # a match that is done again has not come so far yet
-            self._best = confidence
+        if kind == "progress" and not self._is_further(event.progress):
+            return None
         return event
+
+    def _is_further(self, progress: MatchProgress) -> bool:
+        """Whether a match is as far as was told; one that is done again may not be for a while.
+
+        Other progress than that of the search, as that of rooms that are joined, has no confidence.
+        """
+        if not progress.HasField("confidence"):
+            return not self._again or self._best == -math.inf
+        if progress.confidence < self._best:
+            return False
+        self._best, self._again = progress.confidence, False
+        return True
 
     def pause_after(self, error: SketchmatchError, attempts: Attempts) -> float | None:
         """Return the seconds after which to ask again; None if it is in vain.

@@ -62,7 +62,7 @@ class Progress:
 
     @property
     def confidence(self) -> float | None:
-        """ζ of the best map so far, which never falls; None before the search."""
+        """ζ of the best map so far, which never falls; None before and after the search."""
         return self._known("confidence")
 
     @property
