@@ -5,6 +5,7 @@
 
 import subprocess
 import sys
+import tomllib
 from types import ModuleType, SimpleNamespace
 
 import yaml
@@ -58,7 +59,9 @@ def test_the_commands_put_both_packages_where_they_are_built_and_send_the_goal(t
         ["ros2", "launch"],
         ["ros2", "action"],
     ]
-    *_, launch, action = calls
+    client, *_, launch, action = calls
+    project = tomllib.loads((tmp_path / client[-1] / "pyproject.toml").read_text("utf-8"))
+    assert project["project"]["name"] == "sketchmatch-client"
     package, file, argument = launch[2:5]
     described = (ROOT / "clients" / "ros" / package / "launch" / file).read_text("utf-8")
     assert f'DeclareLaunchArgument("{argument.partition(":=")[0]}"' in described
