@@ -155,6 +155,25 @@ def test_a_keepout_mask_forbids_each_cell_that_a_zone_reaches_into():
     assert (found.cells[~forbidden] == 0).all()
 
 
+def test_a_slanted_zone_on_a_turned_map_leaves_no_cell_free_that_it_covers_a_part_of():
+    rng = np.random.default_rng(3)
+    grid = OccupancyGrid(np.zeros((50, 60), dtype=np.int8), 0.1, (-3.0, 1.0, 0.7))
+    rows, columns = np.mgrid[:50, :60]
+    c, s = math.cos(0.7), math.sin(0.7)
+    cells = shapely.transform(
+        shapely.box(columns / 10, rows / 10, (columns + 1) / 10, (rows + 1) / 10),
+        lambda p: p @ np.array([[c, s], [-s, c]]) + (-3.0, 1.0),
+    )
+    for _ in range(20):
+        angles = np.sort(rng.uniform(0.0, 2 * np.pi, 6))
+        ring = np.stack([-2.5 + 2 * np.cos(angles), 4.8 + 2 * np.sin(angles)], axis=1)
+        text, picture = encode_keepout([kept("zone", ring)], [{}], grid, "mask.pgm")
+        forbidden = decode_map_server(text, picture).cells == 100
+        covered = shapely.area(shapely.intersection(cells, shapely.Polygon(ring)))
+        assert ((covered > 1e-8) <= forbidden).all()
+        assert (forbidden <= (covered > 0.0)).all()
+
+
 def test_a_zone_that_is_none_to_keep_out_of_is_left_out_of_the_mask():
     found, _, _ = mask(kept("zone", ZONE), properties=[{"keepout": False}])
     assert (found.cells == 0).all()

@@ -1,4 +1,4 @@
-"""Objects made of pixels: filling polygons, and the outlines of pixels as edges."""
+"""Objects made of pixels: filled polygons, the pixels that outlines cross, outlines of pixels."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ import numpy as np
 from sketchmatch.kernels._jit import kernel
 from sketchmatch.model.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["filled_pixels", "pixel_edges"]
+__all__ = ["crossed_pixels", "filled_pixels", "pixel_edges"]
+
+_TOUCH = 1e-6
+"""In pixels: what reaches no farther into one touches it, up to rounding."""
 
 
 @kernel
@@ -51,6 +54,56 @@ def filled_pixels(starts: FloatArray, ends: FloatArray, rows: int, columns: int)
         for column in range(1, columns):
             inside[row, column] ^= inside[row, column - 1]
     return inside
+
+
+@kernel
+def crossed_pixels(starts: FloatArray, ends: FloatArray, rows: int, columns: int) -> BoolArray:
+    """Return the pixels that the edges of an outline go through.
+
+    With those whose centres lie inside (:func:`filled_pixels`) they are all pixels of which the
+    outline encloses a part, however small: what no edge goes through is inside or outside as its
+    centre is.
+
+    Parameters
+    ----------
+    starts, ends
+        Shape (e, 2): edges, in pixels, the grid's lower left corner in the origin.
+    rows, columns
+        Size of the grid.
+
+    Returns
+    -------
+    ndarray
+        Shape (rows, columns), row 0 at the bottom. An edge along a side of a pixel, or through a
+        corner of it alone, does not go through it, nor does what reaches less than a millionth of
+        its side into it.
+
+    Examples
+    --------
+    A triangle over three by two pixels:
+
+    >>> corners = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 2.0]])
+    >>> crossed_pixels(corners, np.roll(corners, -1, axis=0), 2, 3).astype(int)
+    array([[0, 1, 1],
+           [1, 1, 0]])
+    """
+    crossed = np.zeros((rows, columns), dtype=np.bool_)
+    for e in range(starts.shape[0]):
+        x0, y0, x1, y1 = starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1]
+        if y0 > y1:
+            x0, y0, x1, y1 = x1, y1, x0, y0
+        first, last = max(0, int(np.floor(y0 + _TOUCH))), min(rows, int(np.ceil(y1 - _TOUCH)))
+        for row in range(first, last):
+            a, b = x0, x1
+            if y0 < row:
+                a = x0 + (x1 - x0) * ((row - y0) / (y1 - y0))
+            if y1 > row + 1:
+                b = x0 + (x1 - x0) * ((row + 1 - y0) / (y1 - y0))
+            low, high = min(a, b), max(a, b)
+            left, right = int(np.floor(low + _TOUCH)), int(np.ceil(high - _TOUCH))
+            for column in range(max(0, left), min(columns, right)):
+                crossed[row, column] = True
+    return crossed
 
 
 def pixel_edges(mask: BoolArray) -> tuple[FloatArray, FloatArray]:

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import shapely
 
@@ -30,7 +29,7 @@ from sketchmatch.io._targets import check_target, writing
 from sketchmatch.io.files import read_bytes, read_map_files
 from sketchmatch.model import FloatArray, OccupancyGrid
 from sketchmatch.transfers.features import Carried, Feature, FeatureKind
-from sketchmatch.transfers.obstacles import Obstacles
+from sketchmatch.transfers.obstacles import Obstacles, reached
 from sketchmatch_map_files import YAML_SUFFIXES, MapFileError, parse, text_of
 
 __all__ = [
@@ -147,7 +146,8 @@ def encode_keepout(
     carried, properties
         As :func:`encode_carried` takes them; zones with ``keepout: false`` are left out.
     grid
-        The map; every cell of it that a zone covers, or a part of it, is forbidden.
+        The map; every cell of it of which a zone covers a part, however small, is forbidden. One
+        that a zone touches at a side or a corner alone is free.
     picture
         Name of the picture's file.
 
@@ -157,15 +157,14 @@ def encode_keepout(
         The YAML, and its picture as PGM.
     """
     cells = Obstacles.of_grid(grid, allow_unknown=True)
+    zones = [
+        [cells.local(ring) for ring in each.feature.rings]
+        for each, said in zip(carried, properties, strict=True)
+        if each.kind is FeatureKind.ZONE and each.feature is not None
+        if said.get("keepout") is not False
+    ]
     shades = np.full(grid.cells.shape, _FREE, dtype=np.uint8)
-    for each, said in zip(carried, properties, strict=True):
-        if each.kind is not FeatureKind.ZONE or each.feature is None:
-            continue
-        if said.get("keepout") is False:
-            continue
-        rings = [cells.cells(ring)[:, ::-1].astype(np.int32) for ring in each.feature.rings]
-        cv2.fillPoly(shades, rings, _FORBIDDEN)
-        cv2.polylines(shades, rings[:1], isClosed=True, color=_FORBIDDEN)
+    shades[reached(zones, shades.shape)] = _FORBIDDEN
     rows, columns = grid.cells.shape
     x, y, yaw = grid.origin
     lines = [

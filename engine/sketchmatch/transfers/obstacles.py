@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -10,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sketchmatch.kernels.clearing import legs_clear
+from sketchmatch.kernels.raster import crossed_pixels, filled_pixels
 from sketchmatch.model import BoolArray, FloatArray, IntArray, OccupancyGrid, Scene
 from sketchmatch.model.arrays import Float32Array
 from sketchmatch.model.caching import cached_property
 
-__all__ = ["Obstacles", "Window", "sampled"]
+__all__ = ["Obstacles", "Window", "reached", "sampled"]
 
 _OCCUPIED = 65
 """Percent, from which a cell is an obstacle: the usual threshold of map_server."""
@@ -71,13 +73,9 @@ class Obstacles:
         step = max(min(small, 4.0 * radius) / _PER_SPACING, float(extent.max()) / 2000.0)
         step = max(step, math.sqrt(float(sides[0] * sides[1]) / _MOST_CELLS))
         columns, rows = (math.ceil(side / step) for side in sides)
-        picture = np.zeros((rows, columns), dtype=np.uint8)
-        for item in scene.objects:
-            # Every cell that an object reaches into: its outline is drawn, too.
-            rings = [np.floor((ring - low) / step).astype(np.int32) for ring in item.rings]
-            cv2.fillPoly(picture, rings, 1)
-            cv2.polylines(picture, rings, isClosed=True, color=1)
-        return cls(picture.astype(bool), step, (float(low[0]), float(low[1]), 0.0))
+        outlines = [[(ring - low)[:, ::-1] / step for ring in item.rings] for item in scene.objects]
+        blocked = reached(outlines, (rows, columns))
+        return cls(blocked, step, (float(low[0]), float(low[1]), 0.0))
 
     @cached_property
     def room(self) -> Float32Array:
@@ -200,6 +198,43 @@ class Obstacles:
                 found: FloatArray = places[best]
                 return found
         return None
+
+
+def reached(outlines: Iterable[Sequence[FloatArray]], shape: tuple[int, ...]) -> BoolArray:
+    """Return which cells of a grid areas reach into.
+
+    Parameters
+    ----------
+    outlines
+        Of each area the outline and its holes, each of shape (k, 2), row and column in units of
+        cells, perhaps beyond the grid.
+    shape
+        Rows and columns of the grid.
+
+    Returns
+    -------
+    ndarray
+        Of the shape: every cell of which some area covers a part, however small. A cell that an
+        area touches at a side or a corner alone, up to a millionth of its side, is none.
+
+    Examples
+    --------
+    >>> reached([[np.array([[0.0, 0.5], [0.0, 2.0], [1.1, 2.0]])]], (2, 3)).astype(int)
+    array([[1, 1, 0],
+           [0, 1, 0]])
+    """
+    found = np.zeros(shape, dtype=bool)
+    for rings in outlines:
+        starts = np.vstack(rings)
+        ends = np.vstack([np.roll(ring, -1, axis=0) for ring in rings])
+        low = np.clip(np.floor(starts.min(axis=0)), 0, shape).astype(np.int64)
+        high = np.clip(np.ceil(starts.max(axis=0)), low, shape).astype(np.int64)
+        rows, columns = (high - low).tolist()
+        starts, ends = (np.ascontiguousarray((ring - low)[:, ::-1]) for ring in (starts, ends))
+        part = found[low[0] : high[0], low[1] : high[1]]
+        part |= filled_pixels(starts, ends, rows, columns)
+        part |= crossed_pixels(starts, ends, rows, columns)
+    return found
 
 
 def _distances(walled: PixelsArray) -> Float32Array:
