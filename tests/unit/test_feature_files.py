@@ -17,7 +17,9 @@ from sketchmatch.transfers.files import (
     encode_waypoints,
     landmarks_of,
     read_features,
+    save_keepout,
 )
+from sketchmatch_map_files import parse
 
 ZONE = np.array([[1.0, 1.0], [3.0, 1.0], [3.0, 2.5], [1.0, 2.5]])
 HOLE = np.array([[1.5, 1.5], [2.0, 1.5], [2.0, 2.0]])
@@ -143,7 +145,7 @@ def mask(*carried, properties=None):
 def test_a_keepout_mask_forbids_each_cell_that_a_zone_reaches_into():
     found, text, _ = mask(kept("zone", ZONE), kept("route", [[0, 0], [1, 1]]))
     assert (found.resolution, found.origin, found.cells.shape) == (0.1, GRID.origin, (40, 60))
-    assert "image: mask.pgm\n" in text
+    assert 'image: "mask.pgm"\n' in text
     rows, columns = np.mgrid[:40, :60]
     cells = shapely.box(
         columns / 10 - 1.0, rows / 10 - 0.5, (columns + 1) / 10 - 1.0, (rows + 1) / 10 - 0.5
@@ -172,6 +174,25 @@ def test_a_slanted_zone_on_a_turned_map_leaves_no_cell_free_that_it_covers_a_par
         covered = shapely.area(shapely.intersection(cells, shapely.Polygon(ring)))
         assert ((covered > 1e-8) <= forbidden).all()
         assert (forbidden <= (covered > 0.0)).all()
+
+
+NAMES = ["floor #2", "a: b", 'it\'s "this"', "- [x", "Küche \N{SLICE OF PIZZA}", "yes", "a\\b"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_mask_names_its_picture_whatever_that_is_called(tmp_path, name):
+    text, picture = encode_keepout([kept("zone", ZONE)], [{}], GRID, f"{name}.pgm")
+    assert parse(text).values["image"] == f"{name}.pgm"
+    path = tmp_path / f"{name}.yaml"
+    save_keepout(path, text, picture, "--keepout")
+    assert len(read_features(path).features) == 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_waypoints_have_their_names_whatever_these_are(tmp_path, name):
+    text = encode_waypoints([kept("point", [[4, 5]], name=name)], [{}], 0.0)
+    (found,) = read_features(written(tmp_path, text, "waypoints.yaml")).features
+    assert found.name == name
 
 
 def test_a_zone_that_is_none_to_keep_out_of_is_left_out_of_the_mask():

@@ -14,7 +14,12 @@ from hypothesis.extra.numpy import arrays
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
-from sketchmatch.io.ros_map import decode_map_server, encode_map_server
+from sketchmatch.io.ros_map import (
+    MapServerHeader,
+    decode_map_server,
+    encode_map_server,
+    parse_header,
+)
 from sketchmatch.model import OccupancyGrid
 from sketchmatch_map_files import parse
 from tests.tools import ROOT, require
@@ -139,6 +144,20 @@ def test_a_grid_that_is_saved_is_read_again_as_it_was(cells, resolution, origin)
     read = decode_map_server(*encode_map_server(grid, "the map.png"))
     np.testing.assert_array_equal(read.cells, cells)
     assert (read.resolution, read.origin, read.notes) == (resolution, origin, ())
+
+
+@given(
+    st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1),
+    st.floats(1e-5, 10.0),
+    st.tuples(coordinates, coordinates, coordinates),
+    st.booleans(),
+    st.sampled_from(["trinary", "scale", "raw"]),
+)
+@example("floor #2: a \N{SLICE OF PIZZA}.pgm", 0.05, (-1e-7, 2.0, 0.1), True, "raw")
+def test_a_header_that_is_written_is_read_again_as_it_was(name, resolution, origin, negate, mode):
+    header = MapServerHeader(resolution, origin, negate, 0.65, 0.25, mode)
+    assert parse_header(header.text(name)) == header
+    assert parse(header.text(name)).values["image"] == name
 
 
 def test_a_saved_map_is_dark_at_walls_and_unknown_to_ros_1_where_it_is_transparent():

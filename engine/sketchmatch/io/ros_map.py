@@ -77,6 +77,7 @@ __all__ = [
     "decode_map_server",
     "encode_map_server",
     "header_for",
+    "in_yaml",
     "parse_header",
 ]
 
@@ -134,6 +135,29 @@ class MapServerHeader:
     mode: str
     notes: tuple[str, ...] = ()
     landmarks: tuple[Landmark, ...] = ()
+
+    def text(self, picture: str) -> str:
+        """Return what the YAML file of a picture says, which is read as this again.
+
+        Examples
+        --------
+        >>> header = MapServerHeader(0.05, (-1.0, 2.0, 0.0), False, 0.65, 0.25, "trinary")
+        >>> print(header.text("floor #2.pgm"), end="")
+        image: "floor #2.pgm"
+        mode: trinary
+        resolution: 0.05
+        origin: [-1.0, 2.0, 0.0]
+        negate: 0
+        occupied_thresh: 0.65
+        free_thresh: 0.25
+        """
+        x, y, yaw = map(float, self.origin)
+        return (
+            f"image: {in_yaml(picture)}\nmode: {self.mode}\n"
+            f"resolution: {float(self.resolution)!r}\norigin: [{x!r}, {y!r}, {yaw!r}]\n"
+            f"negate: {self.negate:d}\noccupied_thresh: {self.occupied_thresh!r}\n"
+            f"free_thresh: {self.free_thresh!r}\n"
+        )
 
     def grid(self, image: bytes) -> OccupancyGrid:
         """Return the occupancy grid that the picture's bytes hold.
@@ -251,11 +275,14 @@ def encode_map_server(grid: OccupancyGrid, picture: str = "map.png") -> tuple[st
     file = io.BytesIO()
     pixels = shades[grid.cells[::-1].view(np.uint8)]
     PIL.Image.fromarray(pixels, "LA").save(file, "PNG", compress_level=1)
-    x, y, yaw = map(float, grid.origin)
-    return (
-        f"image: {json.dumps(picture)}\nmode: scale\nresolution: {float(grid.resolution)!r}\n"
-        f"origin: [{x!r}, {y!r}, {yaw!r}]\nnegate: 0\noccupied_thresh: 1.0\nfree_thresh: 0.0\n"
-    ), file.getvalue()
+    header = MapServerHeader(grid.resolution, grid.origin, False, 1.0, 0.0, "scale")
+    return header.text(picture), file.getvalue()
+
+
+def in_yaml(text: str) -> str:
+    """Return a text as YAML writes it, whatever is in it: quoted, as JSON is, which it contains."""
+    # Not in ASCII: of JSON's pairs of escapes for one character YAML makes two, or nothing.
+    return json.dumps(text, ensure_ascii=False)
 
 
 def parse_header(yaml_text: str) -> MapServerHeader:
@@ -326,12 +353,11 @@ def header_for(name: str, picture: bytes) -> tuple[str, str] | None:
     said = _CREATOR.search(start[0])
     resolution = float(said[1]) if said else 0.0
     known = 0.0 < resolution < 1e3
-    text = (
-        f"image: {json.dumps(name)}\nresolution: {resolution if known else 0.05:g}\n"
-        "origin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    header = MapServerHeader(
+        resolution if known else 0.05, (0.0, 0.0, 0.0), False, 0.65, 0.196, "trinary"
     )
     cell = f"{resolution:g} m, as it says" if known else "0.05 m"
-    return text, (
+    return header.text(name), (
         f"{name} looks like a map that map_server saved, but no YAML beside it names it; it was "
         f"read with cells of {cell}, and its lower left corner as the origin; give its YAML if "
         "that is wrong"

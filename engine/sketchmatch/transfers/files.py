@@ -27,6 +27,7 @@ from sketchmatch.api.documents import decode_text, load_json, mapping, number, p
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io._targets import check_target, writing
 from sketchmatch.io.files import read_bytes, read_map_files
+from sketchmatch.io.ros_map import MapServerHeader, in_yaml
 from sketchmatch.model import FloatArray, OccupancyGrid
 from sketchmatch.transfers.features import Carried, Feature, FeatureKind
 from sketchmatch.transfers.obstacles import Obstacles, reached
@@ -166,18 +167,9 @@ def encode_keepout(
     shades = np.full(grid.cells.shape, _FREE, dtype=np.uint8)
     shades[reached(zones, shades.shape)] = _FORBIDDEN
     rows, columns = grid.cells.shape
-    x, y, yaw = grid.origin
-    lines = [
-        f"image: {picture}",
-        "mode: trinary",
-        f"resolution: {grid.resolution:.12g}",
-        f"origin: [{x:.12g}, {y:.12g}, {yaw:.12g}]",
-        "negate: 0",
-        "occupied_thresh: 0.65",
-        "free_thresh: 0.25",
-    ]
+    document = MapServerHeader(grid.resolution, grid.origin, False, 0.65, 0.25, "trinary")
     header = f"P5\n{columns} {rows}\n255\n".encode("ascii")
-    return "\n".join(lines) + "\n", header + shades[::-1].tobytes()
+    return document.text(picture), header + shades[::-1].tobytes()
 
 
 def encode_waypoints(
@@ -202,7 +194,7 @@ def encode_waypoints(
                 f"    orientation: [{w:.6f}, 0.0, 0.0, {z:.6f}]",
             ]
             if each.name:
-                lines.append(f"    name: {json.dumps(each.name)}")
+                lines.append(f"    name: {in_yaml(each.name)}")
             if each.feature.speeds is not None:
                 lines.append(f"    speed: {each.feature.speeds[k]:.6g}")
             count += 1
@@ -228,7 +220,7 @@ def save_keepout(path: Path, document: str, picture: bytes, field: str) -> None:
     """Save a mask: the YAML under its path, the picture beside it."""
     with writing(path, field):
         path.with_suffix(".pgm").write_bytes(picture)
-        path.write_text(document, encoding="utf-8")
+    save_text(path, document, field)
 
 
 def _read(path: Path) -> FeatureFile:
