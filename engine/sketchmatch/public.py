@@ -211,8 +211,9 @@ def transfer(
     sketch, map
         As for :func:`match`.
     features
-        What is carried, in the coordinates of the scene that it is from, y upwards. A route that is
-        drawn in the sketch is carried without being asked.
+        What is carried, in the coordinates of the scene that it is from, y upwards: metres around
+        ``PolygonSet.geographic_origin`` where its file has longitudes and latitudes. A route that
+        is drawn in the sketch is carried without being asked.
     object_map
         Which sketched object is which mapped one, where that is known, e.g.
         ``match(…).object_map``: then nothing is matched.

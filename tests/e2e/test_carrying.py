@@ -160,6 +160,66 @@ def test_zones_of_an_old_map_are_carried_to_a_turned_one(command_line, where, zo
     )
 
 
+BOXES = [[0, 0, 2, 1], [6, 0, 7, 3], [0, 5, 1, 8], [5, 6, 8, 8], [9, 4, 10, 5]]
+CORNERS = [np.array([[a, b], [c, b], [c, d], [a, d], [a, b]], float) for a, b, c, d in BOXES]
+CARPET = np.array([[2.0, 2.0], [5.0, 2.0], [5.0, 5.0], [2.0, 5.0], [2.0, 2.0]])
+
+
+def globe(metres, x, y):
+    """Return metres as longitudes and latitudes at a place."""
+    unit = np.radians(6_371_008.8) * np.array([np.cos(np.radians(y)), 1.0])
+    return (metres / unit + (x, y)).tolist()
+
+
+def test_zones_in_degrees_are_carried_in_degrees(command_line, where, tmp_path):
+    quarter = np.array([[0.0, 2.0], [-2.0, 0.0]])  # twice as large: not the same numbers
+    old = written(
+        tmp_path / "old.geojson", *(("Polygon", [globe(ring, 13.0, 52.0)], {}) for ring in CORNERS)
+    )
+    new = written(
+        tmp_path / "new.geojson",
+        *(("Polygon", [globe(ring @ quarter, 7.0, -35.0)], {}) for ring in CORNERS),
+    )
+    zones = written(tmp_path / "zones.geojson", ("Polygon", [globe(CARPET, 13.0, 52.0)], {}))
+    out = tmp_path / "out.geojson"
+    done = command_line("carry", zones, old, new, "--out", out, *where)
+    assert float(rows(done)[0][2]) < 0.7
+    assert "features: The coordinates are longitudes and latitudes" in done.stderr
+    (found,) = json.loads(out.read_text())["features"]
+    expected = globe(CARPET @ quarter, 7.0, -35.0)
+    assert found["geometry"]["coordinates"][0] == pytest.approx(np.array(expected), abs=1e-6)
+
+
+def test_what_is_in_degrees_is_carried_to_what_is_not_and_back(command_line, tmp_path):
+    map_ = written(
+        tmp_path / "map.geojson", *(("Polygon", [globe(ring, 13.0, 52.0)], {}) for ring in CORNERS)
+    )
+    sketch = tmp_path / "sketch.json"
+    strokes = [{"points": (50.0 * ring).tolist()} for ring in CORNERS]
+    sketch.write_text(json.dumps({"strokes": strokes}))
+    there, back = tmp_path / "there.geojson", tmp_path / "back.geojson"
+    zones = written(tmp_path / "zones.geojson", ("Polygon", [globe(CARPET, 13.0, 52.0)], {}))
+    rows(
+        command_line(
+            "transfer", sketch, map_, zones, "--direction", "map-to-sketch", "--out", there
+        )
+    )
+    drawn = read_features(there).features[0].points
+    assert drawn == pytest.approx(50.0 * CARPET[:-1], abs=5.0)
+    rows(command_line("transfer", sketch, map_, there, "--out", back))
+    (found,) = json.loads(back.read_text())["features"]
+    expected = globe(CARPET, 13.0, 52.0)
+    assert found["geometry"]["coordinates"][0] == pytest.approx(np.array(expected), abs=1e-6)
+
+
+def test_zones_in_degrees_of_a_map_in_metres_are_refused(command_line, tmp_path):
+    zones = written(tmp_path / "zones.geojson", ("Polygon", [globe(CARPET, 13.0, 52.0)], {}))
+    done = command_line("carry", zones, LIVING_ROOM_MAP, LIVING_ROOM_MAP)
+    assert (done.returncode, done.stdout) == (ExitCode.INVALID_INPUT, "")
+    assert done.stderr.startswith(f"sketchmatch: {zones} holds longitudes and latitudes")
+    assert done.stderr.count("\n") == 1
+
+
 def test_in_python_it_is_the_same(zones):
     given = read_features(zones).features
     found = sketchmatch.carry(given, LIVING_ROOM_MAP, LIVING_ROOM_MAP)

@@ -15,7 +15,7 @@ from sketchmatch.api import (
     documents,
     hookimpl,
 )
-from sketchmatch.io.files import _JSON_SUFFIXES, _KINDS
+from sketchmatch.io.files import _KINDS, JSON_SUFFIXES
 from sketchmatch.model import LabelledPolygon, PolygonSet, Scene
 from sketchmatch.registry import OWN_DISTRIBUTION, Kind, default_registry
 from sketchmatch.testing import check_plugin
@@ -49,7 +49,7 @@ def test_the_readme_names_the_files_of_every_reader():
         for suffix in item.reader.suffixes:
             assert f"`{suffix}`" in rows
         assert words.get(item.name, item.name).lower() in rows.lower()
-    for suffix in {*_KINDS, *_JSON_SUFFIXES} - {*PICTURE_SUFFIXES}:
+    for suffix in {*_KINDS, *JSON_SUFFIXES} - {*PICTURE_SUFFIXES}:
         assert f"`{suffix}`" in rows
 
 

@@ -133,6 +133,77 @@ def test_what_was_carried_is_written_with_what_it_had_and_reads_back(tmp_path):
         assert [r.tolist() for r in each.rings] == [r.tolist() for r in was.feature.rings]
 
 
+BERLIN = (13.4, 52.5)
+CRS84 = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}
+WGS84 = {"type": "name", "properties": {"name": "EPSG:4326"}}
+
+
+def around(middle, metres):
+    """Return the longitude and latitude of points in metres east and north of a place."""
+    unit = 2 * math.pi * 6_371_008.8 / 360.0
+    x, y = middle
+    wide = unit * math.cos(math.radians(y))
+    return [[x + east / wide, y + north / unit] for east, north in metres]
+
+
+@pytest.mark.parametrize("said", [{}, {"crs": CRS84}, {"crs": WGS84}])
+def test_longitudes_and_latitudes_of_features_are_metres_where_those_of_their_map_are(
+    tmp_path, said
+):
+    document = collection(
+        feature("Polygon", [around(BERLIN, ZONE)], name="no-go"),
+        feature("Point", around(BERLIN, [(-4.0, 7.5)])[0], name="dock"),
+    )
+    found = read_features(written(tmp_path, {**document, **said}), BERLIN)
+    zone, dock = found.features
+    assert zone.points == pytest.approx(ZONE, abs=1e-6)
+    assert dock.points == pytest.approx(np.array([[-4.0, 7.5]]), abs=1e-6)
+    assert found.notes == ("The coordinates are longitudes and latitudes: turned into metres.",)
+
+
+@pytest.mark.parametrize(
+    ("said", "points"),
+    [
+        ({"crs": None}, around(BERLIN, ZONE)),  # of which our own files say that they are not
+        ({}, ZONE.tolist()),
+        ({"crs": CRS84}, ZONE.tolist()),  # as tools say of what is in metres
+        ({}, [[400.0, 52.5], [401.0, 52.5], [401.0, 53.5]]),
+    ],
+)
+@pytest.mark.parametrize("origin", [None, BERLIN])
+def test_other_coordinates_of_features_stay_as_they_are(tmp_path, said, points, origin):
+    document = {**collection(feature("Polygon", [points])), **said}
+    found = read_features(written(tmp_path, document), origin)
+    assert found.features[0].points.tolist() == points
+    assert found.notes == ()
+
+
+@pytest.mark.parametrize("said", [{}, {"crs": CRS84}])
+@pytest.mark.parametrize(
+    ("origin", "words"), [(None, "has none; give"), ((52.5, 13.4), "lies elsewhere; give")]
+)
+def test_longitudes_and_latitudes_of_no_place_on_the_map_are_refused(tmp_path, said, origin, words):
+    document = {**collection(feature("Polygon", [around(BERLIN, ZONE)])), **said}
+    path = written(tmp_path, document)
+    with pytest.raises(InvalidInputError, match=words) as refused:
+        read_features(path, origin)
+    assert str(refused.value).startswith(f"{path} holds longitudes and latitudes")
+
+
+def test_what_is_carried_onto_a_map_in_degrees_is_written_in_degrees(tmp_path):
+    carried = [kept("zone", ZONE, HOLE, name="no-go"), kept("point", [[4, 5]], name="dock")]
+    text = encode_carried(carried, [{}, {}], 0.0, BERLIN)
+    zone, dock = json.loads(text)["features"]
+    first = around(BERLIN, ZONE[:1])[0]
+    assert zone["geometry"]["coordinates"][0][0] == pytest.approx(first, abs=1e-11)
+    assert dock["geometry"]["coordinates"] == pytest.approx(around(BERLIN, [(4, 5)])[0], abs=1e-11)
+    assert zone["properties"]["deviation"] == 0.25
+    found = read_features(written(tmp_path, text), BERLIN)
+    for each, was in zip(found.features, carried, strict=True):
+        for ring, true in zip(each.rings, was.feature.rings, strict=True):
+            assert ring == pytest.approx(true, abs=1e-6)
+
+
 GRID = OccupancyGrid(np.zeros((40, 60), dtype=np.int8), 0.1, (-1.0, -0.5, 0.0))
 
 

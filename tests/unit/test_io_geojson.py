@@ -2,10 +2,12 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
+from sketchmatch.io.degrees import from_metres
 from sketchmatch.io.geojson import decode_geojson, polygons_of
 from sketchmatch.io.scene_files import encode_geojson
 from sketchmatch.model import PolygonSet, Scene
@@ -181,6 +183,8 @@ def test_degrees_become_metres_where_they_are_meant():
     corners = [[11.0, 60.0], [11.0001, 60.0], [11.0001, 60.0001], [11.0, 60.0001]]
     found = decode_geojson(json.dumps(polygon([corners])))
     assert found.notes == ("The coordinates are longitudes and latitudes: turned into metres.",)
+    (ring,), middle = found.polygons[0].rings, found.geographic_origin
+    assert from_metres(ring, middle) == pytest.approx(np.array(corners), abs=1e-12)
     # 1e-4 degrees of a great circle of 40 030 km; half of it along the parallel of 60°.
     width, height = found.polygons[0].rings[0].max(axis=0) - found.polygons[0].rings[0].min(axis=0)
     assert (width, height) == pytest.approx((5.5597, 11.1195), rel=1e-4)

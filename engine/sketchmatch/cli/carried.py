@@ -16,7 +16,8 @@ from sketchmatch.cli.options import say
 from sketchmatch.cli.pictures import grid_in, grouped, matched_pairs, scene_of
 from sketchmatch.cli.tables import Column, Rows, plain
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.model import FloatArray
+from sketchmatch.io.files import JSON_SUFFIXES, file_and_part, read_here
+from sketchmatch.model import FloatArray, PolygonSet
 from sketchmatch.pictures.overlay import Marking, OverlayMatch, draw_overlay, save_overlay
 from sketchmatch.transfers import files
 from sketchmatch.transfers.features import Carried, Change, ChangeReason, Feature, FeatureKind
@@ -31,7 +32,9 @@ __all__ = [
     "draw",
     "messages",
     "named_in",
+    "origin_of",
     "places_of",
+    "read",
     "save",
     "segmenters",
     "show",
@@ -99,6 +102,22 @@ def named_in(path: Path) -> files.FeatureFile:
     return files.FeatureFile((), ()) if grid is None else files.landmarks_of(grid)
 
 
+def origin_of(path: Path) -> tuple[float, float] | None:
+    """Return longitude and latitude of what is (0, 0) in a scene, if its file has such."""
+    file, _ = file_and_part(path)
+    if sources.is_kept(path) or file.suffix.lower() not in JSON_SUFFIXES:
+        return None
+    source = read_here(path)
+    return source.geographic_origin if isinstance(source, PolygonSet) else None
+
+
+def read(path: Path, of: Path, verbose: bool) -> files.FeatureFile:
+    """Read features of a scene, and say what was decided in that."""
+    found = files.read_features(path, origin_of(of))
+    say_notes("features", found.notes, verbose)
+    return found
+
+
 def segmenters(chosen: str, tries_rooms: bool) -> tuple[str, ...]:
     """Return the segmenters that are tried on both of two maps."""
     if chosen:
@@ -164,7 +183,9 @@ def save(
 ) -> None:
     """Save what was carried into the files that were asked for."""
     if out is not None:
-        text = files.encode_carried(found.carried, found.properties, found.rotation)
+        text = files.encode_carried(
+            found.carried, found.properties, found.rotation, origin_of(target)
+        )
         files.save_text(out, text, "--out")
     if keepout is not None:
         grid = grid_in(target)

@@ -111,7 +111,8 @@ def transfer(
         pictures.check_path(overlay, sketch, map_)
     known = options.parse_pins(pin, no_pin)
     forth = direction is _Direction.SKETCH_TO_MAP
-    carried.check_keepout(keepout, map_ if forth else sketch)
+    start, target = (sketch, map_) if forth else (map_, sketch)
+    carried.check_keepout(keepout, target)
     chosen: TransferOptions = {
         **cast("TransferOptions", search.chosen()),
         "sketch_segmenter": sketch_segmenter,
@@ -124,7 +125,9 @@ def transfer(
         "radius": radius,
         "allow_unknown": allow_unknown,
     }
-    given = files.FeatureFile((), ()) if features is None else files.read_features(features)
+    given = files.FeatureFile((), ())
+    if features is not None:
+        given = carried.read(features, start, verbose)
     with (
         places.places_in(sketch=sketch, map=map_),
         options.pins_as_typed(list(known)),
@@ -137,7 +140,6 @@ def transfer(
         with carried.places_of(features):
             answer = asked.transfer(*sources, carried.messages(given.features), **chosen)
     found = carried.Carriage.of(answer, given, forth)
-    target = map_ if forth else sketch
     carried.save(found, target, out, keepout, waypoints)
     if overlay is not None:
         carried.draw(found, ("Sketch", "Map"), (sketch, map_), overlay)
@@ -189,7 +191,6 @@ def carry(
     from sketchmatch.cli import carried, pictures, places
     from sketchmatch.cli.answering import answerer
     from sketchmatch.cli.sources import in_metres, source_or_stored
-    from sketchmatch.transfers import files
     from sketchmatch_client import InvalidRequestError
 
     options.refuse_config(config, server)
@@ -198,7 +199,7 @@ def carry(
         pictures.check_path(overlay, old, new)
     carried.check_keepout(keepout, new)
     known = options.parse_pins(pin, no_pin)
-    given = files.read_features(features) + carried.named_in(old)
+    given = carried.read(features, old, verbose) + carried.named_in(old)
     with (
         places.places_in(sketch=old, map=new),
         options.pins_as_typed(list(known)),

@@ -26,6 +26,7 @@ from sketchmatch.registry import (
 from sketchmatch_map_files import PICTURE_SUFFIXES, YAML_SUFFIXES
 
 __all__ = [
+    "JSON_SUFFIXES",
     "FileKind",
     "decode_file",
     "file_and_part",
@@ -36,6 +37,7 @@ __all__ = [
     "read_source",
 ]
 
+JSON_SUFFIXES = (".geojson", ".geojsonl", ".json", ".ndjson")
 _Readers = Sequence[RegisteredReader]
 
 
@@ -116,7 +118,7 @@ def kind_of_file(name: str, data: bytes, readers: _Readers | None = None) -> Fil
     named = reader_by_name(readers, name)
     if named is not None:
         return FileKind(named.reader.source, named)
-    if suffix in _JSON_SUFFIXES:
+    if suffix in JSON_SUFFIXES:
         return _kind_of_document(load_sequence(decode_text(data)), readers)
     if suffix in YAML_SUFFIXES:
         raise _invalid(
@@ -142,7 +144,7 @@ def read_here(path: Path) -> Source | None:
     """
     file, part = file_and_part(path)
     suffix = file.suffix.lower()
-    if suffix not in _JSON_SUFFIXES:
+    if suffix not in JSON_SUFFIXES:
         known = suffix in (*_KINDS, *YAML_SUFFIXES) or is_bag(bag_and_topic(file)[0])
         return read_source(path) if known else None
     with _placed_in(path):
@@ -290,7 +292,7 @@ def _seen(document: Any) -> str:
 
 def _suffixes(readers: _Readers) -> str:
     others = (suffix for each in readers for suffix in each.reader.suffixes)
-    return " ".join(sorted({*_KINDS, *_JSON_SUFFIXES, *YAML_SUFFIXES, *SUFFIXES, *others}))
+    return " ".join(sorted({*_KINDS, *JSON_SUFFIXES, *YAML_SUFFIXES, *SUFFIXES, *others}))
 
 
 @contextmanager
@@ -348,7 +350,6 @@ def _invalid(field: str, problem: str) -> InvalidInputError:
     return InvalidInputError(Reason.INVALID_FILE, field, problem)
 
 
-_JSON_SUFFIXES = (".geojson", ".geojsonl", ".json", ".ndjson")
 _KINDS: dict[str, tuple[type[Source], Callable[[bytes], Source]]] = {
     ".svg": (StrokeSet, _svg),
     **dict.fromkeys(PICTURE_SUFFIXES, (Image, _picture)),

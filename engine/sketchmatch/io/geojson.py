@@ -20,8 +20,6 @@ place in metres does. ``"crs": null``, as in what we write, says that they are n
 from __future__ import annotations
 
 import json
-import math
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -41,11 +39,14 @@ from sketchmatch.api.documents import (
     shown,
 )
 from sketchmatch.errors import InvalidInputError, Reason, quoted
+from sketchmatch.io.degrees import SPAN, in_metres, may_be_degrees, middle_of, names_degrees
 from sketchmatch.model import FloatArray, LabelledPolygon, PolygonSet
 from sketchmatch.model.arrays import frozen_floats
 from sketchmatch.model.labels import cleaned_label
 
-__all__ = ["decode_geojson", "is_geojson", "load_sequence", "polygons_of"]
+__all__ = ["TURNED", "decode_geojson", "is_geojson", "load_sequence", "polygons_of"]
+
+TURNED = "The coordinates are longitudes and latitudes: turned into metres."
 
 _POLYGON = Reason.INVALID_POLYGON
 _GEOMETRIES = {
@@ -59,11 +60,7 @@ _GEOMETRIES = {
 }
 _TYPES = {*_GEOMETRIES, "Feature", "FeatureCollection"}
 _RECORD_SEPARATOR = "\x1e"
-# Degrees. A place in metres is larger than that, and a globe's place mostly smaller.
-_SPAN = 0.1
-_EARTH_RADIUS = 6_371_008.8
 _MOST_LEVELS = 12
-_DEGREES = re.compile(r"CRS84|EPSG:+4326\b|EPSG:[\d.]*:4326\b|WGS ?84", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -305,30 +302,19 @@ def _notes(remarks: list[tuple[str, str]]) -> tuple[str, ...]:
 def _in_degrees(found: PolygonSet, document: Any) -> bool:
     """Whether coordinates are longitudes and latitudes."""
     points = _points(found)
-    if not len(points) or (np.abs(points) > (360.0, 90.0)).any():
+    if not may_be_degrees(points, document):
         return False
-    named = document.get("crs", "") if isinstance(document, dict) else ""
-    if named is None:
-        return False
-    return bool(_DEGREES.search(json.dumps(named)) or np.ptp(points, axis=0).max() < _SPAN)
+    return names_degrees(document) or bool(np.ptp(points, axis=0).max() < SPAN)
 
 
 def _in_metres(found: PolygonSet) -> PolygonSet:
     """Turn longitudes and latitudes into metres east and north of their middle."""
-    points = _points(found)
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
-    unit = math.radians(1.0) * _EARTH_RADIUS
-    scale = np.array([unit * math.cos(math.radians(float(middle[1]))), unit])
-    note = "The coordinates are longitudes and latitudes: turned into metres."
-    return PolygonSet(
-        tuple(
-            replace(
-                item, rings=tuple(frozen_floats((ring - middle) * scale) for ring in item.rings)
-            )
-            for item in found.polygons
-        ),
-        (*found.notes, note),
+    middle = middle_of(_points(found))
+    polygons = tuple(
+        replace(item, rings=tuple(frozen_floats(in_metres(ring, middle)) for ring in item.rings))
+        for item in found.polygons
     )
+    return PolygonSet(polygons, (*found.notes, TURNED), geographic_origin=middle)
 
 
 def _points(found: PolygonSet) -> FloatArray:

@@ -143,6 +143,9 @@ class PolygonSet:
         What encloses nothing, each of shape (k, 2), y up: walls, to who looks for rooms.
     landmarks
         Names that are written in the drawing, of kind ``"room"``.
+    geographic_origin
+        Longitude and latitude, in degrees, of the place that is (0, 0), where the file has such
+        and they became metres east and north of it; None elsewhere.
     """
 
     polygons: tuple[LabelledPolygon, ...]
@@ -150,6 +153,7 @@ class PolygonSet:
     # By name alone: classes that derive from this one have fields of their own in third place.
     lines: tuple[FloatArray, ...] = dataclass_field(default=(), kw_only=True)
     landmarks: tuple[Landmark, ...] = dataclass_field(default=(), kw_only=True)
+    geographic_origin: tuple[float, float] | None = dataclass_field(default=None, kw_only=True)
 
     field = "polygon_set"
 

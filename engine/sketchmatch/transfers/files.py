@@ -16,7 +16,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,9 @@ import shapely
 from sketchmatch.api.documents import decode_text, load_json, mapping, number, plain_name, sequence
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io._targets import check_target, writing
+from sketchmatch.io.degrees import SPAN, from_metres, in_metres, may_be_degrees, names_degrees
 from sketchmatch.io.files import read_bytes, read_map_files
+from sketchmatch.io.geojson import TURNED
 from sketchmatch.io.ros_map import MapServerHeader, in_yaml
 from sketchmatch.model import FloatArray, OccupancyGrid
 from sketchmatch.transfers.features import Carried, Feature, FeatureKind
@@ -55,6 +57,11 @@ _SEVERAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygo
 _JSON_SUFFIXES = (".geojson", ".json")
 _REPLACED = ("speed", "speeds", "yaw", "deviation", "deviations", "changes")
 _FREE, _FORBIDDEN = 254, 0
+_NEAR = 1.0
+"""Degrees, from the middle of a scene: features of it lie nearer."""
+_SMALL = 0.01
+"""Nothing that is carried is as small in metres or pixels; in degrees it is a kilometre."""
+_CRS84 = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}
 _OCCUPIED = 65
 
 
@@ -68,17 +75,32 @@ class FeatureFile:
         The points, routes and zones, in their order.
     properties
         What else is said of each.
+    notes
+        What was decided in reading it, each one sentence.
     """
 
     features: tuple[Feature, ...]
     properties: tuple[Mapping[str, Any], ...]
+    notes: tuple[str, ...] = ()
 
     def __add__(self, other: FeatureFile) -> FeatureFile:
-        return FeatureFile(self.features + other.features, self.properties + other.properties)
+        return FeatureFile(
+            self.features + other.features,
+            self.properties + other.properties,
+            self.notes + other.notes,
+        )
 
 
-def read_features(path: str | Path) -> FeatureFile:
+def read_features(path: str | Path, origin: tuple[float, float] | None = None) -> FeatureFile:
     """Read points, routes and zones from GeoJSON, a keep-out mask or a list of waypoints.
+
+    Parameters
+    ----------
+    path
+        The file.
+    origin
+        Longitude and latitude of the place that is (0, 0) in the scene that they are of, if that
+        scene's file has such: then those of the features become metres, too.
 
     Raises
     ------
@@ -87,7 +109,7 @@ def read_features(path: str | Path) -> FeatureFile:
     """
     path = Path(path)
     try:
-        found = _read(path)
+        found = _read(path, origin)
     except InvalidInputError as error:
         if error.field.startswith(str(path)):
             raise
@@ -114,7 +136,10 @@ def landmarks_of(grid: OccupancyGrid) -> FeatureFile:
 
 
 def encode_carried(
-    carried: Sequence[Carried], properties: Sequence[Mapping[str, Any]], rotation: float
+    carried: Sequence[Carried],
+    properties: Sequence[Mapping[str, Any]],
+    rotation: float,
+    origin: tuple[float, float] | None = None,
 ) -> str:
     """Return carried features as GeoJSON, with what each had, its deviations and changes.
 
@@ -126,12 +151,16 @@ def encode_carried(
         What else is said of each.
     rotation
         By how much the whole was turned, in radians: so is every ``yaw``.
+    origin
+        Longitude and latitude of the place that is (0, 0) where they were carried to: then these
+        are written. Deviations stay in metres.
     """
     features = ",\n".join(
-        json.dumps(_encoded(each, said, rotation), ensure_ascii=False, allow_nan=False)
+        json.dumps(_encoded(each, said, rotation, origin), ensure_ascii=False, allow_nan=False)
         for each, said in zip(carried, properties, strict=True)
     )
-    return f'{{"type": "FeatureCollection", "crs": null, "features": [\n{features}\n]}}\n'
+    crs = json.dumps(None if origin is None else _CRS84)
+    return f'{{"type": "FeatureCollection", "crs": {crs}, "features": [\n{features}\n]}}\n'
 
 
 def encode_keepout(
@@ -223,9 +252,10 @@ def save_keepout(path: Path, document: str, picture: bytes, field: str) -> None:
     save_text(path, document, field)
 
 
-def _read(path: Path) -> FeatureFile:
+def _read(path: Path, origin: tuple[float, float] | None) -> FeatureFile:
     if path.suffix.lower() not in YAML_SUFFIXES:
-        return _of_geojson(load_json(decode_text(read_bytes(path))))
+        document = load_json(decode_text(read_bytes(path)))
+        return _in_metres(_of_geojson(document), document, origin)
     try:
         values = parse(text_of(read_bytes(path))).values
     except MapFileError as error:
@@ -274,6 +304,32 @@ def _of_geojson(document: Any) -> FeatureFile:
             features.append(_of_part(part, at, name, said))
             properties.append(said)
     return FeatureFile(tuple(features), tuple(properties))
+
+
+def _in_metres(
+    found: FeatureFile, document: Any, origin: tuple[float, float] | None
+) -> FeatureFile:
+    """Return features as they are in their scene, whose origin has a longitude and latitude."""
+    rings = [ring for each in found.features for ring in each.rings]
+    points = np.vstack(rings) if rings else np.empty((0, 2))
+    if not may_be_degrees(points, document):
+        return found
+    if origin is not None and (np.abs(points - origin) < _NEAR).all():
+        features = tuple(
+            replace(each, rings=tuple(in_metres(ring, origin) for ring in each.rings))
+            for each in found.features
+        )
+        return replace(found, features=features, notes=(*found.notes, TURNED))
+    span = float(np.ptp(points, axis=0).max())
+    if 0.0 < span < _SMALL or (span < SPAN and names_degrees(document)):
+        where = "has none" if origin is None else "lies elsewhere"
+        raise InvalidInputError(
+            _FILE,
+            "",
+            f"holds longitudes and latitudes, and the sketch or map that they are of {where}; give "
+            'its own coordinates, and say "crs": null if these are',
+        )
+    return found
 
 
 def _parts(geometry: dict[str, Any], field: str) -> list[tuple[dict[str, Any], str]]:
@@ -386,7 +442,12 @@ def _of_mask(grid: OccupancyGrid) -> FeatureFile:
     return FeatureFile(features, tuple({"name": each.name} for each in features))
 
 
-def _encoded(carried: Carried, said: Mapping[str, Any], rotation: float) -> dict[str, Any]:
+def _encoded(
+    carried: Carried,
+    said: Mapping[str, Any],
+    rotation: float,
+    origin: tuple[float, float] | None,
+) -> dict[str, Any]:
     kept = {key: value for key, value in said.items() if key not in _REPLACED}
     kept.setdefault("name", carried.name)
     if (yaw := _yaw(said, rotation)) is not None:
@@ -408,13 +469,16 @@ def _encoded(carried: Carried, said: Mapping[str, Any], rotation: float) -> dict
             }
             for each in carried.changes
         ]
-    return {"type": "Feature", "properties": kept, "geometry": _geometry(carried.feature)}
+    return {"type": "Feature", "properties": kept, "geometry": _geometry(carried.feature, origin)}
 
 
-def _geometry(feature: Feature | None) -> dict[str, Any] | None:
+def _geometry(feature: Feature | None, origin: tuple[float, float] | None) -> dict[str, Any] | None:
     if feature is None:
         return None
-    lines = [ring.tolist() for ring in feature.rings]
+    rings = feature.rings
+    if origin is not None:
+        rings = tuple(from_metres(ring, origin) for ring in rings)
+    lines = [ring.tolist() for ring in rings]
     if feature.kind is FeatureKind.POINT:
         return {"type": "Point", "coordinates": lines[0][0]}
     if feature.kind is FeatureKind.ROUTE:
