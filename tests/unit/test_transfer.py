@@ -1,5 +1,7 @@
 """A whole transfer in Python: what it takes, what it refuses by field, and what it returns."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -91,6 +93,19 @@ def test_what_cannot_be_used_is_refused_by_field(options, field):
     with pytest.raises(InvalidInputError) as refused:
         transfer(SCENE, TURNED, features, **options)
     assert refused.value.field.startswith(field)
+
+
+def test_a_radius_beyond_its_bound_is_told_the_bound():
+    transfer(SCENE, TURNED, [HERE], object_map=KNOWN, radius=1e6)
+    with pytest.raises(InvalidInputError, match=r"is 2e\+06; give a number from 0 to 1e\+06$"):
+        transfer(SCENE, TURNED, [HERE], object_map=KNOWN, radius=2e6)
+
+
+@pytest.mark.parametrize("far", [2e9, float("inf"), float("nan")])
+def test_a_feature_that_is_too_far_away_is_told_how_far_it_may_be(far):
+    with pytest.raises(InvalidInputError, match=re.escape(f"(1, {far:g})")) as refused:
+        Feature("route", (np.array([[0.0, 0.0], [1.0, far]]),))
+    assert str(refused.value).endswith("; give finite numbers up to 1e+09")
 
 
 def test_a_mirrored_object_map_is_refused():

@@ -88,8 +88,12 @@ class Feature:
         ring = frozen_floats(given)
         if ring.ndim != 2 or ring.shape[1] != 2:
             raise _refused(field, "is not a list of [x, y] pairs of numbers")
-        if not (np.abs(ring) <= _FARTHEST).all():
-            raise _refused(field, "has a point that is not finite, or too far away")
+        beyond = ~(np.abs(ring) <= _FARTHEST).all(axis=1)
+        if beyond.any():
+            x, y = ring[np.argmax(beyond)]
+            raise _refused(
+                field, f"has a point at ({x:g}, {y:g}); give finite numbers up to {_FARTHEST:g}"
+            )
         if self.kind is FeatureKind.ZONE and len(ring) > 1 and (ring[0] == ring[-1]).all():
             ring = frozen_floats(ring[:-1])
         fewest = _FEWEST[self.kind]

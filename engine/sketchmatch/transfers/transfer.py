@@ -86,8 +86,10 @@ class TransferRequest:
             raise _refused(
                 "direction", f"is {quoted(self.direction)}; give {' or '.join(Direction)}"
             ) from None
-        if self.radius is not None and not 0.0 <= self.radius < _MOST_RADIUS:
-            raise _refused("radius", f"is {self.radius:g}; give a number from 0 on")
+        if self.radius is not None and not 0.0 <= self.radius <= _MOST_RADIUS:
+            raise _refused(
+                "radius", f"is {self.radius:g}; give a number from 0 to {_MOST_RADIUS:g}"
+            )
         if self.object_map is not None:
             _check_pairs(self.object_map)
 
