@@ -248,6 +248,7 @@ def test_a_slanted_zone_on_a_turned_map_leaves_no_cell_free_that_it_covers_a_par
 
 
 NAMES = ["floor #2", "a: b", 'it\'s "this"', "- [x", "Küche \N{SLICE OF PIZZA}", "yes", "a\\b"]
+NUMBERS = ["12", "1e5", "nan"]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -259,7 +260,7 @@ def test_a_mask_names_its_picture_whatever_that_is_called(tmp_path, name):
     assert len(read_features(path).features) == 1
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, *NUMBERS])
 def test_waypoints_have_their_names_whatever_these_are(tmp_path, name):
     text = encode_waypoints([kept("point", [[4, 5]], name=name)], [{}], 0.0)
     (found,) = read_features(written(tmp_path, text, "waypoints.yaml")).features

@@ -386,17 +386,15 @@ def _speeds(said: Mapping[str, Any], count: int) -> FloatArray | None:
 
 
 def _of_waypoints(given: Any) -> FeatureFile:
-    named = mapping(
-        _numbers(given), "waypoints", _FILE, "waypoints by name, as nav2's panel saves them"
-    )
+    named = mapping(given, "waypoints", _FILE, "waypoints by name, as nav2's panel saves them")
     features, properties = [], []
     for key, value in named.items():
         field = f"waypoints.{key}"
         item = mapping(value, field, _FILE, "pose and orientation")
-        place = _line([item.get("pose")], f"{field}.pose")
+        place = _line([_numbers(item.get("pose"))], f"{field}.pose")
         name = plain_name(item.get("name")) or str(key)
         said: dict[str, Any] = {"name": name}
-        turned = item.get("orientation")
+        turned = _numbers(item.get("orientation"))
         if isinstance(turned, list) and len(turned) == 4:
             w, _, _, z = (number(each, f"{field}.orientation", _FILE) for each in turned)
             said["yaw"] = 2.0 * math.atan2(z, w)
@@ -407,8 +405,6 @@ def _of_waypoints(given: Any) -> FeatureFile:
 
 def _numbers(value: Any) -> Any:
     """Return what stands in a YAML with its texts as numbers where they are some."""
-    if isinstance(value, dict):
-        return {key: _numbers(each) for key, each in value.items()}
     if isinstance(value, list):
         return [_numbers(each) for each in value]
     try:
