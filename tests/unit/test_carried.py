@@ -289,6 +289,16 @@ def test_what_lies_beyond_the_grid_is_said(kind):
     assert found.feature is not None
 
 
+@pytest.mark.parametrize(
+    "corners", [(-40, -40, 40, 40), (-40, 4, 40, 6), (-3, -3, 5, 5)], ids=["all", "across", "part"]
+)
+def test_a_zone_lies_on_the_grid_wherever_its_corners_are(corners):
+    x0, y0, x1, y1 = corners
+    ring = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
+    found, _ = led(Feature(FeatureKind.ZONE, (ring,)), floor())
+    assert found.changes == ()
+
+
 def test_objects_of_a_scene_are_obstacles_too():
     feature = route((2, 5), (8, 5.1))
     course = course_between(SCENE, SCENE, SAME, features=[feature])

@@ -175,10 +175,9 @@ def _carried_line(
         thin = ways  # as narrow as it was simplified by
     found = _result(feature, thin, course)
     assert found.feature is not None
-    outline = found.feature.points
-    if obstacles is None or obstacles.inside(outline).any():
+    if obstacles is None or obstacles.meets(found.feature.rings):
         return found
-    last = len(outline) - 1
+    last = len(found.feature.points) - 1
     return found.changed(Change(ChangeReason.OUTSIDE, 0, last, "It lies beyond the grid."))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from sketchmatch.kernels.clearing import legs_clear
@@ -125,6 +126,12 @@ class Obstacles:
         """Return which points lie on the grid."""
         cells = self.cells(points)
         return np.asarray(((cells >= 0) & (cells < self.blocked.shape)).all(axis=1))
+
+    def meets(self, rings: Sequence[FloatArray]) -> bool:
+        """Whether an area, its outline and its holes, lies on the grid, or a part of it does."""
+        outline, *holes = map(self.local, rings)
+        grid = shapely.box(0.0, 0.0, *self.blocked.shape)
+        return bool(shapely.Polygon(outline, holes).intersects(grid))
 
     def kept(self, radius: float) -> float:
         """Return how far from obstacles a robot of a radius is kept."""
