@@ -320,6 +320,21 @@ def test_waypoints_are_written_in_order_and_read_back(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("points", "expected"),
+    [
+        ([[0, 0], [0, 0], [0, 1], [-1, 1], [-1, 1], [-1, 1]], [0.5, 0.5, 1, 1, 1, 1]),
+        ([[0, 0], [-1, 0], [-1, 0], [-1, -1]], [1, -0.5, -0.5, -0.5]),
+        ([[2, 2], [2, 2]], [0, 0]),
+    ],
+)
+def test_a_waypoint_where_a_route_stays_looks_to_where_it_goes_on(tmp_path, points, expected):
+    text = encode_waypoints([kept("route", points)], [{}], 0.0)
+    found = read_features(written(tmp_path, text, "waypoints.yaml"))
+    yaws = [said["yaw"] for said in found.properties]
+    assert yaws == pytest.approx(np.pi * np.array(expected), abs=1e-5)
+
+
+@pytest.mark.parametrize(
     ("text", "words"),
     [
         ("waypoints: [1, 2]", "waypoints is a list of 2; give waypoints by name"),

@@ -483,10 +483,15 @@ def _geometry(feature: Feature | None, origin: tuple[float, float] | None) -> di
 
 
 def _headings(points: FloatArray) -> list[float]:
-    """Return where each point of a route looks: to the next, and the last as the one before."""
+    """Return where each point of a route looks: to the next elsewhere, the last as before."""
     steps = np.diff(points, axis=0)
-    found = np.arctan2(steps[:, 1], steps[:, 0]).tolist()
-    return [*found, found[-1]]
+    moving = np.flatnonzero(steps.any(axis=1))
+    if not len(moving):
+        return [0.0] * len(points)
+    ahead = np.searchsorted(moving, np.arange(len(points))).clip(max=len(moving) - 1)
+    x, y = steps[moving[ahead]].T
+    found: list[float] = np.arctan2(y, x).tolist()
+    return found
 
 
 def _yaw(said: Mapping[str, Any], rotation: float) -> float | None:
