@@ -190,6 +190,16 @@ def test_longitudes_and_latitudes_of_no_place_on_the_map_are_refused(tmp_path, s
     assert str(refused.value).startswith(f"{path} holds longitudes and latitudes")
 
 
+def test_a_point_alone_is_in_metres_of_what_is_and_else_has_to_say_so(tmp_path):
+    document = collection(feature("Point", [2.35, 48.85]))
+    path = written(tmp_path, document)
+    assert read_features(path).features[0].points.tolist() == [[2.35, 48.85]]
+    with pytest.raises(InvalidInputError, match="lies elsewhere; give"):
+        read_features(path, BERLIN)
+    found = read_features(written(tmp_path, {**document, "crs": None}), BERLIN)
+    assert found.features[0].points.tolist() == [[2.35, 48.85]]
+
+
 def test_what_is_carried_onto_a_map_in_degrees_is_written_in_degrees(tmp_path):
     carried = [kept("zone", ZONE, HOLE, name="no-go"), kept("point", [[4, 5]], name="dock")]
     text = encode_carried(carried, [{}, {}], 0.0, BERLIN)

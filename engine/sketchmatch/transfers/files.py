@@ -321,7 +321,9 @@ def _in_metres(
         )
         return replace(found, features=features, notes=(*found.notes, TURNED))
     span = float(np.ptp(points, axis=0).max())
-    if 0.0 < span < _SMALL or (span < SPAN and names_degrees(document)):
+    # One point in metres, of a scene in metres, is small as well.
+    small = span < _SMALL and (span > 0.0 or origin is not None)
+    if small or (span < SPAN and names_degrees(document)):
         where = "has none" if origin is None else "lies elsewhere"
         raise InvalidInputError(
             _FILE,
