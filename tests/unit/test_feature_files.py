@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from sketchmatch.errors import InvalidInputError
-from sketchmatch.io.ros_map import decode_map_server
+from sketchmatch.io.ros_map import MapServerHeader, decode_map_server
 from sketchmatch.model import Landmark, OccupancyGrid
 from sketchmatch.transfers.features import Carried, Change, ChangeReason, Feature
 from sketchmatch.transfers.files import (
@@ -19,6 +19,7 @@ from sketchmatch.transfers.files import (
     read_features,
     save_keepout,
 )
+from sketchmatch.transfers.obstacles import Obstacles
 from sketchmatch_map_files import parse
 
 ZONE = np.array([[1.0, 1.0], [3.0, 1.0], [3.0, 2.5], [1.0, 2.5]])
@@ -295,6 +296,37 @@ def test_a_mask_is_read_as_zones(tmp_path):
         best = max(areas, key=lambda each: true.intersection(each).area)
         shared = true.intersection(best).area / true.union(best).area
         assert shared > 0.8
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_zones_of_a_mask_cover_each_forbidden_cell_and_hardly_more(tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[:30, :40]
+    forbidden = rng.random((30, 40)) < rng.choice([0.0, 0.02, 0.3])
+    forbidden |= np.abs(y - rng.uniform(-1.0, 1.0) * x - 12.0) < rng.uniform(0.3, 4.0)
+    row, column = rng.integers(0, 20, 2)
+    forbidden[row : row + 8, column : column + 15] = True
+    forbidden[row + 3 : row + 5, column + 3 : column + 9] = False
+    shades = np.where(forbidden[::-1], 0, 254).astype(np.uint8)
+    (tmp_path / "mask.pgm").write_bytes(b"P5\n40 30\n255\n" + shades.tobytes())
+    header = MapServerHeader(0.25, (-3.0, 1.0, 0.7), False, 0.65, 0.25, "trinary")
+    path = written(tmp_path, header.text("mask.pgm"), "mask.yaml")
+    cells = Obstacles(forbidden, header.resolution, header.origin)
+    local = [[cells.local(ring) for ring in zone.rings] for zone in read_features(path).features]
+    found = shapely.union_all([shapely.Polygon(outline, holes) for outline, *holes in local])
+    rows, columns = np.argwhere(forbidden).T
+    true = shapely.union_all(shapely.box(rows, columns, rows + 1.0, columns + 1.0))
+    assert found.buffer(1e-6).covers(true)
+    assert true.buffer(1.5).covers(found)
+    assert found.area < true.area + 0.25 * true.length
+
+
+def test_zones_of_a_mask_have_the_corners_of_what_is_straight(tmp_path):
+    ring = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]])
+    _, text, picture = mask(kept("zone", ring))
+    (tmp_path / "mask.pgm").write_bytes(picture)
+    (zone,) = read_features(written(tmp_path, text, "mask.yaml")).features
+    assert sorted(zone.points.round(9).tolist()) == sorted(ring.tolist())
 
 
 def test_waypoints_are_written_in_order_and_read_back(tmp_path):

@@ -8,7 +8,8 @@ where a robot looks at a point; ``keepout: false`` leaves a zone out of the keep
 properties are kept.
 
 A mask of nav2's keep-out filter, which is a map in which the forbidden cells are occupied, is read
-as zones, and a list of waypoints as nav2's panel in RViz saves it as points in their order.
+as zones that cover all of these, and a list of waypoints as nav2's panel in RViz saves it as points
+in their order.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from sketchmatch.io.degrees import SPAN, from_metres, in_metres, may_be_degrees,
 from sketchmatch.io.files import read_bytes, read_map_files
 from sketchmatch.io.geojson import TURNED
 from sketchmatch.io.ros_map import MapServerHeader, in_yaml
+from sketchmatch.kernels.raster import pixel_edges
 from sketchmatch.model import FloatArray, OccupancyGrid
 from sketchmatch.transfers.features import Carried, Feature, FeatureKind
 from sketchmatch.transfers.obstacles import Obstacles, reached
@@ -61,6 +63,9 @@ _NEAR = 1.0
 """Degrees, from the middle of a scene: features of it lie nearer."""
 _SMALL = 0.01
 """Nothing that is carried is as small in metres or pixels; in degrees it is a kilometre."""
+_STEP = 0.5
+"""In cells: by how much the outlines of a mask may be simplified."""
+_ROUNDING = 1e-9
 _CRS84 = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}
 _OCCUPIED = 65
 
@@ -416,28 +421,34 @@ def _numbers(value: Any) -> Any:
 
 
 def _of_mask(grid: OccupancyGrid) -> FeatureFile:
-    """Return what is forbidden as zones."""
-    from skimage.measure import find_contours
-
-    forbidden = np.pad(grid.cells >= _OCCUPIED, 1).astype(np.float64)
+    """Return what is forbidden as zones, which cover all of it."""
+    edges = np.stack(pixel_edges(grid.cells >= _OCCUPIED), axis=1)
+    outlines = shapely.MultiLineString(list(edges))
     cells = Obstacles.of_grid(grid, allow_unknown=True)
-    lines = [
-        shapely.LineString(cells.places(line - 1.0))
-        for line in find_contours(forbidden, 0.5)  # type: ignore[no-untyped-call]
-        if len(line) > 3
-    ]
-    areas = shapely.build_area(shapely.GeometryCollection(lines))
-    zones = [shapely.simplify(each, grid.resolution / 2.0) for each in shapely.get_parts(areas)]
+    zones = map(_plainer, shapely.get_parts(shapely.build_area(outlines)))
     features = tuple(
         Feature(
             FeatureKind.ZONE,
-            tuple(shapely.get_coordinates(ring) for ring in (zone.exterior, *zone.interiors)),
+            tuple(
+                cells.placed(shapely.get_coordinates(ring)[:, ::-1])
+                for ring in (zone.exterior, *zone.interiors)
+            ),
             f"keep-out {k + 1}",
         )
         for k, zone in enumerate(zones)
-        if zone.geom_type == "Polygon" and zone.is_valid and not zone.is_empty
     )
     return FeatureFile(features, tuple({"name": each.name} for each in features))
+
+
+def _plainer(area: shapely.Polygon) -> shapely.Polygon:
+    """Return an area of cells without the steps of its slanted sides, which covers it."""
+    plain = shapely.simplify(area, _STEP)
+    corners = shapely.points(shapely.get_coordinates(area))
+    for wider in (0.0, float(shapely.distance(corners, plain).max()), _STEP):
+        found = shapely.buffer(plain, wider, join_style="mitre", mitre_limit=2.0)
+        if found.geom_type == "Polygon" and found.buffer(_ROUNDING).covers(area):
+            return found
+    return area
 
 
 def _encoded(
