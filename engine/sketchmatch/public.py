@@ -72,7 +72,7 @@ def match(
     allow_unmatched: bool | None = None,
     unmatched_price: float | None = None,
     alternatives: int | None = None,
-    pins: Mapping[int | str, int | str | None] | Iterable[Pin] | None = None,
+    pins: Mapping[Any, int | str | None] | Iterable[Pin] | None = None,
     synonyms: Synonyms | None = None,
     on_progress: Callable[[Progress], None] | None = None,
     config: str | Path | None = None,
@@ -93,7 +93,7 @@ def match(
         source.
     histogram, similarity, searcher, judge
         Names of the algorithms. Left out, the profile decides, or else the configuration, or else
-        they are ``"constant"``, ``"cross-correlation"``, ``"auto"`` and ``"confidence"``.
+        they are ``"constant"``, ``"cross-correlation"``, ``"align"`` and ``"posterior"``.
     params
         Parameters by stage, the six above, e.g. ``{"searcher": {"population": 400}}``; without a
         name they are those of the algorithm that is used anyway.
@@ -108,8 +108,8 @@ def match(
         1, 1, 1.
     allow_unmatched
         Whether an object may stay without partner on both sides, where that is likelier. Left out,
-        as the profile says, or else as searcher and judge do by themselves; the built-in ones
-        match the smaller scene completely.
+        as the profile says, or else as searcher and judge do by themselves: ``"align"`` and
+        ``"posterior"`` leave objects out, others match the smaller scene completely.
     unmatched_price
         What a map loses that leaves all objects of the smaller scene out, in units of ζ, and in
         proportion where it leaves out some. Left out, the judge's own.
@@ -199,7 +199,7 @@ def transfer(
     params: Mapping[str, Mapping[str, Any]] | None = None,
     seed: int = 0,
     time_budget: float | None = None,
-    pins: Mapping[int | str, int | str | None] | Iterable[Pin] | None = None,
+    pins: Mapping[Any, int | str | None] | Iterable[Pin] | None = None,
     synonyms: Synonyms | None = None,
     on_progress: Callable[[Progress], None] | None = None,
     config: str | Path | None = None,
@@ -647,7 +647,7 @@ def _selection(
     }
 
 
-def _pins(given: Mapping[int | str, int | str | None] | Iterable[Pin] | None) -> tuple[Pin, ...]:
+def _pins(given: Mapping[Any, int | str | None] | Iterable[Pin] | None) -> tuple[Pin, ...]:
     """Return pins as a request has them, which checks them."""
     if isinstance(given, Mapping):
         return tuple(Pin(sketched, mapped) for sketched, mapped in given.items())

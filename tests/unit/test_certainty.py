@@ -86,6 +86,17 @@ def test_maps_onto_what_is_in_doubt_lose_and_what_is_left_keeps_the_sum():
     assert _as_certain(same, maps, scene(1.0, 1.0, 1.0)) == pytest.approx(same)
 
 
+def test_maps_of_many_objects_of_which_hardly_any_is_sure_are_told_apart():
+    scene = Scene(
+        tuple(
+            SceneObject.from_rings([[(3 * k, 0), (3 * k + 1, 0), (3 * k, 1)]], "", c)
+            for k, c in enumerate([1e-200, 1e-200, 1e-201])
+        )
+    )
+    shares = _as_certain(np.array([0.3, 0.3, 0.0]), np.array([[0, 1], [0, 2], [2, -1]]), scene)
+    assert shares == pytest.approx([0.6 * 10 / 11, 0.6 / 11, 0.0])
+
+
 def test_the_less_certain_partner_is_the_less_likely():
     rng = np.random.default_rng(0)
     boxes = [SQUARE * rng.uniform(0.5, 2.0, 2) + rng.uniform(0, 20, 2) for _ in range(5)]

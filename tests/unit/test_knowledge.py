@@ -223,3 +223,12 @@ def test_a_matching_leaves_out_as_few_as_any_map(seed, few, more):
     assert allowed[kept, found[kept]].all()
     every = itertools.permutations(range(few + more), few)
     assert len(kept) == max(sum(allowed[a, c] for a, c in enumerate(p)) for p in every)
+
+
+def test_a_chain_of_a_thousand_objects_moves_up_by_one():
+    # Each may take its own or the next, the last one the first alone, which all before hold.
+    count = 1100
+    allowed = np.eye(count, count, dtype=bool) | np.eye(count, count, 1, dtype=bool)
+    allowed[-1] = np.arange(count) == 0
+    preferred = np.eye(count)[:, ::1] + np.arange(count, 0, -1)[:, None]
+    assert matching(allowed, preferred).tolist() == [*range(1, count), 0]

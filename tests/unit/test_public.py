@@ -3,8 +3,10 @@
 import inspect
 import json
 import math
+import pickle
 import subprocess
 import sys
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +36,8 @@ from tests.strategies import FRAME
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
+THREE = Scene.from_polygons([SQUARE, 20.0 + SQUARE, SQUARE * 2.0 + 9.0])
+
 
 def test_every_public_name_is_there():
     for name in sketchmatch.__all__:
@@ -52,6 +56,27 @@ def test_importing_it_loads_nothing_heavy():
 @pytest.fixture(scope="module")
 def living_room():
     return match(LIVING_ROOM_SKETCH, str(LIVING_ROOM_MAP), seed=1)
+
+
+@pytest.mark.parametrize("copied", [lambda each: pickle.loads(pickle.dumps(each)), deepcopy])
+def test_results_go_to_other_processes(living_room, copied):
+    again = copied(living_room)
+    assert again.object_map == living_room.object_map
+    assert again.statistics == living_room.statistics
+    assert hash(again.statistics) == hash(living_room.statistics)
+    with pytest.raises(TypeError):
+        again.statistics.seconds["total"] = 0.0
+    feature = sketchmatch.Feature("route", [[(10, 10), (20, 20)]], "way", speeds=[1, 2])
+    moved = sketchmatch.transfer(THREE, THREE, [feature], object_map={0: 0, 1: 1})
+    assert copied(moved).features[0].points.tolist() == moved.features[0].points.tolist()
+
+
+def test_what_match_says_of_its_defaults_is_so():
+    pipeline = sketchmatch.Engine().resolve({})
+    chosen = (pipeline.histogram, pipeline.similarity, pipeline.searcher, pipeline.judge)
+    names = ", ".join(f'``"{each.name}"``' for each in chosen[:3])
+    said = " ".join((inspect.getdoc(match) or "").split())
+    assert f'they are {names} and ``"{chosen[3].name}"``' in said
 
 
 def test_the_bundled_example_is_matched_as_its_truth_says(living_room):

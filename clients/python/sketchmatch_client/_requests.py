@@ -48,7 +48,7 @@ class Pin:
     excluded: bool = False
 
 
-Pins = Mapping[int | str, int | str | None] | Iterable[Pin]
+Pins = Mapping[Any, int | str | None] | Iterable[Pin]
 """What is known of sketched objects."""
 
 _STAGES = tuple(

@@ -48,7 +48,7 @@ class SceneObject:
         shape (k, 2), k ≥ 3, in metres or sketch units, without a repeated last point.
     label
         A name for people, in one line: :func:`~sketchmatch.model.labels.cleaned_label` makes it
-        so. It never influences a match.
+        so. Where both scenes have some, a match weighs labels as it does all else.
     certainty
         How sure it is that this is one thing, and no part of a wall, shadow or speckle: above 0
         and at most 1. What is in doubt, below :data:`DOUBTFUL`, is drawn hollow.
@@ -286,9 +286,9 @@ class Scene:
 
     @cached_property
     def identity(self) -> str:
-        """A hash of outlines and certainties, in hexadecimal: the same for scenes that match alike.
+        """A hash of outlines and certainties, in hexadecimal: the same for those described alike.
 
-        Labels, which never influence a match, are no part of it.
+        Labels, on which histograms do not depend, are no part of it.
 
         Examples
         --------

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
-
 import numpy as np
 
 from sketchmatch.api import Outcome, Segmentation
@@ -71,7 +69,7 @@ def answer(
         statistics=Statistics(
             found.iterations,
             found.evaluations,
-            MappingProxyType({**clock.seconds, "total": clock.spent()}),
+            {**clock.seconds, "total": clock.spent()},
         ),
         sketch=sketch.scene,
         map=map_.scene,

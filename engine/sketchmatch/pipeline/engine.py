@@ -29,7 +29,7 @@ from sketchmatch.pipeline.selection import (
     resolve,
     resolve_segmenter,
 )
-from sketchmatch.registry import Registry
+from sketchmatch.registry import Registry, default_registry
 
 __all__ = ["Engine"]
 
@@ -44,16 +44,26 @@ class Engine:
     Attributes
     ----------
     registry
-        The algorithms at hand.
+        The algorithms at hand; left out, all that are installed.
     defaults
         What is taken where a request chooses nothing, and the profiles that it can name.
     limits
         How large a sketch or a map may be.
     memory
         What of scenes need not be described again; None where nothing is remembered.
+
+    Examples
+    --------
+    >>> from sketchmatch.pipeline.slices import finish
+    >>> scene = Scene.from_polygons([[[0, 0], [2, 0], [2, 1]], [[5, 0], [6, 0], [6, 3]]])
+    >>> engine = Engine()
+    >>> pipeline = engine.resolve({})
+    >>> compared = finish(engine.compare((scene, scene), pipeline.histogram, pipeline.similarity))
+    >>> compared.table.similarity.shape
+    (1, 1)
     """
 
-    registry: Registry
+    registry: Registry = field(default_factory=default_registry)
     defaults: Defaults = UNCONFIGURED
     limits: SourceLimits = field(default_factory=SourceLimits)
     memory: Memory | None = field(default=None, compare=False)

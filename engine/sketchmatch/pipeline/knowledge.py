@@ -181,16 +181,22 @@ def matching(allowed: BoolArray, preference: FloatArray | None = None) -> IntArr
     holders: dict[int, int] = {}
 
     def place(a: int, seen: set[int]) -> bool:
-        for c in choices[a]:
-            if c not in holders:
-                holders[c] = a
+        # Each object on the way takes what the one after it holds; the last one what nobody does.
+        way, taken = [(a, iter(choices[a]))], list[int]()
+        while way:
+            last, rest = way[-1]
+            free = next((c for c in choices[last] if c not in holders), None)
+            c = next((c for c in rest if c not in seen), None) if free is None else free
+            if c is None:
+                way.pop()
+                taken = taken[:-1]
+                continue
+            taken.append(c)
+            if free is not None:
+                holders.update((c, a) for c, (a, _) in zip(taken, way, strict=True))
                 return True
-        for c in choices[a]:
-            if c not in seen:
-                seen.add(c)
-                if place(holders[c], seen):
-                    holders[c] = a
-                    return True
+            seen.add(c)
+            way.append((holders[c], iter(choices[holders[c]])))
         return False
 
     for a in np.argsort(-value.max(axis=1), kind="stable").tolist():

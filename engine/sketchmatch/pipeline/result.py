@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import zip_longest
+from types import MappingProxyType
 from typing import Any
 
 from sketchmatch.api import Outcome
@@ -181,7 +182,13 @@ class Statistics:
 
     iterations: int
     evaluations: int
-    seconds: Mapping[str, float]
+    seconds: Mapping[str, float] = field(hash=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Statistics, (self.iterations, self.evaluations, dict(self.seconds))
 
 
 @dataclass(frozen=True, repr=False)

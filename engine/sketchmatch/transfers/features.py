@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import FloatArray
@@ -28,7 +30,7 @@ class FeatureKind(StrEnum):
     ZONE = "zone"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Feature:
     """A point, a route or a zone with a name.
 
@@ -56,34 +58,40 @@ class Feature:
 
     kind: FeatureKind
     rings: tuple[FloatArray, ...]
-    name: str = ""
-    speeds: FloatArray | None = None
+    name: str
+    speeds: FloatArray | None
     numbers: tuple[FloatArray, ...] = field(init=False)
 
-    def __post_init__(self) -> None:
-        kind = FeatureKind(self.kind)
+    def __init__(
+        self,
+        kind: FeatureKind | str,
+        rings: Sequence[ArrayLike],
+        name: str = "",
+        speeds: ArrayLike | None = None,
+    ) -> None:
+        kind = FeatureKind(kind)
         object.__setattr__(self, "kind", kind)
-        object.__setattr__(self, "name", cleaned_label(self.name))
-        if len(self.rings) < 1 or (kind is not FeatureKind.ZONE and len(self.rings) > 1):
-            raise _refused("rings", f"are {len(self.rings)}; give a {kind} one line of points")
-        rings = tuple(self._checked(ring, k) for k, ring in enumerate(self.rings))
+        object.__setattr__(self, "name", cleaned_label(name))
+        if len(rings) < 1 or (kind is not FeatureKind.ZONE and len(rings) > 1):
+            raise _refused("rings", f"are {len(rings)}; give a {kind} one line of points")
+        lines = tuple(self._checked(ring, k) for k, ring in enumerate(rings))
         if kind is FeatureKind.ZONE:
-            rings, numbers = zip(*map(mended, rings), strict=True)
+            lines, numbers = zip(*map(mended, lines), strict=True)
         else:
-            numbers = tuple(np.arange(len(ring), dtype=np.float64) for ring in rings)
-        object.__setattr__(self, "rings", tuple(map(frozen_floats, rings)))
+            numbers = tuple(np.arange(len(line), dtype=np.float64) for line in lines)
+        object.__setattr__(self, "rings", tuple(map(frozen_floats, lines)))
         object.__setattr__(self, "numbers", tuple(map(frozen_floats, numbers)))
-        if kind is FeatureKind.ZONE and not shapely.Polygon(rings[0], rings[1:]).is_valid:
+        if kind is FeatureKind.ZONE and not shapely.Polygon(lines[0], lines[1:]).is_valid:
             raise _refused("rings", "cross themselves or each other; draw a zone without crossing")
-        if self.speeds is not None:
-            self._check_speeds(len(rings[0]))
+        checked = None if speeds is None else self._checked_speeds(speeds, len(lines[0]))
+        object.__setattr__(self, "speeds", checked)
 
     @property
     def points(self) -> FloatArray:
         """The first line, shape (k, 2): all there is of a point or a route."""
         return self.rings[0]
 
-    def _checked(self, given: FloatArray, k: int) -> FloatArray:
+    def _checked(self, given: ArrayLike, k: int) -> FloatArray:
         field = f"rings[{k}]" if self.kind is FeatureKind.ZONE else "points"
         ring = frozen_floats(given)
         if ring.ndim != 2 or ring.shape[1] != 2:
@@ -102,8 +110,8 @@ class Feature:
             raise _refused(field, f"has {len(ring)} points; a {self.kind} has {fewest}{exactly}")
         return ring
 
-    def _check_speeds(self, count: int) -> None:
-        speeds = frozen_floats(self.speeds)
+    def _checked_speeds(self, given: ArrayLike, count: int) -> FloatArray:
+        speeds = frozen_floats(given)
         if self.kind is not FeatureKind.ROUTE:
             raise _refused("speeds", f"are given for a {self.kind}; only routes have some")
         if speeds.shape != (count,):
@@ -112,7 +120,7 @@ class Feature:
             )
         if not ((speeds >= 0.0) & np.isfinite(speeds)).all():
             raise _refused("speeds", "have one that is negative or not finite; give m/s")
-        object.__setattr__(self, "speeds", speeds)
+        return speeds
 
 
 class ChangeReason(StrEnum):

@@ -131,7 +131,9 @@ def _as_certain(shares: FloatArray, maps: IntArray, mapped: Scene) -> FloatArray
     The share of a map falls with the certainty of each mapped object in it.
     """
     certain = np.array([*(item.certainty for item in mapped.objects), 1.0])  # −1 is no partner
-    weighted = shares * certain[maps].prod(axis=1)
+    # Of many objects in doubt the product alone would be nothing for all maps.
+    likely = np.log(certain)[maps].sum(axis=1)
+    weighted = shares * np.exp(likely - likely[shares > 0.0].max())
     return np.asarray(weighted * (shares.sum() / weighted.sum()))
 
 
