@@ -114,8 +114,109 @@ def test_errors_say_what_to_do_and_where(url):
     assert re.fullmatch(r"invalid the request cannot be sent \(.*seed.*-1\); correct it", negative)
 
 
+PLACE = "{ kind: { case: 'index', value: 0 } }"
+MISTAKES = {
+    "{ time_budget: { seconds: 1n } }": (
+        "time_budget",
+        "MatchRequest has no 'time_budget'; did you mean 'timeBudget'?",
+    ),
+    "{ timeBudget: { milliseconds: 5 } }": (
+        "timeBudget.milliseconds",
+        "timeBudget has no 'milliseconds'; correct the name",
+    ),
+    "{ timeBudget: 5 }": ("timeBudget", "timeBudget is 5; give { seconds, nanos }"),
+    "{ weights: { simularity: 0 } }": (
+        "weights.simularity",
+        "weights has no 'simularity'; did you mean 'similarity'?",
+    ),
+    "{ pipeline: { search: { name: 'exact' } } }": (
+        "pipeline.search",
+        "pipeline has no 'search'; did you mean 'searcher'?",
+    ),
+    "{ pipeline: { searcher: 'exact' } }": (
+        "pipeline.searcher",
+        "pipeline.searcher is 'exact'; give { name, parameters }",
+    ),
+    f"{{ pins: [{{ sketchObject: {PLACE}, mapObject: {PLACE}, exclude: true }}] }}": (
+        "pins[0].exclude",
+        "pins[0] has no 'exclude'; did you mean 'excluded'?",
+    ),
+    f"{{ pins: {{ sketchObject: {PLACE} }} }}": ("pins", "pins is no list; give [ … ]"),
+    "{ pins: [{ sketchObject: { index: 0 } }] }": (
+        "pins[0].sketchObject.index",
+        "pins[0].sketchObject has no 'index'; write kind: { case: 'index', value: … }",
+    ),
+    **{
+        f"{{ pins: [{{ mapObject: {{ kind: {kind} }} }}] }}": (
+            "pins[0].mapObject.kind",
+            "pins[0].mapObject.kind is unclear; "
+            "give { case, value } with the case 'index' or 'label'",
+        )
+        for kind in ("'index'", "{ case: 'indx', value: 0 }", "{ value: 0 }", "{ case: 'index' }")
+    },
+    "{ allowUnmatched: 'false' }": (
+        "allowUnmatched",
+        "allowUnmatched is 'false'; give true or false",
+    ),
+}
+"""Options as somebody may write them who has no compiler, with the field and the sentence."""
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("url")  # it sees that the client is built
+def test_options_that_would_be_left_out_in_silence_are_refused_at_every_depth():
+    done = node(f"""
+        import {{ SketchmatchClient, sources }} from "@sketchmatch/client";
+        const client = new SketchmatchClient("http://127.0.0.1:9");
+        const there = sources.strokes([]);
+        for (const options of [{", ".join(MISTAKES)}]) {{
+          const told = await client.match(there, there, options).catch((error) => error);
+          console.log(told.failure, told.field, told.message);
+        }}
+    """)
+    assert done.stderr == ""
+    told = [f"invalid {field} {message}" for field, message in MISTAKES.values()]
+    assert done.stdout.splitlines() == told
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("url")
+def test_every_service_and_source_refuses_names_that_it_does_not_know():
+    done = node("""
+        import { RequestFailed, SketchmatchClient, sources } from "@sketchmatch/client";
+        const client = new SketchmatchClient("http://127.0.0.1:9");
+        const there = sources.polygons([]);
+        const watch = async (request) => {
+          for await (const event of client.sketches.watchSketch(request)) console.log(event);
+        };
+        const value = { points: [], speedsMetersPerSecond: new Float64Array(2) };
+        for (const call of [
+          () => client.transfers.transfer({ features: [{ kind: { case: "route", value } }] }),
+          () => client.segment(there, { segmenter: { nmae: "rooms" } }),
+          () => client.transfers.transfer({ sketch: there, map: there, radious: 0.3 }),
+          () => client.sketches.createSketch({ match: { map: there, wieghts: {} } }),
+          () => watch({ sketch: "7" }),
+          () => client.match({ kind: { case: "strokeSet", value: { yaxis: 2 } } }, there),
+          async () => sources.strokes([], "UP"),
+          async () => sources.polygons([], 2),
+        ]) console.log(RequestFailed.from(await call().catch((error) => error)).message);
+    """)
+    assert done.stderr == ""
+    sent, *refused = done.stdout.splitlines()
+    assert sent.startswith("the sketchmatch server is not available")
+    assert refused == [
+        "segmenter has no 'nmae'; did you mean 'name'?",
+        "TransferRequest has no 'radious'; did you mean 'radius'?",
+        "match has no 'wieghts'; did you mean 'weights'?",
+        "WatchSketchRequest has no 'sketch'; did you mean 'sketchId'?",
+        "sketch.kind.value has no 'yaxis'; did you mean 'yAxis'?",
+        "y is 'UP'; give 'up', or 'down' for points from a screen",
+        "y is '2'; give 'up', or 'down' for points from a screen",
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("url")
 def test_a_server_that_breaks_off_is_away():
     done = node("""
         import { createServer } from "node:http";

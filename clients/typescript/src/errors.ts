@@ -67,6 +67,7 @@ export class RequestFailed extends Error {
   static from(thrown: unknown, address = ""): RequestFailed {
     if (thrown instanceof RequestFailed) return thrown;
     const error = ConnectError.from(thrown);
+    if (error.cause instanceof RequestFailed) return error.cause;
     if (isUnreachable(error)) return unreachable(error, address);
     if (isUnsendable(error))
       return invalid(`the request cannot be sent (${error.rawMessage}); correct it`, "");

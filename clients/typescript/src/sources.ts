@@ -2,7 +2,7 @@
 
 import { create } from "@bufbuild/protobuf";
 
-import { RequestFailed } from "./errors.js";
+import { invalid, RequestFailed } from "./errors.js";
 import { type Scene } from "./gen/sketchmatch/v1/scene_pb.js";
 import { type Source, SourceSchema, YAxis } from "./gen/sketchmatch/v1/source_pb.js";
 
@@ -127,5 +127,7 @@ export function file(name: string, data: Uint8Array, part = ""): Source {
 }
 
 function axis(y: Axis): YAxis {
-  return y === "up" ? YAxis.UP : YAxis.DOWN;
+  if (y === "up") return YAxis.UP;
+  if (y === "down") return YAxis.DOWN;
+  throw invalid(`y is '${String(y)}'; give 'up', or 'down' for points from a screen`, "y");
 }
