@@ -114,6 +114,24 @@ def test_errors_say_what_to_do_and_where(url):
     assert re.fullmatch(r"invalid the request cannot be sent \(.*seed.*-1\); correct it", negative)
 
 
+@pytest.mark.slow
+def test_a_request_that_the_transport_refuses_is_too_large_and_not_for_later():
+    with serving_pad("--max-request-mib", "1") as (_, address):
+        there = address.rstrip("/")
+        done = node(f"""
+            import {{ SketchmatchClient, sources }} from "@sketchmatch/client";
+            const client = new SketchmatchClient("{there}");
+            const grid = sources.occupancyGrid(new Int8Array(20e6), 4000, 0.05);
+            for (const call of [() => client.segment(grid), () => client.match(grid, grid)]) {{
+              const {{ failure, reason, message }} = await call().catch((error) => error);
+              console.log(failure, reason, message);
+            }}
+        """)
+    assert done.stderr == ""
+    told = f"the request is larger than the server at {there} accepts; make it smaller"
+    assert done.stdout.splitlines() == [f"invalid MESSAGE_TOO_LARGE {told}"] * 2
+
+
 PLACE = "{ kind: { case: 'index', value: 0 } }"
 MISTAKES = {
     "{ time_budget: { seconds: 1n } }": (

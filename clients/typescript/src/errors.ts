@@ -73,6 +73,7 @@ export class RequestFailed extends Error {
       return invalid(`the request cannot be sent (${error.rawMessage}); correct it`, "");
     const [info] = error.findDetails(ErrorInfoSchema);
     const [request] = error.findDetails(BadRequestSchema);
+    if (!info && isTooLarge(error)) return tooLarge(address);
     const [retry] = error.findDetails(RetryInfoSchema);
     const delay = retry?.retryDelay;
     return new RequestFailed(
@@ -83,6 +84,17 @@ export class RequestFailed extends Error {
       delay && Number(delay.seconds) + delay.nanos / 1e9,
     );
   }
+}
+
+/** Whether the server's transport refused a request, which has no status of its own for that. */
+function isTooLarge(error: ConnectError): boolean {
+  return error.code === Code.ResourceExhausted && /larger than .*max/.test(error.rawMessage);
+}
+
+function tooLarge(address: string): RequestFailed {
+  const who = address ? `the server at ${address}` : "the server";
+  const message = `the request is larger than ${who} accepts; make it smaller`;
+  return new RequestFailed(message, "invalid", "MESSAGE_TOO_LARGE", "", undefined);
 }
 
 /** Return the error of a request that cannot be sent as it is. */
