@@ -12,22 +12,28 @@
 
 namespace sketchmatch {
 
-SketchmatchError::SketchmatchError(const std::string& message, std::string reason)
-    : std::runtime_error(message), reason_(std::move(reason)) {}
+namespace {
 
-std::string SketchmatchError::remedy() const {
-  const std::string sentence = what();
+std::string behind_the_semicolon(const std::string& sentence) {
   const auto end = sentence.rfind("; ");
   return end == std::string::npos ? std::string() : sentence.substr(end + 2);
 }
+
+}  // namespace
+
+SketchmatchError::SketchmatchError(const std::string& message, std::string reason,
+                                   const std::string& detail)
+    : std::runtime_error(detail.empty() ? message : message + " (" + detail + ")"),
+      reason_(std::move(reason)),
+      remedy_(behind_the_semicolon(message)) {}
 
 InvalidRequestError::InvalidRequestError(const std::string& message, std::string reason,
                                          std::string field)
     : SketchmatchError(message, std::move(reason)), field_(std::move(field)) {}
 
 RetryableError::RetryableError(const std::string& message, std::string reason,
-                               std::optional<Seconds> retry_after)
-    : SketchmatchError(message, std::move(reason)), retry_after_(retry_after) {}
+                               std::optional<Seconds> retry_after, const std::string& detail)
+    : SketchmatchError(message, std::move(reason), detail), retry_after_(retry_after) {}
 
 namespace detail {
 
@@ -122,6 +128,7 @@ Failure unavailable(const std::string& message, const std::string& address) {
                 "have it renewed",
             {},
             {},
+            {},
             {}};
   }
   std::string remedy = "start it, or check the address";
@@ -130,14 +137,16 @@ Failure unavailable(const std::string& message, const std::string& address) {
   } else if (contains(message, "Socket closed")) {
     remedy =
         "it ended the link, as one does that stops, or wants encryption or a certificate of the "
-        "client; start it, or check the address";
+        "client that it trusts; start it, or give root_certificates, certificate and key";
+  } else if (contains(message, "http1.x server")) {
+    remedy = "it speaks HTTP/1.1, as the port for browsers does; give the address for gRPC";
   }
   return {Failure::Kind::unavailable,
-          "the sketchmatch server at " + address + " is not available; " + remedy + " (" + message +
-              ")",
+          "the sketchmatch server at " + address + " is not available; " + remedy,
           {},
           {},
-          {}};
+          {},
+          message};
 }
 
 Failure exhausted(Failure failure, const std::string& address) {
@@ -145,6 +154,7 @@ Failure exhausted(Failure failure, const std::string& address) {
     return {Failure::Kind::invalid_request,
             "the request is larger than the server at " + address + " accepts; make it smaller",
             "MESSAGE_TOO_LARGE",
+            {},
             {},
             {}};
   }
@@ -210,7 +220,7 @@ void Failure::raise() const {
     case Kind::invalid_request:
       throw InvalidRequestError(message, reason, field);
     case Kind::unavailable:
-      throw ServerUnavailableError(message, reason, retry_after);
+      throw ServerUnavailableError(message, reason, retry_after, detail);
     case Kind::busy:
       throw ServerBusyError(message, reason, retry_after);
     case Kind::deadline_exceeded:

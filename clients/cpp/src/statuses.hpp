@@ -31,6 +31,8 @@ struct Failure {
   std::string reason;
   std::string field;
   std::optional<Seconds> retry_after;
+  /// What gRPC says of a link that did not come about.
+  std::string detail;
 
   /// Throws it.
   [[noreturn]] void raise() const;

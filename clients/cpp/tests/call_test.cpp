@@ -402,6 +402,28 @@ TEST(Away, NobodyThereIsSaidInOneSentence) {
                          "available; start it, or check the address (",
                          0),
               0U);
+    EXPECT_EQ(error.remedy(), "start it, or check the address");
+  }
+}
+
+TEST_F(Calls, TheRemedyOfALinkThatDidNotComeAboutIsOursAndNotWhatGrpcSays) {
+  const std::string grpc = "failed to connect to all addresses; last error: UNKNOWN: ";
+  for (const auto& [said, remedy] : {
+           std::pair("Connection refused", "start it, or check the address"),
+           std::pair("Socket closed", "start it, or give root_certificates, certificate and key"),
+           std::pair("wrong version number",
+                     "it does not encrypt: ask it without certificates and tls"),
+           std::pair("Trying to connect an http1.x server", "give the address for gRPC"),
+       }) {
+    server.fail(status_of(grpc::StatusCode::UNAVAILABLE, grpc + said));
+    try {
+      static_cast<void>(Client(server.address(), retrying(0)).server_info());
+      FAIL();
+    } catch (const ServerUnavailableError& error) {
+      EXPECT_EQ(error.remedy(), remedy);
+      EXPECT_EQ(std::string(error.what()).substr(std::string(error.what()).rfind(remedy)),
+                std::string(remedy) + " (" + grpc + said + ")");
+    }
   }
 }
 

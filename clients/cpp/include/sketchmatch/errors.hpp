@@ -18,16 +18,19 @@ class SketchmatchError : public std::runtime_error {
   /// @param message One sentence for people.
   /// @param reason A name of `sketchmatch.v1.ErrorReason` without its prefix; empty if none was
   ///   given.
-  explicit SketchmatchError(const std::string& message, std::string reason = {});
+  /// @param detail What others say of it, such as gRPC of a link: in brackets behind the sentence.
+  explicit SketchmatchError(const std::string& message, std::string reason = {},
+                            const std::string& detail = {});
 
   /// A name of `sketchmatch.v1.ErrorReason` without its prefix, e.g. `"INVALID_STROKE"`.
   [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
 
   /// What to do, as the sentence says it behind its semicolon; empty where it does not.
-  [[nodiscard]] std::string remedy() const;
+  [[nodiscard]] const std::string& remedy() const noexcept { return remedy_; }
 
  private:
   std::string reason_;
+  std::string remedy_;
 };
 
 /// The request cannot be used as it is; correct it, the same one fails again.
@@ -52,8 +55,10 @@ class RetryableError : public SketchmatchError {
   /// @param message One sentence.
   /// @param reason Why it does not now.
   /// @param retry_after After which time to send the request again, if the server said it.
+  /// @param detail What others say of it.
   explicit RetryableError(const std::string& message, std::string reason = {},
-                          std::optional<Seconds> retry_after = std::nullopt);
+                          std::optional<Seconds> retry_after = std::nullopt,
+                          const std::string& detail = {});
 
   /// After which time to send the same request again; none where the server did not say.
   [[nodiscard]] std::optional<Seconds> retry_after() const noexcept { return retry_after_; }
