@@ -1,11 +1,18 @@
 """How clients get in: what is said by argument or by the environment, and what is refused."""
 
 import asyncio
+import subprocess
 
 import grpc
 import pytest
 
-from sketchmatch_client import AsyncClient, Client, InvalidRequestError, sources
+from sketchmatch_client import (
+    AsyncClient,
+    Client,
+    InvalidRequestError,
+    NotAuthenticatedError,
+    sources,
+)
 from tests.certificates import Authority
 
 SOURCE = sources.image(b"picture")
@@ -154,6 +161,48 @@ def test_what_contradicts_itself_or_is_no_pem_is_refused_by_name(kind, pair, mon
     monkeypatch.setenv("SKETCHMATCH_TLS", "maybe")
     with pytest.raises(InvalidRequestError, match=r"^SKETCHMATCH_TLS is 'maybe'; say 1 or 0"):
         kind("localhost:1")
+
+
+def test_a_key_of_another_certificate_is_refused_before_any_call(kind, pair, monkeypatch, tmp_path):
+    other = Authority(tmp_path, "other").issue("robot-8").key
+    locked = tmp_path / "locked.key"
+    command = ["openssl", "pkcs8", "-topk8", "-in", pair.key, "-passout", "pass:s", "-out", locked]
+    subprocess.run(command, check=True)
+    for key in (other, locked):
+        with pytest.raises(InvalidRequestError) as caught:
+            kind("localhost:1", certificate=pair.certificate, key=key)
+        told = "key is not the key of certificate, or has a passphrase; give its own without one"
+        assert str(caught.value) == told
+    monkeypatch.setenv("SKETCHMATCH_KEY", str(other))
+    with pytest.raises(InvalidRequestError, match="SKETCHMATCH_KEY is not the key of cert"):
+        kind("localhost:1", certificate=pair.certificate)
+
+
+@pytest.mark.parametrize("method", ["server_info", "wait_until_serving"])
+def test_certificates_that_cannot_be_used_are_no_reason_to_wait(
+    server, call, monkeypatch, tmp_path, method
+):
+    broken = tmp_path / "ca.pem"
+    broken.write_text("-----BEGIN CERTIFICATE-----\nnone\n-----END CERTIFICATE-----\n")
+    monkeypatch.setenv("SKETCHMATCH_ROOT_CERTIFICATES", str(broken))
+    with pytest.raises(InvalidRequestError, match="cannot be used; give certificate and the key"):
+        call(server.address, method, retries=5)
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        ("CERTIFICATE_VERIFY_FAILED", "nobody whom the client trusts vouches for it, or it has ex"),
+        ("CERTIFICATE_VERIFY_FAILED: certificate has expired", "certificate has expired"),
+        ("Hostname Verification Check failed.", "it is for another name"),
+    ],
+)
+def test_why_a_certificate_is_not_trusted_is_said_as_far_as_it_is_known(server, call, said, why):
+    told = f"last error: UNKNOWN: Ssl handshake failed: SSL_ERROR_SSL: OPENSSL_internal:{said}"
+    server.fail(grpc.StatusCode.UNAVAILABLE, told)
+    with pytest.raises(NotAuthenticatedError) as caught:
+        call(server.address, "server_info")
+    assert f"cannot be trusted ({why}" in str(caught.value)
 
 
 def test_an_argument_that_there_is_not_is_pythons_error(kind):

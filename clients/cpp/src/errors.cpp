@@ -116,7 +116,8 @@ std::optional<std::string> distrust(const std::string& message) {
     return std::nullopt;
   }
   const std::string why = stripped(found[1].str());
-  return why.empty() ? "nobody whom the client trusts vouches for it" : why;
+  // OpenSSL does not say why.
+  return why.empty() ? "nobody whom the client trusts vouches for it, or it has expired" : why;
 }
 
 /// Returns what gRPC says of a link that did not come about; it has no status for that.
@@ -127,6 +128,17 @@ Failure unavailable(const std::string& message, const std::string& address) {
                 "); give the root_certificates of its authority and a name that it is for, or "
                 "have it renewed",
             {},
+            {},
+            {},
+            {}};
+  }
+  // gRPC sees it when it is about to connect, and says so in words of older and newer versions.
+  if (contains(message, "empty address list") || contains(message, "create security handshaker")) {
+    return {Failure::Kind::invalid_request,
+            "the certificates for the server at " + address +
+                " cannot be used; give certificate and the key that belongs to it, without a "
+                "passphrase, and root_certificates, all in PEM",
+            "INVALID_FIELD",
             {},
             {},
             {}};

@@ -196,4 +196,25 @@ TEST(Encryption, AServerThatDoesNotEncryptIsToldFromOneThatIsAway) {
   }
 }
 
+TEST(Encryption, ACertificateThatCannotBeUsedIsToldFromAServerThatIsAway) {
+  const FakeServer server;
+  ClientOptions options;
+  options.retries = 5;
+  options.certificate = Pem::content(kCertificate);
+  options.key = Pem::content("-----BEGIN PRIVATE KEY-----\n-----END PRIVATE KEY-----\n");
+  const Client client(server.address(), options);
+  for (const bool waiting : {false, true}) {
+    try {
+      waiting ? client.wait_until_serving(Seconds(60)) : static_cast<void>(client.server_info());
+      FAIL();
+    } catch (const InvalidRequestError& error) {
+      EXPECT_EQ(error.what(),
+                "the certificates for the server at " + server.address() +
+                    " cannot be used; give certificate and the key that belongs to it, without a "
+                    "passphrase, and root_certificates, all in PEM");
+      EXPECT_EQ(error.reason(), "INVALID_FIELD");
+    }
+  }
+}
+
 }  // namespace sketchmatch::test

@@ -427,6 +427,28 @@ TEST_F(Calls, TheRemedyOfALinkThatDidNotComeAboutIsOursAndNotWhatGrpcSays) {
   }
 }
 
+TEST_F(Calls, WhyACertificateIsNotTrustedIsSaidAsFarAsItIsKnown) {
+  const std::string grpc = "last error: UNKNOWN: ipv4:127.0.0.1:1: Ssl handshake failed: ";
+  for (const auto& [said, why] : {
+           std::pair("SSL_ERROR_SSL: error:0A000086:SSL routines::certificate verify failed",
+                     "nobody whom the client trusts vouches for it, or it has expired"),
+           std::pair("SSL_ERROR_SSL: error:1000007d:SSL routines:OPENSSL_internal:"
+                     "CERTIFICATE_VERIFY_FAILED: certificate has expired",
+                     "certificate has expired"),
+           std::pair("Hostname Verification Check failed.", "it is for another name"),
+       }) {
+    server.fail(status_of(grpc::StatusCode::UNAVAILABLE, grpc + said));
+    try {
+      static_cast<void>(client.server_info());
+      FAIL();
+    } catch (const NotAuthenticatedError& error) {
+      EXPECT_NE(std::string(error.what()).find("cannot be trusted (" + std::string(why) + "); "),
+                std::string::npos)
+          << error.what();
+    }
+  }
+}
+
 TEST(Away, AServerThatComesBackIsFoundAgain) {
   auto first = std::make_unique<FakeServer>();
   const int port = first->port();

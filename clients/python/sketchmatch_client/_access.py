@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import ssl
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn, TypedDict, cast
@@ -137,9 +138,25 @@ def _credentials(options: AccessOptions) -> grpc.ChannelCredentials | None:
     for name, other in (("certificate", "key"), ("key", "certificate")):
         if (item := said[name]) is not None and said[other] is None:
             item.refuse(f"is given without {other}; give both")
+    if said["certificate"] and said["key"]:
+        _check_pair(said["certificate"], said["key"])
     if tls or roots or certificate:
         return grpc.ssl_channel_credentials(roots, key, certificate)
     return None
+
+
+def _check_pair(certificate: _Said, key: _Said) -> None:
+    """Refuse the key of another certificate; of what is no file, gRPC tells in the first call."""
+    if isinstance(certificate.value, bytes) or isinstance(key.value, bytes):
+        return
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    first, second = cast("tuple[str, str]", (certificate.value, key.value))
+    try:
+        # An empty password is wrong, and nobody at the terminal is asked for another.
+        context.load_cert_chain(first, second, password="")
+    except ssl.SSLError:
+        own = f"is not the key of {certificate.place}, or has a passphrase"
+        key.refuse(f"{own}; give its own without one")
 
 
 def _said(name: str, options: AccessOptions) -> _Said | None:

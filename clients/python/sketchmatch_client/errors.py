@@ -101,7 +101,11 @@ class DeadlineExceededError(SketchmatchError):
 
 
 class NotAuthenticatedError(SketchmatchError):
-    """Server or client does not trust the other: give another token, or other certificates."""
+    """The server does not know the token, or the client does not trust the server's certificate.
+
+    A server that wants a certificate of the client, or another one, ends the link without a word:
+    that is a :class:`ServerUnavailableError`.
+    """
 
 
 class NotFoundError(SketchmatchError):
@@ -210,16 +214,30 @@ _UNTRUSTED = re.compile(
 _REMEDIES = {
     "WRONG_VERSION_NUMBER": "it does not encrypt: ask it without certificates and tls",
     "Socket closed": "it ended the link, as one does that stops, or wants encryption or a "
-    "certificate of the client; start it, or check the address",
+    "certificate of the client that it trusts; start it, or give root_certificates, certificate "
+    "and key",
+    "http1.x server": "it speaks HTTP/1.1, as the port for browsers does; "
+    "give the address for gRPC",
 }
+# What it says, in words of older and newer versions, where it cannot use a key or a certificate.
+_UNUSABLE = ("empty address list", "create security handshaker")
 
 
 def _unavailable(message: str, address: str) -> SketchmatchError:
     if untrusted := _UNTRUSTED.search(message):
-        why = (untrusted["why"] or "").strip() or "it is for another name"
+        why = "it is for another name"
+        if untrusted["why"] is not None:  # of older versions of gRPC, empty
+            unknown = "nobody whom the client trusts vouches for it, or it has expired"
+            why = untrusted["why"].strip() or unknown
         return NotAuthenticatedError(
             f"the certificate of the server at {address} cannot be trusted ({why}); give the "
             "root_certificates of its authority and a name that it is for, or have it renewed"
+        )
+    if any(sign in message for sign in _UNUSABLE):
+        return InvalidRequestError(
+            f"the certificates for the server at {address} cannot be used; give certificate and "
+            "the key that belongs to it, without a passphrase, and root_certificates, all in PEM",
+            "INVALID_FIELD",
         )
     signs = (remedy for sign, remedy in _REMEDIES.items() if sign in message)
     remedy = next(signs, "start it, or check the address")

@@ -82,7 +82,8 @@ class DeadlineExceededError : public SketchmatchError {
   using SketchmatchError::SketchmatchError;
 };
 
-/// Server or client does not trust the other: give another token, or other certificates.
+/// The server does not know the token, or the client does not trust the server's certificate. A
+/// server that wants a certificate of the client, or another one, is a `ServerUnavailableError`.
 class NotAuthenticatedError : public SketchmatchError {
   using SketchmatchError::SketchmatchError;
 };
