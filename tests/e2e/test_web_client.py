@@ -234,6 +234,40 @@ def test_every_service_and_source_refuses_names_that_it_does_not_know():
 
 
 @pytest.mark.slow
+def test_faults_of_the_callers_own_functions_are_not_the_servers(url):
+    done = node(f"""
+        import {{ SketchmatchClient, sources }} from "@sketchmatch/client";
+        const there = sources.polygons([0, 3, 7, 12].map((x) => (
+          {{ rings: [[[x, 0], [x + 1, 0], [x + 1, x + 2]]] }})));
+        const client = new SketchmatchClient("{url.rstrip("/")}");
+        const scenes = () => undefined.objects;
+        const mine = await client.match(there, there, {{}}, {{ scenes }}).catch((error) => error);
+        console.log(mine.name, mine.message);
+        const tokens = [() => undefined.token, "robot-7.secret", () => "robot-7.\\nsecret"];
+        for (const token of tokens) {{
+          const {{ failure, field, message }} =
+            await new SketchmatchClient("{url.rstrip("/")}", {{ token }}).info().catch((e) => e);
+          console.log(failure, field, message);
+        }}
+        const trimmed = new SketchmatchClient("{url.rstrip("/")}", {{ token: () => "secret\\n" }});
+        console.log((await trimmed.info()).apiVersion);
+    """)
+    assert done.stderr == ""
+    mine, *tokens, version = done.stdout.splitlines()
+    assert mine.startswith("TypeError Cannot read properties of undefined")
+    assert re.fullmatch(
+        r"invalid token token cannot be had \(Cannot read .*\); give a function that returns it",
+        tokens.pop(0),
+    )
+    assert tokens == [
+        "invalid token token cannot be had (token is not a function); "
+        "give a function that returns it",
+        "invalid token token is no token; give what `sketchmatch tokens add` printed",
+    ]
+    assert version == "sketchmatch.v1"
+
+
+@pytest.mark.slow
 @pytest.mark.usefixtures("url")
 def test_a_server_that_breaks_off_is_away():
     done = node("""

@@ -87,7 +87,8 @@ export class SketchmatchClient {
   /**
    * Find out which sketched object is which mapped object.
    *
-   * @throws RequestFailed, with `failure` `"cancelled"` if `signal` aborts it.
+   * @throws RequestFailed, with `failure` `"cancelled"` if `signal` aborts it; what a watcher throws
+   *   goes through as it is.
    */
   async match(
     sketch: Source,
@@ -98,25 +99,23 @@ export class SketchmatchClient {
   ): Promise<Answer> {
     let scenes: MatchScenes | undefined;
     const request = { ...options, sketch, map };
-    return this.#failing(async () => {
-      for await (const { event } of this.#matches.match(request, stopping(signal))) {
-        switch (event.case) {
-          case "accepted":
-            watchers.accepted?.(event.value);
-            break;
-          case "scenes":
-            scenes = event.value;
-            watchers.scenes?.(scenes);
-            break;
-          case "progress":
-            watchers.progress?.(event.value);
-            break;
-          case "result":
-            if (scenes) return { scenes, result: event.value };
-        }
+    for await (const { event } of this.#read(this.#matches.match(request, stopping(signal)))) {
+      switch (event.case) {
+        case "accepted":
+          watchers.accepted?.(event.value);
+          break;
+        case "scenes":
+          scenes = event.value;
+          watchers.scenes?.(scenes);
+          break;
+        case "progress":
+          watchers.progress?.(event.value);
+          break;
+        case "result":
+          if (scenes) return { scenes, result: event.value };
       }
-      throw new RequestFailed("the server broke off", "away", "", "", undefined);
-    });
+    }
+    throw new RequestFailed("the server broke off", "away", "", "", undefined);
   }
 
   /** Find the objects of one source; `includeMap` asks for its occupancy grid, too. */
@@ -142,6 +141,15 @@ export class SketchmatchClient {
     return this.#failing(() => this.#catalog.getServerInfo({}, stopping(signal)));
   }
 
+  /** Yield what a stream holds; what the reader throws meanwhile is none of its faults. */
+  async *#read<T>(stream: AsyncIterable<T>): AsyncGenerator<T> {
+    try {
+      yield* stream;
+    } catch (thrown) {
+      throw RequestFailed.from(thrown, this.#address);
+    }
+  }
+
   async #failing<T>(call: () => Promise<T>): Promise<T> {
     try {
       return await call();
@@ -153,10 +161,25 @@ export class SketchmatchClient {
 
 function showing(token: () => string): Interceptor {
   return (next) => (request) => {
-    const shown = token();
+    const shown = told(token);
     if (shown) request.header.set("Authorization", `Bearer ${shown}`);
     return next(request);
   };
+}
+
+/** Return the token; one that cannot be had or sent is not the server's fault. */
+function told(token: () => string): string {
+  let shown: string;
+  try {
+    shown = token().trim();
+  } catch (thrown) {
+    const why = thrown instanceof Error ? thrown.message : String(thrown);
+    throw invalid(`token cannot be had (${why}); give a function that returns it`, "token");
+  }
+  // What it is instead is not told: it may be a secret all the same.
+  if (!/^[!-~]*$/.test(shown))
+    throw invalid("token is no token; give what `sketchmatch tokens add` printed", "token");
+  return shown;
 }
 
 function stopping(signal: AbortSignal | undefined): { signal?: AbortSignal } {
