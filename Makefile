@@ -58,7 +58,7 @@ lint: $(VENV)/dev .venv-proto/tools
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache > $(VENV)/lint-imports.log || { cat $(VENV)/lint-imports.log; exit 1; }
 	@if [ -x $(PROTO_BIN)/buf ]; then $(PROTO_BIN)/buf lint proto; fi
-	@if [ "$$CI" = true ] || { command -v npm && node --eval 'process.exit(parseInt(process.versions.node) < 20)'; } >/dev/null 2>&1; \
+	@if [ "$$CI" = true ] || { command -v npm && node --eval 'process.exit(parseInt(process.versions.node) < 20 ? 1 : 0)'; } >/dev/null 2>&1; \
 	  then $(MAKE) --no-print-directory lint-web; fi
 
 proto: .venv-proto/tools

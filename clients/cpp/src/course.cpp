@@ -61,17 +61,21 @@ bool Course::take(const v1::MatchResponse& event) {
   begun_ = true;
   const bool told = std::exchange(told_.at(kind), true);
   if (told && (kind == v1::MatchResponse::kAccepted || kind == v1::MatchResponse::kScenes)) {
+    again_ = true;
     return false;
   }
-  if (kind == v1::MatchResponse::kProgress) {
-    const auto& progress = event.progress();
-    const double confidence = progress.has_confidence() ? progress.confidence()
-                                                        : -std::numeric_limits<double>::infinity();
-    if (confidence < best_) {
-      return false;  // a match that is done again has not come so far yet
-    }
-    best_ = confidence;
+  return kind != v1::MatchResponse::kProgress || is_further(event.progress());
+}
+
+bool Course::is_further(const v1::MatchProgress& progress) {
+  if (!progress.has_confidence()) {
+    return !again_ || best_ == -std::numeric_limits<double>::infinity();
   }
+  if (progress.confidence() < best_) {
+    return false;
+  }
+  best_ = progress.confidence();
+  again_ = false;
   return true;
 }
 

@@ -44,12 +44,17 @@ class Course {
   std::optional<Seconds> pause_after(Failure failure, Attempts& attempts);
 
  private:
+  /// Whether a match is as far as was told; one that is done again may not be for a while. Other
+  /// progress than that of the search, as that of rooms that are joined, has no confidence.
+  bool is_further(const v1::MatchProgress& progress);
+
   std::optional<v1::MatchRequest> request_;
   std::string match_id_;
   std::uint64_t after_ = 0;
   bool resumes_ = false;
   bool begun_ = false;
   std::array<bool, 5> told_{};  // by the kind of event
+  bool again_ = false;
   double best_ = -std::numeric_limits<double>::infinity();
 };
 

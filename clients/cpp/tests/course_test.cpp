@@ -1,6 +1,7 @@
 // A match is one stream for who reads it, however often the link or the server is lost.
 #include <gtest/gtest.h>
 
+#include <iterator>
 #include <sketchmatch/raw.hpp>
 #include <sketchmatch/sketchmatch.hpp>
 #include <string>
@@ -87,6 +88,17 @@ TEST_F(Courses, AMatchThatIsDoneAgainTellsNoLessThanWasKnown) {
     known.push_back(progress.confidence.value());
   }));
   EXPECT_EQ(known, (std::vector<double>{0.5, 0.75, 0.75}));
+}
+
+TEST_F(Courses, ProgressWithoutAConfidenceIsToldAfterTheSearchToo) {
+  v1::MatchResponse joining;
+  joining.mutable_progress()->set_fraction(0.5);
+  server.events.insert(std::prev(server.events.end()), joining);
+  std::vector<bool> known;
+  static_cast<void>(client.match(room(), room(), {}, [&](const Progress& progress) {
+    known.push_back(progress.confidence.has_value());
+  }));
+  EXPECT_EQ(known, (std::vector<bool>{true, true, false}));
 }
 
 TEST_F(Courses, WhoWantsNoRetriesIsToldAtOnce) {
