@@ -19,7 +19,7 @@ from sketchmatch.model import (
     StrokeSet,
 )
 from sketchmatch_builtin.segmenters._landmarks import names_of_rooms
-from sketchmatch_builtin.segmenters._plan_things import paper
+from sketchmatch_builtin.segmenters._plan_things import dimensions, paper
 from sketchmatch_builtin.segmenters._swings import doors_apart
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
@@ -529,3 +529,28 @@ def test_walls_are_no_paper_if_they_are_few_or_at_other_distances():
     assert paper(uneven) == frozenset()
     assert paper([line * (1.0, 1.0 + k / 10) for k, line in enumerate(grid)]) == frozenset()
     assert paper([grid[0]] * 20) == frozenset()
+
+
+def test_lines_that_say_how_long_a_wall_is_bound_nothing():
+    below = [[(0, -1), (9, -1)], [(-0.1, -1.1), (0.1, -0.9)], [(8.9, -1.1), (9.1, -0.9)]]
+    beside = [[(-1, 0), (-1, 7)], *(box(-1.1, y, 0.2, 0.2) for y in (0.02, 6.8))]
+    lines = [np.array(line, dtype=float) for line in [*below, *beside, *HALL]]
+    assert dimensions(lines) == frozenset(range(6))
+    found = areas(strokes([*lines, *doors("apart")]))
+    assert sorted(found) == pytest.approx(HALL_AREAS, rel=0.1)
+
+
+def test_a_wall_is_no_dimension():
+    wall = [(0, 0), (9, 0)]
+    ends = [[(0, -0.2), (0, 0.2)], [(9, -0.2), (9, 0.2)]]
+    assert dimensions([np.array(line, dtype=float) for line in [wall, *ends]]) == {0, 1, 2}
+    for others in (
+        ends[:1],  # at one end alone
+        [[(0, -2), (0, 2)], [(9, -2), (9, 2)]],  # walls that meet it
+        [*ends, [(4, 0), (4, 4)]],
+        [[(2, -0.2), (2, 0.2)], [(7, -0.2), (7, 0.2)]],  # not at its ends
+        [*ends, [(9, 0.2), (9, 6)]],  # not apart from walls
+    ):
+        assert not dimensions([np.array(line, dtype=float) for line in [wall, *others]])
+    round_ = [(x, 4 * np.sin(x / 3)) for x in np.linspace(0, 9, 20)]
+    assert not dimensions([np.array(line, dtype=float) for line in [round_, *ends]])

@@ -14,7 +14,7 @@ from sketchmatch.model import FloatArray, Landmark
 from sketchmatch_builtin.segmenters._doorways import Labels
 from sketchmatch_builtin.segmenters._merging import groups
 
-__all__ = ["Things", "paper", "standing", "things_in"]
+__all__ = ["Things", "dimensions", "paper", "standing", "things_in"]
 
 # Of the area of the hull of all that is drawn: the largest thing.
 _LARGEST = 0.06
@@ -30,6 +30,12 @@ _NEAR = 0.003
 _RULED, _AS_LONG, _PARALLEL, _LIKE = 8, 0.98, 0.005, 0.03
 # Of the distances between them: those that are so many times the usual one.
 _EVEN = 0.9
+# Lines of a dimension: it and what ends it.
+_FEWEST = 3
+# Of the length of a dimension line: how long what ends it is, and how far from its end that may be.
+_TICK, _AT_END = 0.1, 0.05
+# It is longer than this share of the span of all, and leaves its chord by no more than that.
+_SHORTEST, _STRAIGHT = 0.05, 0.01
 
 
 class Things(NamedTuple):
@@ -73,6 +79,41 @@ def paper(lines: Sequence[FloatArray]) -> frozenset[int]:
         if even.mean() >= _EVEN:
             found.update(which[j] for j in np.flatnonzero(same))
     return frozenset(found)
+
+
+def dimensions(lines: Sequence[FloatArray]) -> frozenset[int]:
+    """Return which lines, each of shape (k, 2), say how long something is.
+
+    A straight line does, and what is drawn at both of its ends, as ticks and arrowheads are, if
+    these touch nothing else.
+    """
+    which = [k for k, line in enumerate(lines) if len(line) > 1]
+    if len(which) < _FEWEST:
+        return frozenset()
+    drawn = np.array([shapely.LineString(lines[k]) for k in which], dtype=object)
+    span = float(np.ptp(shapely.get_coordinates(drawn), axis=0).max())
+    group = groups(len(drawn), shapely.STRtree(drawn).query(drawn, "dwithin", _NEAR * span))
+    found: list[int] = []
+    for members in np.split(np.argsort(group, kind="stable"), np.bincount(group).cumsum()[:-1]):
+        if len(members) < _FEWEST:
+            continue
+        sizes = np.ptp(shapely.bounds(drawn[members]).reshape(-1, 2, 2), axis=1).max(axis=1)
+        longest = members[int(sizes.argmax())]
+        chord = lines[which[longest]][[0, -1]]
+        length = math.dist(*chord)
+        if length < _SHORTEST * span or not _is_straight(lines[which[longest]]):
+            continue
+        ends, others = shapely.points(chord), drawn[members[members != longest]]
+        at_ends = [shapely.distance(others, end) <= _AT_END * length for end in ends]
+        if (np.sort(sizes)[:-1] <= _TICK * length).all() and all(map(np.any, at_ends)):
+            found += [which[k] for k in members.tolist()]
+    return frozenset(found)
+
+
+def _is_straight(line: FloatArray) -> bool:
+    chord = line[-1] - line[0]
+    across = np.abs((line - line[0]) @ np.array([-chord[1], chord[0]]))
+    return bool(across.max() <= _STRAIGHT * float(chord @ chord))
 
 
 def things_in(lines: Sequence[FloatArray], names: Sequence[Landmark]) -> Things:

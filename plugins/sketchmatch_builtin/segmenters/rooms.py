@@ -47,7 +47,12 @@ from sketchmatch_builtin.segmenters._landmarks import (
     names_of_rooms,
 )
 from sketchmatch_builtin.segmenters._leaves import divided_at_openings
-from sketchmatch_builtin.segmenters._plan_things import paper, standing, things_in
+from sketchmatch_builtin.segmenters._plan_things import (
+    dimensions,
+    paper,
+    standing,
+    things_in,
+)
 from sketchmatch_builtin.segmenters._plans import Plan, drawn, lines_of
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 
@@ -99,11 +104,12 @@ class RoomSegmenter(Segmenter):
     space is cut where it becomes less than half as wide [2]_, at doors as where a corridor opens
     into a hall. A door that is drawn, a leaf and the arc that it turns through, is closed: it is
     no wall, and a room ends there. Small closed strokes are furniture if they stand free in a room,
-    or at its walls while rooms open into each other; parallel lines evenly apart are ruled paper. A
-    match may take another cut of it, where it becomes less than 0.4 or 0.6 times as wide. A text of
-    the drawing, and else a label that one line alone has, name the room around them; of several
-    texts the largest does, and measures are none. Where polygons come with texts, as from DXF,
-    their labels are of layers and blocks.
+    or at its walls while rooms open into each other; parallel lines evenly apart are ruled paper,
+    and a straight line apart with ticks at both ends is a dimension. A match may take another cut
+    of it, where it becomes less than 0.4 or 0.6 times as wide. A text of the drawing, and else a
+    label that one line alone has, name the room around them; of several texts the largest does, and
+    measures are none. Where polygons come with texts, as from DXF, their labels are of layers and
+    blocks.
 
     Rooms come in reading order: by their highest point from the top down, then from the left.
     One that the map's file names, with the type ``room`` and a place in it, has that name.
@@ -267,18 +273,18 @@ class RoomSegmenter(Segmenter):
         return self._emptied(drawn(source, width, left_out=left_out))
 
     def _things(self, source: StrokeSet) -> frozenset[int]:
-        """Return the lines of a drawing that are things in its rooms, or its paper."""
+        """Return the lines of a drawing that are things in its rooms, its paper, or say lengths."""
         lines, names = lines_of(source), source.landmarks
-        ruled = paper(lines)
+        aside = paper(lines) | dimensions(lines)
         free, touching = things_in(lines, names)
         if not (free or touching):
-            return ruled
-        plan, rooms = self._coarse(source, {*ruled, *touching, *itertools.chain(*free)})
+            return aside
+        plan, rooms = self._coarse(source, {*aside, *touching, *itertools.chain(*free)})
         count = int(rooms.max())
         if count < _FEWEST:
-            return ruled
+            return aside
         cells = np.array([plan.cell, *plan.corner])
-        found = ruled.union(standing(free, lines, names, rooms, cells))
+        found = aside.union(standing(free, lines, names, rooms, cells))
         opening = np.unique(parts_that_meet(plan.free | plan.doors, rooms))
         # Where rooms open into each other, what bounds one is more than a line, or has gaps; but
         # of a line that bounds a wall more rooms are found without it.
