@@ -16,6 +16,7 @@ from sketchmatch.app.application import Application
 from sketchmatch.app.jobs import Job, algorithms
 from sketchmatch.app.orders import Order
 from sketchmatch.app.setup import Isolation, RequestLimits, Setup
+from sketchmatch.app.tasks import Task
 from sketchmatch.app.waiting import Caller
 from sketchmatch.errors import (
     InvalidInputError,
@@ -26,10 +27,12 @@ from sketchmatch.errors import (
 )
 from sketchmatch.model import Fmap
 from sketchmatch.pipeline.engine import Engine
+from sketchmatch.pipeline.selection import Choice, Defaults, Profile
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from sketchmatch_client import match_request, segment_request, sources
 from sketchmatch_proto.v1.match_pb2 import OUTCOME_SERVER_STOPPING
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
+from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest
 from tests.pace import within
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
@@ -335,13 +338,40 @@ async def test_an_error_is_what_the_log_ends_with(app):
             {"polygons", "strokes", "held", "constant", "cross-correlation", "posterior"},
         ),
         (segment_request(sources.image(b"no picture")), {"image"}),
-        (match_request(SCENE, SCENE, searcher="nobody"), set()),
     ],
 )
 def test_whose_algorithms_are_asked_for_is_told_without_decoding_anything(request_, named):
     order = Order("", request_.DESCRIPTOR.name, request_.SerializeToString())
     for job in (Job("", request_), order.outline(1_000_000)):
         assert {item.name for item in algorithms(job, setup())} == named
+
+
+@pytest.mark.parametrize(
+    ("request_", "field"),
+    [
+        (match_request(SCENE, SCENE, searcher="nobody"), "pipeline.searcher.name"),
+        (match_request(SCENE, SCENE, searcher="held", judge="nobody"), "pipeline.judge.name"),
+        (match_request(SCENE, SCENE, profile="nobody"), "pipeline.profile"),
+        (segment_request(SCENE, segmenter="nobody"), "segmenter.name"),
+        (
+            CreateSketchRequest(match=match_request(SCENE, SCENE, searcher="nobody")),
+            "match.pipeline.searcher.name",
+        ),
+    ],
+)
+def test_a_name_of_no_use_is_refused_by_whoever_knows_all_plugins(request_, field):
+    order = Order("", request_.DESCRIPTOR.name, request_.SerializeToString())
+    task = Task(order, setup())
+    assert task.refusal.field == field
+    assert ("held" in str(task.refusal)) == (field.endswith("searcher.name"))
+
+
+def test_what_a_profile_names_is_asked_for_though_the_request_names_another():
+    defaults = Defaults(profiles=(Profile("mine", "", {"searcher": Choice("held")}),))
+    given = Setup(Engine(setup().engine.registry, defaults))
+    order = match_request(SCENE, SCENE, profile="mine", searcher="align")
+    names = {item.name for item in algorithms(Job("", order), given)}
+    assert {"align", "held"} <= names, "or the worker, which checks the profile, knows it not"
 
 
 def test_errors_survive_the_way_between_processes():

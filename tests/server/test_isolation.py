@@ -16,6 +16,7 @@ import pytest
 from sketchmatch.app import workers
 from sketchmatch.app.setup import Isolation, RequestLimits, Setup
 from sketchmatch.pipeline.engine import Engine
+from sketchmatch.pipeline.selection import Choice, Defaults, Profile
 from sketchmatch.registry import discover
 from sketchmatch_client import (
     CallCancelledError,
@@ -160,6 +161,30 @@ def test_what_cannot_be_loaded_is_listed_and_named_to_whoever_asks_for_it(
     assert re.search(words, plugin.reason)
     with pytest.raises(InvalidRequestError, match=f"plugin .* of {distribution} failed to load"):
         client.match(scene(4), scene(4), searcher="what-it-might-have-offered")
+
+
+def test_a_wrong_name_is_refused_for_its_own_sake_though_workers_lack_the_plugins(site):
+    words = {
+        "searcher": r"pipeline\.searcher\.name is 'guesing', which is no searcher; .* failed",
+        "judge": r"pipeline\.judge\.name is 'nonesuch', which is no judge; ",
+        "profile": r"pipeline\.profile is 'nonesuch', which is no profile; ",
+    }
+    asked = {
+        "searcher": {"searcher": "guesing"},
+        "judge": {"searcher": "guessing", "judge": "nonesuch"},
+        "profile": {"searcher": "guessing", "profile": "nonesuch"},
+    }
+    defaults = Defaults(profiles=(Profile("mine", "", {"searcher": Choice("guessing")}),))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(site)
+        known = Setup(Engine(discover(), defaults), isolation=Isolation(patience=60.0))
+        with hosting(known, workers=1) as host, Client(host.address) as client:
+            for what, options in asked.items():
+                with pytest.raises(InvalidRequestError, match=words[what]) as no:
+                    client.match(scene(4), scene(4), **options)
+                assert "plugins.allow" not in str(no.value)
+            found = client.match(scene(4), scene(4), profile="mine", searcher="exact")
+    assert found.object_map == {k: k for k in range(4)}
 
 
 class Others:

@@ -126,12 +126,16 @@ def _answers(
 def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, ...]:
     """Return what a request asks of plugins, as far as it can be told without decoding it.
 
-    These are the algorithms that it names and the readers of its files. A name that is not known is
-    refused where the job is done.
+    These are the algorithms that it names and the readers of its files.
+
+    Raises
+    ------
+    InvalidInputError
+        If an algorithm or the profile is unknown, with its path in the request.
     """
-    request, profile = job.request, ""
+    request, profile, place = job.request, "", "pipeline"
     if isinstance(request, CreateSketchRequest):
-        request = request.match
+        request, place = request.match, "match.pipeline"
     readers = setup.engine.registry.readers
     match request:
         case MatchRequest() | TransferRequest():
@@ -143,7 +147,7 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
             files = [request.sketch, request.map]
         case SegmentRequest(profile=profile) | PutSceneRequest(profile=profile):
             found, files = requests.source_type(request.source, readers), [request.source]
-            stage = "sketch_segmenter" if found is None else stage_of(found)
+            stage, place = "sketch_segmenter" if found is None else stage_of(found), ""
             selection, types = {stage: requests.choice(request.segmenter)}, {stage: found}
         case _:
             return ()
@@ -159,8 +163,9 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
         chosen = chosen_algorithms(
             setup.engine.registry, known, sources, setup.engine.defaults, profile
         )
-    except InvalidInputError:
-        return reading
+    except InvalidInputError as error:
+        field = error.field if place else error.field.replace(stage, "segmenter")
+        raise InvalidInputError(error.reason, field, error.problem).within(place) from None
     return (*reading, *chosen)
 
 

@@ -142,6 +142,8 @@ class Setup:
         Which plugins run in processes of their own.
     strangers, trusted
         The algorithms and readers that do, and those that do not.
+    plugins
+        Whether there is any plugin beside the engine's own, be it one that failed.
     shelf
         The scenes that are kept; None where none are.
     """
@@ -152,6 +154,7 @@ class Setup:
     shelf: Shelf | None = field(default=None, compare=False)
     strangers: tuple[Registered | RegisteredReader, ...] = field(init=False, repr=False)
     trusted: tuple[Registered | RegisteredReader, ...] = field(init=False, repr=False)
+    plugins: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         registry = self.engine.registry
@@ -163,3 +166,5 @@ class Setup:
         trusted = tuple(item for item in offered if item not in strangers)
         object.__setattr__(self, "strangers", strangers)
         object.__setattr__(self, "trusted", trusted)
+        found = {item.distribution for item in (*offered, *registry.statuses)}
+        object.__setattr__(self, "plugins", bool({*map(canonical, found)} - {OWN_DISTRIBUTION}))

@@ -14,7 +14,8 @@ from sketchmatch.app.jobs import algorithms
 from sketchmatch.app.orders import Order, Wish
 from sketchmatch.app.setup import Setup
 from sketchmatch.app.waiting import Caller
-from sketchmatch.errors import MatchCancelledError, RetryableError
+from sketchmatch.errors import InvalidInputError, MatchCancelledError, RetryableError
+from sketchmatch.registry import Registered, RegisteredReader
 from sketchmatch_proto.v1 import match_service_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
 
@@ -267,6 +268,9 @@ class Task:
     ----------
     strangers
         The algorithms and readers it asks for that run in a process of their own.
+    refusal
+        Why a name in it is of no use; None where all are known. A worker knows some plugins alone,
+        and would give another reason.
     size
         Bytes of the request, with what comes with it.
     log
@@ -298,13 +302,14 @@ class Task:
         self.setup = setup
         self.caller = caller
         self.wish = wish
-        self.strangers = (
-            setup.isolation.strangers(
-                algorithms(order.outline(setup.limits.max_request_bytes), setup)
-            )
-            if setup.strangers
-            else ()
-        )
+        self.refusal: InvalidInputError | None = None
+        self.strangers: tuple[Registered | RegisteredReader, ...] = ()
+        if setup.plugins:
+            outline = order.outline(setup.limits.max_request_bytes)
+            try:
+                self.strangers = setup.isolation.strangers(algorithms(outline, setup))
+            except InvalidInputError as error:
+                self.refusal = error
         self._run = 0 if former is None else former.run + 1
         self.log = Log[bytes](self._run << _RUN_BITS)
         self.stopping = threading.Event()

@@ -141,7 +141,10 @@ class Workers:
         self._own = _own(setup)
 
     def begin(self, task: Task) -> None:
-        """Let a worker do a task."""
+        """Let a worker do a task, unless it is known already that it is refused."""
+        if task.refusal is not None:
+            asyncio.get_running_loop().call_soon(self.done, task, task.refusal)
+            return
         key = _key(task)
         idle = [each for each in self._all if each.idle and each.key == key]
         if idle:

@@ -286,6 +286,8 @@ def chosen_algorithms(
 ) -> tuple[Registered, ...]:
     """Return which algorithms a caller asks for, without setting any of them up.
 
+    Those that the profile names are among them: it is checked whole, whatever the caller adds.
+
     Parameters
     ----------
     registry, selection, defaults, profile
@@ -299,7 +301,8 @@ def chosen_algorithms(
         If an algorithm or the profile is unknown.
     """
     levels = _Levels(registry, defaults, profile)
-    return tuple(levels.registered(stage, selection, sources.get(stage)) for stage in selection)
+    asked = (levels.registered(stage, selection, sources.get(stage)) for stage in selection)
+    return tuple(dict.fromkeys((*asked, *levels.named_by_profile())))
 
 
 def set_up(registry: Registry, kind: Kind, choice: Choice, stage: str) -> Algorithm:
@@ -443,6 +446,17 @@ class _Levels:
                 raise error.within(stage) from None
             with self._blaming_profile():
                 raise error.within(stage) from None
+
+    def named_by_profile(self) -> Iterator[Registered]:
+        """Yield the algorithms that the profile names."""
+        for stage, choice in self.below[-1].items():
+            if choice.name:
+                with self._blaming_profile():
+                    try:
+                        found = self.registry.find(kind_of(stage), choice.name)
+                    except InvalidInputError as error:
+                        raise error.within(stage) from None
+                yield found
 
     def segmenter(self, stage: str, choice: Choice, source: Source, path: str) -> Segmenter:
         """Return the segmenter of a stage for a source; of a mended map, that of its objects."""
