@@ -30,7 +30,7 @@ from sketchmatch.api import (
     Segmenter,
     Similarity,
 )
-from sketchmatch.model import Fmap, OccupancyGrid, PolygonSet, Scene
+from sketchmatch.model import Fmap, OccupancyGrid, PolygonSet, Scene, SceneObject
 from sketchmatch.testing import (
     ContractViolationError,
     check_plugin,
@@ -950,6 +950,16 @@ def found_two(*_):
     return Segmentation(Scene.from_polygons([box([0, 0], [1, 1]), box([2, 0], [3, 1])]))
 
 
+def unchecked(turned):
+    """Return a segmenter of boxes that makes each object without a check."""
+
+    def segment(self, source):
+        objects = Boxes.segment(self, source).scene.objects
+        return Segmentation(Scene(tuple(SceneObject((turned(o.rings[0]),)) for o in objects)))
+
+    return like(Boxes, segment=segment)
+
+
 def never(*_):
     yield from ()
     return Outcome.CONVERGED
@@ -962,6 +972,8 @@ def never(*_):
         ("search-yields-progress", "without yielding", like(RandomMaps, search=never)),
         ("blank-sources-are-refused", "'sketch.polygons'", like(Boxes, segment=naming_the_stage)),
         ("blank-sources-are-refused", "it found 2 objects", like(Boxes, segment=found_two)),
+        ("scenes-are-found", "goes the wrong way round", unchecked(lambda ring: ring[::-1])),
+        ("scenes-are-found", "is of int32, not float64", unchecked(lambda r: r.astype(np.int32))),
         ("pairs-are-described-alone", "of no pairs", like(Centres, describe=describe(unpaired))),
         (
             "defaults-are-valid",

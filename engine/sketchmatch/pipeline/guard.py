@@ -12,8 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sketchmatch.api import Algorithm, JudgeProblem, MatchProblem, SearchProgress
-from sketchmatch.errors import PluginError, SketchmatchError, quoted
-from sketchmatch.model import FloatArray, Fmap, IntArray, RelationTable, Scene, Source
+from sketchmatch.errors import InvalidInputError, PluginError, SketchmatchError, quoted
+from sketchmatch.model import (
+    FloatArray,
+    Fmap,
+    IntArray,
+    RelationTable,
+    Scene,
+    SceneObject,
+    Source,
+)
 from sketchmatch.registry import Registry
 
 __all__ = [
@@ -22,6 +30,7 @@ __all__ = [
     "blaming",
     "breaks_pins",
     "check_map",
+    "check_scene",
     "checked_array",
     "checked_progress",
     "inspecting",
@@ -161,6 +170,42 @@ def check_map(partners: Any, problem: MatchProblem | JudgeProblem) -> None:
         raise ValueError("its object map holds a pairing that is ruled out")
     if problem.pinned is not None and breaks_pins(partners, problem.pinned):
         raise ValueError("its object map leaves out a pairing that is known")
+
+
+def check_scene(scene: Any) -> None:
+    """Refuse a scene that is not made as :meth:`~sketchmatch.model.SceneObject.from_rings` does.
+
+    Raises
+    ------
+    TypeError, ValueError
+        With a sentence that tells what a plugin did.
+    """
+    if not isinstance(scene, Scene):
+        raise TypeError(f"it found a {type(scene).__name__}, not a Scene")
+    if not isinstance(scene.objects, tuple):
+        raise TypeError(f"its objects are a {type(scene.objects).__name__}, not a tuple")
+    for k, item in enumerate(scene.objects):
+        if not isinstance(item, SceneObject):
+            raise TypeError(f"its objects[{k}] is a {type(item).__name__}, not a SceneObject")
+        try:
+            made = SceneObject.from_rings(item.rings)
+        except InvalidInputError as error:
+            raise ValueError(f"its {error.within(f'objects[{k}]')}") from None
+        for j, (ring, sound) in enumerate(zip(item.rings, made.rings, strict=True)):
+            if fault := _fault_of_ring(ring, sound):
+                place = f"its objects[{k}].rings[{j}]"
+                raise ValueError(f"{place} {fault}; SceneObject.from_rings makes it right")
+
+
+def _fault_of_ring(ring: Any, sound: FloatArray) -> str:
+    """Say how a ring differs from what it should be; empty if it does not."""
+    if not isinstance(ring, np.ndarray):
+        return f"is a {type(ring).__name__}, not an array"
+    if ring.dtype != np.float64:
+        return f"is of {ring.dtype}, not float64"
+    if len(ring) != len(sound):
+        return "has a point twice in a row"
+    return "" if np.array_equal(ring, sound) else "goes the wrong way round"
 
 
 def breaks_pins(partners: IntArray, pinned: IntArray) -> bool:

@@ -15,7 +15,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import OccupancyGrid, Scene, Source
 from sketchmatch.model.labels import cleaned_label
 from sketchmatch.model.limits import check_objects, check_source
-from sketchmatch.pipeline.guard import blaming, inspecting
+from sketchmatch.pipeline.guard import blaming, check_scene, inspecting
 from sketchmatch.pipeline.selection import Pipeline
 from sketchmatch.registry import Registry
 
@@ -105,6 +105,8 @@ def _checked(segmenter: Segmenter, source: Source, registry: Registry) -> Iterat
             if found is None and number:
                 return
             _check_contract(found)
+            if not registry.is_own(segmenter):  # ours are held to it by their tests
+                check_scene(found.scene)
         yield found
 
 

@@ -14,7 +14,13 @@ import shapely
 
 from sketchmatch.api import InvalidInputError, Segmentation, Segmenter
 from sketchmatch.model import FloatArray, OccupancyGrid, PolygonSet, Scene, Source, StrokeSet
-from sketchmatch.testing.conformance.contract import BrokenError, Contract, require
+from sketchmatch.pipeline.guard import check_scene
+from sketchmatch.testing.conformance.contract import (
+    BrokenError,
+    Contract,
+    refused_as_broken,
+    require,
+)
 from sketchmatch.testing.conformance.sources import (
     RESOLUTION,
     blank_sources,
@@ -45,12 +51,14 @@ def sources_are_known(algorithm: type[Any]) -> None:
 
 
 def scenes_are_found(algorithm: type[Any]) -> None:
-    """Return a Segmentation with a Scene, of a plain source of each type, and yield such cuts."""
+    """Return a Segmentation with a sound Scene, of a source of each type, and yield such cuts."""
     for source in _samples(algorithm):
         segmenter = algorithm()
         for found in (segmenter.segment(source), *segmenter.cuts(source)):
             fits = isinstance(found, Segmentation) and isinstance(found.scene, Scene)
             require(fits, f"of {source.field}, it returned a {type(found).__name__}")
+            with refused_as_broken():
+                check_scene(found.scene)
             if found.route is not None:
                 shape = np.shape(found.route)
                 require(len(shape) == 2 and shape[1] == 2, f"the route has shape {shape}")
