@@ -1,13 +1,25 @@
 """What plugins return and raise is theirs to answer for, by name, whatever it is."""
 
+from importlib.metadata import EntryPoint
+
 import numpy as np
 import pytest
 
-from sketchmatch.api import Segmentation, Segmenter
-from sketchmatch.errors import PluginError
+from sketchmatch.api import Histogram, Reader, Segmentation, Segmenter
+from sketchmatch.errors import InvalidInputError, PluginError, Reason
 from sketchmatch.model import LabelledPolygon, PolygonSet, Scene, SceneObject
 from sketchmatch.pipeline.engine import Engine
-from sketchmatch.registry import Kind, Registered, Registry, default_registry
+from sketchmatch.pipeline.request import MatchRequest
+from sketchmatch.pipeline.selection import Choice
+from sketchmatch.registry import (
+    Kind,
+    Registered,
+    RegisteredReader,
+    Registry,
+    default_registry,
+    discover,
+)
+from sketchmatch.testing import plugin_checks
 
 SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 2.0], [0.0, 2.0]])
 STEPS = [[0.0, 0.0], [4.0, 0.0], [0.0, 5.0], [9.0, 9.0]]
@@ -71,3 +83,100 @@ def test_what_is_no_object_is_the_segmenters_fault():
 def test_what_from_rings_makes_is_sound():
     holed = SceneObject.from_rings([SQUARE, 0.5 * SQUARE + [0.5, 0.5]])
     assert len(segmented(Segmentation(Scene((holed, *SCENE.objects)))).scene) == 5
+
+
+class Speechless(Exception):  # noqa: N818
+    """Says nothing, and fails even in that."""
+
+    def __str__(self):
+        raise RuntimeError("no words")
+
+
+class OwnError(InvalidInputError):
+    """Is made in a way of its own."""
+
+    def __init__(self):
+        super().__init__(Reason.INVALID_POLYGON, "polygons[0]", "is not to my liking")
+
+
+def histogram(describe, exponent=0.0):
+    told = {"name": "told", "summary": "As told.", "exponent": exponent, "describe": describe}
+    return type("Told", (Histogram,), told)
+
+
+def raising(error):
+    def describe(*_):
+        raise error
+
+    return histogram(describe)
+
+
+def matched(plugin, stage):
+    engine = engine_with(plugin)
+    choices = {"searcher": Choice("exact"), "judge": Choice("confidence"), stage: Choice("told")}
+    request = MatchRequest(SCENE, SCENE, choices)
+    *_, last = engine.match(request)
+    return last.result
+
+
+@pytest.mark.parametrize(
+    ("plugin", "words"),
+    [
+        (raising(Speechless()), "Speechless: its __str__ raised RuntimeError"),
+        (raising(ValueError("bad \ud800 text")), "ValueError: bad \N{REPLACEMENT CHARACTER} text"),
+        (raising(ValueError("y" * 5_000_000)), "ValueError: y+…"),
+        (raising(InvalidInputError("MY_REASON", "x", "is bad")), "InvalidInputError: x is bad"),
+        (raising(InvalidInputError(Reason.INVALID_FIELD, 3, None)), "InvalidInputError: 3 None"),
+        (histogram(lambda *_: None, "two"), "its exponent is 'two', not a finite number"),
+        (histogram(lambda *_: None, np.nan), "its exponent is nan, not a finite number"),
+    ],
+)
+def test_whatever_a_plugin_raises_it_is_blamed_by_name(plugin, words):
+    with pytest.raises(PluginError, match=words) as blamed:
+        matched(plugin, "histogram")
+    sentence = str(blamed.value)
+    assert sentence.startswith("histogram told of acme-plugins 1.2 failed (")
+    assert sentence.encode("utf-8")
+    assert len(sentence) < 400
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (
+            InvalidInputError(Reason.INVALID_POLYGON, "x\ud800", "is bad \ud800; go"),
+            "x\N{REPLACEMENT CHARACTER} is bad \N{REPLACEMENT CHARACTER}; go",
+        ),
+        (OwnError(), "polygons[0] is not to my liking"),
+    ],
+)
+def test_what_a_plugin_says_to_its_caller_can_be_told_everywhere(error, said):
+    with pytest.raises(InvalidInputError) as refused:
+        matched(raising(error), "histogram")
+    assert str(refused.value).endswith(said)
+    assert refused.value.within("map").reason is Reason.INVALID_POLYGON
+
+
+def test_a_plugin_or_a_reader_that_cannot_say_why_it_fails_is_blamed_as_any_other():
+    class Mute(Reader):
+        def read(self, data, part=""):  # noqa: ARG002
+            raise Speechless
+
+    with pytest.raises(PluginError, match=r"^reader told of acme 1\.2 failed \(Speechless: its"):
+        RegisteredReader(
+            type("Told", (Mute,), {"name": "told", "source": PolygonSet}), "acme", "1.2"
+        ).read(b"")
+    point = EntryPoint("mute", "tests.unit.test_guard:loaded_in_vain", "sketchmatch")
+    (status,) = discover([point]).statuses
+    assert status.reason == "Speechless: its __str__ raised RuntimeError"
+
+
+def __getattr__(name):
+    if name == "loaded_in_vain":
+        raise Speechless
+    raise AttributeError(name)
+
+
+def test_a_check_tells_of_what_cannot_say_why_it_fails():
+    checks = {check.name: check for check in plugin_checks(raising(Speechless()))}
+    assert "Speechless: its __str__ raised" in checks["rows-are-finite"].result().seen

@@ -311,7 +311,7 @@ def discovered_beside(folder, monkeypatch):
         ("badep2", "acme-badep2", "AttributeError: "),
         ("base", "acme-base", "B: x"),
         ("exit", "acme-exit", "SystemExit: 3"),
-        ("kbd", "acme-kbd", "KeyboardInterrupt: "),
+        ("kbd", "acme-kbd", "KeyboardInterrupt"),
         ("missingmod", "acme-missing", "ModuleNotFoundError: "),
         ("noname", "acme-noname", "its METADATA cannot be read (ValueError: it has no Name); inst"),
         ("recur", "acme-recur", "RecursionError: "),

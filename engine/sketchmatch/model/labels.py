@@ -14,7 +14,14 @@ import numpy as np
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.model.arrays import IntArray, sealed
 
-__all__ = ["Synonyms", "cleaned_label", "compare_labels", "folded", "label_from"]
+__all__ = [
+    "Synonyms",
+    "cleaned_label",
+    "cleaned_sentence",
+    "compare_labels",
+    "folded",
+    "label_from",
+]
 
 Synonyms = Sequence[Sequence[str]]
 """Groups of words for the same thing."""
@@ -77,6 +84,21 @@ def cleaned_label(label: Any) -> str:
     text = _ESCAPES.sub("", text)
     shown = (c for c in text if c.isspace() or c in _KEPT or unicodedata.category(c) not in _UNSEEN)
     return " ".join("".join(shown).split())
+
+
+def cleaned_sentence(text: str, longest: int) -> str:
+    r"""Return a sentence as :func:`cleaned_label` does a name, cut short where it is long.
+
+    Examples
+    --------
+    >>> cleaned_sentence("two\nlines", 9), cleaned_sentence("x" * 10_000_000, 5)
+    ('two lines', 'xxxxx…')
+    """
+    start = text[: 2 * longest]  # cleaning takes long where a text does
+    cleaned = cleaned_label(start)
+    if len(cleaned) <= longest and len(start) == len(text):
+        return cleaned
+    return f"{cleaned[:longest]}…"
 
 
 def label_from(given: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Generator, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import is_dataclass
@@ -11,8 +12,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sketchmatch.api import Algorithm, JudgeProblem, MatchProblem, SearchProgress
-from sketchmatch.errors import InvalidInputError, PluginError, SketchmatchError, quoted
+from sketchmatch.api import Algorithm, Histogram, JudgeProblem, MatchProblem, SearchProgress
+from sketchmatch.errors import InvalidInputError, PluginError, quoted
 from sketchmatch.model import (
     FloatArray,
     Fmap,
@@ -23,12 +24,14 @@ from sketchmatch.model import (
     Source,
 )
 from sketchmatch.registry import Registry
+from sketchmatch.registry.raised import passed_on, words_of
 
 __all__ = [
     "FEWEST",
     "blamed",
     "blaming",
     "breaks_pins",
+    "check_made",
     "check_map",
     "check_scene",
     "checked_array",
@@ -41,7 +44,6 @@ _Value = TypeVar("_Value")
 FEWEST = 3
 """Template objects that find a partner in any case, where there are as many."""
 
-_LONGEST = 200
 _ROUNDING = 1e-9
 _DOUBT = 1e-6
 _COUNTABLE = 2**63
@@ -65,13 +67,16 @@ class blaming:  # noqa: N801
         pass
 
     def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
-        if error is None or isinstance(error, SketchmatchError | KeyboardInterrupt):
+        if error is None or isinstance(error, KeyboardInterrupt):
             return
-        text = " ".join(f"{type(error).__name__}: {error}".split())
-        cause = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+        told = passed_on(error)
+        if told is error:
+            return
+        if told is not None:
+            raise told from None
         raise PluginError(
-            f"{self._registry.whose(self._algorithm)} failed ({cause}); tell its author or choose "
-            "another"
+            f"{self._registry.whose(self._algorithm)} failed ({words_of(error)}); tell its author "
+            "or choose another"
         ) from error
 
 
@@ -90,6 +95,20 @@ def blamed(
                 except StopIteration as stop:
                     return stop.value  # type: ignore[no-any-return]
             yield told
+
+
+def check_made(algorithm: Algorithm) -> None:
+    """Refuse an algorithm, as it is set up, of which a number is none.
+
+    Raises
+    ------
+    TypeError
+        With a sentence that tells what a plugin says.
+    """
+    if isinstance(algorithm, Histogram):
+        exponent: Any = algorithm.exponent
+        if not (isinstance(exponent, numbers.Real) and math.isfinite(exponent)):
+            raise TypeError(f"its exponent is {quoted(exponent)}, not a finite number")
 
 
 def checked_array(values: Any, shape: tuple[int, ...], most: float = math.inf) -> FloatArray:

@@ -24,7 +24,7 @@ from sketchmatch.model import (
     Source,
     StrokeSet,
 )
-from sketchmatch.pipeline.guard import blaming
+from sketchmatch.pipeline.guard import blaming, check_made
 from sketchmatch.registry import Kind, Registered, Registry
 
 __all__ = [
@@ -317,7 +317,9 @@ def set_up(registry: Registry, kind: Kind, choice: Choice, stage: str) -> Algori
         raise fault
     algorithm = registry.find(kind, choice.name).algorithm
     with blaming(algorithm, registry):
-        return algorithm(algorithm.Params(**dict(choice.parameters)))
+        made = algorithm(algorithm.Params(**dict(choice.parameters)))
+        check_made(made)
+        return made
 
 
 def set_up_faults(

@@ -24,6 +24,7 @@ from sketchmatch.registry.distributions import (
     PluginStatus,
     canonical,
 )
+from sketchmatch.registry.raised import words_of
 from sketchmatch.registry.readers import RegisteredReader
 from sketchmatch.registry.registry import Kind, Registered, Registry
 
@@ -31,6 +32,7 @@ __all__ = ["ENTRY_POINT_GROUP", "discover"]
 
 ENTRY_POINT_GROUP = "sketchmatch"
 _LOADING_SECONDS = 30.0
+_LONGEST_REASON = 1000
 _NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 _SOURCES = (StrokeSet, PolygonSet, OccupancyGrid, Image)
 _SUFFIX = re.compile(r"(\.[a-z0-9_+-]+)+")
@@ -77,7 +79,7 @@ def discover(
             continue
         offered = _loaded_in_time(point, loading_seconds)
         if isinstance(offered, BaseException):
-            reason = f"{type(offered).__name__}: {offered}"
+            reason = words_of(offered, _LONGEST_REASON)
             statuses.append(replace(status, state=PluginState.FAILED, reason=reason))
         else:
             statuses.append(status)

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from sketchmatch.api.reader import Reader
-from sketchmatch.errors import InvalidInputError, PluginError, Reason, SketchmatchError
-from sketchmatch.model.labels import cleaned_label
+from sketchmatch.errors import InvalidInputError, PluginError, Reason
 from sketchmatch.registry.distributions import OWN_DISTRIBUTION
+from sketchmatch.registry.raised import passed_on, words_of
 
 __all__ = ["RegisteredReader", "reader_by_keys", "reader_by_name"]
-
-_LONGEST = 200
 
 
 @dataclass(frozen=True)
@@ -46,19 +44,20 @@ class RegisteredReader:
         """
         try:
             source = self.reader().read(data, part)
-        except (SketchmatchError, KeyboardInterrupt):
+        except KeyboardInterrupt:
             raise
         except BaseException as error:  # a plugin may raise anything, and exit
-            raise self._failure(f"{type(error).__name__}: {error}") from error
+            told = passed_on(error)
+            if told is not None:
+                raise told from None
+            raise self._failure(words_of(error)) from error
         if not isinstance(source, self.reader.source):
             expected = self.reader.source.__name__
             raise self._failure(f"it returned a {type(source).__name__}, not a {expected}")
         return source
 
     def _failure(self, cause: str) -> PluginError:
-        text = cleaned_label(cause)
-        text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
-        return PluginError(f"{self.origin} failed ({text}); tell its author")
+        return PluginError(f"{self.origin} failed ({cause}); tell its author")
 
 
 def reader_by_name(readers: Iterable[RegisteredReader], name: str) -> RegisteredReader | None:

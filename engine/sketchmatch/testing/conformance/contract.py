@@ -14,6 +14,7 @@ from pathlib import Path
 from time import perf_counter  # the real one, whatever a check does to the module
 from typing import Any
 
+from sketchmatch.registry.raised import words_of
 from sketchmatch.testing.conformance.time_limit import OverdueError, in_time
 
 __all__ = [
@@ -41,6 +42,7 @@ Its name is the check's, its docstring says what it demands.
 """
 
 _METHODS = ("segment", "describe", "compare", "combine", "search", "judge", "read")
+_LONGEST = 1000
 _READ_ONLY = re.compile(r"read.?only", re.IGNORECASE)
 
 
@@ -182,7 +184,7 @@ class PluginCheck:
         writing = writing_behind(error)
         did = "wrote to what it is given, which is read-only, and" if writing else ""
         cause = writing or error
-        words = " ".join(f"{did} raised {type(cause).__name__}: {cause}".split())
+        words = f"{did} raised {words_of(cause, _LONGEST)}".strip()
         return f"it {words}{self._place(traceback.extract_tb(cause.__traceback__))}"
 
     def _place(self, stack: traceback.StackSummary) -> str:
@@ -229,7 +231,8 @@ def writing_behind(error: BaseException) -> BaseException | None:
     """Return the error that comes from writing to what is read-only, if that is behind another."""
     cause: BaseException | None = error
     while cause is not None:
-        read_only = _READ_ONLY.search(str(cause)) and not isinstance(cause, OSError | BrokenError)
+        ours = isinstance(cause, OSError | BrokenError)
+        read_only = not ours and _READ_ONLY.search(words_of(cause, _LONGEST))
         if read_only or isinstance(cause, FrozenInstanceError):
             return cause
         cause = cause.__cause__ or (None if cause.__suppress_context__ else cause.__context__)
