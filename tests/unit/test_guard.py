@@ -5,9 +5,18 @@ from importlib.metadata import EntryPoint
 import numpy as np
 import pytest
 
-from sketchmatch.api import Histogram, Reader, Segmentation, Segmenter
+from sketchmatch.api import (
+    Histogram,
+    Outcome,
+    Reader,
+    Searcher,
+    SearchProgress,
+    Segmentation,
+    Segmenter,
+    Similarity,
+)
 from sketchmatch.errors import InvalidInputError, PluginError, Reason
-from sketchmatch.model import LabelledPolygon, PolygonSet, Scene, SceneObject
+from sketchmatch.model import Fmap, LabelledPolygon, PolygonSet, Scene, SceneObject
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.selection import Choice
@@ -19,7 +28,7 @@ from sketchmatch.registry import (
     default_registry,
     discover,
 )
-from sketchmatch.testing import plugin_checks
+from sketchmatch.testing import plugin_checks, score_fmap
 
 SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 2.0], [0.0, 2.0]])
 STEPS = [[0.0, 0.0], [4.0, 0.0], [0.0, 5.0], [9.0, 9.0]]
@@ -180,3 +189,58 @@ def __getattr__(name):
 def test_a_check_tells_of_what_cannot_say_why_it_fails():
     checks = {check.name: check for check in plugin_checks(raising(Speechless()))}
     assert "Speechless: its __str__ raised" in checks["rows-are-finite"].result().seen
+
+
+def searcher(note="", outcome=Outcome.CONVERGED):
+    """Return a searcher that is content with the first map."""
+
+    def search(self, problem, rng):  # noqa: ARG001
+        partners = np.arange(problem.table.template_objects)
+        fmap = Fmap.from_object_map(partners, problem.table.argument_objects)
+        confidence = score_fmap(fmap, problem.table, problem.weights).total
+        yield SearchProgress(fmap, confidence, 1, 1, note=note)
+        return outcome
+
+    return type("Told", (Searcher,), {"name": "told", "summary": "As told.", "search": search})
+
+
+@pytest.mark.parametrize(
+    ("note", "told"),
+    [
+        ("a\nb\x1b[31mred", "a bred"),
+        ("half \ud800", "half \N{REPLACEMENT CHARACTER}"),
+        ("x" * 10_000_000, "x" * 1000 + "…"),
+        ("σ × ζ, as it is", "σ × ζ, as it is"),
+    ],
+)
+def test_a_note_of_a_search_is_one_line_that_somebody_can_read(note, told):
+    assert matched(searcher(note), "searcher").search_note == told
+
+
+@pytest.mark.parametrize("outcome", [Outcome.TIME_BUDGET, "SERVER_STOPPING"])
+def test_a_search_that_speaks_for_the_host_is_blamed(outcome):
+    with pytest.raises(PluginError, match=r"it returned [A-Z_]+, which the host alone can say"):
+        matched(searcher(outcome=outcome), "searcher")
+
+
+def test_warnings_are_sentences_that_somebody_can_read():
+    with pytest.raises(PluginError, match="its warnings are a str, not a tuple"):
+        segmented(Segmentation(SCENE, "oops"))
+    warnings = segmented(Segmentation(SCENE, ("w\ud800\x1b[2J" * 99_999,) * 300_000)).warnings
+    assert len(warnings) == 1001
+    assert warnings[-1] == "299000 more are left out."
+    assert max(map(len, warnings)) <= 1001
+    assert "\x1b" not in warnings[0]
+
+
+def test_what_is_complex_is_refused_for_that():
+    likeness = {"compare": lambda _, rows, __: np.full(len(rows), 0.5 + 0.5j)}
+    told = {"name": "told", "summary": "As told."}
+    words = "TypeError: the values are complex, not real"
+    with pytest.raises(PluginError, match=words):
+        matched(type("Told", (Similarity,), {**told, **likeness}), "similarity")
+    rows = histogram(lambda self, _, pairs: np.full((len(pairs), self.directions), 1 + 1j))
+    with pytest.raises(PluginError, match=words):
+        matched(rows, "histogram")
+    with pytest.raises(PluginError, match=words):
+        segmented(Segmentation(SCENE, (), np.array([[0, 1j], [2, 3]])))

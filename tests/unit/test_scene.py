@@ -70,6 +70,7 @@ def test_a_small_object_far_from_the_origin_keeps_its_area():
         ([[[0, 0], [1, 1], [np.inf, 0]]], "rings[0].points[2]", "not finite"),
         ([[[0, 0, 0], [1, 1, 1], [2, 0, 0]]], "rings[0]", "[x, y] pairs"),
         ([["a", "b"]], "rings[0]", "[x, y] pairs"),
+        ([np.array([[0, 0], [1, 1j], [2, 0]])], "rings[0]", "[x, y] pairs of numbers"),
         ([[[0, 0], [1], [2, 0]]], "rings[0]", "[x, y] pairs"),
         ([[]], "rings[0]", "[x, y] pairs"),
         ([SQUARE, [[5, 5], [6, 5], [6, 6]]], "", "keep holes inside"),

@@ -15,6 +15,7 @@ __all__ = [
     "IntArray",
     "frozen",
     "frozen_floats",
+    "real_floats",
     "sealed",
     "settled_middle",
 ]
@@ -72,3 +73,19 @@ def settled_middle(low: FloatArray, high: FloatArray) -> FloatArray:
 def frozen_floats(values: Any) -> FloatArray:
     """Return values as a read-only float64 array."""
     return frozen(np.asarray(values, dtype=np.float64))
+
+
+def real_floats(values: Any) -> FloatArray:
+    """Return values as a float64 array, none of which loses its imaginary part.
+
+    Raises
+    ------
+    TypeError
+        If they are complex, or no numbers.
+    ValueError
+        If they are no array, or no numbers.
+    """
+    array = np.asarray(values)
+    if np.iscomplexobj(array):
+        raise TypeError("the values are complex, not real")
+    return np.asarray(array, dtype=np.float64)

@@ -18,6 +18,7 @@ __all__ = [
     "Synonyms",
     "cleaned_label",
     "cleaned_sentence",
+    "cleaned_sentences",
     "compare_labels",
     "folded",
     "label_from",
@@ -36,6 +37,9 @@ _ESCAPES = re.compile(
 _UNSEEN = ("Cc", "Cf")
 # Invisible, and yet part of words and of single pictures: joiners, and the tags in some flags.
 _KEPT = frozenset("\u200c\u200d") | frozenset(map(chr, range(0xE0020, 0xE0080)))
+
+_LONGEST, _MOST = 1000, 1000
+"""Characters of a sentence, and sentences of a scene, that somebody may still read."""
 
 # Numbers of one or two digits count things; longer ones name them, as in "room 101".
 _COUNT = re.compile(r"(?<!\d)\d{1,2}$")
@@ -86,7 +90,7 @@ def cleaned_label(label: Any) -> str:
     return " ".join("".join(shown).split())
 
 
-def cleaned_sentence(text: str, longest: int) -> str:
+def cleaned_sentence(text: str, longest: int = _LONGEST) -> str:
     r"""Return a sentence as :func:`cleaned_label` does a name, cut short where it is long.
 
     Examples
@@ -99,6 +103,19 @@ def cleaned_sentence(text: str, longest: int) -> str:
     if len(cleaned) <= longest and len(start) == len(text):
         return cleaned
     return f"{cleaned[:longest]}…"
+
+
+def cleaned_sentences(texts: Sequence[str]) -> tuple[str, ...]:
+    """Return sentences, each as :func:`cleaned_sentence` does; of very many the first thousand.
+
+    Examples
+    --------
+    >>> cleaned_sentences(["A dot is left out."] * 300_000)[-1]
+    '299000 more are left out.'
+    """
+    told = tuple(map(cleaned_sentence, texts[:_MOST]))
+    more = len(texts) - len(told)
+    return (*told, f"{more} more are left out.") if more else told
 
 
 def label_from(given: Any) -> str:

@@ -16,7 +16,14 @@ from shapely.geometry.base import BaseGeometry
 from shapely.validation import explain_validity
 
 from sketchmatch.errors import InvalidInputError, Reason, quoted
-from sketchmatch.model.arrays import FloatArray, IntArray, frozen_floats, sealed, settled_middle
+from sketchmatch.model.arrays import (
+    FloatArray,
+    IntArray,
+    frozen_floats,
+    real_floats,
+    sealed,
+    settled_middle,
+)
 from sketchmatch.model.caching import cached_property
 from sketchmatch.model.labels import cleaned_label, label_from
 from sketchmatch.model.text import listed, name, shortened
@@ -375,7 +382,7 @@ def _is_ring(polygon: Any) -> bool:
 
 def _clean_ring(ring: Any, field: str) -> FloatArray:
     try:
-        points = np.asarray(ring, dtype=np.float64)
+        points = real_floats(ring)
     except (TypeError, ValueError):
         points = np.empty(0)
     if points.ndim != 2 or points.shape[1] != 2:

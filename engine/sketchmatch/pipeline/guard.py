@@ -6,13 +6,20 @@ import math
 import numbers
 from collections.abc import Generator, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import is_dataclass
+from dataclasses import is_dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sketchmatch.api import Algorithm, Histogram, JudgeProblem, MatchProblem, SearchProgress
+from sketchmatch.api import (
+    Algorithm,
+    Histogram,
+    JudgeProblem,
+    MatchProblem,
+    Outcome,
+    SearchProgress,
+)
 from sketchmatch.errors import InvalidInputError, PluginError, quoted
 from sketchmatch.model import (
     FloatArray,
@@ -23,6 +30,8 @@ from sketchmatch.model import (
     SceneObject,
     Source,
 )
+from sketchmatch.model.arrays import real_floats
+from sketchmatch.model.labels import cleaned_sentence
 from sketchmatch.registry import Registry
 from sketchmatch.registry.raised import passed_on, words_of
 
@@ -35,6 +44,7 @@ __all__ = [
     "check_map",
     "check_scene",
     "checked_array",
+    "checked_outcome",
     "checked_progress",
     "inspecting",
 ]
@@ -47,6 +57,7 @@ FEWEST = 3
 _ROUNDING = 1e-9
 _DOUBT = 1e-6
 _COUNTABLE = 2**63
+_OF_THE_HOST = (Outcome.TIME_BUDGET, Outcome.SERVER_STOPPING)
 _ROW = 4096
 _SMALL = 2**15
 """Bytes up to which an array is hashed whole: sums by column cost more."""
@@ -113,7 +124,7 @@ def check_made(algorithm: Algorithm) -> None:
 
 def checked_array(values: Any, shape: tuple[int, ...], most: float = math.inf) -> FloatArray:
     """Return what a plugin returned as an array, if it has that shape and is within 0 … most."""
-    array = np.asarray(values, dtype=np.float64)
+    array = real_floats(values)
     if array.shape != shape:
         raise ValueError(f"it returned an array of shape {array.shape}, not {shape}")
     if not np.isfinite(array).all():
@@ -159,7 +170,16 @@ def checked_progress(
             raise ValueError(f"its {name} is {quoted(count)}, not a count")
     if not isinstance(progress.note, str):
         raise TypeError(f"its note is a {type(progress.note).__name__}, not a string")
-    return progress
+    note = cleaned_sentence(progress.note)
+    return progress if note == progress.note else replace(progress, note=note)
+
+
+def checked_outcome(returned: Any) -> Outcome:
+    """Return why a search ended by itself, of which it need not say anything."""
+    outcome = Outcome(returned or Outcome.CONVERGED)
+    if outcome in _OF_THE_HOST:
+        raise ValueError(f"it returned {outcome}, which the host alone can say")
+    return outcome
 
 
 def check_map(partners: Any, problem: MatchProblem | JudgeProblem) -> None:

@@ -16,7 +16,13 @@ from sketchmatch.errors import AnswerUnavailableError
 from sketchmatch.model import BoolArray, ConfidenceWeights, IntArray, Scene
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison
-from sketchmatch.pipeline.guard import FEWEST, blaming, checked_progress, inspecting
+from sketchmatch.pipeline.guard import (
+    FEWEST,
+    blaming,
+    checked_outcome,
+    checked_progress,
+    inspecting,
+)
 from sketchmatch.pipeline.obeying import Obedience, first_parts, obedience, ruled_out
 from sketchmatch.pipeline.slices import retold
 from sketchmatch.pipeline.unmatched import Part, PartSearch, Rival, part_of, trials
@@ -176,7 +182,7 @@ def _searched(
                 except StopIteration as stop:
                     if found is None:
                         raise ValueError("it ended without any answer") from None
-                    found = replace(found, outcome=Outcome(stop.value or Outcome.CONVERGED))
+                    found = replace(found, outcome=checked_outcome(stop.value))
                     break
             found = PartSearch(part, told) if obeying is None else obeying.read(told, found)
             if time.monotonic() > until or clock.left() <= 0.0:

@@ -13,7 +13,8 @@ import numpy as np
 from sketchmatch.api import Segmentation, Segmenter
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import OccupancyGrid, Scene, Source
-from sketchmatch.model.labels import cleaned_label
+from sketchmatch.model.arrays import real_floats
+from sketchmatch.model.labels import cleaned_sentences
 from sketchmatch.model.limits import check_objects, check_source
 from sketchmatch.pipeline.guard import blaming, check_scene, inspecting
 from sketchmatch.pipeline.selection import Pipeline
@@ -120,7 +121,7 @@ def _read_by(segmenter: Segmenter, source: Source, field: str) -> tuple[Source, 
 
 def _with_notes(found: Segmentation, source: Source) -> Segmentation:
     """Put what a file's reader noted before the warnings, unless the segmenter handed it on."""
-    warnings = tuple(map(cleaned_label, found.warnings))
+    warnings = cleaned_sentences(found.warnings)
     notes = (note for note in _notes(source) if note not in warnings)
     return replace(found, warnings=(*notes, *warnings))
 
@@ -135,7 +136,7 @@ def _with_reasons(error: InvalidInputError, source: Source) -> InvalidInputError
 
 def _notes(source: Source) -> tuple[str, ...]:
     """Return what a file's reader noted, in which names of the file may stand as they were."""
-    return tuple(map(cleaned_label, getattr(source, "notes", ())))
+    return cleaned_sentences(getattr(source, "notes", ()))
 
 
 def _check_contract(found: Any) -> None:
@@ -145,13 +146,15 @@ def _check_contract(found: Any) -> None:
         raise TypeError(f"it found a {type(found.scene).__name__}, not a Scene")
     if found.route is not None:
         _check_route(found.route)
+    if not isinstance(found.warnings, tuple | list):
+        raise TypeError(f"its warnings are a {type(found.warnings).__name__}, not a tuple")
     if not all(isinstance(warning, str) for warning in found.warnings):
         raise TypeError("its warnings are not all strings")
     _check_passages(found.passages, len(found.scene))
 
 
 def _check_route(route: Any) -> None:
-    points = np.asarray(route, dtype=np.float64)
+    points = real_floats(route)
     if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
         raise ValueError(f"its route has shape {points.shape}, not (k, 2), or is not finite")
 

@@ -12,10 +12,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.kernels.directions import HalfTurns, effective_forces
 from sketchmatch.model import FloatArray, IntArray, Scene, SceneDescriptor, object_pairs
-from sketchmatch.model.arrays import sealed
+from sketchmatch.model.arrays import real_floats, sealed
 from sketchmatch.pipeline.result import ObjectRelation
 
 __all__ = [
@@ -119,7 +119,11 @@ def directional_relation(histogram: Any) -> DirectionalRelation:
     >>> f"the desk is {relation.phrase} the plant, {relation.degree:.2f}"
     'the desk is to the left of and below the plant, 0.97'
     """
-    row = np.asarray(histogram, dtype=np.float64)
+    try:
+        row = real_floats(histogram)
+    except (TypeError, ValueError):
+        problem = f"is {quoted(histogram)}; give a list of real numbers, one for each direction"
+        raise InvalidInputError(Reason.INVALID_PARAMETER, "histogram", problem) from None
     if row.ndim != 1 or len(row) < 4 or len(row) % 2:
         raise InvalidInputError(
             Reason.INVALID_PARAMETER,
