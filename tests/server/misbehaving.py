@@ -6,6 +6,7 @@ import math
 import os
 import re
 import sys
+import threading
 import time
 
 import numpy as np
@@ -303,6 +304,33 @@ class OddParamsSearcher(Searcher):
         raise NotImplementedError
 
 
+class PoisoningHistogram(Histogram):
+    """Leaves the process in a state in which nothing works any more."""
+
+    name = "poisoninghistogram"
+    summary = "Breaks its process."
+    exponent = 0.0
+
+    def describe(self, scene, pairs):
+        np.asarray = None
+        return np.ones((len(pairs), self.directions))
+
+
+class ThreadedHistogram(ConstantForce):
+    """Leaves a thread that computes as long as its process lives."""
+
+    name = "threadedhistogram"
+
+    def describe(self, scene, pairs):
+        threading.Thread(target=spin, name="spinning", daemon=True).start()
+        return super().describe(scene, pairs)
+
+
+def spin():
+    while True:
+        pass
+
+
 @unstoppable("searcher", "gave no sign of life for 1 s and was stopped")
 class SleepingSearcher(Searcher):
     def search(self, problem, rng):
@@ -533,7 +561,7 @@ def sketchmatch_register_segmenters():
 
 @hookimpl
 def sketchmatch_register_histograms():
-    return _of(Histogram)
+    return [*_of(Histogram), PoisoningHistogram, ThreadedHistogram]
 
 
 @hookimpl

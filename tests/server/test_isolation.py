@@ -187,6 +187,26 @@ def test_a_wrong_name_is_refused_for_its_own_sake_though_workers_lack_the_plugin
     assert found.object_map == {k: k for k in range(4)}
 
 
+def test_what_a_plugin_that_failed_has_changed_no_other_request_meets(patient_host):
+    with Client(patient_host.address) as client:
+        for _ in range(2):
+            with pytest.raises(ServerFailedError, match="histogram poisoninghistogram of acme-mis"):
+                client.match(scene(4), scene(4), histogram="poisoninghistogram")
+            assert len(client.segment(scene(4)).scene.objects) == 4
+
+
+def test_threads_that_a_plugin_leaves_end_with_its_process_and_are_told(patient_host, caplog):
+    with Client(patient_host.address) as client:
+        for _ in range(2):
+            found = client.match(scene(4), scene(4), histogram="threadedhistogram")
+            assert found.object_map == {k: k for k in range(4)}
+    told = [record.message for record in caplog.records if "left threads" in record.message]
+    assert told[0] == (
+        "histogram threadedhistogram of acme-misbehaving 1.2 left threads running (spinning), so "
+        "the process was ended; tell its author or choose another"
+    )
+
+
 class Others:
     """Requests that have nothing to do with a plugin, one after the other."""
 

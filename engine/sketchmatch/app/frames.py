@@ -50,6 +50,8 @@ class Says(IntEnum):
     """The work ended with an error."""
     DESCRIBED = 10
     """Histograms of a scene that is kept, to be kept beside it."""
+    LEFT = 11
+    """Threads that the work has left behind, by name: before the end of it."""
     ANSWER = 16
     """A response."""
 

@@ -9,7 +9,9 @@ import queue
 import signal
 import struct
 import threading
-from contextlib import closing, suppress
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -24,10 +26,12 @@ from sketchmatch.app.orders import Order
 from sketchmatch.app.remembered import Remembered
 from sketchmatch.app.setup import RequestLimits, Setup
 from sketchmatch.kernels._jit import on_compile
+from sketchmatch.model.labels import cleaned_sentence
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.selection import Defaults
+from sketchmatch.pipeline.slices import is_helper
 from sketchmatch.pipeline.warmup import warm_up, warm_up_others
 from sketchmatch.registry import OWN_DISTRIBUTION, PluginRules, Registry, discover
 from sketchmatch_proto.v1 import match_pb2
@@ -50,6 +54,9 @@ LOOKUPS = struct.Struct("!3I")
 """How a worker tells, at the end of each request, how often histograms were needed."""
 
 _LOADING = 120.0
+_ENDING = 0.1
+"""Seconds in which threads may come to an end that a plugin has told to."""
+_MOMENT = 0.005
 _POLITE = 10
 _FIRST_TO_GO = 500
 _CHUNK = 65536
@@ -195,13 +202,30 @@ class _Worker:
         order: Order = pickle.loads(content)
         job = order.job(self._setup.limits.max_request_bytes)
         try:
-            with closing(answers(job, self._setup, self._begun)) as responses:
+            with (
+                self._telling_of_threads(),
+                closing(answers(job, self._setup, self._begun)) as responses,
+            ):
                 for response in responses:
                     if self._stop.is_set():
                         break
                     self.say(Says.ANSWER | flags(response), response.SerializeToString())
         finally:
             self._clock = None
+
+    @contextmanager
+    def _telling_of_threads(self) -> Iterator[None]:
+        """Say which threads go on that were not there before, if there are any."""
+        before = _threads()
+        try:
+            yield
+        finally:
+            until = time.monotonic() + _ENDING
+            while (left := _threads() - before) and time.monotonic() < until:
+                time.sleep(_MOMENT)
+            if left:
+                names = ", ".join(sorted({thread.name for thread in left}))
+                self.say(Says.LEFT, cleaned_sentence(names).encode())
 
     def _begun(self, clock: Clock) -> None:
         self._clock = clock
@@ -230,6 +254,11 @@ def flags(response: Message) -> int:
     news = Flag.NEWS if response.HasField("progress") else 0
     compiles = response.progress.phase == match_pb2.PHASE_COMPILE
     return news | (Flag.EARLY if response.HasField("accepted") or compiles else 0)
+
+
+def _threads() -> set[threading.Thread]:
+    """Return the threads of this process but for those that help with any request."""
+    return {thread for thread in threading.enumerate() if not is_helper(thread)}
 
 
 def _end_unless_alive(patience: float) -> None:

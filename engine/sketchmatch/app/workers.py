@@ -9,7 +9,8 @@ killed and replaced.
 One rule more holds for other people's plugins: a worker loads those that it was started for, and a
 request that asks for one is answered by a worker of that kind. If that one gives no sign of life
 for too long, does not end when its time is over, or ends its process, then the request fails with
-the names of plugin and distribution.
+the names of plugin and distribution. A worker in which a plugin has failed, or has left threads
+behind, does no other request.
 """
 
 from __future__ import annotations
@@ -281,6 +282,8 @@ class _Worker(asyncio.Protocol):
         self._stop_until = math.inf
         self._killed = False
         self._spent = 0.0
+        self._threads = ""
+        """Names of those that strangers' plugins have left behind."""
         self._verdict: BaseException | None = None
 
     @property
@@ -445,6 +448,8 @@ class _Worker(asyncio.Protocol):
                 self._workers.described(content)
             case Says.READY:
                 self._answer(None)
+            case Says.LEFT if self._strangers:
+                self._threads = content.decode()
             case Says.ENDED:
                 if not self._strangers:
                     self._workers.looked_up(Lookups(*LOOKUPS.unpack(content)))
@@ -466,6 +471,15 @@ class _Worker(asyncio.Protocol):
         self.since = time.monotonic()
         if task.long:
             self._step_forward()
+        if self._threads:
+            _log.warning(
+                "%s left threads running (%s), so the process was ended; %s",
+                _culprits(self._strangers),
+                self._threads,
+                _REMEDY,
+            )
+        if self._threads or (self._strangers and isinstance(error, PluginError | WorkerError)):
+            self.kill()  # who failed may have changed what other requests would meet
         self._workers.done(task, None if task.stopping.is_set() else error)
 
     def _answer(self, error: BaseException | None) -> None:

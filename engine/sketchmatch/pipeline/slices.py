@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import closing
 from typing import Any, TypeVar
 
-__all__ = ["finish", "in_slices", "retold"]
+__all__ = ["finish", "in_slices", "is_helper", "retold"]
 
 _Step = TypeVar("_Step")
 _Told = TypeVar("_Told")
@@ -136,9 +136,14 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_start_pool)
 
 
+def is_helper(thread: threading.Thread) -> bool:
+    """Return whether a thread is one of the pool's, which wait for work between two."""
+    return thread.name.startswith(_THREAD_NAME)
+
+
 def _is_helping() -> bool:
     """Return whether this thread is one of the pool's, which must not wait for the others."""
-    return threading.current_thread().name.startswith(_THREAD_NAME)
+    return is_helper(threading.current_thread())
 
 
 def _usable_cpus() -> int:
