@@ -165,14 +165,14 @@ def match(
         request = MatchRequest(
             sketch=_loaded("sketch", sketch, engine),
             map=_loaded("map", map, engine),
-            selection=_selection(names, params or {}),
+            selection=_selection(names, params),
             seed=seed,
             time_budget=time_budget,
             weights=weights,
             allow_unmatched=allow_unmatched,
             unmatched_price=unmatched_price,
             alternatives=alternatives,
-            profile=profile or "",
+            profile=_profile(profile),
             pins=_pins(pins),
             synonyms=() if synonyms is None else synonyms,  # type: ignore[arg-type]  # it checks
         )
@@ -260,10 +260,10 @@ def transfer(
         matching = MatchRequest(
             sketch=_loaded("sketch", sketch, engine),
             map=_loaded("map", map, engine),
-            selection=_selection(names, params or {}),
+            selection=_selection(names, params),
             seed=seed,
             time_budget=time_budget,
-            profile=profile or "",
+            profile=_profile(profile),
             pins=_pins(pins),
             synonyms=() if synonyms is None else synonyms,  # type: ignore[arg-type]  # it checks
         )
@@ -363,9 +363,9 @@ def read_scene(
     """
     engine = _engine(config)
     with engine.limited():
-        source = read_source(Path(path), engine.registry.readers)
-    choice = Choice(segmenter or "", _mapping("params", params))
-    chosen = engine.resolve_segmenter(choice, source, profile or "")
+        source = read_source(path, engine.registry.readers)
+    choice = Choice(_name("segmenter", segmenter), _mapping("params", params))
+    chosen = engine.resolve_segmenter(choice, source, _profile(profile))
     return engine.segment(source, chosen, f"{path}: {source.field}").scene
 
 
@@ -416,9 +416,9 @@ def compare(
         "histogram": histogram,
         "similarity": similarity,
     }
-    selection = _selection(names, params or {})
+    selection = _selection(names, params)
     unread = [None if isinstance(each, Scene) else each for each in given]
-    pipeline = engine.resolve(selection, unread[0], unread[1], profile or "")
+    pipeline = engine.resolve(selection, unread[0], unread[1], _profile(profile))
     drawn, mapped = (
         engine.segment_side(side, each, pipeline).scene
         for side, each in zip(SIDES, given, strict=True)
@@ -515,7 +515,10 @@ def label_force_histograms(labels: Any, *, r: float = 0.0, directions: int = 180
     [[0.0, 0.0, 1.0, 0.0]]
     """
     params = _forces(r, directions)
-    image = np.asarray(labels)
+    try:
+        image = np.asarray(labels)
+    except ValueError:  # of rows that are not equally long
+        image = np.empty(0)
     if image.ndim != 2 or not np.issubdtype(image.dtype, np.integer):
         raise InvalidInputError(
             Reason.INVALID_IMAGE, "labels", "are not a grid of integers; give rows of labels"
@@ -550,6 +553,9 @@ def _told(
 
 def _engine(config: str | Path | None = None) -> Engine:
     """Return the engine of a configuration; limits that are in force hold for it too."""
+    if config is not None and not (isinstance(config, str | Path) and str(config)):
+        problem = f"is {quoted(config)}; give the path of a file, or leave it out"
+        raise InvalidInputError(Reason.INVALID_FIELD, "config", problem)
     engine = open_engine(load(config, search=False))
     return replace(engine, limits=source_limits(engine.limits))
 
@@ -621,20 +627,17 @@ def _loaded(side: str, given: Scene | Source | str | Path, engine: Engine) -> Sc
             "path of a file",
         )
     try:
-        return read_source(Path(given), engine.registry.readers)
+        return read_source(given, engine.registry.readers)
     except InvalidInputError as error:
-        raise error.within(side) from None
+        raise InvalidInputError(error.reason, f"{side}: {error.field}", error.problem) from None
 
 
 def _selection(
-    names: Mapping[str, str | None], params: Mapping[str, Mapping[str, Any]]
+    names: Mapping[str, str | None], params: Mapping[str, Mapping[str, Any]] | None
 ) -> Selection:
-    for stage, name in names.items():
-        if name is not None and not isinstance(name, str):
-            raise InvalidInputError(
-                Reason.INVALID_FIELD, stage, f"is {quoted(name)}; give the name of an algorithm"
-            )
-    for stage in _mapping("params", params):
+    named = {stage: _name(stage, name) for stage, name in names.items()}
+    params = _mapping("params", params)
+    for stage in params:
         if stage not in STAGES:
             raise InvalidInputError(
                 Reason.INVALID_PARAMETER,
@@ -642,9 +645,23 @@ def _selection(
                 f"is no stage; choose one of: {', '.join(STAGES)}",
             )
     return {
-        stage: Choice(names.get(stage) or "", _mapping(f"params.{stage}", params.get(stage)))
-        for stage in {*names, *params}
+        stage: Choice(named.get(stage, ""), _mapping(f"params.{stage}", params.get(stage)))
+        for stage in {*named, *params}
     }
+
+
+def _profile(given: str | None) -> str:
+    return _name("profile", given, "a profile")
+
+
+def _name(field: str, given: Any, what: str = "an algorithm") -> str:
+    """Return a name, empty where it is left out, as None alone does: no unset variable."""
+    if given is None:
+        return ""
+    if not isinstance(given, str) or not given:
+        problem = f"is {quoted(given)}; give the name of {what}, or leave it out"
+        raise InvalidInputError(Reason.INVALID_FIELD, field, problem)
+    return given
 
 
 def _pins(given: Mapping[Any, int | str | None] | Iterable[Pin] | None) -> tuple[Pin, ...]:

@@ -543,6 +543,7 @@ def test_label_images_have_180_directions_and_constant_forces_unless_told():
         np.zeros((0, 0), int),
         np.where(LABELS == 2, 7, LABELS),
         np.array([["a", "b"]]),
+        [[1, 2], [1]],
         None,
     ],
     ids=[
@@ -556,6 +557,7 @@ def test_label_images_have_180_directions_and_constant_forces_unless_told():
         "empty",
         "gap-in-labels",
         "text",
+        "uneven",
         "none",
     ],
 )

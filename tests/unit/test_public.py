@@ -4,6 +4,7 @@ import inspect
 import json
 import math
 import pickle
+import shutil
 import subprocess
 import sys
 from copy import deepcopy
@@ -23,6 +24,7 @@ from sketchmatch import (
 )
 from sketchmatch.api import Outcome
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH, LIVING_ROOM_TRUTH
+from sketchmatch.io import read_source
 from sketchmatch.model import Stroke, StrokeSet
 from sketchmatch.model.text import likelihood
 from sketchmatch.pipeline.events import Phase, Progress
@@ -251,7 +253,14 @@ def test_a_time_budget_reaches_the_match():
         ({"alternatives": 0.5}, r"alternatives is 0\.5; give a whole number"),
         ({"allow_unmatched": "yes"}, "allow_unmatched is 'yes'; give True or False"),
         ({"allow_unmatched": True, "unmatched_price": "x"}, "unmatched_price is 'x'; give a numb"),
-        ({"profile": 5}, "profile is 5, which is no profile"),
+        ({"profile": 5}, "profile is 5; give the name of a profile, or leave it out"),
+        ({"profile": []}, r"profile is \[\]; give the name of a profile, or leave it out"),
+        ({"profile": ""}, "profile is ''; give the name of a profile, or leave it out"),
+        ({"searcher": ""}, "searcher is ''; give the name of an algorithm, or leave it out"),
+        ({"params": ""}, "params is ''; give a dict of parameters"),
+        ({"config": ""}, "config is ''; give the path of a file, or leave it out"),
+        ({"config": []}, r"config is \[\]; give the path of a file, or leave it out"),
+        ({"config": 0}, "config is 0; give the path of a file, or leave it out"),
     ],
 )
 def test_a_wrong_argument_is_refused_in_one_sentence(arguments, words):
@@ -424,6 +433,25 @@ def test_a_file_that_is_not_there_is_refused_with_its_side(tmp_path, side):
     assert caught.value.field.startswith(side)
     assert "lost.svg" in str(caught.value)
     assert isinstance(caught.value, SketchmatchError)
+
+
+def test_an_empty_path_is_not_the_folder_that_we_are_in(tmp_path, monkeypatch):
+    for file in (LIVING_ROOM_MAP, LIVING_ROOM_MAP.with_suffix(".pgm")):
+        shutil.copy(file, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InvalidInputError, match=r"^sketch: path is empty; give that of a file$"):
+        match("", LIVING_ROOM_MAP)
+    for call in (read_scene, read_source):
+        with pytest.raises(InvalidInputError, match=r"^path is empty; give that of a file$"):
+            call("")
+        with pytest.raises(InvalidInputError, match=r"^path is None; give that of a file$"):
+            call(None)
+    assert len(read_scene(".")) > 2, "who means the folder says so"
+
+
+def test_a_file_that_is_not_there_is_told_from_the_side_that_it_is_for():
+    with pytest.raises(InvalidInputError, match=r"^sketch: lost\.svg does not exist; check the"):
+        match("lost.svg", LIVING_ROOM_MAP)
 
 
 @pytest.mark.parametrize("directions", [4, 36, 180])

@@ -66,11 +66,20 @@ def read_source(path: str | Path, readers: _Readers | None = None) -> Source:
         In one sentence that begins with the path, if the file is missing, of no known kind,
         too large, or its contents cannot be used.
     """
-    path = Path(path)
+    path = _as_path(path)
     with _placed_in(path):
         source = _decoded(path, readers)
         check_source(source)
         return source
+
+
+def _as_path(given: Any) -> Path:
+    """Return what is given as a path; an empty one would be the folder that we are in."""
+    if not isinstance(given, str | os.PathLike):
+        raise _invalid("path", f"is {quoted(given)}; give that of a file")
+    if not os.fspath(given):
+        raise _invalid("path", "is empty; give that of a file")
+    return Path(given)
 
 
 class FileKind(NamedTuple):
