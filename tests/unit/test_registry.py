@@ -123,7 +123,8 @@ def test_a_third_partys_plugin_is_found(install):
         ("def broken(:", "SyntaxError"),
         (
             HEADER + "@hookimpl\ndef sketchmatch_register_searcher():\n    return []",
-            "unknown hook 'sketchmatch_register_searcher'",
+            "it has sketchmatch_register_searcher, which is no hook; choose among: "
+            "sketchmatch_register_histograms, sketchmatch_register_judges, ",
         ),
         (
             HEADER + "@hookimpl\ndef sketchmatch_register_searchers():\n    raise OSError('disk')",

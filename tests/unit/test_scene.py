@@ -151,6 +151,20 @@ def test_a_scene_has_at_least_two_objects(polygons, words):
     assert caught.value.reason is Reason.TOO_FEW_OBJECTS
 
 
+def test_polygons_come_in_whatever_can_be_gone_through():
+    scene = Scene.from_polygons((SQUARE for _ in range(3)), labels=iter("abc"))
+    assert scene.labels == ("a", "b", "c")
+
+
+@pytest.mark.parametrize("given", [None, 5, np.array(5)])
+def test_what_holds_no_polygons_or_labels_is_refused(given):
+    with pytest.raises(InvalidInputError, match=r"^polygons is .*; give a list of polygons$"):
+        Scene.from_polygons(given)
+    if given is not None:
+        with pytest.raises(InvalidInputError, match=r"^labels is .*; give a list of labels$"):
+            Scene.from_polygons([SQUARE, TRIANGLE], labels=given)
+
+
 def test_a_bad_polygon_is_named_by_its_place_in_the_scene():
     with pytest.raises(InvalidInputError) as caught:
         Scene.from_polygons([SQUARE, [SQUARE, [[0, 0], [1, np.nan], [1, 0]]]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import numbers
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from html import escape
@@ -213,7 +213,7 @@ class Scene:
             )
 
     @classmethod
-    def from_polygons(cls, polygons: Sequence[Any], labels: Sequence[Any] | None = None) -> Self:
+    def from_polygons(cls, polygons: Iterable[Any], labels: Iterable[Any] | None = None) -> Self:
         """Build a scene from polygons.
 
         Parameters
@@ -240,15 +240,16 @@ class Scene:
             raise InvalidInputError(
                 Reason.INVALID_FIELD, "labels", f"is {quoted(labels)}; give a list of names"
             )
-        names = [""] * len(polygons) if labels is None else list(labels)
-        if len(names) != len(polygons):
+        given = _items("polygons", polygons)
+        names = [""] * len(given) if labels is None else _items("labels", labels)
+        if len(names) != len(given):
             raise InvalidInputError(
                 Reason.INVALID_FIELD,
                 "labels",
-                f"has {len(names)} names for {len(polygons)} polygons; give one for each",
+                f"has {len(names)} names for {len(given)} polygons; give one for each",
             )
         objects = []
-        for k, polygon in enumerate(polygons):
+        for k, polygon in enumerate(given):
             try:
                 objects.append(SceneObject.from_polygon(polygon, names[k]))
             except InvalidInputError as error:
@@ -332,6 +333,16 @@ class Scene:
         x0, y0, x1, y1 = self.bounds
         x, y = settled_middle(np.array([x0, y0]), np.array([x1, y1]))
         return (float(x), float(y))
+
+
+def _items(field: str, given: Any) -> list[Any]:
+    """Return what a list, or anything else that can be gone through, holds."""
+    try:
+        items = iter(given)
+    except TypeError:
+        problem = f"is {quoted(given)}; give a list of {field}"
+        raise InvalidInputError(Reason.INVALID_FIELD, field, problem) from None
+    return list(items)
 
 
 def _checked_certainty(value: Any) -> float:

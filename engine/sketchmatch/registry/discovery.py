@@ -187,7 +187,7 @@ def _load(point: EntryPoint) -> _Offered:
     manager = pluggy.PluginManager("sketchmatch")
     manager.add_hookspecs(hookspecs)
     manager.register(module, name=point.name)
-    manager.check_pending()
+    _check_hooks(manager)
     found = [
         (kind, _checked(kind, offered))
         for kind in Kind
@@ -205,6 +205,15 @@ def _load(point: EntryPoint) -> _Offered:
         if times > 1:
             raise ValueError(f"it offers {times} {kind.plural} named {name!r}")
     return _Offered(found, readers)
+
+
+def _check_hooks(manager: pluggy.PluginManager) -> None:
+    """Refuse what is marked as a hook and is none."""
+    hooks = {name: hook for name, hook in vars(manager.hook).items() if not name.startswith("_")}
+    known = sorted(name for name, hook in hooks.items() if hook.has_spec())
+    for name, hook in hooks.items():
+        if name not in known and not all(each.optionalhook for each in hook.get_hookimpls()):
+            raise ValueError(f"it has {name}, which is no hook; choose among: {', '.join(known)}")
 
 
 def _check_version(version: Any) -> None:
