@@ -10,6 +10,7 @@ import tomllib
 import pytest
 
 from sketchmatch import Scene, match, read_scene
+from sketchmatch.cli.serve import _setup
 from sketchmatch.config import Origin, builtin, check, entries, load, open_registry, template
 from sketchmatch.config.layers import found_file
 from sketchmatch.config.settings import static_paths
@@ -176,6 +177,22 @@ def test_a_profile_of_ones_own_changes_the_built_in_one(file):
         ("sever = 1", "{file}: sever is no setting; did you mean server?"),
         ("[server]\nx = 1", "{file}: server.x is no setting; server has: address, grace_seconds"),
         ("[limits]\nmax_objects = 'few'", "{file}: limits.max_objects is 'few'; it should be a"),
+        (
+            "[limits]\nmax_objects = '50'",
+            "{file}: limits.max_objects is '50'; it should be a",
+        ),
+        (
+            "[server]\nmax_matches = true",
+            "{file}: server.max_matches is True; it should be",
+        ),
+        (
+            "[server]\ngrace_seconds = true",
+            "{file}: server.grace_seconds is True; it should",
+        ),
+        (
+            "[algorithms.searcher.easm]\npatience = true",
+            "{file}: algorithms.searcher.easm.patience is True; it should be a valid integer",
+        ),
         ("[limits]\nmax_objects = 1", "{file}: limits.max_objects is 1; it should be greater"),
         ("[server]\ngrace_seconds = inf", "{file}: server.grace_seconds is inf; it should be a f"),
         (
@@ -294,6 +311,29 @@ def test_a_profile_of_no_use_harms_only_those_who_name_it(file):
     ]
     named = load(path, {"profile": "mine"})
     assert refused(open_registry, named).field == f"{path}: profiles.mine.searcher.name"
+
+
+def test_a_server_says_what_check_says_and_is_not_started_for_it_if_strict(file, capsys):
+    path = file(
+        "[plugins]\nallow = ['acme-missing']\n[profiles.mine.searcher]\nname = 'annealing'\n"
+    )
+    _setup(load(path))
+    said = capsys.readouterr().err.splitlines()
+    assert said == [f"sketchmatch: {fault}" for fault in check(path)[1]]
+    assert [sentence.split(" is ")[0].rpartition(" ")[2] for sentence in said] == [
+        "profiles.mine.searcher.name",
+        "plugins.allow",
+    ]
+    error = refused(_setup, load(path, {"plugins.strict": True}))
+    assert error.field == f"{path}: profiles.mine.searcher.name"
+    assert str(error).endswith("; mend it, or do without strict plugins")
+
+
+def test_numbers_that_people_write_are_numbers(monkeypatch):
+    monkeypatch.setenv("SKETCHMATCH_SERVER__GRACE_SECONDS", ".5")
+    monkeypatch.setenv("SKETCHMATCH_LIMITS__MAX_OBJECTS", "+50")
+    found = load(search=False)
+    assert (found.settings.server.grace_seconds, found.limits.max_objects) == (0.5, 50)
 
 
 def test_check_finds_every_fault(file):

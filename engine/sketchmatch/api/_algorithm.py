@@ -5,7 +5,9 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter
+from pydantic import TypeAdapter
+
+from sketchmatch.api._numbers import Plain
 
 __all__ = ["API_VERSION", "Algorithm", "Params"]
 
@@ -18,10 +20,11 @@ with suppress(Exception):
     TypeAdapter(int)
 
 
-class Params(BaseModel):
+class Params(Plain):
     """Parameters of one algorithm: frozen, nothing extra; default, bounds and text on every field.
 
-    One definition serves validation, configuration, command line, catalogue and documentation.
+    It is a model of pydantic, in which a number is neither True nor text. One definition serves
+    validation, configuration, command line, catalogue and documentation.
 
     Examples
     --------
@@ -33,8 +36,6 @@ class Params(BaseModel):
     >>> Tracing(tolerance=0.5)
     Tracing(tolerance=0.5)
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Algorithm:

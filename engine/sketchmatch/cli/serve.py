@@ -214,7 +214,9 @@ def serve(
     strict_plugins: Annotated[
         bool,
         typer.Option(
-            "--strict-plugins", help="Do not start while a plugin fails or a name is taken twice."
+            "--strict-plugins",
+            help="Do not start while a plugin fails, a name is taken twice, or the configuration "
+            "names what is not there.",
         ),
     ] = False,
 ) -> None:
@@ -348,7 +350,8 @@ def _store(folder: str | None, keep: bool) -> Path | None:
 def _setup(configuration: Configuration) -> Setup:
     """Return what requests are answered with; plugins are looked for anew."""
     from sketchmatch.app.setup import Isolation, RequestLimits, Setup, SketchLimits
-    from sketchmatch.config import refuse_faults
+    from sketchmatch.config import idle_faults, refuse_faults
+    from sketchmatch.errors import InvalidInputError
     from sketchmatch.pipeline.engine import Engine
     from sketchmatch.registry import discover
 
@@ -356,6 +359,11 @@ def _setup(configuration: Configuration) -> Setup:
     if configuration.strict:
         registry.refuse_problems()
     refuse_faults(configuration, registry)
+    for fault in idle_faults(configuration, registry):
+        if configuration.strict:
+            problem = f"{fault.problem}; mend it, or do without strict plugins"
+            raise InvalidInputError(fault.reason, fault.field, problem)
+        say(str(fault))
     server = configuration.settings.server
     stored = server.max_stored_mib_per_caller
     return Setup(

@@ -51,6 +51,7 @@ __all__ = [
     "Configuration",
     "builtin",
     "check",
+    "idle_faults",
     "load",
     "open_engine",
     "open_registry",
@@ -71,7 +72,8 @@ class Configuration:
     rules
         Which plugins may be used.
     strict
-        Whether a server may start while a plugin has failed or a name is taken twice.
+        Whether a server must not start while a plugin has failed, a name is taken twice, or what
+        is said of algorithms and distributions is of no use.
     trusted
         Canonical names of the distributions whose algorithms run in the server's own process;
         ``"*"`` stands for all.
@@ -215,6 +217,17 @@ def refuse_faults(configuration: Configuration, registry: Registry) -> None:
     """
     for fault in _faults_in_force(configuration, registry):
         raise _placed(configuration.layers, fault)
+
+
+def idle_faults(configuration: Configuration, registry: Registry) -> tuple[InvalidInputError, ...]:
+    """Return what :func:`check` finds though :func:`refuse_faults` does not mind.
+
+    It does no harm until a request asks for it, such as a profile of an algorithm that is not
+    there, or none at all, as a distribution that is not installed.
+    """
+    return tuple(
+        _placed(configuration.layers, fault) for fault in _all_faults(configuration, registry)
+    )
 
 
 def check(path: str | Path | None = None) -> tuple[Path | None, list[InvalidInputError]]:

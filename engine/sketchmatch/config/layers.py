@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -48,6 +49,8 @@ _OF_CLIENTS = (
 )
 _NO_SETTINGS = (_NAMING_FILE, "SKETCHMATCH_DEBUG", *(f"{_PREFIX}{name}" for name in _OF_CLIENTS))
 _SECTION = "__"
+# Numbers that JSON does not know, and people write.
+_SHORT_NUMBER = re.compile(r"[+-]?(\.\d+|\d+\.)|\+\d+(\.\d+)?")
 _OWN_ALONE = PluginRules.of(allow=())
 _BUILTIN = Path(__file__).with_name("builtin.toml")
 # A file may be a pipe, as of a shell's <(…), but no endless device.
@@ -92,13 +95,13 @@ def value_of(text: str) -> Any:
 
     Examples
     --------
-    >>> value_of("400"), value_of("pairwise")
-    (400, 'pairwise')
+    >>> value_of("400"), value_of("pairwise"), value_of(".5")
+    (400, 'pairwise', 0.5)
     """
     try:
         return json.loads(text)
     except (ValueError, RecursionError):
-        return text
+        return float(text) if _SHORT_NUMBER.fullmatch(text) else text
 
 
 def found_file(named: str | Path | None) -> Path | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Self, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, create_model
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, create_model
 from pydantic_settings import (
     BaseSettings,
     InitSettingsSource,
@@ -13,6 +13,7 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 
+from sketchmatch.api._numbers import Plain
 from sketchmatch.config.addresses import address_fault, bridge_fault, network_fault
 from sketchmatch.model.limits import SourceLimits
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
@@ -68,11 +69,7 @@ _Parameters = dict[str, Any]
 _Named = dict[str, _Parameters]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class _Stage(_Section):
+class _Stage(Plain):
     """The algorithm of one stage."""
 
     name: str = Field("", description="Name of the algorithm.")
@@ -80,7 +77,7 @@ class _Stage(_Section):
 
 
 _EACH_STAGE: dict[str, Any] = {stage: (_Stage, _Stage()) for stage in STAGES}
-_Stages: Any = create_model("_Stages", __base__=_Section, **_EACH_STAGE)
+_Stages: Any = create_model("_Stages", __base__=Plain, **_EACH_STAGE)
 
 
 class _Pipeline(_Stages):
@@ -103,17 +100,17 @@ class _Profile(_Stages):
     )
 
 
-class _Algorithms(_Section):
+class _Algorithms(Plain):
     """Parameters of an algorithm, wherever it is chosen."""
 
-    segmenter: _Named = {}
-    histogram: _Named = {}
-    similarity: _Named = {}
-    searcher: _Named = {}
-    judge: _Named = {}
+    segmenter: _Named = Field({})
+    histogram: _Named = Field({})
+    similarity: _Named = Field({})
+    searcher: _Named = Field({})
+    judge: _Named = Field({})
 
 
-class _Plugins(_Section):
+class _Plugins(Plain):
     """Which plugins may be used, and how far they are trusted. All are named by distribution."""
 
     allow: _Names | None = Field(
@@ -125,7 +122,8 @@ class _Plugins(_Section):
     deny: _Names = Field((), description="Distributions whose plugins may not be used.")
     strict: bool = Field(
         False,
-        description="Do not start a server while a plugin has failed or a name is taken twice.",
+        description="Do not start a server while a plugin has failed, a name is taken twice, or "
+        "the configuration names what is not there.",
     )
     trusted: _Names = Field(
         (),
@@ -139,7 +137,7 @@ class _Plugins(_Section):
     )
 
 
-class _Server(_Section):
+class _Server(Plain):
     """What `sketchmatch serve` listens on and lets requests ask for."""
 
     address: Annotated[str, AfterValidator(_listening)] = Field(
@@ -317,7 +315,7 @@ class _Server(_Section):
     )
 
 
-class _Limits(_Section):
+class _Limits(Plain):
     """How large one sketch or one map may be, in a file or in a request."""
 
     max_bytes: int = Field(
