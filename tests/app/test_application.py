@@ -353,6 +353,8 @@ def test_whose_algorithms_are_asked_for_is_told_without_decoding_anything(reques
         (match_request(SCENE, SCENE, searcher="held", judge="nobody"), "pipeline.judge.name"),
         (match_request(SCENE, SCENE, profile="nobody"), "pipeline.profile"),
         (segment_request(SCENE, segmenter="nobody"), "segmenter.name"),
+        (match_request(SCENE, sources.file(b"", name="map.plan")), "map.file"),
+        (segment_request(sources.file(b"", name="map.plan")), "source.file"),
         (
             CreateSketchRequest(match=match_request(SCENE, SCENE, searcher="nobody")),
             "match.pipeline.searcher.name",

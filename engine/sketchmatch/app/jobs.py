@@ -131,11 +131,14 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
     Raises
     ------
     InvalidInputError
-        If an algorithm or the profile is unknown, with its path in the request.
+        If an algorithm, the profile or the kind of a file is unknown, with its path in the request.
     """
     request, profile, place = job.request, "", "pipeline"
     if isinstance(request, CreateSketchRequest):
-        request, place = request.match, "match.pipeline"
+        try:
+            return algorithms(replace(job, request=request.match), setup)
+        except InvalidInputError as error:
+            raise error.within("match") from None
     readers = setup.engine.registry.readers
     match request:
         case MatchRequest() | TransferRequest():
@@ -144,9 +147,9 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
                 "sketch_segmenter": requests.source_type(request.sketch, readers),
                 "map_segmenter": requests.source_type(request.map, readers),
             }
-            files = [request.sketch, request.map]
+            files = {"sketch": request.sketch, "map": request.map}
         case SegmentRequest(profile=profile) | PutSceneRequest(profile=profile):
-            found, files = requests.source_type(request.source, readers), [request.source]
+            found, files = requests.source_type(request.source, readers), {"source": request.source}
             stage, place = "sketch_segmenter" if found is None else stage_of(found), ""
             selection, types = {stage: requests.choice(request.segmenter)}, {stage: found}
         case _:
@@ -157,7 +160,7 @@ def algorithms(job: Job, setup: Setup) -> tuple[Registered | RegisteredReader, .
         for stage, choice in selection.items()
         if stage in sources or not stage.endswith("segmenter")
     }
-    kinds = (requests.file_kind(file, readers) for file in files)
+    kinds = (requests.file_kind(file, field, readers) for field, file in files.items())
     reading = tuple(kind.reader for kind in kinds if kind is not None and kind.reader is not None)
     try:
         chosen = chosen_algorithms(

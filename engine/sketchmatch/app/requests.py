@@ -254,18 +254,29 @@ def source_type(
     message: source_pb2.Source, readers: Sequence[RegisteredReader] = ()
 ) -> type[Source] | None:
     """Return what :func:`source` makes of a sketch or a map; None where nobody knows."""
-    kind = file_kind(message, readers)
+    try:
+        kind = file_kind(message, "", readers)
+    except InvalidInputError:
+        return None
     return _TYPES.get(message.WhichOneof("kind") or "") if kind is None else kind.source
 
 
-def file_kind(message: source_pb2.Source, readers: Sequence[RegisteredReader]) -> FileKind | None:
-    """Return what kind of file a source is; None if it is none, or of no known kind."""
+def file_kind(
+    message: source_pb2.Source, field: str, readers: Sequence[RegisteredReader]
+) -> FileKind | None:
+    """Return what kind of file a source is; None if it is none.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is of no known kind, with a path that begins with ``field``.
+    """
     if message.WhichOneof("kind") != "file":
         return None
     try:
         return kind_of_file(message.file.name, message.file.data, readers)
-    except InvalidInputError:
-        return None
+    except InvalidInputError as error:
+        raise error.within(f"{field}.file") from None
 
 
 def time_budget(request: _Matching, limits: RequestLimits) -> float | None:
