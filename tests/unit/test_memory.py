@@ -1,5 +1,8 @@
 """What is remembered of scenes is what would be computed, to the last digit."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -139,6 +142,16 @@ def test_what_was_used_longest_ago_makes_room():
     memory.keep(scenes[2], third)
     assert [memory.descriptor(each, made) for each in scenes] == [first, None, third]
     assert [each for each, _ in told] == scenes
+
+
+def test_what_made_room_or_is_too_large_is_held_nowhere():
+    made, memory = histogram(), Memory(2 * 36 * 8)
+    pairs = [scene([(0, 1.0), (k, 1.0)]) for k in (1, 2, 3)]
+    larger = scene([(0, 1.0), (1, 1.0), (2, 1.0)])
+    held = [weakref.ref(describe(each, memory)) for each in (*pairs, larger)]
+    gc.collect()
+    assert [each() is not None for each in held] == [False, True, True, False]
+    assert [memory.pairs(each, made) is not None for each in pairs] == [False, True, True]
 
 
 def test_what_is_kept_elsewhere_is_fetched_once_and_not_told():

@@ -34,11 +34,11 @@ _TABLE_BYTES = 4 * 1024 * 1024
 
 @dataclass(frozen=True)
 class _Described:
-    """A scene and its histograms, with the place of each object by its outline."""
+    """A scene whose histograms were met lately, with the place of each object by its outline."""
 
+    key: tuple[str, str]
     scene: Scene
     places: dict[bytes, int]
-    descriptor: SceneDescriptor
 
 
 @dataclass(frozen=True)
@@ -160,9 +160,9 @@ class Memory:
         key, size = (descriptor.scene, descriptor.described_by), descriptor.histograms.nbytes
         places = {_outline(item): k for k, item in enumerate(scene.objects)}
         with self._lock:
-            self._recent.appendleft(_Described(scene, places, descriptor))
             if key in self._known or size > self._max_bytes:
                 return
+            self._recent.appendleft(_Described(key, scene, places))
             self._known[key] = descriptor
             self._bytes += size
             while self._bytes > self._max_bytes:
@@ -182,18 +182,22 @@ class Memory:
             return None
         wanted = histogram.identity
         with self._lock:
-            recent = [each for each in self._recent if each.descriptor.described_by == wanted]
+            recent = [
+                (each, self._known[each.key])
+                for each in self._recent
+                if each.key[1] == wanted and each.key in self._known
+            ]
         outlines = [_outline(item) for item in scene.objects]
-        best: tuple[int, _Described] | None = None
-        for each in recent:
+        best: tuple[int, _Described, SceneDescriptor] | None = None
+        for each, descriptor in recent:
             if each.scene.middle == scene.middle:
                 shared = sum(outline in each.places for outline in outlines)
                 if shared >= 2 and (best is None or shared > best[0]):
-                    best = shared, each
+                    best = shared, each, descriptor
         if best is None:
             return None
-        former = [best[1].places.get(outline, -1) for outline in outlines]
-        return _copied(former, best[1].descriptor)
+        _, other, descriptor = best
+        return _copied([other.places.get(outline, -1) for outline in outlines], descriptor)
 
     def rows(
         self, template: SceneDescriptor, argument: SceneDescriptor, similarity: Similarity
