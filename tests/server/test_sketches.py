@@ -309,8 +309,30 @@ def test_revisions_of_long_ago_are_forgotten(client):
         for k in range(258):
             sketch.update({"s0": [(0, 0), (k, 1)]})
         sketch.update(restore=3)
-        with pytest.raises(InvalidRequestError, match="is 3; give one from 4 to 259"):
+        with pytest.raises(InvalidRequestError, match="no longer kept; give one from 4 to 259"):
             sketch.update(restore=3)
+
+
+def test_the_oldest_revisions_of_a_large_sketch_are_forgotten_sooner(client):
+    ink = np.resize(outline(0), (30_000, 2))
+    with client.sketch(MAP) as sketch:
+        sketch.update({"small": outline(1)})
+        for k in range(6):
+            made = sketch.update({"large": ink + k, "more": outline(2)}).revision
+        with pytest.raises(InvalidRequestError, match=r"is 1, .*; give one from [3-6] to 7"):
+            sketch.update(restore=1)
+        assert sketch.update(restore=made - 1).stroke_count == 3
+        sketch.update(erase=["large"])
+        assert sketch.update(restore=made + 1).stroke_count == 3
+
+
+def test_revisions_that_share_their_strokes_are_no_larger_for_it(client):
+    ink = np.resize(outline(0), (30_000, 2))
+    with client.sketch(MAP) as sketch:
+        sketch.update({"large": ink})
+        for k in range(20):
+            sketch.update({"small": outline(1, k)})
+        assert sketch.update(restore=0).stroke_count == 0
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,16 @@ only the relations of objects that changed are described and compared with the m
 from __future__ import annotations
 
 import asyncio
+import itertools
 import logging
 import math
 import secrets
 import time
-from collections.abc import AsyncGenerator, Coroutine, Mapping
+from collections import Counter
+from collections.abc import AsyncGenerator, Coroutine, Iterator, Mapping
 from contextlib import aclosing, suppress
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from sketchmatch.app.following import followed
 from sketchmatch.app.packed import Packed
@@ -62,6 +64,12 @@ __all__ = ["Sketches", "question"]
 _log = logging.getLogger(__name__)
 
 _REVISIONS = 256
+_BYTES = 8 * 1024 * 1024
+"""Memory for the revisions of a sketch; beyond it the oldest are forgotten, never the latest."""
+
+_OF_MESSAGE, _OF_POINT = 1024, 48
+"""Bytes of memory that a message takes, and a point in it, beside those it is sent as."""
+
 _LONGEST_NAME = 64
 # Seconds for which a sketch that nobody draws or watches is kept, although its creator begins more.
 _SPARED = 60.0
@@ -74,6 +82,8 @@ _PEN_RESTS = 0.15
 _OVERTAKEN = 0.5
 """Seconds after which a match of a revision that is not the latest is given up."""
 
+_Part = TypeVar("_Part", Stroke, Pin)
+
 
 @dataclass(frozen=True)
 class _State:
@@ -81,6 +91,11 @@ class _State:
 
     strokes: Mapping[str, Stroke] = field(default_factory=dict)
     pins: tuple[Pin, ...] = ()
+
+    @property
+    def parts(self) -> Iterator[Stroke | Pin]:
+        """All that it consists of."""
+        return itertools.chain(self.strokes.values(), self.pins)
 
 
 class _Board(Log[bytes]):
@@ -133,7 +148,10 @@ class _Sketch:
         self.runner: asyncio.Task[None] | None = None
         self._request = request
         self._y_axis = y_axis
-        self._states = {0: _State(pins=tuple(request.pins))}
+        self._states: dict[int, _State] = {}
+        self._uses: Counter[int] = Counter()
+        self._bytes = 0
+        self._keep(_State(pins=tuple(request.pins)))
         self.board.put("map", _map_event(StoredScene.FromString(record)))
 
     @property
@@ -144,20 +162,36 @@ class _Sketch:
     def at(self, revision: int) -> _State:
         """Return what was drawn in a revision that is still known."""
         if revision not in self._states:
-            oldest = min(self._states)
+            forgotten = revision < (oldest := min(self._states))
             raise InvalidInputError(
                 Reason.INVALID_FIELD,
                 "restore_revision",
-                f"is {revision}; give one from {oldest} to {self.revision}",
+                f"is {revision}, which is {'no longer kept' if forgotten else 'yet to be made'}; "
+                f"give one from {oldest} to {self.revision}",
             )
         return self._states[revision]
 
     def change(self, state: _State) -> None:
-        """Make the next revision."""
+        """Make the next revision, and forget the oldest that are too many or take too much."""
         self.revision += 1
-        self._states[self.revision] = state
-        self._states.pop(self.revision - _REVISIONS, None)
+        self._keep(state)
+        while len(self._states) > 1 and (len(self._states) > _REVISIONS or self._bytes > _BYTES):
+            self._forget(min(self._states))
         self.changed.set()
+
+    def _keep(self, state: _State) -> None:
+        self._states[self.revision] = state
+        for part in state.parts:  # which revisions share
+            if not self._uses[id(part)]:
+                self._bytes += _size(part)
+            self._uses[id(part)] += 1
+
+    def _forget(self, revision: int) -> None:
+        for part in self._states.pop(revision).parts:
+            self._uses[id(part)] -= 1
+            if not self._uses[id(part)]:
+                del self._uses[id(part)]
+                self._bytes -= _size(part)
 
     def request(self) -> bytes:
         """Return the request for a match of the latest revision."""
@@ -217,7 +251,7 @@ class Sketches:
             state = sketch.at(request.restore_revision)
         state = replace(state, strokes=self._drawn(dict(state.strokes), request))
         if request.HasField("pins"):
-            state = replace(state, pins=tuple(request.pins.pins))
+            state = replace(state, pins=tuple(map(_apart, request.pins.pins)))
         sketch.change(state)
         return UpdateSketchResponse(revision=sketch.revision, stroke_count=len(state.strokes))
 
@@ -334,9 +368,7 @@ class Sketches:
                     f"set_strokes[{k}].stroke_id",
                     f"has {len(each.stroke_id)} characters; give a name of 1 to {_LONGEST_NAME}",
                 )
-            stroke = Stroke()
-            stroke.CopyFrom(each.stroke)
-            strokes[each.stroke_id] = stroke
+            strokes[each.stroke_id] = _apart(each.stroke)
         if len(strokes) > self._limits.strokes:
             raise _too_large("set_strokes", len(strokes), "strokes", self._limits.strokes)
         points = sum(len(stroke.points) for stroke in strokes.values())
@@ -465,6 +497,19 @@ def _told(event: MatchResponse, taken: float) -> tuple[str, WatchSketchResponse]
             result = SketchResult(result=event.result, question=question(event.result))
             return "outcome", WatchSketchResponse(result=result)
     return None
+
+
+def _apart(part: _Part) -> _Part:
+    """Return a part of a message by itself: as it is, it keeps the whole message in memory."""
+    copy = type(part)()
+    copy.CopyFrom(part)
+    return copy
+
+
+def _size(part: Stroke | Pin) -> int:
+    """Return about how many bytes of memory a message takes."""
+    points = len(part.points) if isinstance(part, Stroke) else 0
+    return _OF_MESSAGE + _OF_POINT * points + part.ByteSize()
 
 
 def _map_event(record: StoredScene) -> WatchSketchResponse:

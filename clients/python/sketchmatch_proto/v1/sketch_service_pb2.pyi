@@ -88,8 +88,8 @@ class UpdateSketchRequest(google.protobuf.message.Message):
     sketch_id: builtins.str
     """The sketch. Required."""
     restore_revision: builtins.int
-    """Returns to the strokes and pins of this revision, one of the last 256: undo, and redo, too. The
-    numbers go on.
+    """Returns to the strokes and pins of this revision: undo, and redo, too. The numbers go on. The last
+    256 are kept, or fewer where what was drawn in them takes more than some 100 000 points together.
     """
     @property
     def set_strokes(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___SketchStroke]:
