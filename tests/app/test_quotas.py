@@ -7,7 +7,7 @@ import pytest
 from sketchmatch.app.jobs import Job, answers
 from sketchmatch.app.quotas import Rates
 from sketchmatch.errors import InvalidInputError, Reason, TooBusyError
-from sketchmatch_client import match_request
+from sketchmatch_client import features, match_request, transfer_request
 from tests.app.test_application import SCENE, Held, held, setup, until  # noqa: F401
 from tests.app.test_matches import ALICE, BOB, endless, matched, named, serving
 
@@ -79,6 +79,15 @@ def test_a_match_of_too_many_comparisons_is_refused_before_it_makes_them():
     with pytest.raises(InvalidInputError, match="makes 360 comparisons in 40 directions") as no:
         asked(request, max_comparisons=3 * 3 * 40 - 1)
     assert (no.value.reason, no.value.field) == (Reason.LIMIT_EXCEEDED, "sketch")
+
+
+def test_a_match_that_is_made_to_carry_something_may_cost_no_more():
+    options = {"params": {"histogram": {"directions": 40}, "searcher": {"generations": 30}}}
+    request = transfer_request(SCENE, SCENE, [features.point(0, 0)], searcher="easm", **options)
+    for name, limit in {"max_comparisons": 3 * 3 * 40, "max_candidates": 10**9}.items():
+        assert asked(request, **{name: limit})
+        with pytest.raises(InvalidInputError, match="more than this server's limit of 8"):
+            asked(request, **{name: 8})
 
 
 def test_a_search_of_too_many_maps_is_refused_by_its_parameters():

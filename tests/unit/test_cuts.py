@@ -273,6 +273,22 @@ def test_scenes_are_told_once_and_are_those_of_the_cut_that_fits():
     assert seen[-1].result.object_map == {k: k for k in range(len(NAMES))}
 
 
+def test_what_is_too_much_is_refused_before_any_cut_is_compared(monkeypatch):
+    asked = []
+
+    def check(_, scenes):
+        asked.append(scenes and tuple(map(len, scenes)))
+        if scenes:
+            raise InvalidInputError(Reason.LIMIT_EXCEEDED, "sketch", "is too much")
+
+    monkeypatch.setattr("sketchmatch.pipeline.match.described", lambda *_: pytest.fail("compared"))
+    sketch, _ = drawn()
+    request = MatchRequest(source_of(sketch.scene), floor().scene, selection=CUT)
+    with pytest.raises(InvalidInputError, match="is too much"):
+        list(run_match(request, with_cuts(), check=check))
+    assert asked == [None, (7, 7)]
+
+
 def cut_once(segmenter, source):
     yield segmenter.segment(source)
     pytest.fail("it was asked for another cut")

@@ -2,51 +2,44 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from sketchmatch.app.setup import RequestLimits
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import Scene
 from sketchmatch.model.relations import pair_count
-from sketchmatch.pipeline.describe import with_directions
-from sketchmatch.pipeline.events import Accepted, MatchEvent, Segmented
 from sketchmatch.pipeline.selection import Pipeline
-from sketchmatch.registry import Registry
 
 __all__ = ["Costs"]
 
 
+@dataclass(frozen=True)
 class Costs:
-    """Refuses a match whose cost, as its events tell it, is beyond the limits.
+    """Refuses a match whose cost is beyond the limits.
 
-    Parameters
+    Attributes
     ----------
     limits
         What a match may cost.
-    registry
-        Where its algorithms come from.
     """
 
-    def __init__(self, limits: RequestLimits, registry: Registry) -> None:
-        self._limits = limits
-        self._registry = registry
-        self._pipeline: Pipeline | None = None
+    limits: RequestLimits
 
-    def check(self, event: MatchEvent) -> None:
-        """Look at the next event.
+    def check(self, pipeline: Pipeline, scenes: tuple[Scene, Scene] | None) -> None:
+        """Look at the algorithms of a match, or at two scenes that they are to compare.
 
         Raises
         ------
         InvalidInputError
             If the match costs too much, with the path of the field that makes it so.
         """
-        match event:
-            case Accepted():
-                self._pipeline = event.pipeline
-                self._check_candidates(event.pipeline)
-            case Segmented() if self._pipeline is not None:
-                self._check_comparisons(self._pipeline, event.sketch.scene, event.map.scene)
+        if scenes is None:
+            self._check_candidates(pipeline)
+        else:
+            self._check_comparisons(pipeline.histogram.directions, *scenes)
 
     def _check_candidates(self, pipeline: Pipeline) -> None:
-        limit, parameters = self._limits.max_candidates, pipeline.searcher.params
+        limit, parameters = self.limits.max_candidates, pipeline.searcher.params
         generations = getattr(parameters, "generations", None)
         population = getattr(parameters, "population", None) or 1
         if limit is None or not isinstance(generations, int) or not isinstance(population, int):
@@ -59,10 +52,9 @@ class Costs:
                 f"{population}, more than this server's limit of {limit}; ask for fewer of either",
             )
 
-    def _check_comparisons(self, pipeline: Pipeline, sketch: Scene, map_: Scene) -> None:
-        if (limit := self._limits.max_comparisons) is None:
+    def _check_comparisons(self, directions: int, sketch: Scene, map_: Scene) -> None:
+        if (limit := self.limits.max_comparisons) is None:
             return
-        directions = with_directions(pipeline.histogram, self._registry, sketch, map_).directions
         comparisons = pair_count(len(sketch)) * pair_count(len(map_)) * directions
         if comparisons > limit:
             raise InvalidInputError(

@@ -182,7 +182,7 @@ def time_budget(job: Job, setup: Setup) -> float | None:
 def _match(
     job: Job, request: MatchRequest, setup: Setup, begun: Callable[[Clock], None]
 ) -> Generator[Message, None, None]:
-    engine = setup.engine
+    engine = replace(setup.engine, check=Costs(setup.limits).check)
     with engine.limited():
         value = requests.match_request(
             request, setup.limits, engine.registry.readers, _stored(job, setup)
@@ -196,9 +196,7 @@ def _match(
         _stopping(clock),
         closing(engine.match(value, job.id, clock)) as events,
     ):
-        costs = Costs(setup.limits, engine.registry)
         for event in events:
-            costs.check(event)
             yield writer.response(event)
 
 
@@ -206,7 +204,7 @@ def _transfer(
     job: Job, request: TransferRequest, setup: Setup, begun: Callable[[Clock], None]
 ) -> Generator[Message, None, None]:
     """Carry features; before the response there is the progress of the match, a sign of life."""
-    engine = setup.engine
+    engine = replace(setup.engine, check=Costs(setup.limits).check)
     with engine.limited():
         value = requests.transfer_request(
             request, setup.limits, engine.registry.readers, _stored(job, setup)

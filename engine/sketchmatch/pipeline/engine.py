@@ -14,7 +14,7 @@ from sketchmatch.pipeline.compare import Comparison, check_scenes, compare
 from sketchmatch.pipeline.describe import check_histograms, described, with_directions
 from sketchmatch.pipeline.events import MatchEvent
 from sketchmatch.pipeline.judge import Judged, judged
-from sketchmatch.pipeline.match import run_match
+from sketchmatch.pipeline.match import Check, run_match, unchecked
 from sketchmatch.pipeline.memory import Memory
 from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch.pipeline.search import Goal, Search, search
@@ -51,6 +51,8 @@ class Engine:
         How large a sketch or a map may be.
     memory
         What of scenes need not be described again; None where nothing is remembered.
+    check
+        As for :func:`~sketchmatch.pipeline.match.run_match`.
 
     Examples
     --------
@@ -67,6 +69,7 @@ class Engine:
     defaults: Defaults = UNCONFIGURED
     limits: SourceLimits = field(default_factory=SourceLimits)
     memory: Memory | None = field(default=None, compare=False)
+    check: Check = field(default=unchecked, compare=False)
 
     @contextmanager
     def limited(self) -> Iterator[None]:
@@ -79,7 +82,14 @@ class Engine:
     ) -> Generator[MatchEvent, None, None]:
         """Match, event by event, as :func:`sketchmatch.pipeline.match.run_match` does."""
         return run_match(
-            request, self.registry, self.defaults, self.limits, match_id, clock, self.memory
+            request,
+            self.registry,
+            self.defaults,
+            self.limits,
+            match_id,
+            clock,
+            self.memory,
+            self.check,
         )
 
     def resolve(

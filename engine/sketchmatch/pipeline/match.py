@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import uuid
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TypeVar
@@ -47,12 +47,19 @@ from sketchmatch.pipeline.slices import retold
 from sketchmatch.pipeline.warmup import loading_kernels
 from sketchmatch.registry import Kind, Registry
 
-__all__ = ["run_match"]
+__all__ = ["Check", "run_match", "unchecked"]
 
 _Value = TypeVar("_Value")
 
+Check = Callable[[Pipeline, tuple[Scene, Scene] | None], None]
+"""Raises where algorithms, or these and the scenes that they are to compare, are too much."""
+
 _AMPLE = 10.0
 """Of the time that finding objects takes: what must be left for trying other cuts of them."""
+
+
+def unchecked(pipeline: Pipeline, scenes: tuple[Scene, Scene] | None) -> None:
+    """Let everything pass."""
 
 
 def run_match(
@@ -63,6 +70,7 @@ def run_match(
     match_id: str = "",
     clock: Clock | None = None,
     memory: Memory | None = None,
+    check: Check = unchecked,
 ) -> Generator[MatchEvent, None, None]:
     """Match, yielding Accepted, Segmented, some Progress (at most 20 a second) and Finished.
 
@@ -85,6 +93,8 @@ def run_match(
         is none.
     memory
         What of the scenes need not be described again; None where nothing is remembered.
+    check
+        Asked at once, before there are scenes, and again before any are compared.
 
     Raises
     ------
@@ -96,7 +106,8 @@ def run_match(
         If a plugin breaks its contract.
     """
     clock = clock or Clock(request.time_budget)
-    plan = _planned(request, registry, defaults)
+    plan = _planned(request, registry, defaults, check)
+    check(plan.pipeline, None)
     name = match_id or uuid.uuid4().hex
     return _events(request, plan, registry, limits or source_limits(), name, clock, memory)
 
@@ -113,14 +124,17 @@ class _Plan:
         What is sought, but for how many alternatives: that depends on the scenes.
     usual
         As in :class:`~sketchmatch.api.JudgeProblem`.
+    check
+        As for :func:`run_match`.
     """
 
     pipeline: Pipeline
     goal: Goal
     usual: bool
+    check: Check
 
 
-def _planned(request: MatchRequest, registry: Registry, defaults: Defaults) -> _Plan:
+def _planned(request: MatchRequest, registry: Registry, defaults: Defaults, check: Check) -> _Plan:
     try:
         pipeline = resolve(
             registry,
@@ -138,7 +152,7 @@ def _planned(request: MatchRequest, registry: Registry, defaults: Defaults) -> _
     check_pins_obeyed(request.pins, pipeline.searcher)
     price = price_in_force(request, profile, weights, pipeline, registry)
     goal = Goal(weights, price, seed=request.seed, at_once=finds_partial(pipeline, registry))
-    return _Plan(pipeline, goal, _is_usual(pipeline, registry))
+    return _Plan(pipeline, goal, _is_usual(pipeline, registry), check)
 
 
 def _is_usual(pipeline: Pipeline, registry: Registry) -> bool:
@@ -235,8 +249,9 @@ def _matched(
     scenes = (sketch.scene, map_.scene)
     check_scenes(scenes, pipeline.histogram)
     check_exponent(pipeline.histogram.exponent)
-    yield Segmented(sketch, map_)
     pipeline = replace(pipeline, histogram=with_directions(pipeline.histogram, registry, *scenes))
+    plan.check(pipeline, scenes)
+    yield Segmented(sketch, map_)
     shown = alternatives_wanted(request.alternatives, *scenes)
     # How likely the answer is follows from maps that compete with it, seen or not.
     wanted = max(shown, alternatives_wanted(None, *scenes))
