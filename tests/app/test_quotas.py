@@ -6,7 +6,7 @@ import pytest
 
 from sketchmatch.app.jobs import Job, answers
 from sketchmatch.app.quotas import Rates
-from sketchmatch.errors import InvalidInputError, Reason, TooBusyError
+from sketchmatch.errors import InvalidInputError, PluginError, Reason, TooBusyError
 from sketchmatch_client import features, match_request, transfer_request
 from tests.app.test_application import SCENE, Held, held, setup, until  # noqa: F401
 from tests.app.test_matches import ALICE, BOB, endless, matched, named, serving
@@ -94,8 +94,34 @@ def test_a_search_of_too_many_maps_is_refused_by_its_parameters():
     params = {"searcher": {"population": 20, "generations": 30}}
     request = match_request(SCENE, SCENE, searcher="easm", params=params)
     assert asked(request, max_candidates=600)
-    with pytest.raises(InvalidInputError, match="makes 600 maps to weigh") as no:
+    with pytest.raises(InvalidInputError, match="let 'easm' weigh 600 maps") as no:
         asked(request, max_candidates=599)
     assert no.value.reason is Reason.LIMIT_EXCEEDED
-    assert no.value.field == "pipeline.searcher.parameters.generations"
-    assert asked(match_request(SCENE, SCENE), max_candidates=1)  # it has no generations
+    assert no.value.field == "pipeline.searcher.parameters"
+    assert asked(match_request(SCENE, SCENE), max_candidates=1)  # no parameter says how many
+
+
+@pytest.mark.parametrize(
+    ("searcher", "parameters"),
+    [
+        ("easm", {"generations": 2}),
+        ("nn", {"seed_points": 1001}),
+        ("nn-pso", {"particles": 7, "iterations": 143}),
+        ("fsnn-pso", {"particles": 143, "iterations": 7}),
+        ("direct", {"population": 2, "offspring": 1001}),
+    ],
+)
+def test_all_searchers_whose_parameters_say_how_much_they_weigh_are_held_to_it(
+    searcher, parameters
+):
+    request = match_request(SCENE, SCENE, searcher=searcher, params={"searcher": parameters})
+    with pytest.raises(InvalidInputError, match=r"weigh 1[02]0[01] maps, .* limit of 1000"):
+        asked(request, max_candidates=1000)
+    assert asked(request, max_candidates=1200)
+
+
+@pytest.mark.parametrize("said", ["many", 0, 1.5])
+def test_a_searcher_that_does_not_say_a_number_is_blamed(monkeypatch, said):
+    monkeypatch.setattr("sketchmatch_builtin.searchers.align.Align.most_maps", said)
+    with pytest.raises(PluginError, match=f"its most_maps is .*{said}"):
+        asked(match_request(SCENE, SCENE), max_candidates=1)

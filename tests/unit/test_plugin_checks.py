@@ -490,6 +490,10 @@ SEARCHERS = {
         "its object map matches 1 objects, and at least 3 must",
         like(RandomMaps, partial=True, search=search(with_one_object)),
     ),
+    "iterations-are-no-more-than-maps": (
+        "it says most_maps = 24, and has made 25 iterations",
+        like(RandomMaps, most_maps=24),
+    ),
     "starts-are-taken": (
         "it claims ζ =",
         like(RandomMaps, warm=True, search=search(boasting_of_starts)),

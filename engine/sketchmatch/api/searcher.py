@@ -156,6 +156,15 @@ class Searcher(Algorithm, ABC):
         """Whether it is quick where a problem has maps to start with: ``MatchProblem.start``."""
         return False
 
+    @property
+    def most_maps(self) -> int | None:
+        """How many maps it makes at most by its parameters, whatever the scenes.
+
+        It grows, breeds or improves each of them, and has no more iterations than that. A server
+        may refuse what is beyond its limit. None, as here, is where no parameter says it.
+        """
+        return None
+
     @abstractmethod
     def search(
         self, problem: MatchProblem, rng: np.random.Generator

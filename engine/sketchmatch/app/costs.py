@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sketchmatch.api import Searcher
 from sketchmatch.app.setup import RequestLimits
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import Scene
 from sketchmatch.model.relations import pair_count
+from sketchmatch.pipeline.request import most_maps
 from sketchmatch.pipeline.selection import Pipeline
+from sketchmatch.registry import Registry
 
 __all__ = ["Costs"]
 
@@ -21,9 +24,12 @@ class Costs:
     ----------
     limits
         What a match may cost.
+    registry
+        Where its algorithms come from.
     """
 
     limits: RequestLimits
+    registry: Registry
 
     def check(self, pipeline: Pipeline, scenes: tuple[Scene, Scene] | None) -> None:
         """Look at the algorithms of a match, or at two scenes that they are to compare.
@@ -34,22 +40,20 @@ class Costs:
             If the match costs too much, with the path of the field that makes it so.
         """
         if scenes is None:
-            self._check_candidates(pipeline)
+            self._check_candidates(pipeline.searcher)
         else:
             self._check_comparisons(pipeline.histogram.directions, *scenes)
 
-    def _check_candidates(self, pipeline: Pipeline) -> None:
-        limit, parameters = self.limits.max_candidates, pipeline.searcher.params
-        generations = getattr(parameters, "generations", None)
-        population = getattr(parameters, "population", None) or 1
-        if limit is None or not isinstance(generations, int) or not isinstance(population, int):
+    def _check_candidates(self, searcher: Searcher) -> None:
+        if (limit := self.limits.max_candidates) is None:
             return
-        if (candidates := population * generations) > limit:
+        candidates = most_maps(searcher, self.registry)
+        if candidates is not None and candidates > limit:
             raise InvalidInputError(
                 Reason.LIMIT_EXCEEDED,
-                "pipeline.searcher.parameters.generations",
-                f"is {generations}, which makes {candidates} maps to weigh with a population of "
-                f"{population}, more than this server's limit of {limit}; ask for fewer of either",
+                "pipeline.searcher.parameters",
+                f"let {searcher.name!r} weigh {candidates} maps, more than this server's limit of "
+                f"{limit}; set them so that it weighs fewer",
             )
 
     def _check_comparisons(self, directions: int, sketch: Scene, map_: Scene) -> None:

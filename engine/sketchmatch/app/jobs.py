@@ -36,6 +36,7 @@ from sketchmatch.model import OccupancyGrid, Scene, SceneDescriptor
 from sketchmatch.model import Source as AnySource
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.describe import in_directions
+from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.events import Accepted, MatchEvent, Progress
 from sketchmatch.pipeline.former import Former
 from sketchmatch.pipeline.selection import Choice, chosen_algorithms, stage_of
@@ -182,7 +183,7 @@ def time_budget(job: Job, setup: Setup) -> float | None:
 def _match(
     job: Job, request: MatchRequest, setup: Setup, begun: Callable[[Clock], None]
 ) -> Generator[Message, None, None]:
-    engine = replace(setup.engine, check=Costs(setup.limits).check)
+    engine = _within_costs(setup)
     with engine.limited():
         value = requests.match_request(
             request, setup.limits, engine.registry.readers, _stored(job, setup)
@@ -200,11 +201,17 @@ def _match(
             yield writer.response(event)
 
 
+def _within_costs(setup: Setup) -> Engine:
+    """Return the engine, for matches that may cost so much."""
+    check = Costs(setup.limits, setup.engine.registry).check
+    return replace(setup.engine, check=check)
+
+
 def _transfer(
     job: Job, request: TransferRequest, setup: Setup, begun: Callable[[Clock], None]
 ) -> Generator[Message, None, None]:
     """Carry features; before the response there is the progress of the match, a sign of life."""
-    engine = replace(setup.engine, check=Costs(setup.limits).check)
+    engine = _within_costs(setup)
     with engine.limited():
         value = requests.transfer_request(
             request, setup.limits, engine.registry.readers, _stored(job, setup)

@@ -67,8 +67,8 @@ class RequestLimits:
         Numbers that the relations of one match may be compared by, or None for no limit: pairs of
         sketched objects × pairs of mapped objects × directions.
     max_candidates
-        Maps that a search may weigh by its parameters, or None for no limit: population ×
-        generations.
+        Maps that a search may weigh by its parameters, or None for no limit: those that its
+        searcher says it makes at most.
     sketches
         How many sketches may be in progress.
     """

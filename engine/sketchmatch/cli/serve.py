@@ -87,7 +87,9 @@ def serve(
     ] = None,
     max_candidates: Annotated[
         int | None,
-        typer.Option(help="Population × generations that a request may ask of a search."),
+        typer.Option(
+            help="Maps that a search may weigh by its parameters, such as population × generations."
+        ),
     ] = None,
     grace: Annotated[
         float | None,

@@ -220,8 +220,8 @@ class _Server(Plain):
         None,
         ge=1,
         le=10**15,
-        description="Population × generations that a request may ask of a search; no limit, when "
-        "left out.",
+        description="Maps that a search may weigh by its parameters, such as population × "
+        "generations or particles × iterations; no limit, when left out.",
         examples=[100_000_000],
     )
     tls_certificate: str | None = Field(

@@ -24,6 +24,7 @@ __all__ = [
     "alternatives_wanted",
     "check_objects_weighed",
     "finds_partial",
+    "most_maps",
     "price_in_force",
 ]
 
@@ -136,6 +137,17 @@ def finds_partial(pipeline: Pipeline, registry: Registry) -> bool:
             if algorithm.partial:
                 return True
     return False
+
+
+def most_maps(searcher: Searcher, registry: Registry) -> int | None:
+    """Return how many maps a search makes at most by its parameters; None where none says it."""
+    with blaming(searcher, registry):
+        most = searcher.most_maps
+        if most is not None and not (isinstance(most, int) and most > 0):
+            raise ValueError(
+                f"its most_maps is {quoted(most)}, not a whole number above 0, or None"
+            )
+    return most
 
 
 def price_in_force(

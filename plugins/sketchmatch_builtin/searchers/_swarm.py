@@ -49,6 +49,11 @@ class SwarmParams(GrowthParams):
         description="Iterations without a better best after which it has converged.",
     )
 
+    @property
+    def most_maps(self) -> int:
+        """How many maps grow at most: one of each particle, in each iteration."""
+        return self.particles * self.iterations
+
     @field_validator("c2")
     @classmethod
     def _sum_is_bounded(cls, c2: float, others: ValidationInfo) -> float:

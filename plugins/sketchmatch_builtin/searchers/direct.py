@@ -118,6 +118,11 @@ class Direct(Searcher):
 
     params: Params
 
+    @property
+    def most_maps(self) -> int:
+        """All that climb."""
+        return self.params.offspring
+
     @classmethod
     def warm_up(cls) -> None:
         """Compile the kernels."""

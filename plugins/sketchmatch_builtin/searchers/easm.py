@@ -39,6 +39,9 @@ _REPORT_EVERY = 0.02
 # What is drawn and judged between two looks at the clock: 10 ms.
 _SLICE_ENTRIES = 50_000
 # 512 kB of hash codes, to stay in the cache.
+_LARGEST = 600
+"""Of the populations that follow from the scenes."""
+
 _KNOWN = 2**16
 
 
@@ -119,6 +122,11 @@ class Easm(Searcher):
         """Whether that is what makes an FMAP legal."""
         return self.params.consistency == "object"
 
+    @property
+    def most_maps(self) -> int:
+        """Those of the largest population there may be, in each generation."""
+        return (self.params.population or _LARGEST) * self.params.generations
+
     @classmethod
     def warm_up(cls) -> None:
         """Compile the kernels for both meanings of a legal FMAP."""
@@ -164,7 +172,7 @@ class Easm(Searcher):
         """Return a population without members, and relations that are yet to be read."""
         table, params = problem.table, self.params
         by_object = params.consistency == "object"
-        size = params.population or min(max(100, 2 * table.argument_objects**2), 600)
+        size = params.population or min(max(100, 2 * table.argument_objects**2), _LARGEST)
         genes = table.template_objects if by_object else table.template_pairs
         others = table.argument_objects if by_object else table.argument_pairs
         shape = table.similarity.shape

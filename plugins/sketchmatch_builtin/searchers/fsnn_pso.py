@@ -85,6 +85,11 @@ class FsnnPso(Searcher):
 
     params: Params
 
+    @property
+    def most_maps(self) -> int | None:
+        """Those of the swarm; where every entry is the first of one, the scenes say how many."""
+        return self.params.most_maps if self.params.first == "swarm" else None
+
     @classmethod
     def warm_up(cls) -> None:
         """Compile the kernels, those for large scenes too."""

@@ -66,6 +66,11 @@ class Nn(Searcher):
 
     params: Params
 
+    @property
+    def most_maps(self) -> int:
+        """One of each seed point."""
+        return self.params.seed_points
+
     @classmethod
     def warm_up(cls) -> None:
         """Compile the kernels."""

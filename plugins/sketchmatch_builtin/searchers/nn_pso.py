@@ -54,6 +54,11 @@ class NnPso(Searcher):
 
     params: Params
 
+    @property
+    def most_maps(self) -> int:
+        """Those of the swarm."""
+        return self.params.most_maps
+
     @classmethod
     def warm_up(cls) -> None:
         """Compile the kernels."""

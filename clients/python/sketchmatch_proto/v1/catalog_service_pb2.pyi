@@ -449,7 +449,9 @@ class ServerLimits(google.protobuf.message.Message):
     max_comparisons: builtins.int
     """Most comparisons of relations: pairs of sketched objects × pairs of mapped objects × directions."""
     max_candidates: builtins.int
-    """Most maps that a search may weigh: population × generations of searchers that have both."""
+    """Most maps that a search may weigh by its parameters, such as population × generations; searchers
+    whose parameters do not say how many are held by their time alone.
+    """
     max_waiting_bytes: builtins.int
     """Most bytes that requests which wait may have together; more are RESOURCE_EXHAUSTED."""
     @property

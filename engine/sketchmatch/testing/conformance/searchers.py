@@ -206,6 +206,16 @@ def maps_beside_are_possible(algorithm: type[Searcher]) -> None:
                 check_map(partners, problem)
 
 
+def iterations_are_no_more_than_maps(algorithm: type[Searcher]) -> None:
+    """Have no more iterations than ``most_maps`` says, where it says how many maps there are."""
+    most = algorithm().most_maps
+    require_applicable(most is not None, "it says most_maps = None")
+    for problem in _problems():
+        made = _run(algorithm, problem).seen[-1].iteration
+        within = most is None or made <= most
+        require(within, f"it says most_maps = {most}, and has made {made} iterations")
+
+
 def starts_are_taken(algorithm: type[Searcher]) -> None:
     """With ``warm``, answer a problem that has maps to start with like any other."""
     require_applicable(algorithm().warm, "it says warm = False")
@@ -312,6 +322,7 @@ CONTRACTS: tuple[Contract, ...] = (
     optimal_is_optimal,
     object_maps_are_kept_to,
     maps_beside_are_possible,
+    iterations_are_no_more_than_maps,
     starts_are_taken,
     evidence_is_weighed,
     rotations_are_weighed,
