@@ -14,7 +14,7 @@ from sketchmatch.server import readiness, serve
 from sketchmatch.server.readiness import Readiness
 from sketchmatch_client import Client, InvalidRequestError
 from tests.pace import wait_until
-from tests.server.harness import hosting, in_loop, registry_with, serving
+from tests.server.harness import hosting, in_loop, registry_with, serving, serving_setup
 from tests.server.probes import SlowToWarm
 
 ALGORITHMS = {f"{item.kind}/{item.name}": item for item in default_registry().algorithms}
@@ -76,6 +76,26 @@ def test_after_a_reload_what_is_new_gets_ready_too(monkeypatch):
         wait_until(lambda: "the configuration is reloaded" in host.said, "it is not reloaded")
         wait_until(lambda: client.is_serving("searcher/slow-to-warm"), "it is never ready")
         assert client.is_serving("searcher/align")
+
+
+@pytest.mark.parametrize("size", [1 << 20, 1 << 26])
+def test_a_reload_changes_limits_but_that_of_the_size_of_requests(monkeypatch, size):
+    actions, former = {}, 2 << 20
+    monkeypatch.setattr(serve, "_on_signals", actions.update)
+    setups = [
+        serving_setup(max_request_bytes=former, max_waiting=5),
+        serving_setup(max_request_bytes=size, max_waiting=6),
+    ]
+
+    async def reload():
+        actions["SIGHUP"]()
+
+    with hosting(lambda: setups.pop(0), warm=False) as host, Client(host.address) as client:
+        in_loop(reload()).result()
+        wait_until(lambda: "the configuration is reloaded" in host.said, "it is not reloaded")
+        limits = client.server_info().limits
+        assert (limits.max_request_bytes, limits.max_waiting) == (former, 6)
+        assert "server.max_request_mib stays until the server is started anew" in host.said
 
 
 def test_no_more_streams_watch_health_than_probes_need(monkeypatch):

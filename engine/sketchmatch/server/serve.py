@@ -7,7 +7,7 @@ import signal
 import socket
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -160,7 +160,7 @@ async def serve(
     load
         Returns what requests are answered with. It is called again, in a thread, at each SIGHUP;
         what it raises then is said, and the former setup stays. Requests under way end with
-        theirs.
+        theirs. How large a request may be stays as it was at the start.
     settings
         How to serve.
     say
@@ -395,12 +395,19 @@ class _Reloading:
             except SketchmatchError as error:
                 self._say(f"the configuration stays as it is: {error}")
                 return
-            self._app.change(setup)
+            self._app.change(self._of_former_size(setup))
             await self._readiness.know(setup.engine.registry.algorithms)
             for problem in setup.engine.registry.problems:
                 self._say(problem)
             self._say("the configuration is reloaded")
         await self._warming.again()
+
+    def _of_former_size(self, setup: Setup) -> Setup:
+        """Return a setup for requests as large as the ports take them since the start."""
+        former = self._app.setup.limits.max_request_bytes
+        if setup.limits.max_request_bytes != former:
+            self._say("server.max_request_mib stays until the server is started anew")
+        return replace(setup, limits=replace(setup.limits, max_request_bytes=former))
 
 
 def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readiness) -> None:
