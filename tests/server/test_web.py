@@ -6,6 +6,7 @@ import gzip
 import http.client
 import json
 import re
+import shutil
 import socket
 import ssl
 import struct
@@ -331,19 +332,20 @@ def test_a_missing_package_is_named_with_the_remedy(monkeypatch):
         host.wait_until_listening()
 
 
+def common_name(host, trusting):
+    """Return whose certificate a handshake shows."""
+    name, _, port = address_of(host).rpartition(":")
+    with (
+        socket.create_connection((name, int(port)), 30) as link,
+        trusting.wrap_socket(link, server_hostname="localhost") as secure,
+    ):
+        return dict(part[0] for part in secure.getpeercert()["subject"])["commonName"]
+
+
 def test_it_encrypts_with_the_certificate_of_the_server_and_with_a_renewed_one(tmp_path):
     authority = Authority(tmp_path, "ours")
     pair = authority.issue("first")
     trusting = ssl.create_default_context(cafile=str(authority.certificate))
-
-    def shown(host):
-        name, _, port = address_of(host).rpartition(":")
-        with (
-            socket.create_connection((name, int(port)), 30) as link,
-            trusting.wrap_socket(link, server_hostname="localhost") as secure,
-        ):
-            return dict(part[0] for part in secure.getpeercert()["subject"])["commonName"]
-
     settings = {"tls": TlsFiles(pair.certificate, pair.key)}
     with gateway(settings) as host:
         request = urllib.request.Request(
@@ -351,9 +353,62 @@ def test_it_encrypts_with_the_certificate_of_the_server_and_with_a_renewed_one(t
         )
         with urllib.request.urlopen(request, context=trusting) as answer:
             assert json.load(answer)["version"]
-        assert shown(host) == "first"
+        assert common_name(host, trusting) == "first"
         pair.replace(authority.issue("second"))
-        wait_until(lambda: shown(host) == "second", "a renewed certificate is not shown")
+        time.sleep(1.1)
+        assert common_name(host, trusting) == "second"  # by the first handshake already
+        pair.certificate.write_bytes(authority.issue("third").certificate.read_bytes())
+        time.sleep(1.1)
+        assert common_name(host, trusting) == "second"  # the key is yet to come
+        assert any("stay as they were" in line for line in host.said)
+
+
+@pytest.mark.parametrize("version", [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3])
+def test_no_session_outlives_the_certificates_it_began_with(tmp_path, version):
+    authority = Authority(tmp_path, "ours")
+    pair = authority.issue("first")
+    trusting = ssl.create_default_context(cafile=str(authority.certificate))
+    trusting.maximum_version = version
+    with gateway({"tls": TlsFiles(pair.certificate, pair.key)}) as host:
+        name, _, port = address_of(host).rpartition(":")
+
+        def asked(session=None):
+            with (
+                socket.create_connection((name, int(port)), 30) as link,
+                trusting.wrap_socket(link, server_hostname="localhost", session=session) as secure,
+            ):
+                secure.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                assert secure.recv(4)
+                return secure.session, secure.session_reused
+
+        session, _ = asked()
+        assert not asked(session)[1]
+
+
+def test_browsers_show_certificates_of_the_authorities_there_are_now(tmp_path):
+    ours, theirs, others = (Authority(tmp_path, name) for name in ("ours", "theirs", "others"))
+    pair, known = ours.issue("server"), tmp_path / "known.pem"
+    shutil.copy(theirs.certificate, known)
+
+    def answered(authority):
+        trusting = ssl.create_default_context(cafile=str(ours.certificate))
+        if authority:
+            own = authority.issue("browser")
+            trusting.load_cert_chain(own.certificate, own.key)
+        request = urllib.request.Request(
+            f"https://{address_of(host)}{INFO}", b"{}", {"Content-Type": "application/json"}
+        )
+        try:
+            with urllib.request.urlopen(request, context=trusting) as answer:
+                return answer.status == 200
+        except OSError:
+            return False
+
+    with gateway({"tls": TlsFiles(pair.certificate, pair.key, known)}) as host:
+        assert [answered(each) for each in (theirs, others, None)] == [True, False, False]
+        shutil.copy(others.certificate, known)
+        time.sleep(1.1)
+        assert [answered(each) for each in (theirs, others, None)] == [False, True, False]
 
 
 def page(pages, path, method="GET", **headers):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import socket
-import ssl
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from http import HTTPStatus
@@ -17,7 +16,7 @@ from sketchmatch.config.addresses import is_of_this_machine
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.server.called import Handlers
 from sketchmatch.server.pages import Pages, answer_plainly, bundled_pages
-from sketchmatch.server.tls import Pems, TlsFiles
+from sketchmatch.server.tls import Pems, newest_context
 from sketchmatch.server.watched import Watched
 
 if TYPE_CHECKING:
@@ -47,8 +46,8 @@ class Gateway:
         Full names of the services.
     robots
         Addresses of ROS bridges that the sketch pad may send routes to.
-    tls
-        Files of certificates, and what is in them; None: no encryption.
+    pems
+        What is in the files of certificates; None: no encryption.
 
     Raises
     ------
@@ -64,7 +63,7 @@ class Gateway:
         handlers: Handlers,
         services: Iterable[str],
         robots: Sequence[str] = (),
-        tls: tuple[TlsFiles, Watched[Pems]] | None = None,
+        pems: Watched[Pems] | None = None,
     ) -> None:
         try:
             import uvicorn
@@ -83,10 +82,10 @@ class Gateway:
         )
         pages = bundled_pages(robots)
         self._socket, self.address = _listening(address)
-        self.url = f"{'https' if tls else 'http'}://{self.address}/"
+        self.url = f"{'https' if pems else 'http'}://{self.address}/"
         self.lacking = () if pages else ("the sketch pad is not built; make web does",)
         front = _Front(connect, pages, origins, local=is_of_this_machine(address))
-        self._server = _server(uvicorn, front, tls)
+        self._server = _server(uvicorn, front, pems)
         self._end: asyncio.Task[None] | None = None
 
     def start(self) -> None:
@@ -195,9 +194,7 @@ def _listening(address: str) -> tuple[socket.socket, str]:
     return listener, f"{host}:{listener.getsockname()[1]}"
 
 
-def _server(
-    uvicorn_: Any, front: _Asgi, tls: tuple[TlsFiles, Watched[Pems]] | None
-) -> uvicorn.Server:
+def _server(uvicorn_: Any, front: _Asgi, pems: Watched[Pems] | None) -> uvicorn.Server:
     class Server(uvicorn_.Server):  # type: ignore[misc]
         @contextmanager
         def capture_signals(self) -> Iterator[None]:
@@ -214,27 +211,7 @@ def _server(
         access_log=False,
         server_header=False,
         proxy_headers=False,
-        ssl_context_factory=None if tls is None else lambda *_: _fresh_context(*tls),
+        ssl_context_factory=None if pems is None else lambda *_: newest_context(pems),
     )
     server: uvicorn.Server = Server(config)
     return server
-
-
-def _fresh_context(files: TlsFiles, pems: Watched[Pems]) -> ssl.SSLContext:
-    """Return what each handshake takes the newest certificate from."""
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.minimum_version = ssl.TLSVersion.TLSv1_2
-    context.load_cert_chain(files.certificate, files.key)
-    if files.client_ca is not None:
-        context.verify_mode = ssl.CERT_REQUIRED
-        context.load_verify_locations(files.client_ca)
-    shown = pems.value
-
-    def newest(*_: Any) -> None:
-        nonlocal shown
-        if pems.value is not shown:
-            shown = pems.value
-            context.load_cert_chain(files.certificate, files.key)
-
-    context.sni_callback = newest
-    return context

@@ -304,7 +304,6 @@ class _Beside:
             self._monitor = Monitor(settings.metrics_address, metrics, lambda: readiness.serving)
             self.sentences.append(f"metrics are at http://{self._monitor.address}/metrics")
         if settings.web_address:
-            tls = (settings.tls, files.pems) if settings.tls and files.pems else None
             self._gateway = Gateway(
                 settings.web_address,
                 settings.web_origins,
@@ -312,7 +311,7 @@ class _Beside:
                 handlers,
                 _SERVICES,
                 settings.web_robots,
-                tls,
+                files.pems,
             )
             self.sentences += [f"the sketch pad is at {self._gateway.url}", *self._gateway.lacking]
 

@@ -13,7 +13,9 @@ import grpc
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.server.watched import Watched, content_of
 
-__all__ = ["Pems", "TlsFiles", "server_credentials", "watched_pems"]
+__all__ = ["Pems", "TlsFiles", "newest_context", "server_credentials", "watched_pems"]
+
+_OLDEST = ssl.TLSVersion.TLSv1_2
 
 
 @dataclass(frozen=True)
@@ -38,11 +40,12 @@ class TlsFiles:
 
 @dataclass(frozen=True, repr=False)
 class Pems:
-    """What is in such files."""
+    """What is in such files, and the same as Python takes it."""
 
     certificate: bytes
     key: bytes
     client_ca: bytes | None
+    context: ssl.SSLContext
 
     @property
     def expires(self) -> datetime | None:
@@ -105,7 +108,29 @@ def server_credentials(pems: Watched[Pems]) -> grpc.ServerCredentials:
     )
 
 
+def newest_context(pems: Watched[Pems]) -> ssl.SSLContext:
+    """Return a context of which each handshake takes the newest in its place."""
+
+    def newest(connection: ssl.SSLSocket | ssl.SSLObject, *_: object) -> None:
+        connection.context = pems.value.context
+
+    first = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    first.minimum_version, first.verify_mode = _OLDEST, pems.value.context.verify_mode
+    first.sni_callback = newest  # whether or not the client gives a name
+    # Who resumes a session is shown no certificate, and shows none, though others hold by now.
+    first.num_tickets, first.options = 0, first.options | ssl.OP_NO_TICKET
+    return first
+
+
 def _read(files: TlsFiles) -> Pems:
+    found = _contents(files)
+    context = _context(files)
+    if _contents(files) != found:  # they were replaced meanwhile, and what was checked is another
+        return _read(files)
+    return Pems(*found, context)
+
+
+def _contents(files: TlsFiles) -> tuple[bytes, bytes, bytes | None]:
     certificate = content_of(files.certificate, "the certificate", "server.tls_certificate")
     key = content_of(files.key, "the private key", "server.tls_key")
     authorities = None
@@ -113,13 +138,13 @@ def _read(files: TlsFiles) -> Pems:
         authorities = content_of(
             files.client_ca, "the authorities of clients", "server.tls_client_ca"
         )
-    _check(files)
-    return Pems(certificate, key, authorities)
+    return certificate, key, authorities
 
 
-def _check(files: TlsFiles) -> None:
-    """Refuse files that gRPC would not take, and say no more about than that."""
+def _context(files: TlsFiles) -> ssl.SSLContext:
+    """Return a context, or refuse files that gRPC would not take, and say no more than that."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = _OLDEST
     try:
         context.load_cert_chain(files.certificate, files.key, password=_refuse_password)
     except ssl.SSLError as error:
@@ -140,6 +165,8 @@ def _check(files: TlsFiles) -> None:
         except ssl.SSLError:
             problem = "holds no certificate in PEM; give those of the authorities of clients"
             raise InvalidInputError(Reason.INVALID_FILE, str(files.client_ca), problem) from None
+        context.verify_mode = ssl.CERT_REQUIRED
+    return context
 
 
 def _first_block(pem: bytes) -> str:
