@@ -244,7 +244,7 @@ def test_the_table_does_not_depend_on_the_threads_or_the_slices(similarity, monk
     expected = related(*scenes_, similarity)
     monkeypatch.setattr(slices, "_SLICE_SECONDS", 1e-3)
     for cpus in (1, 4):
-        monkeypatch.setattr(slices, "_usable_cpus", lambda cpus=cpus: cpus)
+        monkeypatch.setattr(slices, "usable_cpus", lambda cpus=cpus: cpus)
         found = related(*scenes_, similarity)
         for name in ("similarity", "rotation", "dilation"):
             assert (getattr(found, name) == getattr(expected, name)).all()

@@ -15,7 +15,7 @@ from sketchmatch.pipeline.slices import finish, in_slices
 
 @pytest.fixture(params=[1, 2, 7], ids="{} cpus".format)
 def cpus(request, monkeypatch):
-    monkeypatch.setattr(module, "_usable_cpus", lambda: request.param)
+    monkeypatch.setattr(module, "usable_cpus", lambda: request.param)
     return request.param
 
 
@@ -116,7 +116,7 @@ def test_closing_starts_nothing_and_lets_what_is_under_way_end(cpus):
 
 @pytest.mark.usefixtures("quick_to_pool")
 def test_what_is_forgotten_may_be_collected_in_a_thread_of_its_own_work(monkeypatch):
-    monkeypatch.setattr(module, "_usable_cpus", lambda: 2)
+    monkeypatch.setattr(module, "usable_cpus", lambda: 2)
     forgotten, collected, ended = [], threading.Event(), threading.Event()
 
     def work(first, last):
@@ -141,7 +141,7 @@ def test_what_is_forgotten_may_be_collected_in_a_thread_of_its_own_work(monkeypa
 
 @pytest.mark.usefixtures("quick_to_pool")
 def test_work_that_is_itself_cut_into_slices_ends(monkeypatch):
-    monkeypatch.setattr(module, "_usable_cpus", lambda: 4)
+    monkeypatch.setattr(module, "usable_cpus", lambda: 4)
     done = []
 
     def inner(first, last):
@@ -160,7 +160,7 @@ def test_work_that_is_itself_cut_into_slices_ends(monkeypatch):
 @pytest.mark.usefixtures("quick_to_pool")
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 def test_a_forked_process_has_threads_of_its_own(monkeypatch):
-    monkeypatch.setattr(module, "_usable_cpus", lambda: 2)
+    monkeypatch.setattr(module, "usable_cpus", lambda: 2)
     list(in_slices(50, lambda *_: time.sleep(0.001)))
     child = os.fork()
     if child == 0:
@@ -196,7 +196,7 @@ def test_while_nobody_asks_no_new_range_starts():
 def test_they_grow_while_the_work_is_quick_and_shrink_when_it_is_not(monkeypatch):
     clock = [0.0]
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: clock[0]))
-    monkeypatch.setattr(module, "_usable_cpus", lambda: 1)
+    monkeypatch.setattr(module, "usable_cpus", lambda: 1)
     sizes = []
 
     def work(first, last):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 from sketchmatch.app.shelf import Shelf
 from sketchmatch.pipeline.engine import Engine
+from sketchmatch.pipeline.processors import usable_cpus
 from sketchmatch.registry import OWN_DISTRIBUTION, Registered, RegisteredReader
 from sketchmatch.registry.distributions import canonical
 
@@ -74,7 +74,7 @@ class RequestLimits:
     """
 
     max_request_bytes: int = 64 * 1024 * 1024
-    max_concurrent_matches: int = 4 * (os.cpu_count() or 1)
+    max_concurrent_matches: int = 4 * usable_cpus()
     max_time_budget: float | None = None
     max_waiting: int = 500
     max_wait: float = 10.0

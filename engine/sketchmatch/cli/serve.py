@@ -299,9 +299,8 @@ def serve(
 
 def _server_settings(configuration: Configuration) -> ServerSettings:
     """Return how to serve."""
-    import os
-
     from sketchmatch.errors import InvalidInputError, Reason
+    from sketchmatch.pipeline.processors import usable_cpus
     from sketchmatch.server.serve import ServerSettings
     from sketchmatch.server.tls import TlsFiles
 
@@ -320,7 +319,7 @@ def _server_settings(configuration: Configuration) -> ServerSettings:
     return ServerSettings(
         server.address,
         server.grace_seconds,
-        (os.cpu_count() or 1) if server.workers is None else server.workers,
+        usable_cpus() if server.workers is None else server.workers,
         _PATIENCE_SECONDS,
         TlsFiles(Path(certificate), Path(key), Path(authorities) if authorities else None)
         if certificate and key

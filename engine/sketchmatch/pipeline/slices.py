@@ -10,6 +10,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import closing
 from typing import Any, TypeVar
 
+from sketchmatch.pipeline.processors import usable_cpus
+
 __all__ = ["finish", "in_slices", "is_helper", "retold"]
 
 _Step = TypeVar("_Step")
@@ -42,7 +44,7 @@ def in_slices(total: int, work: Callable[[int, int], None]) -> Generator[float, 
     float
         The share that is done.
     """
-    threads = 1 if _is_helping() else min(_usable_cpus(), _MOST_THREADS)
+    threads = 1 if _is_helping() else min(usable_cpus(), _MOST_THREADS)
     done, size, seconds = 0, 1, 0.0
     while done < total and (threads == 1 or seconds < _SLICE_SECONDS / 4):
         first, done = done, min(total, done + size)
@@ -144,10 +146,3 @@ def is_helper(thread: threading.Thread) -> bool:
 def _is_helping() -> bool:
     """Return whether this thread is one of the pool's, which must not wait for the others."""
     return is_helper(threading.current_thread())
-
-
-def _usable_cpus() -> int:
-    """Return the number of processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

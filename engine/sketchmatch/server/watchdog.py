@@ -11,6 +11,8 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
+from sketchmatch.pipeline.processors import usable_cpus
+
 __all__ = ["HUNG", "watch"]
 
 HUNG = 70
@@ -68,7 +70,7 @@ def _ended_by_the_system(patience: float) -> Iterator[Callable[[], None]]:
     if not hasattr(faulthandler, "register") or signal.getsignal(signal.SIGPROF) != signal.SIG_DFL:
         yield lambda: None
         return
-    seconds = patience + _TURN_SECONDS * (os.cpu_count() or 1)
+    seconds = patience + _TURN_SECONDS * usable_cpus()
     faulthandler.register(signal.SIGPROF, chain=True)
 
     def put_off() -> None:
