@@ -119,3 +119,13 @@ def test_no_more_streams_watch_health_than_probes_need(monkeypatch):
 
         wait_until(again, "a place is never given back")
         assert stub.Check(request)
+
+
+def test_names_are_listed_to_nobody_and_no_stranger_fills_the_log_by_asking(caplog):
+    with serving(warm=False) as host, grpc.insecure_channel(host.address) as channel:
+        # As newer clients ask, whatever this one has.
+        asking = channel.unary_unary("/grpc.health.v1.Health/List", bytes, bytes)
+        with pytest.raises(grpc.RpcError) as refused:
+            asking(b"")
+    assert refused.value.code() is grpc.StatusCode.UNIMPLEMENTED
+    assert not [each for each in caplog.records if "Health" in each.getMessage()]

@@ -21,7 +21,11 @@ _WHOLE = ""
 
 
 class _Health(health.aio.HealthServicer):
-    """The standard service, with no more streams than a fleet's probes need."""
+    """The standard service, with no more streams than a fleet's probes need.
+
+    It answers strangers, whom the names of an operator's plugins do not concern: who asks of one
+    knows it.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -39,6 +43,11 @@ class _Health(health.aio.HealthServicer):
             await super().Watch(request, context)
         finally:
             self._watchers -= 1
+
+    async def List(self, _: Any, context: Any) -> None:  # noqa: N802
+        """Tell nobody all names that health knows."""
+        problem = "this server lists no names; ask of one, or of '', the whole server, by Check"
+        await context.abort(grpc.StatusCode.UNIMPLEMENTED, problem)
 
 
 class Readiness:
