@@ -88,6 +88,7 @@ def test_a_time_budget_and_a_price_that_there_are_not_are_absent():
     writer = responses.ResponseWriter(MATCHES["MatchRequest.sparse"])
     expected = as_written("MatchResponse.accepted")
     del expected["accepted"]["timeBudget"], expected["accepted"]["unmatchedPrice"]
+    expected["accepted"]["allowUnmatched"] = False
     assert as_json(writer.response(replace(ACCEPTED, unmatched_price=None))) == expected
 
 

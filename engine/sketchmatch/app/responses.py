@@ -127,6 +127,7 @@ class ResponseWriter:
         message.weights.CopyFrom(_weights(event.weights))
         if (budget := self._request.time_budget) is not None:
             _write_duration(message.time_budget, budget)
+        message.allow_unmatched = event.unmatched_price is not None
         if event.unmatched_price is not None:
             message.unmatched_price = event.unmatched_price
 

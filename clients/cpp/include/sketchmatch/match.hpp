@@ -39,6 +39,7 @@ struct MatchAccepted {
   Weights weights;                        ///< The weights in force.
   std::optional<Seconds> time_budget;     ///< The time budget in force, if there is one.
   std::optional<double> unmatched_price;  ///< The price in force for unmatched objects, if any.
+  std::optional<bool> allow_unmatched;    ///< Whether objects may stay without partner.
 };
 
 /// The objects found, which the indices of later events point to.

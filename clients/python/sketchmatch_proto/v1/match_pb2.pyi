@@ -180,6 +180,7 @@ class MatchAccepted(google.protobuf.message.Message):
     WEIGHTS_FIELD_NUMBER: builtins.int
     TIME_BUDGET_FIELD_NUMBER: builtins.int
     UNMATCHED_PRICE_FIELD_NUMBER: builtins.int
+    ALLOW_UNMATCHED_FIELD_NUMBER: builtins.int
     match_id: builtins.str
     """Name of this match, unique on the server; it also stands in the server's log."""
     seed: builtins.int
@@ -187,6 +188,10 @@ class MatchAccepted(google.protobuf.message.Message):
     unmatched_price: builtins.float
     """The price in force for leaving objects unmatched. Absent: every object of the smaller scene finds
     a partner.
+    """
+    allow_unmatched: builtins.bool
+    """Whether objects may stay without partner on both sides. Absent: an older server, which means by
+    `unmatched_price` that they may.
     """
     @property
     def pipeline(self) -> sketchmatch_proto.v1.pipeline_pb2.Pipeline:
@@ -209,9 +214,13 @@ class MatchAccepted(google.protobuf.message.Message):
         weights: global___ConfidenceWeights | None = ...,
         time_budget: google.protobuf.duration_pb2.Duration | None = ...,
         unmatched_price: builtins.float | None = ...,
+        allow_unmatched: builtins.bool | None = ...,
     ) -> None: ...
-    def HasField(self, field_name: typing.Literal["_unmatched_price", b"_unmatched_price", "pipeline", b"pipeline", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> builtins.bool: ...
-    def ClearField(self, field_name: typing.Literal["_unmatched_price", b"_unmatched_price", "match_id", b"match_id", "pipeline", b"pipeline", "seed", b"seed", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> None: ...
+    def HasField(self, field_name: typing.Literal["_allow_unmatched", b"_allow_unmatched", "_unmatched_price", b"_unmatched_price", "allow_unmatched", b"allow_unmatched", "pipeline", b"pipeline", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> builtins.bool: ...
+    def ClearField(self, field_name: typing.Literal["_allow_unmatched", b"_allow_unmatched", "_unmatched_price", b"_unmatched_price", "allow_unmatched", b"allow_unmatched", "match_id", b"match_id", "pipeline", b"pipeline", "seed", b"seed", "time_budget", b"time_budget", "unmatched_price", b"unmatched_price", "weights", b"weights"]) -> None: ...
+    @typing.overload
+    def WhichOneof(self, oneof_group: typing.Literal["_allow_unmatched", b"_allow_unmatched"]) -> typing.Literal["allow_unmatched"] | None: ...
+    @typing.overload
     def WhichOneof(self, oneof_group: typing.Literal["_unmatched_price", b"_unmatched_price"]) -> typing.Literal["unmatched_price"] | None: ...
 
 global___MatchAccepted = MatchAccepted
