@@ -6,12 +6,16 @@ from sketchmatch.app.frames import Frames, Says, failure, failure_of, frame
 from sketchmatch.errors import (
     AnswerUnavailableError,
     InvalidInputError,
+    MatchInterruptedError,
     NotFoundError,
     PluginError,
     Reason,
+    RetryableError,
     ServerStoppingError,
     SketchmatchError,
     StoreError,
+    TooBusyError,
+    WorkerLostError,
 )
 
 
@@ -37,6 +41,10 @@ class OddError(SketchmatchError):
         (PickyError(Reason.INVALID_GRID, Words("cells"), Words("is empty")), InvalidInputError),
         (LateError("no time"), AnswerUnavailableError),
         (ServerStoppingError("it stops"), ServerStoppingError),
+        (ServerStoppingError("it stops", 5), ServerStoppingError),
+        (TooBusyError("it is full", 17), TooBusyError),
+        (WorkerLostError("it died", 2), WorkerLostError),
+        (MatchInterruptedError("it ended", 3), MatchInterruptedError),
         (NotFoundError("there is none"), NotFoundError),
         (StoreError("it is full"), StoreError),
         (PluginError("it failed"), PluginError),
@@ -50,6 +58,13 @@ def test_errors_are_the_engines_own_when_they_leave_the_process(raised, told):
     assert log == "where it was"
     if told is InvalidInputError:
         assert (plain.reason, plain.field) == (Reason.INVALID_GRID, "cells")
+    if isinstance(raised, RetryableError):
+        assert plain.retry_seconds == raised.retry_seconds
+
+
+def test_what_a_former_version_kept_of_an_error_is_read():
+    error, _ = failure_of(b'{"log": "", "kind": "interrupted", "problem": "it ended"}')
+    assert (type(error), error.retry_seconds) == (MatchInterruptedError, 1)
 
 
 def test_what_nobody_foresaw_stays_where_it_is():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from enum import IntEnum, unique
 
 from sketchmatch.errors import (
@@ -19,6 +19,8 @@ from sketchmatch.errors import (
     ServerStoppingError,
     SketchmatchError,
     StoreError,
+    TooBusyError,
+    WorkerLostError,
 )
 
 __all__ = ["Flag", "Frames", "Says", "failure", "failure_of", "frame"]
@@ -99,24 +101,29 @@ _SENTENCES: dict[str, type[SketchmatchError]] = {
 """Errors that are a sentence and nothing else."""
 _RETRYABLE: dict[str, type[RetryableError]] = {
     "stopping": ServerStoppingError,
+    "busy": TooBusyError,
+    "lost": WorkerLostError,
     "interrupted": MatchInterruptedError,
 }
+"""Errors that are a sentence and a time after which to ask again."""
 
 
 def failure(error: Exception, log: str) -> bytes:
     """Return what is told of an error: nothing that needs a plugin's own classes to be read."""
     told: dict[str, object] = {"log": log}
-    sentence = next((kind for kind, each in _SENTENCES.items() if isinstance(error, each)), None)
+
+    def kind_of(known: Mapping[str, type[SketchmatchError]], otherwise: str) -> str:
+        return next((kind for kind, each in known.items() if isinstance(error, each)), otherwise)
+
     match error:
         case InvalidInputError():
             told |= {"kind": "input", "reason": str(Reason(error.reason))}
             told |= {"field": f"{error.field}", "problem": f"{error.problem}"}
-        case ServerStoppingError():
-            told |= {"kind": "stopping", "problem": f"{error.problem}"}
         case RetryableError():
-            told |= {"kind": "interrupted", "problem": f"{error.problem}"}
+            told |= {"kind": kind_of(_RETRYABLE, "interrupted"), "problem": f"{error.problem}"}
+            told["retry"] = int(error.retry_seconds)
         case SketchmatchError():
-            told |= {"kind": sentence or "plugin", "problem": f"{error}"}
+            told |= {"kind": kind_of(_SENTENCES, "plugin"), "problem": f"{error}"}
     return json.dumps(told).encode()
 
 
@@ -127,7 +134,8 @@ def failure_of(content: bytes) -> tuple[SketchmatchError | None, str]:
         case {"kind": "input", "reason": reason, "field": field, "problem": problem}:
             return InvalidInputError(Reason(reason), field, problem), told["log"]
         case {"kind": str(kind), "problem": problem} if kind in _RETRYABLE:
-            return _RETRYABLE[kind](problem), told["log"]
+            # What a former version kept has no time.
+            return _RETRYABLE[kind](problem, told.get("retry", 1)), told["log"]
         case {"kind": str(kind), "problem": problem}:
             return _SENTENCES.get(kind, PluginError)(problem), told["log"]
     return None, told["log"]
