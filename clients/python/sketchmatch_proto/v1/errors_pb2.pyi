@@ -33,11 +33,13 @@ class _ErrorReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._En
     ERROR_REASON_INVALID_STROKE: _ErrorReason.ValueType  # 4
     """INVALID_ARGUMENT: a stroke has too few points, or encloses nothing."""
     ERROR_REASON_INVALID_GRID: _ErrorReason.ValueType  # 5
-    """INVALID_ARGUMENT: an occupancy grid's size, resolution, origin or cells are wrong."""
+    """INVALID_ARGUMENT: an occupancy grid's size, resolution, origin or cells are wrong, or the yaml of a
+    robot's map cannot be read, lacks a key or has a wrong one.
+    """
     ERROR_REASON_INVALID_IMAGE: _ErrorReason.ValueType  # 6
     """INVALID_ARGUMENT: a picture cannot be decoded, or shows nothing."""
     ERROR_REASON_INVALID_FILE: _ErrorReason.ValueType  # 7
-    """INVALID_ARGUMENT: a file's text, such as a map's yaml, lacks a key or has a wrong one."""
+    """INVALID_ARGUMENT: a file cannot be read, or its text, such as GeoJSON, lacks a key or has a wrong one."""
     ERROR_REASON_TOO_FEW_OBJECTS: _ErrorReason.ValueType  # 8
     """INVALID_ARGUMENT: a scene has fewer than the two objects that make a relation."""
     ERROR_REASON_UNKNOWN_ALGORITHM: _ErrorReason.ValueType  # 9
@@ -112,11 +114,13 @@ ERROR_REASON_INVALID_POLYGON: ErrorReason.ValueType  # 3
 ERROR_REASON_INVALID_STROKE: ErrorReason.ValueType  # 4
 """INVALID_ARGUMENT: a stroke has too few points, or encloses nothing."""
 ERROR_REASON_INVALID_GRID: ErrorReason.ValueType  # 5
-"""INVALID_ARGUMENT: an occupancy grid's size, resolution, origin or cells are wrong."""
+"""INVALID_ARGUMENT: an occupancy grid's size, resolution, origin or cells are wrong, or the yaml of a
+robot's map cannot be read, lacks a key or has a wrong one.
+"""
 ERROR_REASON_INVALID_IMAGE: ErrorReason.ValueType  # 6
 """INVALID_ARGUMENT: a picture cannot be decoded, or shows nothing."""
 ERROR_REASON_INVALID_FILE: ErrorReason.ValueType  # 7
-"""INVALID_ARGUMENT: a file's text, such as a map's yaml, lacks a key or has a wrong one."""
+"""INVALID_ARGUMENT: a file cannot be read, or its text, such as GeoJSON, lacks a key or has a wrong one."""
 ERROR_REASON_TOO_FEW_OBJECTS: ErrorReason.ValueType  # 8
 """INVALID_ARGUMENT: a scene has fewer than the two objects that make a relation."""
 ERROR_REASON_UNKNOWN_ALGORITHM: ErrorReason.ValueType  # 9

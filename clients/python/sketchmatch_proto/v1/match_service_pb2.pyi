@@ -63,7 +63,7 @@ class _MatchStateEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._Enu
     MATCH_STATE_QUEUED: _MatchState.ValueType  # 1
     """It waits for its turn."""
     MATCH_STATE_RUNNING: _MatchState.ValueType  # 2
-    """It is done."""
+    """It is under way."""
     MATCH_STATE_CANCELLING: _MatchState.ValueType  # 3
     """It was told to stop, and has not yet."""
     MATCH_STATE_SUCCEEDED: _MatchState.ValueType  # 4
@@ -85,7 +85,7 @@ MATCH_STATE_UNSPECIFIED: MatchState.ValueType  # 0
 MATCH_STATE_QUEUED: MatchState.ValueType  # 1
 """It waits for its turn."""
 MATCH_STATE_RUNNING: MatchState.ValueType  # 2
-"""It is done."""
+"""It is under way."""
 MATCH_STATE_CANCELLING: MatchState.ValueType  # 3
 """It was told to stop, and has not yet."""
 MATCH_STATE_SUCCEEDED: MatchState.ValueType  # 4

@@ -36,7 +36,9 @@ class SegmentRequest(google.protobuf.message.Message):
     """
     @property
     def source(self) -> sketchmatch_proto.v1.source_pb2.Source:
-        """The sketch or map. Required."""
+        """The sketch or map. Required. A stored scene is none: its objects are found already, and `GetScene`
+        returns them.
+        """
 
     @property
     def segmenter(self) -> sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection:
