@@ -95,6 +95,20 @@ def test_a_full_file_says_so_keeps_what_it_had_and_takes_more_after_a_deletion(r
     assert names(database) == ["table"]
 
 
+def test_a_file_shrinks_after_what_was_in_it_is_deleted(reopened, store):
+    database, file = reopened(max_bytes=64 * MIB), store.folder / "things.sqlite"
+    for k in range(24):
+        put(database, f"large {k}", bytes(MIB))
+    put(database, "small")
+    database.close()
+    assert file.stat().st_size > 24 * MIB
+    database.work(lambda open_: open_.execute("DELETE FROM things WHERE name LIKE 'large%'"))
+    for _ in range(25):
+        assert names(database) == ["small"]
+    database.close()
+    assert file.stat().st_size < 2 * MIB
+
+
 @pytest.mark.parametrize(("free", "words"), [(1000, "its disk is full"), (1 << 30, "is full; del")])
 def test_a_full_disk_is_told_from_a_limit_that_is_met(reopened, monkeypatch, free, words):
     usage = SimpleNamespace(free=free)

@@ -19,6 +19,12 @@ _Result = TypeVar("_Result")
 
 _PAGE_BYTES = 4096
 _FEWEST_PAGES = 64
+_SPARE_PAGES = 256
+"""Free pages that a file keeps for what comes next."""
+
+_GIVEN_BACK = 256
+"""Free pages that go back to the disk at once: in some hundredths of a second."""
+
 _PATIENCE_SECONDS = 2.0
 _FULL = frozenset({sqlite3.SQLITE_FULL})
 # With less room on the disk it is not the limit that was met.
@@ -131,7 +137,9 @@ class Database(_File):
             connection = self._connection or self._opened()
             with connection:
                 connection.execute("BEGIN IMMEDIATE")
-                return job(connection)
+                result = job(connection)
+            _shrink(connection)
+            return result
 
     def _opened(self) -> sqlite3.Connection:
         connection = sqlite3.connect(
@@ -171,6 +179,16 @@ class Database(_File):
         except sqlite3.Error as error:
             self._close()
             raise _said(self.path, error) from error
+
+
+def _shrink(connection: sqlite3.Connection) -> None:
+    """Give some of what is no longer needed back to the disk: all at once would hold others up."""
+    with suppress(sqlite3.Error):  # the work is done, and the next says what is wrong
+        (free,) = connection.execute("PRAGMA freelist_count").fetchone()
+        if free > _SPARE_PAGES:
+            most = min(free - _SPARE_PAGES, _GIVEN_BACK)
+            # Each step gives one page back, and `execute` makes one alone where there are no rows.
+            connection.executescript(f"PRAGMA incremental_vacuum({most})")
 
 
 class Reading(_File):
