@@ -1,6 +1,7 @@
 """How many sketches are kept, for how long and for whom."""
 
 import asyncio
+import math
 from types import SimpleNamespace
 
 import pytest
@@ -64,6 +65,40 @@ def test_a_sketch_is_its_creators():
         with pytest.raises(InvalidInputError, match="sketch_id is not set"):
             await sketches.update(UpdateSketchRequest(), ANNA)
         await sketches.update(UpdateSketchRequest(sketch_id=name), ANNA)
+
+    with_sketches(scenario)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_points_that_are_nowhere_are_refused_and_change_nothing(value):
+    async def scenario(sketches):
+        name = await made(sketches)
+        request = UpdateSketchRequest(sketch_id=name)
+        for label in ("one", "two"):
+            stroke = request.set_strokes.add(stroke_id=label).stroke
+            stroke.points.add(x=0, y=1)
+            stroke.points.add(x=1, y=2)
+        stroke.points.add(x=3, y=value)
+        with pytest.raises(InvalidInputError, match="is not finite") as no:
+            await sketches.update(request, ANNA)
+        assert no.value.field == "set_strokes[1].stroke.points[2]"
+        again = await sketches.update(UpdateSketchRequest(sketch_id=name), ANNA)
+        assert (again.revision, again.stroke_count) == (1, 0)
+
+    with_sketches(scenario)
+
+
+def test_a_pin_of_no_object_is_refused_and_changes_nothing():
+    async def scenario(sketches):
+        name = await made(sketches)
+        request = UpdateSketchRequest(sketch_id=name)
+        request.pins.pins.add().sketch_object.label = "bed"
+        request.pins.pins.add().map_object.index = 1
+        with pytest.raises(InvalidInputError, match="is not set; give index or label") as no:
+            await sketches.update(request, ANNA)
+        assert no.value.field == "pins.pins[1].sketch_object"
+        again = await sketches.update(UpdateSketchRequest(sketch_id=name), ANNA)
+        assert again.revision == 1
 
     with_sketches(scenario)
 

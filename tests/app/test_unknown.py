@@ -146,3 +146,13 @@ def test_a_way_of_y_that_nobody_knows_is_refused(setup, kind):
     with pytest.raises(InvalidInputError, match=r"is 7, .*; give Y_AXIS_UP or Y_AXIS_DOWN$") as no:
         list(answers(job, setup))
     assert (no.value.reason, no.value.field) == (Reason.INVALID_FIELD, f"sketch.{kind}.y_axis")
+
+
+def test_a_priority_that_nobody_knows_is_refused(setup):
+    request = golden("MatchRequest")
+    request.priority = 9
+    job = Order("m1", "MatchRequest", request.SerializeToString()).job(LIMIT)
+    names = "PRIORITY_LOW or PRIORITY_NORMAL or PRIORITY_HIGH$"
+    with pytest.raises(InvalidInputError, match=f"priority is 9, .*; give {names}") as no:
+        list(answers(job, setup))
+    assert (no.value.reason, no.value.field) == (Reason.INVALID_FIELD, "priority")

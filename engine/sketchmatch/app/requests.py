@@ -9,6 +9,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from google.protobuf import struct_pb2
+from google.protobuf.descriptor import EnumDescriptor
 
 from sketchmatch.api import Segmentation
 from sketchmatch.app.setup import RequestLimits
@@ -50,6 +51,7 @@ __all__ = [
     "file_kind",
     "match_request",
     "paths_of",
+    "pin",
     "selection",
     "source",
     "source_type",
@@ -103,6 +105,8 @@ def match_request(
     InvalidInputError
         If it cannot be used, with the path of the field.
     """
+    if isinstance(request, match_service_pb2.MatchRequest):
+        _check_known("priority", request.priority, match_service_pb2.Priority.DESCRIPTOR)
     return MatchRequest(
         sketch=_side(request, "sketch", readers, stored),
         map=_side(request, "map", readers, stored),
@@ -114,7 +118,7 @@ def match_request(
         time_budget=time_budget(request, limits),
         weights=_weights(request.weights) if request.HasField("weights") else None,
         profile=request.pipeline.profile,
-        pins=tuple(_pin(pin, f"pins[{k}]") for k, pin in enumerate(request.pins)),
+        pins=tuple(pin(each, f"pins[{k}]") for k, each in enumerate(request.pins)),
         synonyms=tuple(tuple(group.labels) for group in request.synonyms),
         **{field.name: value for field, value in request.ListFields() if field.name in _OPTIONS},
     )
@@ -146,10 +150,8 @@ def transfer_request(
     InvalidInputError
         If it cannot be used, with the path of the field.
     """
-    if request.direction not in transfer_service_pb2.TransferDirection.values():
-        problem = f"is {request.direction}, which this server's contract does not know; give "
-        problem += "TRANSFER_DIRECTION_SKETCH_TO_MAP or TRANSFER_DIRECTION_MAP_TO_SKETCH"
-        raise InvalidInputError(Reason.INVALID_FIELD, "direction", problem)
+    directions = transfer_service_pb2.TransferDirection.DESCRIPTOR
+    _check_known("direction", request.direction, directions)
     back = request.direction == transfer_service_pb2.TRANSFER_DIRECTION_MAP_TO_SKETCH
     pairs = tuple((each.sketch_object, each.map_object) for each in request.object_map)
     return TransferRequest(
@@ -351,7 +353,14 @@ def _weights(message: match_pb2.ConfidenceWeights) -> ConfidenceWeights:
     return ConfidenceWeights(**{field.name: value for field, value in message.ListFields()})
 
 
-def _pin(message: match_service_pb2.Pin, field: str) -> Pin:
+def pin(message: match_service_pb2.Pin, field: str) -> Pin:
+    """Read what is known of an object; ``field`` is the path of it.
+
+    Raises
+    ------
+    InvalidInputError
+        If it names no object of the sketch.
+    """
     sketched = _reference(message.sketch_object, f"{field}.sketch_object")
     mapped = None
     if message.HasField("map_object"):
@@ -481,12 +490,13 @@ def upward_of(y_axis: int) -> float:
     InvalidInputError
         If it is none of the contract.
     """
-    upward = _UPWARD.get(y_axis)
-    if upward is None:
-        raise InvalidInputError(
-            Reason.INVALID_FIELD,
-            "y_axis",
-            f"is {y_axis}, which this server's contract does not know; give Y_AXIS_UP or "
-            "Y_AXIS_DOWN",
-        )
-    return upward
+    _check_known("y_axis", y_axis, source_pb2.YAxis.DESCRIPTOR)
+    return _UPWARD[y_axis]
+
+
+def _check_known(field: str, value: int, kind: EnumDescriptor) -> None:
+    """Refuse a value that an enumeration of the contract does not have."""
+    if value not in kind.values_by_number:
+        names = " or ".join(each.name for each in kind.values if each.number)
+        problem = f"is {value}, which this server's contract does not know; give {names}"
+        raise InvalidInputError(Reason.INVALID_FIELD, field, problem)

@@ -21,6 +21,7 @@ from contextlib import aclosing, suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from sketchmatch.app import requests
 from sketchmatch.app.following import followed
 from sketchmatch.app.packed import Packed
 from sketchmatch.app.setup import SketchLimits
@@ -251,6 +252,8 @@ class Sketches:
             state = sketch.at(request.restore_revision)
         state = replace(state, strokes=self._drawn(dict(state.strokes), request))
         if request.HasField("pins"):
+            for k, each in enumerate(request.pins.pins):
+                requests.pin(each, f"pins.pins[{k}]")
             state = replace(state, pins=tuple(map(_apart, request.pins.pins)))
         sketch.change(state)
         return UpdateSketchResponse(revision=sketch.revision, stroke_count=len(state.strokes))
@@ -368,6 +371,7 @@ class Sketches:
                     f"set_strokes[{k}].stroke_id",
                     f"has {len(each.stroke_id)} characters; give a name of 1 to {_LONGEST_NAME}",
                 )
+            _check_points(each.stroke, f"set_strokes[{k}].stroke")
             strokes[each.stroke_id] = _apart(each.stroke)
         if len(strokes) > self._limits.strokes:
             raise _too_large("set_strokes", len(strokes), "strokes", self._limits.strokes)
@@ -497,6 +501,13 @@ def _told(event: MatchResponse, taken: float) -> tuple[str, WatchSketchResponse]
             result = SketchResult(result=event.result, question=question(event.result))
             return "outcome", WatchSketchResponse(result=result)
     return None
+
+
+def _check_points(stroke: Stroke, field_: str) -> None:
+    for k, point in enumerate(stroke.points):
+        if not (math.isfinite(point.x) and math.isfinite(point.y)):
+            problem = "is not finite; give plain numbers"
+            raise InvalidInputError(Reason.INVALID_STROKE, f"{field_}.points[{k}]", problem)
 
 
 def _apart(part: _Part) -> _Part:
