@@ -29,6 +29,7 @@ from sketchmatch_client import (
 from sketchmatch_proto.v1.match_service_pb2_grpc import MatchServiceStub
 from tests.certificates import Authority
 from tests.contract.golden import as_json, golden
+from tests.pace import wait_until
 from tests.processes import server
 from tests.server.harness import Host, hosting, in_loop, kinds, scene
 
@@ -439,6 +440,15 @@ def test_tokens_change_while_the_server_runs(ours, tls, robot, tmp_path):
     assert len(told) == 2
     assert f"{file}, line 1, has another form than NAME:sha256:SALT:HASH" in told[0]
     assert not any(other in line for line in host.said)
+
+
+def test_what_is_wrong_with_a_file_is_said_though_nobody_calls(monkeypatch, robot, tmp_path):
+    monkeypatch.setattr("sketchmatch.server.serve._LOOK_AT_FILES", 0.05)
+    file = tmp_path / "tokens"
+    file.write_text(robot[1].line)
+    with hosting(SETUP, tokens=file) as host:
+        file.write_text("nonsense")
+        wait_until(lambda: "the tokens stay as they were" in "".join(host.said), "it is not said")
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import signal
 import socket
 import time
@@ -52,6 +53,8 @@ from sketchmatch_proto.v1 import (
 
 __all__ = ["ServerSettings", "serve"]
 
+_log = logging.getLogger(__name__)
+
 _ALL = 2**31 - 1
 _MOST_AT_ONCE = 1000
 _PING_MS = 10_000
@@ -59,6 +62,7 @@ _IDLE_MS = 600_000
 _QUIET = 1.0
 _DAY = 86_400.0
 _LOOK = 0.05
+_LOOK_AT_FILES = 1.0
 _COMING_TO_AN_END = 4.0
 """Seconds of the grace, half of it at most, that matches have for coming to an end with what they
 have: a judge takes longer on a machine that is busy."""
@@ -276,9 +280,18 @@ class _Files:
             if watched is not None:
                 watched.look()
 
+    async def watch(self) -> None:
+        """Look every second, so that faults are said before anybody calls."""
+        while self.pems is not None or self._tokens is not None:
+            await asyncio.sleep(_LOOK_AT_FILES)
+            try:
+                await asyncio.to_thread(self.look)
+            except Exception:  # nobody else would look from then on
+                _log.exception("the files of certificates and tokens were not looked at")
+
 
 class _Beside:
-    """What is beside the gRPC server: monitors, browsers, and a collector of traces.
+    """What is beside the gRPC server: watched files, monitors, browsers, a collector of traces.
 
     Attributes
     ----------
@@ -297,7 +310,8 @@ class _Beside:
         traces: Traces,
     ) -> None:
         self.sentences: list[str] = []
-        self._traces = traces
+        self._files, self._traces = files, traces
+        self._watching: asyncio.Task[None] | None = None
         self._monitor: Monitor | None = None
         self._gateway: Gateway | None = None
         if settings.metrics_address:
@@ -317,6 +331,7 @@ class _Beside:
 
     def start(self) -> None:
         """Answer from now on."""
+        self._watching = asyncio.create_task(self._files.watch())
         if self._gateway:
             self._gateway.start()
 
@@ -327,6 +342,8 @@ class _Beside:
 
     async def close(self) -> None:
         """Tell monitors nothing more, and the collector of traces the last."""
+        if self._watching:
+            self._watching.cancel()
         if self._monitor:
             await asyncio.to_thread(self._monitor.close)
         await asyncio.to_thread(self._traces.close)
