@@ -1,15 +1,22 @@
 """How much each caller may ask for, and what a match may cost."""
 
 import asyncio
+import pickle
 
 import pytest
 
 from sketchmatch.app.jobs import Job, answers
 from sketchmatch.app.quotas import Rates
 from sketchmatch.errors import InvalidInputError, PluginError, Reason, TooBusyError
+from sketchmatch.model import Scene
+from sketchmatch.pipeline.engine import Engine
+from sketchmatch.pipeline.request import MatchRequest
 from sketchmatch_client import features, match_request, transfer_request
+from sketchmatch_proto.v1.sketch_service_pb2 import CreateSketchRequest
 from tests.app.test_application import SCENE, Held, held, setup, until  # noqa: F401
 from tests.app.test_matches import ALICE, BOB, endless, matched, named, serving
+
+BOXES = Scene.from_polygons([[(k, 0), (k + 1, 0), (k, 1 + k)] for k in (0, 3, 9)])
 
 
 def test_a_caller_may_send_so_many_requests_in_a_minute_at_once_or_one_by_one():
@@ -118,6 +125,21 @@ def test_all_searchers_whose_parameters_say_how_much_they_weigh_are_held_to_it(
     with pytest.raises(InvalidInputError, match=r"weigh 1[02]0[01] maps, .* limit of 1000"):
         asked(request, max_candidates=1000)
     assert asked(request, max_candidates=1200)
+
+
+def test_a_sketch_whose_matches_would_weigh_too_much_is_not_begun():
+    match = match_request(SCENE, SCENE, searcher="nn", params={"searcher": {"seed_points": 9}})
+    match.ClearField("sketch")
+    request = CreateSketchRequest(match=match)
+    assert asked(request, max_candidates=9)
+    with pytest.raises(InvalidInputError, match="let 'nn' weigh 9 maps") as no:
+        asked(request, max_candidates=8)
+    assert no.value.field == "match.pipeline.searcher.parameters"
+
+
+def test_an_engine_that_checks_nothing_goes_to_other_processes():
+    engine = pickle.loads(pickle.dumps(Engine()))
+    assert len(list(engine.match(MatchRequest(BOXES, BOXES)))) > 2
 
 
 @pytest.mark.parametrize("said", ["many", 0, 1.5])

@@ -324,7 +324,7 @@ def _map_of_sketch(
     job: Job, request: CreateSketchRequest, setup: Setup
 ) -> Generator[Message, None, None]:
     """Find the objects of the map of a sketch, once it is known that the match can be had."""
-    engine, match = setup.engine, MatchRequest()
+    engine, match = _within_costs(setup), MatchRequest()
     requests.upward_of(request.y_axis)
     match.CopyFrom(request.match)
     try:
