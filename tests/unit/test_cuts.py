@@ -2,6 +2,7 @@
 
 import math
 import re
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -300,6 +301,24 @@ def test_with_little_time_no_other_cut_is_made(monkeypatch):
     sketch, _ = drawn()
     request = (source_of(sketch.scene), floor().scene, with_cuts())
     assert told(*request, selection=CUT, time_budget=60.0)[-1].result.object_map
+
+
+@pytest.mark.parametrize(("budget", "most"), [(None, 12), (3.0, 3)])
+def test_a_segmenter_of_cuts_without_end_is_asked_for_a_few_while_there_is_time(
+    monkeypatch, budget, most
+):
+    made = []
+
+    def cuts(segmenter, source):
+        while True:
+            made.append(time.sleep(0.1 if budget else 0.0))
+            yield segmenter.segment(source)
+
+    monkeypatch.setattr(Cut, "cuts", cuts)
+    sketch, _ = drawn()
+    request = (source_of(sketch.scene), floor().scene, with_cuts())
+    assert told(*request, selection=CUT, time_budget=budget)[-1].result.object_map
+    assert len(made) <= most if budget else len(made) == most
 
 
 @pytest.mark.parametrize("given", [source_of, lambda scene: scene, Segmentation])

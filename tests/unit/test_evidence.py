@@ -185,7 +185,7 @@ def test_objects_tell_apart_what_their_places_cannot():
     )
     drawn = Scene.from_polygons([item.rings[0][:, ::-1] * (-1, 1) for item in scene.objects])
     truth = {k: k for k in range(4)}
-    for profile in ("thesis", ""):
+    for profile in ("thesis", None):
         assert match(drawn, scene, profile=profile, weights=(1, 1, 1, 3, 3)).object_map == truth
 
 

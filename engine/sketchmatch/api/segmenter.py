@@ -63,8 +63,8 @@ class Segmenter(Algorithm, ABC):
 
         Where one object ends and the next begins is not always plain, as in free space, which may
         be cut coarser, or finer. A match takes the cut of either side that fits the other best, and
-        the first where nothing speaks for another; it asks for others only where there is time for
-        them. There is no other by default.
+        the first where nothing speaks for another; it asks for another one only while there is time
+        for it, and for twelve at most. There is no other by default.
 
         Raises
         ------

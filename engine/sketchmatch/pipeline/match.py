@@ -57,6 +57,9 @@ Check = Callable[[Pipeline, tuple[Scene, Scene] | None], None]
 _AMPLE = 10.0
 """Of the time that finding objects takes: what must be left for trying other cuts of them."""
 
+_MOST_CUTS = 12
+"""Cuts of a side that are asked for."""
+
 
 def unchecked(pipeline: Pipeline, scenes: tuple[Scene, Scene] | None) -> None:
     """Let everything pass."""
@@ -197,9 +200,12 @@ def _events(
         clock.check(Phase.SEGMENT)
         map_ = next(cuts[1])
         drawn, mapped = [sketch], [map_]
-        if is_open and clock.left() > _AMPLE * clock.spent():
-            drawn += cuts[0]
-            mapped += cuts[1]
+        for side, others in ((drawn, cuts[0]), (mapped, cuts[1])):
+            while is_open and len(side) < _MOST_CUTS and clock.left() > _AMPLE * clock.spent():
+                cut = next(others, None)
+                if cut is None:
+                    break
+                side.append(cut)
     remembered = Memory()
 
     def matched(sketch: Segmentation, map_: Segmentation) -> Generator[MatchEvent, None, None]:

@@ -145,7 +145,7 @@ class Stroke(google.protobuf.message.Message):
     POINTS_FIELD_NUMBER: builtins.int
     LABEL_FIELD_NUMBER: builtins.int
     label: builtins.str
-    """A name for people, e.g. "sofa". It never influences a match; but the segmenter `strokes` takes
+    """A name, e.g. "sofa": evidence where both scenes have some. The segmenter `strokes` takes
     a stroke named "route" or "path" for the sketched route, which is no object.
     """
     @property
@@ -226,7 +226,7 @@ class LabelledPolygon(google.protobuf.message.Message):
     LABEL_FIELD_NUMBER: builtins.int
     CERTAINTY_FIELD_NUMBER: builtins.int
     label: builtins.str
-    """A name for people. It never influences a match."""
+    """A name, e.g. "sofa": evidence where both scenes have some."""
     certainty: builtins.float
     """How sure it is that this is one thing, above 0 and up to 1; not set: 1."""
     @property
