@@ -385,7 +385,9 @@ def test_work_between_pauses_is_bounded_for_many_objects(monkeypatch, partial):
         return counted
 
     monkeypatch.setattr(
-        _candidates, "refine_pose", counting(_candidates.refine_pose, lambda *a: a[5].size)
+        _candidates,
+        "refine_guesses",
+        counting(_candidates.refine_guesses, lambda *a: len(a[0]) * a[3].size),
     )
     monkeypatch.setattr(module, "completed", counting(module.completed, lambda *a: a[1].bonus.size))
     rng = np.random.default_rng(0)

@@ -231,7 +231,7 @@ def test_far_pairs_are_laid_first_and_each_object_soon():
 
 def test_work_between_pauses_is_bounded(monkeypatch):
     weighed, refined = [], [0]
-    guess, refine = module.guess_poses, module.refine_pose
+    guess, refine = module.guess_poses, module.refine_guesses
 
     def counted(*arguments):
         before = int(arguments[-1].state[1])
@@ -239,11 +239,11 @@ def test_work_between_pauses_is_bounded(monkeypatch):
         weighed.append(int(arguments[-1].state[1]) - before)
 
     def noted(*arguments):
-        refined[0] += 1
+        refined[0] += len(arguments[0])
         return refine(*arguments)
 
     monkeypatch.setattr(module, "guess_poses", counted)
-    monkeypatch.setattr(module, "refine_pose", noted)
+    monkeypatch.setattr(module, "refine_guesses", noted)
     drawn, mapped, order = copied(0, 60, 60)
     work = laid_maps(sides(drawn, mapped), 60, 120, True)
     most = before = 0

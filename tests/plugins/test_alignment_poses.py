@@ -1,5 +1,6 @@
 """Poses: what they are worth, which are guessed, and how they are refined."""
 
+import itertools
 import math
 
 import numpy as np
@@ -11,6 +12,7 @@ from sketchmatch_builtin.alignment import _poses
 from sketchmatch_builtin.alignment._poses import (
     TOLERANCES,
     empty_guesses,
+    far_pairs,
     fitted_pose,
     fitting_pose,
     grid_of,
@@ -18,6 +20,7 @@ from sketchmatch_builtin.alignment._poses import (
     guess_poses,
     guessed_pose,
     pairing_worths,
+    refine_guesses,
     refine_pose,
     vary,
 )
@@ -263,6 +266,36 @@ def test_a_refined_pose_holds_the_best_of_all_maps_under_it(seed, n, m):
     best = max(aligning.value(each, found, TOLERANCES.omission) for each in aligning.all_maps(n, m))
     assert score == pytest.approx(best, abs=1e-8)
     assert aligning.value(partners, found, TOLERANCES.omission) == pytest.approx(best, abs=1e-8)
+
+
+def test_several_guesses_are_refined_as_each_alone():
+    rng = np.random.default_rng(4)
+    drawn, mapped, bonus = things(rng, 5), things(rng, 7), rng.normal(size=(5, 7))
+    pairings = np.array([[0, j, 3, g] for j in range(7) for g in range(7) if j != g])
+    partners = np.empty((len(pairings), 5), dtype=np.int64)
+    poses, values = np.empty((len(pairings), 2), dtype=complex), np.empty((len(pairings), 2))
+    refine_guesses(pairings, drawn, mapped, bonus, TOLERANCES, partners, poses, values)
+    alone = np.empty(5, dtype=np.int64)
+    for k, pairing in enumerate(pairings):
+        start = guessed_pose(pairing, drawn, mapped)
+        known = refine_pose(*start, drawn, mapped, bonus, TOLERANCES, alone)
+        assert (*poses[k].tolist(), *values[k].tolist()) == known
+        np.testing.assert_array_equal(partners[k], alone)
+
+
+@given(st.integers(0, 2**32), st.integers(2, 7), st.integers(0, 30))
+@examples(40)
+def test_far_pairs_come_first_and_each_place_soon(seed, n, most):
+    places = things(np.random.default_rng(seed), n).places
+    left, used = list(itertools.combinations(range(n), 2)), [0] * n
+    found = far_pairs(places, most).tolist()
+    assert len(found) == min(len(left), most)
+    for a, b in found:
+        worth = {(i, j): abs(places[i] - places[j]) / (1 + used[i] + used[j]) for i, j in left}
+        assert worth[a, b] == pytest.approx(max(worth.values()))
+        left.remove((a, b))
+        used[a] += 1
+        used[b] += 1
 
 
 def test_refining_finds_a_copy_from_a_pose_that_is_a_little_off():

@@ -14,11 +14,12 @@ from sketchmatch_builtin.alignment._poses import (
     TOLERANCES,
     Guesses,
     empty_guesses,
+    far_pairs,
     fitting_pose,
     grid_of,
     guess_poses,
-    guessed_pose,
     pairing_worths,
+    refine_guesses,
     refine_pose,
     vary,
 )
@@ -61,6 +62,9 @@ _STEP = 16_000
 
 _PAIRINGS = 100_000
 """Pairings to weigh for poses that are refined between two pauses, or a few more."""
+
+_AT_ONCE = 16
+"""Poses to refine at once: calls cost as much as the work, and the last ones may be in vain."""
 
 _NEAR = -1
 _NEAR_PAIRS, _NEAR_POSES = 3, 10
@@ -287,17 +291,24 @@ def _refined(guesses: Guesses, sides: Sides, poses: int) -> Generator[int, None,
     """Return the different maps that the best guesses lead to."""
     drawn, mapped = sides.drawn, sides.mapped
     found: dict[bytes, Laid] = {}
-    partners = np.empty(len(drawn.places), dtype=np.int64)
     count, weighed = int(guesses.state[0]), 0
-    ranked = np.argsort(-guesses.scores[:count], kind="stable")
-    for g in ranked[: 5 * poses]:
-        pose = guessed_pose(guesses.pairings[g], drawn, mapped)
-        u, t, growth, score = refine_pose(*pose, drawn, mapped, sides.bonus, TOLERANCES, partners)
-        _keep_better(found, Laid(partners.copy(), (u, t, growth), score))
+    ranked = guesses.pairings[np.argsort(-guesses.scores[:count], kind="stable")[: 5 * poses]]
+    step = min(_AT_ONCE, max(1, _PAIRINGS // sides.bonus.size))
+    for low in range(0, len(ranked), step):
+        pairings = ranked[low : low + step]
+        partners = np.empty((len(pairings), len(drawn.places)), dtype=np.int64)
+        places, values = np.empty((len(pairings), 2), dtype=np.complex128), np.empty((step, 2))
+        refine_guesses(pairings, drawn, mapped, sides.bonus, TOLERANCES, partners, places, values)
+        for each, (u, t), (growth, score) in zip(
+            partners, places.tolist(), values[: len(pairings)].tolist(), strict=True
+        ):
+            _keep_better(found, Laid(each, (u, t, growth), score))
+            if len(found) >= poses:
+                break
         if len(found) >= poses:
             break
-        weighed += sides.bonus.size
-        if weighed >= _PAIRINGS:
+        weighed += step * sides.bonus.size
+        if weighed + step * sides.bonus.size > _PAIRINGS:
             weighed = 0
             yield int(guesses.state[1])
     return sorted(found.values(), key=lambda laid: -laid.score)
@@ -366,12 +377,4 @@ def _varied(laid: list[Laid], sides: Sides, most: int) -> list[Laid]:
 def _pairs(drawn: Things, most: int | None = None) -> IntArray:
     """Return the sketched pairs to lay on others: far ones first, and each object soon."""
     n = len(drawn.places)
-    a, b = np.triu_indices(n, k=1)
-    apart, used = np.abs(drawn.places[a] - drawn.places[b]), np.zeros(n)
-    chosen = []
-    for _ in range(min(len(a), max(_PAIRS, 2 * n) if most is None else most)):
-        best = int(np.argmax(apart / (1.0 + used[a] + used[b])))
-        chosen.append((a[best], b[best]))
-        used[[a[best], b[best]]] += 1.0
-        apart[best] = -1.0
-    return np.array(chosen, dtype=np.int64)
+    return far_pairs(drawn.places, max(_PAIRS, 2 * n) if most is None else most)

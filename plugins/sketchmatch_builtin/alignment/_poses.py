@@ -20,6 +20,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sketchmatch.api.kernels import kernel
 from sketchmatch.model import BoolArray, FloatArray, IntArray
@@ -32,6 +33,7 @@ __all__ = [
     "Guesses",
     "Tolerances",
     "empty_guesses",
+    "far_pairs",
     "fitted_pose",
     "fitting_pose",
     "grid_of",
@@ -40,6 +42,7 @@ __all__ = [
     "guessed_pose",
     "pair_score",
     "pairing_worths",
+    "refine_guesses",
     "refine_pose",
     "square",
     "vary",
@@ -234,6 +237,30 @@ def guess_poses(
             score = _worth(u, t, twist, growth, drawn, grid, free, tolerances, guesses.floor[0])
             if score > guesses.floor[0]:
                 _keep(guesses, score, i, j, k, g)
+
+
+@kernel
+def far_pairs(places: NDArray[np.complex128], most: int) -> IntArray:
+    """Return so many pairs of places at most, shape (k, 2): far ones first, and each place soon."""
+    n = places.size
+    count = n * (n - 1) // 2
+    apart, used = np.empty((n, n)), np.zeros(n)
+    for i in range(n):
+        for j in range(i + 1, n):
+            apart[i, j] = abs(places[i] - places[j])
+    found = np.empty((min(count, most), 2), dtype=np.int64)
+    for x in range(found.shape[0]):
+        best, a, b = -1.0, 0, 0
+        for i in range(n):
+            for j in range(i + 1, n):
+                value = apart[i, j] / (1.0 + used[i] + used[j])
+                if value > best:
+                    best, a, b = value, i, j
+        found[x, 0], found[x, 1] = a, b
+        used[a] += 1.0
+        used[b] += 1.0
+        apart[a, b] = -np.inf
+    return found
 
 
 @kernel
@@ -468,6 +495,41 @@ def refine_pose(
         u, t = v, s
         growth = grown(drawn, mapped, partners, 2.0 * np.log(abs(u)), tolerances)
     return u, t, growth, total
+
+
+@kernel
+def refine_guesses(
+    pairings: IntArray,
+    drawn: Things,
+    mapped: Things,
+    bonus: FloatArray,
+    tolerances: Tolerances,
+    partners: IntArray,
+    poses: NDArray[np.complex128],
+    values: FloatArray,
+) -> None:
+    """Refine several guessed poses, as :func:`refine_pose` does each.
+
+    Parameters
+    ----------
+    pairings
+        Shape (k, 4), as in :class:`Guesses`.
+    drawn, mapped, bonus, tolerances
+        As for :func:`refine_pose`.
+    partners
+        Shape (k, n), written: the mapped object of each sketched one, −1 for none.
+    poses
+        Shape (k, 2), written: u and t.
+    values
+        Shape (k, 2), written: the growth, and the sum of ℓ and −λ.
+    """
+    for x in range(pairings.shape[0]):
+        u, t, growth = guessed_pose(pairings[x], drawn, mapped)
+        u, t, growth, score = refine_pose(
+            u, t, growth, drawn, mapped, bonus, tolerances, partners[x]
+        )
+        poses[x, 0], poses[x, 1] = u, t
+        values[x, 0], values[x, 1] = growth, score
 
 
 @kernel
