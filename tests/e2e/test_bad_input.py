@@ -340,7 +340,7 @@ CASES = [
         "picture of another kind",
         "INVALID_IMAGE",
         "is not a picture",
-        "give a PNG, JPEG, BMP, TIFF or PGM",
+        "give a PNG, JPEG, WebP, GIF, BMP, TIFF or PGM",
         b"%PDF-1.4",
         place="{map}: image",
     ),

@@ -116,7 +116,14 @@ def test_a_pipe_gets_tab_separated_lines_and_nothing_else(where):
     assert done.returncode == 0
     assert done.stderr == ""
     head, *lines = [line.split("\t") for line in done.stdout.splitlines()]
-    assert head == ["sketch_object", "map_object", "confidence", "sketch_label", "map_label"]
+    assert head == [
+        "sketch_object",
+        "map_object",
+        "confidence",
+        "sketch_label",
+        "map_label",
+        "probability",
+    ]
     assert [line[0] for line in lines] == [str(k) for k in range(8)]
     assert sorted(line[1] for line in lines) == [str(k) for k in range(8)]
     assert all(0 < float(line[2]) <= 1 for line in lines)

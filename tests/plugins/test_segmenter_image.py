@@ -171,7 +171,7 @@ def test_too_few_shapes_say_how_large_they_would_have_to_be():
     assert (caught.value.field, caught.value.reason) == ("pixels", Reason.TOO_FEW_OBJECTS)
     assert caught.value.problem == (
         "has only one shape of at least 8 pixels' side, and a match needs two; draw objects "
-        "apart from each other, or lower min_size"
+        "apart from each other, lower min_size, or choose the segmenter rooms if it is a floor plan"
     )
 
 

@@ -200,9 +200,13 @@ def test_in_a_pipe_doubts_go_to_standard_error_and_the_columns_stay(monkeypatch,
     plain_ = capsys.readouterr()
     assert plain_.err == ""
     assert plain_.out.splitlines()[:2] == [
-        "sketch_object\tmap_object\tconfidence\tsketch_label\tmap_label",
-        "0\t0\t0.9000\t\t",
+        "sketch_object\tmap_object\tconfidence\tsketch_label\tmap_label\tprobability",
+        "0\t0\t0.9000\t\t\t",
     ]
+    sure.result.object_matches[0].probability = 0.00412345
+    display.show_match(sure, metres=False, verbose=False)
+    assert capsys.readouterr().out.splitlines()[1] == "0\t0\t0.9000\t\t\t0.004123"
+    sure.result.object_matches[0].ClearField("probability")
     sure.result.place_probability = 0.004
     sure.result.unmatched_sketch_objects.append(3)
     display.show_match(sure, metres=False, verbose=False)

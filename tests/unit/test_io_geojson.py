@@ -274,3 +274,20 @@ def test_a_level_of_a_file_is_read_by_its_name(tmp_path):
     file = tmp_path / "house.geojson"
     file.write_text(json.dumps(building(unit(0, level=0), unit(2, level=1))), encoding="utf-8")
     assert [each.label for each in read_source(f"{file}#1").polygons] == ["u2"]
+
+
+def test_properties_that_name_a_thing_are_found_however_they_are_capitalized():
+    corners = [[0, 0], [2, 0], [2, 1], [0, 0]]
+    given = [{"Name": "desk"}, {"LABEL": "sofa", "name": "x"}, {"ref": "A 12"}, {"NAME": None}]
+    features = [
+        {
+            "type": "Feature",
+            "id": k,
+            "properties": each,
+            "geometry": {"type": "Polygon", "coordinates": [corners]},
+        }
+        for k, each in enumerate(given)
+    ]
+    document = {"type": "FeatureCollection", "features": features}
+    found = decode_geojson(json.dumps(document)).polygons
+    assert [polygon.label for polygon in found] == ["desk", "sofa", "A 12", "3"]

@@ -28,6 +28,16 @@ def test_lossless_formats_keep_every_grey(kind, mode):
     assert (decode_image(data).pixels == GREY).all()
 
 
+@pytest.mark.parametrize("name", ["sketch.webp", "sketch.GIF", "sketch.jpg", "sketch.png"])
+@pytest.mark.parametrize("kind", ["WEBP", "GIF"])
+def test_pictures_of_browsers_are_read_whatever_they_are_called(tmp_path, kind, name):
+    options = {"lossless": True} if kind == "WEBP" else {}
+    others = {"save_all": True, "append_images": [PIL.Image.new("L", (3, 2), 255)]}
+    path = tmp_path / name
+    path.write_bytes(saved(PIL.Image.fromarray(GREY), kind, **others, **options))
+    assert (read_source(path).pixels == GREY).all()
+
+
 COLOURS = np.zeros((40, 60, 3), np.uint8) + np.array([255, 250, 240], np.uint8)
 COLOURS[5:15, 5:25], COLOURS[20:35, 30:50] = [250, 220, 0], [200, 30, 40]
 

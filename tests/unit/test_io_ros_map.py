@@ -424,7 +424,7 @@ def png(width, height, data):
         (b"P2\n3 1\n255\n0 x 2\n", "is damaged or cut short"),
         (b"P5\n3", "is damaged or cut short"),
         (b"P5\n0 3\n255\n", "is not a picture"),
-        (b"", "is not a picture; give a PNG, JPEG, BMP, TIFF or PGM file"),
+        (b"", "is not a picture; give a PNG, JPEG, WebP, GIF, BMP, TIFF or PGM file"),
         (b"image: map.pgm", "is not a picture"),
     ],
 )

@@ -21,8 +21,8 @@ constexpr std::size_t kMostObjectBytes = std::size_t{16} * 1024 * 1024;
 constexpr const char* kObjects = ".objects.geojson";
 constexpr const char* kRemedy = "give the file that map_server saved";
 constexpr std::array kYamls{".yaml", ".yml"};
-constexpr std::array kPictures{".bmp", ".jpeg", ".jpg", ".pbm", ".pgm",
-                               ".png", ".pnm",  ".ppm", ".tif", ".tiff"};
+constexpr std::array kPictures{".bmp", ".gif", ".jpeg", ".jpg", ".pbm",  ".pgm",
+                               ".png", ".pnm", ".ppm",  ".tif", ".tiff", ".webp"};
 
 template <std::size_t N>
 bool has_suffix(const fs::path& path, const std::array<const char*, N>& suffixes) {

@@ -249,7 +249,7 @@ def image(file: str | os.PathLike[str] | bytes) -> source_pb2.Source:
     Parameters
     ----------
     file
-        A PNG, JPEG, BMP or PGM file, or its bytes.
+        A PNG, JPEG, WebP, GIF, BMP, TIFF or PGM file, or its bytes.
 
     Raises
     ------

@@ -36,8 +36,8 @@ __all__ = [
 YAML_SUFFIXES = (".yaml", ".yml")
 """Of the file that map_server is given."""
 PICTURE_SUFFIXES = (
-    *(".bmp", ".jpeg", ".jpg", ".pbm", ".pgm"),
-    *(".png", ".pnm", ".ppm", ".tif", ".tiff"),
+    *(".bmp", ".gif", ".jpeg", ".jpg", ".pbm", ".pgm"),
+    *(".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"),
 )
 """Of pictures that may be a map's."""
 

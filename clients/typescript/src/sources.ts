@@ -116,7 +116,7 @@ export function mapServerMap(yaml: string, image: Uint8Array, objects = ""): Sou
   return create(SourceSchema, { kind: { case: "mapServerMap", value } });
 }
 
-/** Return a picture: PNG, JPEG, BMP or PGM. */
+/** Return a picture: PNG, JPEG, WebP, GIF, BMP, TIFF or PGM. */
 export function image(data: Uint8Array): Source {
   return create(SourceSchema, { kind: { case: "image", value: { data } } });
 }

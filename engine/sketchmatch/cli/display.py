@@ -174,11 +174,16 @@ def show_match(match: Match, metres: bool, verbose: bool) -> None:
         output.show(_answer(match, metres))
         return
     say_doubt(match)
-    output.write_line("sketch_object", "map_object", "confidence", "sketch_label", "map_label")
+    columns = ("sketch_object", "map_object", "confidence", "sketch_label", "map_label")
+    output.write_line(*columns, "probability")
     for line in match.result.object_matches:
-        confidence = f"{line.confidence:.4f}"
         output.write_line(
-            line.sketch_object, line.map_object, confidence, line.sketch_label, line.map_label
+            line.sketch_object,
+            line.map_object,
+            f"{line.confidence:.4f}",
+            line.sketch_label,
+            line.map_label,
+            f"{line.probability:.4g}" if line.HasField("probability") else "",
         )
 
 

@@ -2,8 +2,9 @@
 
 A ``FeatureCollection``, ``Feature``, ``GeometryCollection``, ``Polygon`` or ``MultiPolygon``, or
 several of them in a list, in a line each, or as a text sequence (RFC 8142); each polygon becomes
-one object. A feature's property ``label``, or else ``name`` or ``alt_name``, or else its ``id``, is
-its label; a name in several languages, as IMDF has them, is the first of them. Its property
+one object. A feature's property ``label``, or else ``name``, ``alt_name`` or ``ref``, however it is
+capitalized, or else its ``id``, is its label; a name in several languages, as IMDF has them, is the
+first of them. Its property
 ``certainty``, above 0 and up to 1, is how sure it is that it is one thing. Of a building of several
 levels, which features name in ``level_id`` or ``level``, ``plan.geojson#1`` chooses one.
 Heights (a third coordinate) are ignored, and rings need not repeat their first point.
@@ -208,8 +209,8 @@ def _properties(feature: dict[str, Any]) -> dict[str, Any]:
 
 
 def _label(feature: dict[str, Any]) -> str:
-    given = _properties(feature)
-    keys = ("label", "name", "alt_name")
+    given = {key.lower(): value for key, value in reversed(_properties(feature).items())}
+    keys = ("label", "name", "alt_name", "ref")
     names = (name for key in keys for name in _in_any_language(given.get(key)))
     return next((name for name in map(plain_name, (*names, feature.get("id"))) if name), "")
 

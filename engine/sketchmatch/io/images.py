@@ -1,4 +1,4 @@
-"""Pictures of maps and sketches: PNG, JPEG, BMP, TIFF and netpbm (PGM, PPM, PBM)."""
+"""Pictures of maps and sketches: PNG, JPEG, WebP, GIF, BMP, TIFF, netpbm (PGM, PPM, PBM)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import PIL.BmpImagePlugin
+import PIL.GifImagePlugin
 import PIL.Image
 import PIL.ImageChops
 import PIL.ImageOps
@@ -16,6 +17,7 @@ import PIL.JpegImagePlugin
 import PIL.PngImagePlugin
 import PIL.PpmImagePlugin
 import PIL.TiffImagePlugin
+import PIL.WebPImagePlugin
 from numpy.typing import NDArray
 
 from sketchmatch.errors import InvalidInputError, Reason
@@ -24,7 +26,7 @@ from sketchmatch.model.limits import check_bytes, check_pixels
 
 __all__ = ["decode_image", "load_picture", "scaled_to_8_bits"]
 
-_FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "PPM")
+_FORMATS = ("PNG", "JPEG", "WEBP", "GIF", "BMP", "TIFF", "PPM")
 _GREY = ("1", "L", "LA", "La")
 
 # Pixels whose channels differ by this much are in colour; fewer than this share are blemishes.
@@ -46,7 +48,8 @@ def decode_image(data: bytes) -> Image:
     Parameters
     ----------
     data
-        A whole PNG, JPEG, BMP, TIFF, PGM, PPM or PBM file.
+        A whole PNG, JPEG, WebP, GIF, BMP, TIFF, PGM, PPM or PBM file; of several pictures the
+        first.
 
     Raises
     ------
@@ -125,7 +128,7 @@ def load_picture(data: bytes, field: str) -> PIL.Image.Image:
         raise _invalid(
             field, f"is damaged or cut short ({cause}); save the picture again"
         ) from None
-    raise _invalid(field, "is not a picture; give a PNG, JPEG, BMP, TIFF or PGM file")
+    raise _invalid(field, "is not a picture; give a PNG, JPEG, WebP, GIF, BMP, TIFF or PGM file")
 
 
 def _announced(data: bytes) -> PIL.Image.Image | None:

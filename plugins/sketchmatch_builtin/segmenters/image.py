@@ -196,6 +196,6 @@ def _check_count(found: int, side: int) -> None:
             Reason.TOO_FEW_OBJECTS,
             "pixels",
             f"has {'no shape' if not found else 'only one shape'} of at least {side} "
-            "pixels' side, and a match needs two; draw objects apart from each other, or lower "
-            "min_size",
+            "pixels' side, and a match needs two; draw objects apart from each other, lower "
+            "min_size, or choose the segmenter rooms if it is a floor plan",
         )

@@ -109,7 +109,8 @@ Source occupancy_grid(const std::vector<std::int8_t>& cells, std::uint32_t colum
 /// @throws InvalidRequestError If the file or its picture cannot be read, or it names none.
 Source map_server_map(const std::filesystem::path& path);
 
-/// Returns a picture of a map or of a sketch: a PNG, JPEG, BMP or PGM file.
+/// Returns a picture of a map or of a sketch: a PNG, JPEG, WebP, GIF, BMP,
+/// TIFF or PGM file.
 /// @throws InvalidRequestError If the file cannot be read.
 Source image(const std::filesystem::path& path);
 

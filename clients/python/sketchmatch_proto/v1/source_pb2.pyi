@@ -399,7 +399,7 @@ class EncodedImage(google.protobuf.message.Message):
 
     DATA_FIELD_NUMBER: builtins.int
     data: builtins.bytes
-    """Bytes of the file: PNG, JPEG, BMP or PGM, told apart by their content."""
+    """Bytes of the file: PNG, JPEG, WebP, GIF, BMP, TIFF or PGM, told apart by their content."""
     def __init__(
         self,
         *,
