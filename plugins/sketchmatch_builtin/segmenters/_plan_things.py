@@ -18,6 +18,8 @@ __all__ = ["Things", "dimensions", "paper", "standing", "things_in"]
 
 # Of the area of the hull of all that is drawn: the largest thing.
 _LARGEST = 0.06
+# … and most of all that touch walls.
+_FULL = 0.3
 # Of the square of the way around it: the least area. What is longer than seven times its width is
 # a wall.
 _THICK = 0.027
@@ -144,8 +146,11 @@ def things_in(lines: Sequence[FloatArray], names: Sequence[Landmark]) -> Things:
     touches[shapely.STRtree(walls).query(outlines, "dwithin", near)[0]] = True
     touching = np.isin(group, group[touches])
     written = shapely.MultiPoint([item.point for item in names])
+    unnamed = touching & ~shapely.intersects(outlines, written)
+    # What covers so much is rooms.
+    unnamed &= shapely.area(outlines[unnamed]).sum() <= _FULL * whole.convex_hull.area
     free = [which[~touching & (group == k)].tolist() for k in np.unique(group[~touching])]
-    return Things(free, which[touching & ~shapely.intersects(outlines, written)].tolist())
+    return Things(free, which[unnamed].tolist())
 
 
 def standing(
