@@ -249,3 +249,42 @@ def test_a_stroke_that_leaves_an_object_is_no_mark_in_it(end, inside):
 def test_a_route_leads_across_half_of_the_sketch(end, is_route):
     found = found_in(box(0, 0, 4, 4), AWAY, [(0, 8), (end, 8)])
     assert (found.route is not None) == is_route
+
+
+def letter(x, y, size, is_open):
+    turn = 200 if is_open else 360
+    return arc(0, turn, size / 2) + np.array([x, y])
+
+
+def word(x, y, size, shape, step=1.3):
+    """A row of letters, o of them closed and c open."""
+    return [letter(x + step * size * k, y, size, each == "c") for k, each in enumerate(shape)]
+
+
+DESKS = [box(0, 0, 10, 8), box(20, 0, 10, 10), box(0, 20, 9, 9)]
+
+
+@pytest.mark.parametrize(
+    ("drawn", "objects"),
+    [
+        (word(0, -3, 2.0, "coo"), 3),
+        (word(0, -3, 2.0, "ococ"), 3),
+        (word(0, -3, 2.0, "oooo"), 7),  # four stools
+        (word(0, -3, 2.0, "ooo") + word(20, -3, 2.0, "oooo"), 3),
+        (word(0, -5, 3.2, "coo"), 3),
+        (word(0, -5, 3.2, "ooo") + word(20, -5, 3.2, "ooo"), 9),
+        (word(0, -8, 5.0, "coo"), 5),  # far too large for letters
+        (word(0, -3, 2.0, "co"), 4),  # too few
+        (word(0, -3, 2.0, "coo", step=2.0), 5),  # too far apart
+        (word(0, -3, 2.0, "coo") + word(0, -5.5, 2.0, "coo") + word(0, -8, 2.0, "coo"), 9),
+    ],
+)
+def test_small_strokes_in_a_row_are_writing(drawn, objects):
+    found = found_in(*DESKS, *drawn)
+    assert len(found.scene.objects) == objects
+    said = [sentence for sentence in found.warnings if "as writing is" in sentence]
+    assert bool(said) == (objects == 3)
+
+
+def test_writing_alone_is_all_there_is():
+    assert len(found_in(*word(0, 0, 2, "oococ"), box(20, 0, 12, 12)).scene.objects) == 4

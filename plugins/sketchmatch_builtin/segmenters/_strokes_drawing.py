@@ -13,16 +13,17 @@ from sketchmatch.model.caching import cached_property
 
 from ._strokes_trace import Trace, span_of
 
-__all__ = ["DOT", "FLICK", "LONGHAND", "ROUTE", "TANGLED", "Drawing", "Outline"]
+__all__ = ["DOT", "FLICK", "LONGHAND", "ROUTE", "TANGLED", "WRITING", "Drawing", "Outline"]
 
 DOT = "left out: a dot of the pen, which encloses nothing"
 FLICK = "left out: far smaller than the objects"
 LONGHAND = "left out: many small loops, as longhand has them"
 ROUTE = "taken as the route: open, and across much of the sketch"
+WRITING = "left out: small and close to each other in a row, as writing is"
 TANGLED = "left out: the strokes cross themselves too often to look at them all; draw fewer"
 
 # Reasons why something that a person drew is missing, who wants to know where it is.
-_MISSING = {DOT, FLICK, LONGHAND, TANGLED}
+_MISSING = {DOT, FLICK, LONGHAND, TANGLED, WRITING}
 # Strokes named in one sentence.
 _NAMED = 8
 

@@ -17,7 +17,16 @@ from sketchmatch.api import InvalidInputError, Params, Reason, Segmentation, Seg
 from sketchmatch.model import FloatArray, Scene, SceneObject, Stroke, StrokeSet
 
 from ._strokes_chains import closed_chains
-from ._strokes_drawing import DOT, FLICK, LONGHAND, ROUTE, TANGLED, Drawing, Outline
+from ._strokes_drawing import (
+    DOT,
+    FLICK,
+    LONGHAND,
+    ROUTE,
+    TANGLED,
+    WRITING,
+    Drawing,
+    Outline,
+)
 from ._strokes_marks import (
     along_others,
     are_straight,
@@ -26,6 +35,7 @@ from ._strokes_marks import (
     places,
     repeated,
     typical_span,
+    written,
 )
 from ._strokes_outline import areas_of, enclosed_by, own_gap, tangled, total_of
 from ._strokes_trace import LATELY, LONGEST, traced
@@ -64,7 +74,8 @@ class StrokeSegmenter(Segmenter):
     Strokes that stay open are joined end to end to chains that close: those with the smallest
     gaps and the shortest tails first, which is the perceptual organisation by proximity and good
     continuation of [2]_. What is left is a stroke drawn over an outline again, a mark inside an
-    object, a flick, or the route.
+    object, a flick, or the route. Small strokes close to each other in a row are writing if some
+    are open, or if there are several such rows.
 
     Sizes of a stroke are the larger side of its bounding box; spans, of chains and of the sketch,
     are the largest distance between two points.
@@ -151,10 +162,10 @@ class StrokeSegmenter(Segmenter):
             drawing.explain(dots, DOT)
         route = _labelled_route(drawing) if self.params.route == "auto" else None
         outlines = self._outlines(drawing, route)
-        objects = self._objects(drawing, outlines)
+        objects, writing = self._objects(drawing, outlines)
         drawn = {k for item in objects for k in item.strokes}
         left = [k for k in range(len(points)) if k not in drawn | drawing.explained | {route}]
-        left = self._without_marks(drawing, left, objects)
+        left = self._without_marks(drawing, left, objects, writing)
         if route is None and self.params.route == "auto":
             route = _route_across(drawing, left)
         for k in left:
@@ -220,8 +231,19 @@ class StrokeSegmenter(Segmenter):
             areas[0].area < (1.0 - _NOTABLE) * total_of(areas),
         )
 
-    def _objects(self, drawing: Drawing, outlines: list[Outline]) -> list[Outline]:
-        """Return the outlines that are objects, and explain the others."""
+    def _writing(self, drawing: Drawing, outlines: list[Outline]) -> frozenset[int]:
+        """Return the strokes that are writing beside the objects."""
+        alone = {outline.strokes[0] for outline in outlines if len(outline.strokes) == 1}
+        closed = [k in alone for k in range(len(drawing.strokes))]
+        found = written(drawing.strokes, closed, _typical(outlines))
+        # A match needs two.
+        left = [outline for outline in outlines if not found.issuperset(outline.strokes)]
+        return found if len(left) > 1 else frozenset()
+
+    def _objects(
+        self, drawing: Drawing, outlines: list[Outline]
+    ) -> tuple[list[Outline], frozenset[int]]:
+        """Return the outlines that are objects, and what is writing; explain the others."""
         areas = [outline.area for outline in outlines]
         first_of, within = repeated(areas), hosts(areas)
         outlines = _named_alike(outlines, first_of)
@@ -229,7 +251,7 @@ class StrokeSegmenter(Segmenter):
         around_things = frames([outline.span for outline in outlines], within, whole)
         for k in around_things:
             outlines[k] = replace(outlines[k], frame=True)
-        smallest = self._smallest(outlines)
+        smallest, writing = self._smallest(outlines), self._writing(drawing, outlines)
         mark = min(_MARK * smallest, _second_largest(outlines))
         objects = []
         for outline, first, around in zip(outlines, first_of, within, strict=True):
@@ -242,6 +264,8 @@ class StrokeSegmenter(Segmenter):
                 drawing.explain(members, drawing.again(outlines[around].strokes))
             elif around is not None and (outline.span < mark or outline.open > _LOOSE):
                 drawing.explain(members, drawing.inside(outlines[around].strokes))
+            elif writing.issuperset(members):
+                drawing.explain(members, WRITING)
             else:
                 objects.append(outline)
                 if around is not None:
@@ -253,15 +277,18 @@ class StrokeSegmenter(Segmenter):
                         members[0],
                         f"{name} {verb} separate areas: the largest alone was taken.",
                     )
-        return objects
+        return objects, writing
 
     def _smallest(self, outlines: list[Outline]) -> float:
         """Return the least span of an object: a match needs two, so two are large enough."""
-        typical = typical_span([outline.span for outline in outlines if not outline.frame])
-        return min(self.params.min_size * typical, _second_largest(outlines))
+        return min(self.params.min_size * _typical(outlines), _second_largest(outlines))
 
     def _without_marks(
-        self, drawing: Drawing, left: list[int], objects: list[Outline]
+        self,
+        drawing: Drawing,
+        left: list[int],
+        objects: list[Outline],
+        writing: frozenset[int],
     ) -> list[int]:
         """Explain what strokes beside objects are, and return those that are none of it."""
         along, within = places([drawing.strokes[k] for k in left], [item.area for item in objects])
@@ -274,6 +301,8 @@ class StrokeSegmenter(Segmenter):
                 drawing.explain([k], drawing.inside(objects[around].strokes))
             elif drawing.strokes[k].span < smallest:
                 drawing.explain([k], FLICK)
+            elif k in writing:
+                drawing.explain([k], WRITING)
             else:
                 others.append(k)
         return others
@@ -304,6 +333,11 @@ def _named_alike(outlines: list[Outline], first_of: Sequence[int | None]) -> lis
 def _retraces(outline: Outline, host: Outline) -> bool:
     """Whether several strokes inside an object go over it again, rather than stand in a room."""
     return len(outline.strokes) > 1 and outline.area.area > _RETRACED * host.area.area
+
+
+def _typical(outlines: list[Outline]) -> float:
+    """Return the span of the typical object, which what is around others is not."""
+    return typical_span([outline.span for outline in outlines if not outline.frame])
 
 
 def _second_largest(outlines: list[Outline]) -> float:
