@@ -187,3 +187,34 @@ def test_nested_rings_by_the_hundred_are_no_problem():
         cv2.circle(pixels, (1000, 1000), radius, 0, 1)
     with pytest.raises(InvalidInputError, match="has only one shape"):
         segmented(pixels, blur=0.0)
+
+
+def things():
+    pixels = paper((600, 900))
+    for x, y in ((60, 60), (400, 80), (650, 300), (100, 330)):
+        cv2.rectangle(pixels, (x, y), (x + 160, y + 110), 20, 3)
+    return pixels
+
+
+def test_names_beside_things_are_writing():
+    pixels = things()
+    for name, x, y in (("sofabed", 60, 210), ("board", 400, 230), ("desk", 650, 455)):
+        cv2.putText(pixels, name, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 1.3, 20, 3)
+    found = segmented(pixels)
+    assert len(found.scene.objects) == 4
+    (said,) = found.warnings
+    assert re.fullmatch(r"\d+ small shapes close to each other in rows were left out, .*", said)
+
+
+@pytest.mark.parametrize(("count", "size", "objects"), [(4, 20, 8), (3, 50, 7), (2, 20, 6)])
+def test_a_row_of_small_things_is_none(count, size, objects):
+    pixels = things()
+    for k in range(count):
+        cv2.circle(pixels, (400 + 2 * size * k, 500), size // 2 + 4, 20, 3)
+    assert len(segmented(pixels).scene.objects) == objects
+
+
+def test_names_alone_are_what_there_is():
+    pixels = paper()
+    cv2.putText(pixels, "bood", (60, 200), cv2.FONT_HERSHEY_SIMPLEX, 3.0, 20, 4)
+    assert len(segmented(pixels).scene.objects) == 4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Container
 from dataclasses import dataclass
 from typing import Any
 
@@ -112,13 +113,17 @@ class Drawing:
         share = np.cumsum(np.array(lengths)[order])
         return float(np.array(widths)[order][np.searchsorted(share, share[-1] / 2.0)])
 
-    def loose(self, shapes: list[int], lines: list[int]) -> Mask:
+    def beside(self, shapes: list[int]) -> list[int]:
+        """Return all shapes that lie in what some lie in, small ones, too."""
+        return [int(k) for k in np.flatnonzero(np.isin(self._parents, self._parents[shapes]))]
+
+    def loose(self, shapes: list[int], lines: list[int], writing: Container[int]) -> Mask:
         """Return the ink of lines and of long pieces of lines that lie in no other shape."""
         ink = np.zeros_like(self._ink)
         for shape in map(int, np.flatnonzero(~self._large & (self._lengths >= 2.0 * self._side))):
             if self._parents[shape] != (self._parents[shapes[0]] if shapes else -1):
                 continue
-            if max(self.box(shape)[2:]) < self._side:
+            if max(self.box(shape)[2:]) < self._side or shape in writing:
                 continue
             cv2.drawContours(ink, [self._contours[shape]], 0, 1, cv2.FILLED)
         for shape in lines:

@@ -12,6 +12,8 @@ import numpy as np
 from sketchmatch.api import InvalidInputError, Reason
 from sketchmatch_builtin.segmenters._image_drawing import Drawing, Shape, without_specks
 from sketchmatch_builtin.segmenters._image_light import Mask
+from sketchmatch_builtin.segmenters._strokes_marks import typical_span
+from sketchmatch_builtin.segmenters._writing import written
 
 __all__ = ["MOST_SHAPES", "Tracing", "trace"]
 
@@ -39,6 +41,7 @@ class Tracing:
     attached: int = 0
     closed: int = 0
     parted: int = 0
+    written: int = 0
     open_lines: int = 0
 
 
@@ -83,21 +86,20 @@ def trace(ink: Mask, least: float, gap: float, frames: bool) -> Tracing:
         )
     pen = drawing.pen()
     radius = 1 + math.ceil(1.2 * pen) if pen else 0
-    lines = []
     for hole in attached:
         found.shapes.append(_widened(drawing.filled(hole), max(1, round(pen))))
         found.attached += 1
-    for shape in shapes:
-        whole = drawing.filled(shape)
-        if radius and not _is_whole(whole.mask, radius, least):
-            lines.append(shape)
-            continue
-        parts = _parts(drawing.ink_of(shape), whole, radius, least)
+    whole = [k for k in shapes if not radius or _is_whole(drawing.filled(k).mask, radius, least)]
+    writing = _writing(drawing, drawing.beside(shapes), whole)
+    found.written = len(writing.intersection(whole))
+    lines = [shape for shape in shapes if shape not in {*whole, *writing}]
+    for shape in (each for each in whole if each not in writing):
+        parts = _parts(drawing.ink_of(shape), drawing.filled(shape), radius, least)
         found.parted += len(parts) > 1
         found.shapes.extend(parts)
     if not radius:
         return found
-    loose = drawing.loose(shapes, lines)
+    loose = drawing.loose(shapes, lines, writing)
     open_frame: Shape | None = None
     for part, pieces in _closed_outlines(loose, gap, radius, least):
         within = [other for other in found.shapes if _covers(part, _box(other))]
@@ -118,6 +120,20 @@ def trace(ink: Mask, least: float, gap: float, frames: bool) -> Tracing:
         found.shapes.extend(rest)
         found.open_lines += not rest
     return found
+
+
+def _writing(drawing: Drawing, shapes: list[int], whole: list[int]) -> frozenset[int]:
+    """Return which shapes of a drawing are writing beside its objects."""
+    if len(shapes) > MOST_SHAPES:
+        return frozenset()
+    boxes = np.array([drawing.box(shape) for shape in shapes]).reshape(-1, 4)
+    corners = [np.array([(x, y), (x + w, y + h)], float) for x, y, w, h in boxes.tolist()]
+    known = set(whole)
+    spans = [max(drawing.box(shape)[2:]) for shape in whole]
+    found = written(corners, [k in known for k in shapes], typical_span(spans))
+    which = frozenset(shapes[k] for k in found)
+    # A match needs two.
+    return which if len(known - which) > 1 else frozenset()
 
 
 def _disk(radius: int) -> Mask:

@@ -7,9 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from sketchmatch.model import FloatArray
-
-from ._merging import groups
 from ._strokes_trace import SAMPLES, Trace, span_of
 
 __all__ = [
@@ -20,7 +17,6 @@ __all__ = [
     "places",
     "repeated",
     "typical_span",
-    "written",
 ]
 
 # A stroke within this share of its own span of another line is drawn over that.
@@ -34,12 +30,6 @@ _BESIDE = 0.9
 # What is around so many others, so many times as large as is typical of what is around nothing,
 # and has this share of the whole sketch's span, is no thing among them.
 _FRAMED, _LARGER, _SPREAD = 3, 3.0, 0.3
-# Strokes in a row: at least so many, up to this share of the larger one's span apart, in a box that
-# is no wider than this many times the largest, and so many times as long.
-_LETTERS, _SPACED, _WIDE, _LONG = 3, 0.6, 1.6, 1.5
-# They are writing, of the typical object's span, if some are open, or if there are several rows.
-_LETTER, _ROUND_LETTER = 0.3, 0.2
-_OPEN, _ROWS = 1 / 3, 2
 # A line is straight that leaves its chord by no more than this share of it.
 _STRAIGHT = 0.02
 # Share of an outline's area, or of a stroke's points, within an object that lies in it.
@@ -183,51 +173,3 @@ def places(
         for k in which[inside].tolist():
             within[k] = j
     return along, within
-
-
-def written(strokes: Sequence[Trace], closed: Sequence[bool], typical: float) -> frozenset[int]:
-    """Return the strokes that are writing: small, and close to each other in a row.
-
-    Rows of closed strokes alone, as stools are, count if there are several and these are smaller.
-
-    Parameters
-    ----------
-    strokes
-        All strokes of the sketch.
-    closed
-        Whether each encloses something by itself.
-    typical
-        Span of the typical object.
-    """
-    which = [k for k, stroke in enumerate(strokes) if 0.0 < stroke.span <= _LETTER * typical]
-    if len(which) < _LETTERS:
-        return frozenset()
-    spans = np.array([strokes[k].span for k in which])
-    samples = np.stack([strokes[k].samples for k in which])
-    boxes = np.asarray(shapely.box(*samples.min(axis=1).T, *samples.max(axis=1).T), dtype=object)
-    first, second = shapely.STRtree(boxes).query(boxes, "dwithin", _SPACED * spans)
-    group = groups(len(which), np.stack([first, second]))
-    found: list[list[int]] = []
-    others: list[list[int]] = []
-    for members in (np.flatnonzero(group == n) for n in range(group.max() + 1)):
-        if len(members) < _LETTERS or not _is_row(samples[members], float(spans[members].max())):
-            continue
-        row = [which[k] for k in members.tolist()]
-        if sum(not closed[k] for k in row) >= _OPEN * len(row):
-            found.append(row)
-        elif spans[members].max() <= _ROUND_LETTER * typical:
-            others.append(row)
-    if len(found) + len(others) >= _ROWS:
-        found += others
-    return frozenset(k for row in found for k in row)
-
-
-def _is_row(samples: FloatArray, largest: float) -> bool:
-    """Whether strokes, shape (k, SAMPLES, 2), lie in a row as high as the largest of them."""
-    box = shapely.get_coordinates(
-        shapely.MultiPoint(samples.reshape(-1, 2)).minimum_rotated_rectangle
-    )
-    if len(box) < 5:
-        return True
-    short, long = np.sort(np.hypot(*(box[1:3] - box[:2]).T))
-    return bool(short <= _WIDE * largest and long >= _LONG * short)

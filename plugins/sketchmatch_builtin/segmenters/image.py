@@ -39,6 +39,9 @@ class ImageSegmenter(Segmenter):
     frame and left out. Coordinates are pixels from the lower left corner. Objects come in reading
     order: by their highest point from the top down, then from the left.
 
+    Small shapes close to each other in a row are writing if some are open, or if there are several
+    such rows.
+
     References
     ----------
     .. [1] L. Vincent, "Morphological grayscale reconstruction in image analysis", IEEE
@@ -163,6 +166,11 @@ def _said(found: Tracing) -> Iterator[str]:
         yield (
             f"{_count(found.attached, 'shape')} drawn against the frame {_was(found.attached)} "
             f"taken as {'objects' if found.attached > 1 else 'an object'}."
+        )
+    if found.written:
+        yield (
+            f"{_count(found.written, 'small shape')} close to each other in rows "
+            f"{_was(found.written)} left out, as writing: draw objects apart."
         )
     if found.parted:
         yield (

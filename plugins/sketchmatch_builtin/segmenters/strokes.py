@@ -35,10 +35,10 @@ from ._strokes_marks import (
     places,
     repeated,
     typical_span,
-    written,
 )
 from ._strokes_outline import areas_of, enclosed_by, own_gap, tangled, total_of
 from ._strokes_trace import LATELY, LONGEST, traced
+from ._writing import written
 
 __all__ = ["StrokeSegmenter"]
 
@@ -235,7 +235,7 @@ class StrokeSegmenter(Segmenter):
         """Return the strokes that are writing beside the objects."""
         alone = {outline.strokes[0] for outline in outlines if len(outline.strokes) == 1}
         closed = [k in alone for k in range(len(drawing.strokes))]
-        found = written(drawing.strokes, closed, _typical(outlines))
+        found = written([each.samples for each in drawing.strokes], closed, _typical(outlines))
         # A match needs two.
         left = [outline for outline in outlines if not found.issuperset(outline.strokes)]
         return found if len(left) > 1 else frozenset()
