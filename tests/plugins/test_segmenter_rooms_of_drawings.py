@@ -562,3 +562,11 @@ def test_small_holes_of_walls_are_rooms_though_larger_ones_open_into_each_other(
     found = sorted(areas(strokes([*small, box(0, 0, 8.99, 11), [(0, 6), (8.99, 6)], *walls])))
     assert found[:-3] == pytest.approx([1.49**2] * 24, rel=0.1)
     assert len(found) == 27
+
+
+def test_in_a_drawing_of_very_many_lines_furniture_is_not_looked_for(monkeypatch):
+    lines = [*HALL, *doors("apart"), box(7, 6.0, 2, 1)]
+    monkeypatch.setattr("sketchmatch_builtin.segmenters.rooms._MOST_LINES", len(lines) - 1)
+    assert len(segmented(strokes(lines)).scene) == 6
+    monkeypatch.undo()
+    assert len(segmented(strokes(lines)).scene) == 5

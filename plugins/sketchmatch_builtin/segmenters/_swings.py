@@ -35,7 +35,7 @@ _MEETS = 0.2
 # is, so that it meets the walls.
 _IN_LINE, _OPEN, _BEYOND = 0.3, 0.1, 0.1
 # In a drawing of more points or arcs no doors are looked for, as that would take long.
-_MOST_POINTS, _MOST_ARCS = 200_000, 5000
+_MOST_POINTS, _MOST_ARCS = 200_000, 1000
 
 
 class _Pieces(NamedTuple):

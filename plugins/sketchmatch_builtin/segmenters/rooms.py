@@ -72,6 +72,8 @@ _NARROW = 0.5
 _OTHERWISE_NARROW = (0.4, 0.6)
 # Cells along the longer side of a drawing in which rooms are looked for without what is in them.
 _COARSE_SIDE = 400
+# In a drawing of more lines that is not looked for: every two that meet would be looked at.
+_MOST_LINES = 3000
 # Rooms of a plan.
 _FEWEST = 2
 # Of its longer side: half the width from which a room counts.
@@ -275,6 +277,8 @@ class RoomSegmenter(Segmenter):
     def _things(self, source: StrokeSet) -> frozenset[int]:
         """Return the lines of a drawing that are things in its rooms, its paper, or say lengths."""
         lines, names = lines_of(source), source.landmarks
+        if len(lines) > _MOST_LINES:
+            return frozenset()
         aside = paper(lines) | dimensions(lines)
         free, touching = things_in(lines, names)
         if not (free or touching):
