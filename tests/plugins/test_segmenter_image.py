@@ -218,3 +218,13 @@ def test_names_alone_are_what_there_is():
     pixels = paper()
     cv2.putText(pixels, "bood", (60, 200), cv2.FONT_HERSHEY_SIMPLEX, 3.0, 20, 4)
     assert len(segmented(pixels).scene.objects) == 4
+
+
+@pytest.mark.parametrize(("start", "end"), [((353, 41), (562, 356)), ((413, 45), (589, 545))])
+def test_a_shape_that_a_line_passes_through_is_one(start, end):
+    pixels = paper((600, 900))
+    for x, y in ((60, 60), (650, 300), (100, 330)):
+        cv2.rectangle(pixels, (x, y), (x + 160, y + 110), 20, 3)
+    cv2.polylines(pixels, [np.array([(400, 80), (560, 95), (545, 195), (390, 180)])], True, 20, 3)
+    cv2.arrowedLine(pixels, start, end, 20, 3, cv2.LINE_AA, 0, 0.06)
+    assert len(segmented(pixels).scene.objects) == 4

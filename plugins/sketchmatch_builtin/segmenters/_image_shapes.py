@@ -117,8 +117,10 @@ def trace(ink: Mask, least: float, gap: float, frames: bool) -> Tracing:
         if open_frame and drawing.box(shape)[2] > 0.8 * open_frame.mask.shape[1]:
             continue
         rest = _opened(drawing.filled(shape), radius, least)
-        found.shapes.extend(rest)
         found.open_lines += not rest
+        # Where a line passes through a shape with gaps, that was closed before.
+        known = [*found.shapes]
+        found.shapes += [each for each in rest if not any(_overlap(each, one) for one in known)]
     return found
 
 
@@ -194,6 +196,18 @@ def _covers(shape: Shape, box: tuple[int, int, int, int]) -> bool:
     wide = min(x + width, left + columns) - max(x, left)
     high = min(y + height, top + rows) - max(y, top)
     return bool(wide > 0 and high > 0 and wide * high >= 0.6 * width * height)
+
+
+def _overlap(shape: Shape, other: Shape) -> bool:
+    """Return whether half of a shape lies in another one."""
+    (x, y), (u, v) = shape.corner, other.corner
+    (rows, columns), (height, width) = shape.mask.shape, other.mask.shape
+    low, high = (max(x, u), max(y, v)), (min(x + columns, u + width), min(y + rows, v + height))
+    if low[0] >= high[0] or low[1] >= high[1]:
+        return False
+    mine = shape.mask[low[1] - y : high[1] - y, low[0] - x : high[0] - x]
+    its = other.mask[low[1] - v : high[1] - v, low[0] - u : high[0] - u]
+    return bool(2 * np.count_nonzero(mine & its) >= np.count_nonzero(shape.mask))
 
 
 def _box(shape: Shape) -> tuple[int, int, int, int]:
