@@ -228,3 +228,26 @@ def test_a_shape_that_a_line_passes_through_is_one(start, end):
     cv2.polylines(pixels, [np.array([(400, 80), (560, 95), (545, 195), (390, 180)])], True, 20, 3)
     cv2.arrowedLine(pixels, start, end, 20, 3, cv2.LINE_AA, 0, 0.06)
     assert len(segmented(pixels).scene.objects) == 4
+
+
+def test_walls_of_several_rooms_are_left_out_and_what_is_in_them_found():
+    pixels = paper((600, 1000))
+    for left in (40, 540):
+        cv2.rectangle(pixels, (left, 60), (left + 420, 540), 20, 4)
+        for x, y in ((40, 50), (250, 90), (130, 300)):
+            cv2.rectangle(pixels, (left + x, 60 + y), (left + x + 110, 60 + y + 80), 20, 3)
+    found = segmented(pixels)
+    assert len(found.scene.objects) == 6
+    assert found.warnings[-1].startswith("2 outlines around other shapes were taken for walls")
+    assert len(segmented(pixels, frame="keep").scene.objects) == 2
+
+
+def test_what_is_around_few_things_or_hardly_larger_ones_is_an_object():
+    pixels = things()
+    cv2.rectangle(pixels, (600, 260), (890, 450), 20, 3)  # around one
+    for x in (620, 700, 780):
+        cv2.rectangle(pixels, (x, 500), (x + 60, 550), 20, 3)
+    cv2.rectangle(pixels, (600, 480), (860, 580), 20, 3)  # a tray with three cups
+    found = segmented(pixels)
+    assert len(found.scene.objects) == 5
+    assert not any("walls" in sentence for sentence in found.warnings)

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from sketchmatch_builtin.segmenters._image_light import Mask
+from sketchmatch_builtin.segmenters._strokes_marks import typical_span
 
 __all__ = ["Drawing", "Shape", "without_specks"]
 
@@ -18,6 +19,9 @@ __all__ = ["Drawing", "Shape", "without_specks"]
 _THICKEST_PEN = 0.012
 # A frame's box is at least this share of the drawing's.
 _FRAME = 0.6
+# A room is around so many shapes at least, and so many times as large as the typical one, and has
+# at least this share of the drawing's span.
+_FEWEST, _LARGER, _SPREAD = 3, 3.0, 0.3
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,23 @@ class Drawing:
         largest = int(areas.argmax())
         spans = areas[largest] >= _FRAME * np.prod(high - low)
         return shapes[largest] if spans and len(self.inside(shapes[largest])) >= 2 else None
+
+    def room(self, shapes: list[int]) -> int | None:
+        """Return a shape around others that is far larger than these, as the walls of a room are.
+
+        There may be several, none of which spans most of the drawing.
+        """
+        spans = {shape: max(self.box(shape)[2:]) for shape in shapes}
+        inside = {shape: self.inside(shape) for shape in shapes}
+        around = [shape for shape in shapes if len(inside[shape]) >= _FEWEST]
+        if not around:
+            return None
+        others = [spans[shape] for shape in shapes if shape not in around]
+        others += [max(self.box(each)[2:]) for shape in around for each in inside[shape]]
+        boxes = np.array([self.box(shape) for shape in shapes])
+        whole = float(np.ptp(np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]]), 0).max())
+        least = max(_LARGER * typical_span(others), _SPREAD * whole)
+        return next((shape for shape in around if spans[shape] >= least), None)
 
     def drawn_against(self, frame: int) -> list[int]:
         """Return the small empty faces between a frame and lines that end on it."""

@@ -38,6 +38,7 @@ class Tracing:
 
     shapes: list[Shape] = field(default_factory=list)
     framed: bool = False
+    rooms: int = 0
     attached: int = 0
     closed: int = 0
     parted: int = 0
@@ -73,10 +74,15 @@ def trace(ink: Mask, least: float, gap: float, frames: bool) -> Tracing:
     drawing = Drawing(without_specks(ink, math.sqrt(least)), least)
     shapes = drawing.outermost()
     attached: list[int] = []
-    while frames and (frame := drawing.frame(shapes)) is not None:
-        attached += drawing.drawn_against(frame)
-        shapes = [shape for shape in shapes if shape != frame] + drawing.inside(frame)
-        found.framed = True
+    while frames:
+        frame = drawing.frame(shapes)
+        around = drawing.room(shapes) if frame is None else frame
+        if around is None:
+            break
+        attached += drawing.drawn_against(around)
+        shapes = [shape for shape in shapes if shape != around] + drawing.inside(around)
+        found.framed |= frame is not None
+        found.rooms += frame is None
     if len(shapes) > MOST_SHAPES:
         raise InvalidInputError(
             Reason.LIMIT_EXCEEDED,

@@ -108,8 +108,9 @@ class ImageSegmenter(Segmenter):
         frame: Literal["auto", "keep"] = Field(
             "auto",
             description=(
-                "What to do with one shape around at least two others, and with a table around "
-                "the sheet: 'auto' leaves it out, 'keep' takes it as the one object it is."
+                "What to do with one shape around at least two others, with walls around things "
+                "far smaller, and with a table around the sheet: 'auto' leaves it out, 'keep' "
+                "takes it as the one object it is."
             ),
         )
         max_gap: float = Field(
@@ -162,6 +163,11 @@ def _outline(shape: Shape, ink: Ink, rows: int) -> FloatArray:
 def _said(found: Tracing) -> Iterator[str]:
     if found.framed:
         yield _FRAMED
+    if found.rooms:
+        yield (
+            f"{_count(found.rooms, 'outline')} around other shapes {_was(found.rooms)} taken for "
+            "walls of rooms and left out: set frame to 'keep' to have what encloses others alone."
+        )
     if found.attached:
         yield (
             f"{_count(found.attached, 'shape')} drawn against the frame {_was(found.attached)} "
