@@ -236,9 +236,11 @@ def test_walls_of_several_rooms_are_left_out_and_what_is_in_them_found():
         cv2.rectangle(pixels, (left, 60), (left + 420, 540), 20, 4)
         for x, y in ((40, 50), (250, 90), (130, 300)):
             cv2.rectangle(pixels, (left + x, 60 + y), (left + x + 110, 60 + y + 80), 20, 3)
+        cv2.rectangle(pixels, (left + 290, 400), (left + 390, 500), 20, 3)
+        cv2.rectangle(pixels, (left + 330, 390), (left + 345, 410), 240, cv2.FILLED)  # a gap
     found = segmented(pixels)
-    assert len(found.scene.objects) == 6
-    assert found.warnings[-1].startswith("2 outlines around other shapes were taken for walls")
+    assert len(found.scene.objects) == 8
+    assert found.warnings[0].startswith("2 outlines around other shapes were taken for walls")
     assert len(segmented(pixels, frame="keep").scene.objects) == 2
 
 

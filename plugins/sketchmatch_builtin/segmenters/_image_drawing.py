@@ -141,18 +141,19 @@ class Drawing:
     def loose(self, shapes: list[int], lines: list[int], writing: Container[int]) -> Mask:
         """Return the ink of lines and of long pieces of lines that lie in no other shape."""
         ink = np.zeros_like(self._ink)
+        holes = {int(self._parents[shape]) for shape in shapes} or {-1}
         for shape in map(int, np.flatnonzero(~self._large & (self._lengths >= 2.0 * self._side))):
-            if self._parents[shape] != (self._parents[shapes[0]] if shapes else -1):
+            if self._parents[shape] not in holes:
                 continue
             if max(self.box(shape)[2:]) < self._side or shape in writing:
                 continue
             cv2.drawContours(ink, [self._contours[shape]], 0, 1, cv2.FILLED)
         for shape in lines:
             cv2.drawContours(ink, [self._contours[shape]], 0, 1, cv2.FILLED)
-        if shapes and self._parents[shapes[0]] >= 0:
+        if -1 not in holes:
             around = np.zeros_like(self._ink)
-            hole = self._contours[self._parents[shapes[0]]]
-            cv2.drawContours(around, [hole], 0, 1, cv2.FILLED)
+            for hole in holes:
+                cv2.drawContours(around, [self._contours[hole]], 0, 1, cv2.FILLED)
             ink &= around
         return ink & self._ink
 
