@@ -80,9 +80,8 @@ inline auto fields(Of<SceneObject> /*type*/) {
 inline auto fields(Of<Scene> /*type*/) { return std::tuple{FIELD(objects)}; }
 
 inline auto fields(Of<MatchAccepted> /*type*/) {
-  return std::tuple{FIELD(match_id),       FIELD(seed),
-                    FIELD(pipeline),       FIELD(weights),
-                    FIELD(time_budget),    FIELD(unmatched_price),
+  return std::tuple{FIELD(match_id),       FIELD(seed),        FIELD(pipeline),
+                    FIELD(weights),        FIELD(time_budget), FIELD(unmatched_price),
                     FIELD(allow_unmatched)};
 }
 

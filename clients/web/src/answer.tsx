@@ -1,5 +1,6 @@
 /** The answer in words: what is what, how sure that is, and what to ask. */
 
+import type { RequestFailed } from "@sketchmatch/client";
 import { useEffect, useState } from "preact/hooks";
 
 import type { Carried } from "./carry";
@@ -44,6 +45,7 @@ import {
   sketchName,
   trouble,
   unit,
+  wantsToken,
 } from "./state";
 import { language, type Texts, texts } from "./texts";
 
@@ -95,8 +97,8 @@ function Headline() {
       )}
       {failed && !running.value ? (
         <div class="row">
-          <p class="trouble">{failedText(failed.failure, failed.reason, failed.message)}</p>
-          {failed.failure === "unauthenticated" && (
+          <p class="trouble">{failedText(failed)}</p>
+          {wantsToken(failed) && (
             <button type="button" class="quiet" onClick={askForToken}>
               {t.connect}
             </button>
@@ -119,11 +121,12 @@ function askForToken(): void {
   document.querySelector<HTMLDialogElement>("dialog#token-dialog")?.showModal();
 }
 
-function failedText(failure: string, reason: string, message: string): string {
+function failedText(failed: RequestFailed): string {
   const t = texts.value;
+  const { failure, reason, message } = failed;
   if (failure === "away") return t.away;
   if (failure === "busy") return t.busy;
-  if (failure === "unauthenticated") return t.token;
+  if (wantsToken(failed)) return t.token;
   if (reason === "TOO_FEW_OBJECTS" || reason === "INVALID_STROKE") return t.oneMore;
   return message;
 }

@@ -16,8 +16,8 @@ import { Tuning } from "./tuning";
 import {
   asking,
   bringMap,
-  canBeLinked,
   bringSketch,
+  canBeLinked,
   carried,
   choose,
   choosePlace,
@@ -40,6 +40,7 @@ import {
   type Tool,
   tool,
   trouble,
+  wantsToken,
 } from "./state";
 import { type Language, language, LANGUAGES, speak, texts } from "./texts";
 
@@ -560,7 +561,7 @@ function NameDialog() {
 function TokenDialog() {
   const t = texts.value;
   const dialog = useRef<HTMLDialogElement>(null);
-  const wanted = trouble.value?.failure === "unauthenticated";
+  const wanted = wantsToken(trouble.value);
   useEffect(() => {
     if (wanted) dialog.current?.showModal();
     else dialog.current?.close();

@@ -576,6 +576,11 @@ export async function link(): Promise<string> {
   return `${location.origin}${location.pathname}#${await packed(shared)}`;
 }
 
+/** Whether the server wants a token, or another one; what was typed may be none at all. */
+export function wantsToken(failed: RequestFailed | null | undefined): boolean {
+  return failed?.failure === "unauthenticated" || failed?.field === "token";
+}
+
 export function showToken(token: string): void {
   remember("token", token.trim(), "tab");
   trouble.value = null;

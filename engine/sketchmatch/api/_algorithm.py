@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import Any, ClassVar
-
-from pydantic import TypeAdapter
 
 from sketchmatch.api._numbers import Plain
 
@@ -13,12 +10,6 @@ __all__ = ["API_VERSION", "Algorithm", "Params"]
 
 API_VERSION = 1
 """Version of the plugin API. It rises when a plugin written before would no longer work."""
-
-# The first use of pydantic reads what each installed distribution says of itself, and raises what a
-# broken one makes of that; the second does not.
-with suppress(Exception):
-    TypeAdapter(int)
-
 
 class Params(Plain):
     """Parameters of one algorithm: frozen, nothing extra; default, bounds and text on every field.

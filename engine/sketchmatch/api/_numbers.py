@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from types import NoneType
 from typing import Any, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationInfo, field_validator
 
 __all__ = ["Plain"]
+
+# The first use of pydantic reads what each installed distribution says of itself, and raises what a
+# broken one makes of that; the second does not.
+with suppress(Exception):
+    TypeAdapter(int)
 
 
 class Plain(BaseModel):
