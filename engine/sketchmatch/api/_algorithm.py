@@ -11,6 +11,7 @@ __all__ = ["API_VERSION", "Algorithm", "Params"]
 API_VERSION = 1
 """Version of the plugin API. It rises when a plugin written before would no longer work."""
 
+
 class Params(Plain):
     """Parameters of one algorithm: frozen, nothing extra; default, bounds and text on every field.
 
