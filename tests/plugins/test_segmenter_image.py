@@ -175,6 +175,7 @@ def test_too_few_shapes_say_how_large_they_would_have_to_be():
     )
 
 
+@pytest.mark.slow
 def test_a_picture_of_noise_is_refused_before_it_takes_long():
     noise = np.where(np.random.default_rng(0).random((800, 800)) < 0.1, 0, 255).astype(np.uint8)
     with pytest.raises(InvalidInputError, match="more than the limit of 1000; raise blur or"):

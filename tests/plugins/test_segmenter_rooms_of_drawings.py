@@ -409,8 +409,21 @@ def doors(kind):
     return lines
 
 
-@pytest.mark.parametrize("kind", ["apart", "one line", "closed", "thick", "ajar", "coarse"])
-@pytest.mark.parametrize("degrees", [0.0, 31.0])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("kind", "degrees"),
+    [
+        ("apart", 31.0),
+        ("closed", 0.0),
+        *(
+            pytest.param(kind, degrees, marks=SLOW)
+            for kind in ("apart", "one line", "closed", "thick", "ajar", "coarse")
+            for degrees in (0.0, 31.0)
+        ),
+    ],
+)
 def test_doors_drawn_with_their_swings_end_rooms_and_cut_none(kind, degrees):
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     lines = [np.array(line) @ [[c, s], [-s, c]] for line in [*HALL, *doors(kind)]]
@@ -420,6 +433,7 @@ def test_doors_drawn_with_their_swings_end_rooms_and_cut_none(kind, degrees):
     assert len(scene.passages) == 4
 
 
+@SLOW
 def test_a_hand_drawn_swing_is_a_door():
     rng = np.random.default_rng(2)
     lines = [line + rng.normal(0.0, 0.012, np.shape(line)) for line in [*HALL, *doors("apart")]]
@@ -511,7 +525,7 @@ def test_named_outlines_apart_in_a_place_without_a_name_are_rooms():
     assert len(segmented(strokes([*tents, *field])).scene) == 2
 
 
-@pytest.mark.parametrize("degrees", [0.0, 8.0])
+@pytest.mark.parametrize("degrees", [pytest.param(0.0, marks=SLOW), 8.0])
 def test_ruled_paper_is_no_wall(degrees):
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     across = [[(x, -1.0), (x, 8.0)] for x in np.arange(-1.0, 10.1, 0.5)]
@@ -564,6 +578,7 @@ def test_small_holes_of_walls_are_rooms_though_larger_ones_open_into_each_other(
     assert len(found) == 27
 
 
+@SLOW
 def test_in_a_drawing_of_very_many_lines_furniture_is_not_looked_for(monkeypatch):
     lines = [*HALL, *doors("apart"), box(7, 6.0, 2, 1)]
     monkeypatch.setattr("sketchmatch_builtin.segmenters.rooms._MOST_LINES", len(lines) - 1)
