@@ -6,7 +6,6 @@ import math
 import uuid
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import TypeVar
 
 from sketchmatch.api import Segmentation
@@ -279,7 +278,7 @@ def _matched(
 
 def _as_of_now(so_far: Statistics, clock: Clock) -> Statistics:
     """Return what a match took, with what was tried after it."""
-    return replace(so_far, seconds=MappingProxyType({**clock.seconds, "total": clock.spent()}))
+    return replace(so_far, seconds={**clock.seconds, "total": clock.spent()})
 
 
 def _compared(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -289,22 +289,14 @@ def _guessed(
 
 def _refined(guesses: Guesses, sides: Sides, poses: int) -> Generator[int, None, list[Laid]]:
     """Return the different maps that the best guesses lead to."""
-    drawn, mapped = sides.drawn, sides.mapped
     found: dict[bytes, Laid] = {}
     count, weighed = int(guesses.state[0]), 0
     ranked = guesses.pairings[np.argsort(-guesses.scores[:count], kind="stable")[: 5 * poses]]
     step = min(_AT_ONCE, max(1, _PAIRINGS // sides.bonus.size))
     for low in range(0, len(ranked), step):
-        pairings = ranked[low : low + step]
-        partners = np.empty((len(pairings), len(drawn.places)), dtype=np.int64)
-        places, values = np.empty((len(pairings), 2), dtype=np.complex128), np.empty((step, 2))
-        refine_guesses(pairings, drawn, mapped, sides.bonus, TOLERANCES, partners, places, values)
-        for each, (u, t), (growth, score) in zip(
-            partners, places.tolist(), values[: len(pairings)].tolist(), strict=True
-        ):
-            _keep_better(found, Laid(each, (u, t, growth), score))
-            if len(found) >= poses:
-                break
+        for laid in _laid_by(ranked[low : low + step], sides):
+            if len(found) < poses:
+                _keep_better(found, laid)
         if len(found) >= poses:
             break
         weighed += step * sides.bonus.size
@@ -312,6 +304,20 @@ def _refined(guesses: Guesses, sides: Sides, poses: int) -> Generator[int, None,
             weighed = 0
             yield int(guesses.state[1])
     return sorted(found.values(), key=lambda laid: -laid.score)
+
+
+def _laid_by(pairings: IntArray, sides: Sides) -> Iterator[Laid]:
+    """Yield what the poses of pairings, shape (k, 4), lead to."""
+    count = len(pairings)
+    partners = np.empty((count, len(sides.drawn.places)), dtype=np.int64)
+    poses, values = np.empty((count, 2), dtype=np.complex128), np.empty((count, 2))
+    refine_guesses(
+        pairings, sides.drawn, sides.mapped, sides.bonus, TOLERANCES, partners, poses, values
+    )
+    for each, (u, t), (growth, score) in zip(
+        partners, poses.tolist(), values.tolist(), strict=True
+    ):
+        yield Laid(each, (u, t, growth), score)
 
 
 def _filled(laid: Laid, sides: Sides) -> Laid:

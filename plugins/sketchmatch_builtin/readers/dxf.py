@@ -138,11 +138,10 @@ def _read(drawing: Any, part: str) -> PolygonSet:
         areas.polygon_set(*notes, *_note_on_layers(shapes, part), upwards=1.0),
         lines=tuple(frozen_floats(line * factor) for line in lines),
         landmarks=tuple(
-            Landmark(
-                each.name,
-                (each.point[0] * factor, each.point[1] * factor),
-                each.kind,
-                each.size * factor,
+            replace(
+                each,
+                point=(each.point[0] * factor, each.point[1] * factor),
+                size=each.size * factor,
             )
             for each in texts
         ),

@@ -38,10 +38,9 @@ __all__ = ["Easm"]
 _REPORT_EVERY = 0.02
 # What is drawn and judged between two looks at the clock: 10 ms.
 _SLICE_ENTRIES = 50_000
-# 512 kB of hash codes, to stay in the cache.
+# Of the populations that follow from the scenes.
 _LARGEST = 600
-"""Of the populations that follow from the scenes."""
-
+# 512 kB of hash codes, to stay in the cache.
 _KNOWN = 2**16
 
 

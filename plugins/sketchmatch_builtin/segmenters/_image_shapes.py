@@ -97,8 +97,8 @@ def trace(ink: Mask, least: float, gap: float, frames: bool) -> Tracing:
         found.attached += 1
     whole = [k for k in shapes if not radius or _is_whole(drawing.filled(k).mask, radius, least)]
     writing = _writing(drawing, drawing.beside(shapes), whole)
-    found.written = len(writing.intersection(whole))
-    lines = [shape for shape in shapes if shape not in {*whole, *writing}]
+    found.written, known = len(writing.intersection(whole)), writing.union(whole)
+    lines = [shape for shape in shapes if shape not in known]
     for shape in (each for each in whole if each not in writing):
         parts = _parts(drawing.ink_of(shape), drawing.filled(shape), radius, least)
         found.parted += len(parts) > 1
@@ -125,8 +125,8 @@ def trace(ink: Mask, least: float, gap: float, frames: bool) -> Tracing:
         rest = _opened(drawing.filled(shape), radius, least)
         found.open_lines += not rest
         # Where a line passes through a shape with gaps, that was closed before.
-        known = [*found.shapes]
-        found.shapes += [each for each in rest if not any(_overlap(each, one) for one in known)]
+        before = [*found.shapes]
+        found.shapes += [each for each in rest if not any(_overlap(each, one) for one in before)]
     return found
 
 

@@ -12,6 +12,7 @@ import shapely
 
 from sketchmatch.model import FloatArray, Landmark
 from sketchmatch_builtin.segmenters._doorways import Labels
+from sketchmatch_builtin.segmenters._lines import is_closed, is_straight
 from sketchmatch_builtin.segmenters._merging import groups
 
 __all__ = ["Things", "dimensions", "paper", "standing", "things_in"]
@@ -75,10 +76,10 @@ def paper(lines: Sequence[FloatArray]) -> frozenset[int]:
         across = np.array([-steps[k, 1], steps[k, 0]]) / lengths[k]
         gaps = np.diff(np.sort(ends[same].mean(axis=1) @ across))
         usual = float(np.median(gaps))
-        even = (
-            np.abs(gaps / usual - np.round(gaps / usual)) <= _LIKE if usual else np.array([False])
-        )
-        if even.mean() >= _EVEN:
+        if not usual:
+            continue
+        off = np.abs(gaps / usual - np.round(gaps / usual))
+        if (off <= _LIKE).mean() >= _EVEN:
             found.update(which[j] for j in np.flatnonzero(same))
     return frozenset(found)
 
@@ -103,19 +104,13 @@ def dimensions(lines: Sequence[FloatArray]) -> frozenset[int]:
         longest = members[int(sizes.argmax())]
         chord = lines[which[longest]][[0, -1]]
         length = math.dist(*chord)
-        if length < _SHORTEST * span or not _is_straight(lines[which[longest]]):
+        if length < _SHORTEST * span or not is_straight(lines[which[longest]], _STRAIGHT):
             continue
         ends, others = shapely.points(chord), drawn[members[members != longest]]
         at_ends = [shapely.distance(others, end) <= _AT_END * length for end in ends]
         if (np.sort(sizes)[:-1] <= _TICK * length).all() and all(map(np.any, at_ends)):
             found += [which[k] for k in members.tolist()]
     return frozenset(found)
-
-
-def _is_straight(line: FloatArray) -> bool:
-    chord = line[-1] - line[0]
-    across = np.abs((line - line[0]) @ np.array([-chord[1], chord[0]]))
-    return bool(across.max() <= _STRAIGHT * float(chord @ chord))
 
 
 def things_in(lines: Sequence[FloatArray], names: Sequence[Landmark]) -> Things:
@@ -128,7 +123,7 @@ def things_in(lines: Sequence[FloatArray], names: Sequence[Landmark]) -> Things:
     names
         What is written in it.
     """
-    closed = [k for k, line in enumerate(lines) if _is_closed(line)]
+    closed = [k for k, line in enumerate(lines) if len(line) >= _CORNERS and is_closed(line)]
     if not closed:
         return Things([], [])
     outlines = np.array([shapely.Polygon(lines[k]) for k in closed], dtype=object)
@@ -195,10 +190,6 @@ def standing(
         if room and (named[room] < 2 or own[room])
         for k in each
     ]
-
-
-def _is_closed(line: FloatArray) -> bool:
-    return len(line) >= _CORNERS and bool((line[0] == line[-1]).all())
 
 
 def _room_at(points: FloatArray, rooms: Labels, cells: FloatArray) -> int:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
+from ._lines import is_straight
 from ._strokes_trace import SAMPLES, Trace, span_of
 
 __all__ = [
@@ -115,14 +116,7 @@ def frames(spans: Sequence[float], within: Sequence[int | None], whole: float) -
 
 def are_straight(strokes: Sequence[Trace]) -> list[bool]:
     """Return for each stroke whether it is a straight line."""
-    chords = [stroke.samples[-1] - stroke.samples[0] for stroke in strokes]
-    return [
-        bool(
-            np.abs((stroke.samples - stroke.samples[0]) @ (-chord[1], chord[0])).max()
-            <= _STRAIGHT * (chord @ chord)
-        )
-        for stroke, chord in zip(strokes, chords, strict=True)
-    ]
+    return [is_straight(stroke.samples, _STRAIGHT) for stroke in strokes]
 
 
 def _meeting(outlines: Sequence[shapely.Polygon], share: float) -> list[tuple[int, int]]:

@@ -16,6 +16,7 @@ import shapely
 from numpy.typing import NDArray
 
 from sketchmatch.model import FloatArray
+from sketchmatch_builtin.segmenters._lines import is_closed, is_straight
 
 __all__ = ["doors_apart"]
 
@@ -108,7 +109,7 @@ def _turns(line: FloatArray, aside: float) -> tuple[FloatArray, FloatArray]:
     steps = np.hypot(*np.diff(line, axis=0).T)
     until = np.concatenate([[0.0], steps.cumsum()])
     whole = float(until[-1])
-    closed = len(line) > 2 and bool((line[0] == line[-1]).all())
+    closed = is_closed(line)
     there = np.stack([until - aside, until + aside])
     there = there % whole if closed else there.clip(0.0, whole)
     around = np.stack([np.interp(there, until, each) for each in line.T], axis=-1)
@@ -135,7 +136,7 @@ def _corners(line: FloatArray, aside: float) -> list[int]:
 
 def _from_a_corner(line: FloatArray, aside: float) -> FloatArray:
     """Return a line that, if it is closed, begins at a corner where it has one."""
-    if len(line) < 3 or (line[0] != line[-1]).any():
+    if not is_closed(line):
         return line
     corners = _corners(line, aside)
     if not corners or corners[0] == 0:
@@ -177,12 +178,6 @@ def _arc(piece: int, points: FloatArray) -> _Arc | None:
     return _Arc(piece, hinge, radius) if _TURNS[0] <= turns <= _TURNS[1] else None
 
 
-def _is_straight(points: FloatArray) -> bool:
-    chord = points[-1] - points[0]
-    across = np.abs((points - points[0]) @ np.array([-chord[1], chord[0]]))
-    return bool(across.max() <= _STRAIGHT * float(chord @ chord))
-
-
 def _swings(
     arcs: Sequence[_Arc], lines: Sequence[FloatArray], pieces: _Pieces
 ) -> Iterator[tuple[_Arc, tuple[list[int], list[int]]]]:
@@ -198,7 +193,7 @@ def _swings(
         if (
             piece != arcs[n].piece
             and math.hypot(*to_tips[tip].tolist()) <= near[n]
-            and _is_straight(_points(lines, pieces, piece))
+            and is_straight(_points(lines, pieces, piece), _STRAIGHT)
         ):
             leaves[n][tip].append(piece)
     for arc, reach, both in zip(arcs, near.tolist(), leaves, strict=True):

@@ -283,7 +283,7 @@ class RoomSegmenter(Segmenter):
         free, touching = things_in(lines, names)
         if not (free or touching):
             return aside
-        plan, rooms = self._coarse(source, {*aside, *touching, *itertools.chain(*free)})
+        plan, rooms = self._rooms_without(source, {*aside, *touching, *itertools.chain(*free)})
         count = int(rooms.max())
         if count < _FEWEST:
             return aside
@@ -293,18 +293,15 @@ class RoomSegmenter(Segmenter):
         # Where rooms open into each other, what bounds one is more than a line, or has gaps; but
         # of a line that bounds a wall more rooms are found without it.
         if touching and 2 * len(opening) > count:
-            found |= {*touching} if count <= self._coarse(source, found)[1].max() else set()
+            found |= {*touching} if count <= self._rooms_without(source, found)[1].max() else set()
         return found
 
-    def _coarse(self, source: StrokeSet, left_out: Container[int]) -> tuple[Plan, Labels]:
+    def _rooms_without(self, source: StrokeSet, left_out: Container[int]) -> tuple[Plan, Labels]:
         """Return a plan in larger cells without some lines, and the number of each cell's room."""
         width = self.params.door_width
         plan = self._emptied(drawn(source, width, left_out=left_out, side=_COARSE_SIDE))
         (parts,) = self._by_width(plan, [_NARROW])
-        _, labels, statistics, _ = cv2.connectedComponentsWithStats(parts, connectivity=8)
-        large = statistics[:, cv2.CC_STAT_AREA] >= self._cells(plan)
-        large[0] = False
-        return plan, np.where(large, np.cumsum(large), 0).astype(np.int32)[labels]
+        return plan, _numbered(parts, self._cells(plan))
 
     def _emptied(self, plan: Plan) -> Plan:
         """Return a plan without the things that stand free."""
@@ -353,21 +350,27 @@ class RoomSegmenter(Segmenter):
         cut: str,
     ) -> tuple[list[shapely.Polygon], tuple[tuple[int, int], ...]]:
         """Return rooms, components of cells, as outlines in reading order, and who meets whom."""
-        _, parts, statistics, _ = cv2.connectedComponentsWithStats(rooms, connectivity=8)
-        large = statistics[:, cv2.CC_STAT_AREA] >= area / cell**2
-        large[0] = False
-        which = np.flatnonzero(large)
-        refuse_more(len(which), source_limits().max_objects, "raise min_area")
-        if len(which) < _FEWEST:
-            raise _too_few(len(which), path, area, cut)
+        labels = _numbered(rooms, area / cell**2)
+        count = int(labels.max(initial=0))
+        refuse_more(count, source_limits().max_objects, "raise min_area")
+        if count < _FEWEST:
+            raise _too_few(count, path, area, cut)
         tolerance = self.params.tolerance
-        labels = np.where(large, np.cumsum(large), 0).astype(np.int32)[parts]
         found = _simplified(_polygons(labels), TOLERANCE if tolerance is None else tolerance / cell)
         order = sorted(range(len(found)), key=lambda k: reading_order(found[k]))
         place = np.zeros(len(found) + 1, np.int32)
         place[np.add(order, 1)] = np.arange(1, len(found) + 1)
         meeting = parts_that_meet(free, place[labels]) - 1
         return [found[k] for k in order], tuple((a, b) for a, b in meeting.tolist())
+
+
+def _numbered(rooms: Mask, least: float) -> Labels:
+    """Return the number of each cell's room, from 1, and 0 where none has so many cells."""
+    _, parts, statistics, _ = cv2.connectedComponentsWithStats(rooms, connectivity=8)
+    large = statistics[:, cv2.CC_STAT_AREA] >= least
+    large[0] = False
+    numbers = np.where(large, np.cumsum(large), 0).astype(np.int32)
+    return np.asarray(numbers[parts], dtype=np.int32)
 
 
 def _named(
