@@ -286,5 +286,13 @@ def test_small_strokes_in_a_row_are_writing(drawn, objects):
     assert bool(said) == (objects == 3)
 
 
+@pytest.mark.parametrize(("letters", "objects"), [("", 4), ("c", 4), ("cc", 3), ("co", 3)])
+def test_a_small_object_drawn_in_four_strokes_is_one_letter_at_most(letters, objects):
+    corners = [(0, -3), (2, -3), (2, -1.4), (0, -1.4), (0, -3)]
+    sides = [corners[k : k + 2] for k in range(4)]
+    found = found_in(*DESKS, *sides, *word(3.6, -2.2, 2.0, letters))
+    assert len(found.scene.objects) == objects
+
+
 def test_writing_alone_is_all_there_is():
     assert len(found_in(*word(0, 0, 2, "oococ"), box(20, 0, 12, 12)).scene.objects) == 4

@@ -20,10 +20,16 @@ _LETTER, _ROUND_LETTER = 0.3, 0.2
 _OPEN, _ROWS = 1 / 3, 2
 
 
-def written(points: Sequence[FloatArray], closed: Sequence[bool], typical: float) -> frozenset[int]:
+def written(
+    points: Sequence[FloatArray],
+    closed: Sequence[bool],
+    typical: float,
+    joined: Sequence[Sequence[int]] = (),
+) -> frozenset[int]:
     """Return the shapes that are writing: small, and close to each other in a row.
 
     Rows of closed shapes alone, as stools are, count if there are several and these are smaller.
+    The parts of one outline are one letter at most.
 
     Parameters
     ----------
@@ -33,6 +39,8 @@ def written(points: Sequence[FloatArray], closed: Sequence[bool], typical: float
         Whether each encloses something by itself.
     typical
         Span of the typical object.
+    joined
+        Shapes that are an outline together.
     """
     boxes = np.array([(*each.min(axis=0), *each.max(axis=0)) for each in points]).reshape(-1, 4)
     spans = (boxes[:, 2:] - boxes[:, :2]).max(axis=1)
@@ -48,7 +56,8 @@ def written(points: Sequence[FloatArray], closed: Sequence[bool], typical: float
         which[np.argsort(group, kind="stable")], np.bincount(group).cumsum()[:-1]
     ):
         row, largest = members.tolist(), float(spans[members].max())
-        if len(row) < _LETTERS or not _is_row([points[k] for k in row], largest):
+        letters = len(row) - sum(len(parts) - 1 for parts in joined if set(row).issuperset(parts))
+        if letters < _LETTERS or not _is_row([points[k] for k in row], largest):
             continue
         if sum(not closed[k] for k in row) >= _OPEN * len(row):
             found.append(row)

@@ -234,8 +234,12 @@ class StrokeSegmenter(Segmenter):
     def _writing(self, drawing: Drawing, outlines: list[Outline]) -> frozenset[int]:
         """Return the strokes that are writing beside the objects."""
         alone = {outline.strokes[0] for outline in outlines if len(outline.strokes) == 1}
-        closed = [k in alone for k in range(len(drawing.strokes))]
-        found = written([each.samples for each in drawing.strokes], closed, _typical(outlines))
+        found = written(
+            [each.samples for each in drawing.strokes],
+            [k in alone for k in range(len(drawing.strokes))],
+            _typical(outlines),
+            [outline.strokes for outline in outlines],
+        )
         # A match needs two.
         left = [outline for outline in outlines if not found.issuperset(outline.strokes)]
         return found if len(left) > 1 else frozenset()
