@@ -355,6 +355,14 @@ def test_parameters_bound_how_many_maps_there_are():
     assert offered(posed, poses=1, maps=1) == [tuple(order.tolist())]
 
 
+def test_near_a_map_it_starts_with_a_judge_is_told_of_as_many():
+    sketch, map_, order = sloppy(2, 9, 12)
+    posed = problem(sketch, map_, partial=True, start=(order,))
+    assert offered(posed)[0] == tuple(order.tolist())
+    assert len(offered(posed)) == 20
+    assert offered(posed, maps=7) == offered(posed)[:7]
+
+
 def test_relations_without_scenes_are_searched_as_auto_does():
     posed, _ = matching_problem(np.random.default_rng(0), 4)
     bare = MatchProblem(posed.table, alternatives=2)

@@ -12,7 +12,15 @@ from sketchmatch import match
 from sketchmatch.api import Candidate, JudgeProblem
 from sketchmatch.model import Confidence, RelationTable, Scene, SceneObject
 from sketchmatch.testing import judging_problem
-from sketchmatch_builtin.alignment import Line, Measured, Things, Whole, known_maps, sides_of
+from sketchmatch_builtin.alignment import (
+    Line,
+    Measured,
+    Things,
+    Whole,
+    known_maps,
+    near_maps,
+    sides_of,
+)
 from sketchmatch_builtin.alignment._poses import TOLERANCES
 from sketchmatch_builtin.judges import _described, _evidence
 from sketchmatch_builtin.judges import posterior as module
@@ -641,6 +649,21 @@ def test_a_sketch_of_this_place_exceeds_what_its_decoys_achieve():
         known = described((sketch, map_), sides, table, None, [np.arange(6)])
         leads.append(numbers_of_place(known)[5])
     assert leads[0] > leads[1] + 3.0 * AT_FIRST
+
+
+def test_a_quick_judgement_follows_from_the_candidates_alone():
+    sketch, map_, order = sloppy(1, 5, 7)
+    other = np.array([order[1], order[0], *order[2:]])
+    posed = problem(sketch, map_, [order, other], elsewhere=0.2)
+    before = judge(posed)
+    near_maps(sides_of((sketch, map_), False, None, None, None), [order])
+    for judgement in (before, judge(posed)):
+        assert_sound(judgement, posed)
+        assert [each.partners.tolist() for each in judgement.maps] == [
+            order.tolist(),
+            other.tolist(),
+        ]
+        assert judgement.elsewhere == 0.2
 
 
 def test_objects_in_one_place_are_judged_all_the_same():

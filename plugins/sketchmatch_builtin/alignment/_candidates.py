@@ -32,7 +32,6 @@ __all__ = [
     "completed",
     "drive",
     "known_maps",
-    "known_near_maps",
     "laid_maps",
     "near_maps",
     "refined_maps",
@@ -66,7 +65,6 @@ _PAIRINGS = 100_000
 _AT_ONCE = 16
 """Poses to refine at once: calls cost as much as the work, and the last ones may be in vain."""
 
-_NEAR = -1
 _NEAR_PAIRS, _NEAR_POSES = 3, 10
 """Sketched pairs that are laid on all others, and maps that follow, beside those that are near."""
 
@@ -77,6 +75,8 @@ _VARIED = 20
 """Maps that changes are made of."""
 
 _RECENT: deque[tuple[Any, list[Laid]]] = deque(maxlen=8)
+"""What :func:`laid_maps` last returned, and for what: a searcher asks first, then a judge."""
+
 _CHANGES = 20_000
 _FARTHEST = 20.0
 _FEWEST = 3
@@ -138,7 +138,7 @@ def laid_maps(
     """
     laid = yield from _laid(sides, poses, guesses)
     found = _found(laid, sides, maps, partial)
-    _RECENT.appendleft((_key(sides, poses, maps, partial, guesses), found))
+    _RECENT.appendleft(((sides.identity, poses, maps, partial, guesses), found))
     return found
 
 
@@ -146,8 +146,6 @@ def near_maps(
     sides: Sides, start: Iterable[IntArray], maps: int = 50, partial: bool = True
 ) -> list[Laid]:
     """Lay a sketch upon a map near maps that were right a moment ago, and in a few other ways.
-
-    What comes of it is kept for :func:`known_near_maps`.
 
     Parameters
     ----------
@@ -166,15 +164,7 @@ def near_maps(
                 *pose, sides.drawn, sides.mapped, sides.bonus, TOLERANCES, partners
             )
             laid.append(Laid(partners.copy(), (u, t, growth), score))
-    found = _found(_ranked(laid), sides, maps, partial)
-    _RECENT.appendleft((_key(sides, _NEAR, partial), found))
-    return found
-
-
-def known_near_maps(sides: Sides, partial: bool = True) -> list[Laid]:
-    """Return what :func:`near_maps` found just before, or nothing."""
-    key = _key(sides, _NEAR, partial)
-    return next((found for known, found in tuple(_RECENT) if known == key), [])
+    return _found(_ranked(laid), sides, maps, partial)
 
 
 def _found(laid: list[Laid], sides: Sides, maps: int, partial: bool) -> list[Laid]:
@@ -190,15 +180,11 @@ def known_maps(
     sides: Sides, poses: int = 60, maps: int = MAPS, partial: bool = True, guesses: int = GUESSES
 ) -> list[Laid]:
     """Return what :func:`laid_maps` does, at once where a searcher asked for it just before."""
-    key = _key(sides, poses, maps, partial, guesses)
+    key = (sides.identity, poses, maps, partial, guesses)
     for known, found in tuple(_RECENT):
         if known == key:
             return found
     return drive(laid_maps(sides, poses, maps, partial, guesses))
-
-
-def _key(sides: Sides, *how: int) -> tuple[Any, ...]:
-    return (sides.identity, *how)
 
 
 def refined_maps(sides: Sides, poses: int, guesses: int) -> list[Laid]:

@@ -13,7 +13,6 @@ from sketchmatch_builtin.alignment import (
     Sides,
     Things,
     known_maps,
-    known_near_maps,
     measured,
     refined_maps,
     relations_of,
@@ -56,9 +55,9 @@ def described(
     related
         Whether relations are those that were learned from.
     quick
-        Whether nothing is laid upon the map here, and no decoys at all.
+        Whether to go by the maps that are known alone, and by no decoys.
     """
-    laid = known_near_maps(sides, partial) if quick else known_maps(sides, partial=partial)
+    laid = [] if quick else known_maps(sides, partial=partial)
     found = [*met, *(each.partners for each in laid)]
     unique = {each.tobytes(): each for each in found}
     maps = np.stack([*unique.values()])

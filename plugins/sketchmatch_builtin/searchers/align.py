@@ -22,7 +22,7 @@ from sketchmatch_builtin.searchers.auto import Auto
 __all__ = ["Align"]
 
 _NEAR = 10
-"""The best maps near those that it starts with."""
+"""The best maps near those that it starts with, to complete."""
 
 _OFFERED = 10
 """Maps to complete between two pauses."""
@@ -119,21 +119,23 @@ class Align(Searcher):
         poses = 0
         if problem.start:
             start = [sides.drawn_partners(each) for each in problem.start]
-            laid = near_maps(sides, start, partial=problem.partial)[:_NEAR]
+            laid = near_maps(sides, start, self.params.maps, problem.partial)
+            offered = laid[:_NEAR]
         else:
             work = laid_maps(sides, self.params.poses, partial=problem.partial)
             while True:
                 try:
                     poses = next(work)
                 except StopIteration as stop:
-                    laid = stop.value
+                    laid = offered = stop.value[: self.params.maps]
                     break
                 yield best.progress(poses)
-        for k, each in enumerate(laid[: self.params.maps]):
+        for k, each in enumerate(offered):
             best.offer(completed(each, sides))
             if (k + 1) % _OFFERED == 0:
                 yield best.progress(poses)
-        maps = template_maps(laid[: self.params.maps], sides)
+        # A judge that is to be quick goes by these alone.
+        maps = template_maps(laid, sides)
         yield best.progress(poses, tuple(maps) if problem.partial else ())
         return Outcome.CONVERGED
 
