@@ -204,7 +204,7 @@ def test_whoever_moves_to_another_place_is_found_there_by_a_few_pairs():
 
 
 def test_what_was_found_just_before_is_known_of_the_same_alone():
-    drawn, mapped, order = copied(6, 4, 6)
+    drawn, mapped, _ = copied(6, 4, 6)
     seen, other = sides(drawn, mapped), sides(mapped, drawn, swapped=True)
     assert known_maps(seen) is known_maps(seen)
     assert known_maps(other) is not known_maps(seen)

@@ -41,6 +41,7 @@ def test_a_number_gives_the_same_drawing_each_time_and_another_one_another(drawi
     assert len(corners) == len(drawings)
 
 
+@pytest.mark.slow
 def test_who_draws_boxes_draws_outlines_of_what_reaches_around_something_else():
     rng = np.random.default_rng(0)
     around = np.array([[0, 0], [4, 0], [4, 4], [3, 4], [3, 1], [1, 1], [1, 4], [0, 4]], float)
@@ -158,6 +159,7 @@ def test_halls_are_recalled_about_as_they_are_and_in_their_order():
     assert 0.93 < np.mean(agreeing) < 0.998  # and not as they are
 
 
+@pytest.mark.slow
 def test_of_halls_and_of_the_inventive_the_truth_is_a_partial_map():
     for draw, most in ((hall_drawing, 0.45), (inventive_drawing, 0.0)):
         drawings = [draw(number) for number in range(30)]
@@ -176,6 +178,7 @@ def test_of_halls_and_of_the_inventive_the_truth_is_a_partial_map():
         assert set(extras) == {0, 1, 2}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "draw",
     [

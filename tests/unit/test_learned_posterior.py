@@ -120,6 +120,7 @@ def test_who_goes_on_begins_with_what_is_known(monkeypatch):
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_who_knows_what_is_judged_leaves_nothing_of_what_was_known():
     rng = np.random.default_rng(0)
     first = learned_posterior(made_up(rng, 60), made_up(rng, 50))
@@ -142,6 +143,7 @@ def test_who_knows_what_is_judged_leaves_nothing_of_what_was_known():
     assert right(judge) > right(first) + 0.02
 
 
+@pytest.mark.slow
 def test_how_often_the_right_map_is_unknown_follows_from_what_the_best_is_worth():
     rng = np.random.default_rng(0)
     first = learned_posterior(made_up(rng, 60), made_up(rng, 50))
@@ -177,6 +179,7 @@ def test_how_often_the_right_map_is_unknown_follows_from_what_the_best_is_worth(
     assert doubts(seldom, checked, True) > 2.0 * doubts(seldom, checked, False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sharper", [0.7, 1.0, 1.6])
 def test_maps_are_told_as_surely_as_those_of_others(sharper):
     rng = np.random.default_rng(0)
