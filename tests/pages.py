@@ -48,7 +48,8 @@ TAKEN: dict[Block, set[str]] = {}
 
 def page_names() -> list[str]:
     """Return the pages of which every block is run."""
-    patterns = "README.md", "clients/README.md", "clients/*/README.md", "proto/**/README.md"
+    clients = "clients/README.md", "clients/*/README.md"
+    patterns = "README.md", "engine/GUIDE.md", *clients, "proto/**/README.md"
     found = [page for pattern in patterns for page in sorted(ROOT.glob(pattern))]
     ours = [str(page.relative_to(ROOT)) for page in found]
     return [name for name in ours if "node_modules" not in name]

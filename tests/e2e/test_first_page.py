@@ -1,4 +1,4 @@
-"""The first page, command by command and program by program, and where all clients begin."""
+"""The first page, the guide and where all clients begin, by command and by program."""
 
 import json
 import re
@@ -20,18 +20,20 @@ from tests.web import serving_pad
 # An environment is made, and kernels are compiled in it.
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
 
-PAGE = Page("README.md", __name__)
+PAGE, GUIDE = Page("README.md", __name__), Page("engine/GUIDE.md", __name__)
 DEMO = PAGE.take_one("console", "$ make demo")
 PAD = PAGE.take_one("console", "$ sketchmatch serve --web ")
-COMMANDS = PAGE.take_one("console", "$ sketchmatch plugins list")
-CARRYING = PAGE.take_one("console", "$ sketchmatch transfer sketch.svg office.yaml goals.geojson")
-SCENES = PAGE.take_one("console", "$ sketchmatch scenes put")
-TOKENS = PAGE.take_one("console", "$ sketchmatch tokens add")
+BEGINNING = PAGE.take_one("console", "$ sketchmatch plugins list")
+COMMANDS = GUIDE.take_one("console", "$ sketchmatch plugins list")
+CARRYING = GUIDE.take_one("console", "$ sketchmatch transfer sketch.svg office.yaml goals.geojson")
+SCENES = GUIDE.take_one("console", "$ sketchmatch scenes put")
+TOKENS = GUIDE.take_one("console", "$ sketchmatch tokens add")
 MATCH = PAGE.take_one("python", "import Scene, match")
-TRANSFER = PAGE.take_one("python", "import Feature, carry")
-RELATION = PAGE.take_one("python", "directional_relation(")
+RESULT = GUIDE.take_one("python", "import Scene, match")
+TRANSFER = GUIDE.take_one("python", "import Feature, carry")
+RELATION = GUIDE.take_one("python", "directional_relation(")
 CLIENT = PAGE.take_one("python", "sources.strokes(strokes")
-IN_PROGRESS = PAGE.take_one("python", "client.sketch(")
+IN_PROGRESS = GUIDE.take_one("python", "client.sketch(")
 BEGIN = Page("clients/README.md", __name__).take_one("console", "$ sketchmatch serve")
 FIRST = Page("clients/python/README.md", __name__).take("python")[0]
 TUTORIAL = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -155,14 +157,17 @@ def test_the_sketch_pad_is_served():
         assert "<title>" in answer.read().decode()
 
 
-def test_every_command_does_something_good(reader):
-    said = follow(reader, COMMANDS.commands, {"50051": str(free_port())})
+@pytest.mark.parametrize(("block", "files"), [(BEGINNING, 4), (COMMANDS, 8)])
+def test_every_command_does_something_good(reader, block, files):
     folder = reader.folder / "first page"
+    written = set(re.findall(r"--(?:overlay|out|plot|keepout) (\S+)", block.text))
+    assert len(written) == files
+    for name in written:
+        (folder / name).unlink(missing_ok=True)
+    said = follow(reader, block.commands, {"50051": str(free_port())})
     assert len(rows(said[0])) == 8
-    written = set(re.findall(r"--(?:overlay|out|plot|keepout) (\S+)", COMMANDS.text))
-    assert len(written) == 8
     assert {name for name in written if not (folder / name).exists()} == set()
-    pinned = next(k for k, each in enumerate(COMMANDS.commands) if "--pin" in each)
+    pinned = next(k for k, each in enumerate(block.commands) if "--pin" in each)
     assert ["6", "2"] in [row[:2] for row in rows(said[pinned])]
 
 
@@ -221,7 +226,8 @@ def printed(folder, *programs):
 
 def test_the_programs_in_python_run(tmp_path):
     lay(tmp_path)
-    said = printed(tmp_path, MATCH.text, RELATION.text, "print(relation)\n")
+    assert " sketched objects matched" in printed(tmp_path, MATCH.text)
+    said = printed(tmp_path, RESULT.text, RELATION.text, "print(relation)\n")
     assert " sketched objects matched" in said
     assert " of " in said.splitlines()[-1]
     said = printed(tmp_path, TRANSFER.text, "print(len(driven.carried), len(moved.carried))\n")

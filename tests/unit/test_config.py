@@ -22,7 +22,7 @@ from sketchmatch.registry import Kind, PluginStatus, Registry, default_registry
 from sketchmatch_client import AccessOptions
 from tests.pages import Page
 
-SHOWN = Page("README.md", __name__).take_one("toml")
+SHOWN = Page("engine/GUIDE.md", __name__).take_one("toml")
 
 SCENE = Scene.from_polygons(
     [[[0, 0], [2, 0], [2, 1]], [[5, 1], [6, 1], [6, 4]], [[1, 5], [2, 5], [2, 7]]]

@@ -24,6 +24,7 @@ from sketchmatch_map_files import PICTURE_SUFFIXES
 from tests.tools import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+GUIDE = (ROOT / "engine" / "GUIDE.md").read_text(encoding="utf-8")
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 BUILT_IN = [item for item in default_registry().algorithms if item.distribution == OWN_DISTRIBUTION]
 SCENE = Scene.from_polygons(
@@ -36,14 +37,14 @@ SCENE = Scene.from_polygons(
 )
 
 
-def test_the_readme_lists_exactly_the_algorithms_there_are():
-    listed = set(re.findall(rf"^\| ({'|'.join(Kind)}) \| `([^`]+)`", README, re.M))
+def test_the_guide_lists_exactly_the_algorithms_there_are():
+    listed = set(re.findall(rf"^\| ({'|'.join(Kind)}) \| `([^`]+)`", GUIDE, re.M))
     registered = {(str(item.kind), item.name) for item in BUILT_IN}
     assert listed == registered
 
 
-def test_the_readme_names_the_files_of_every_reader():
-    (rows,) = re.findall(r"^\| file \| holds \|\n(.*?)\n\n", README, re.M | re.S)
+def test_the_guide_names_the_files_of_every_reader():
+    (rows,) = re.findall(r"^\| file \| holds \|\n(.*?)\n\n", GUIDE, re.M | re.S)
     words = {"scene-graph": "Hydra"}
     for item in default_registry().readers:
         for suffix in item.reader.suffixes:
@@ -81,8 +82,8 @@ def test_the_judge_that_is_shown_keeps_the_contracts():
     check_plugin(names["Tidy"])
 
 
-def test_the_readme_gives_each_algorithm_the_source_that_it_names_itself():
-    cells = re.findall(r"^\| \w+ \| `([^`]+)` \| .*? \| (?:([^|]*) )?\|$", README, re.M)
+def test_the_guide_gives_each_algorithm_the_source_that_it_names_itself():
+    cells = re.findall(r"^\| \w+ \| `([^`]+)` \| .*? \| (?:([^|]*) )?\|$", GUIDE, re.M)
     sources = {item.name: item.source for item in BUILT_IN}
     assert len(cells) == len(sources)
     for name, short in cells:
@@ -91,9 +92,9 @@ def test_the_readme_gives_each_algorithm_the_source_that_it_names_itself():
             assert word in sources[name], f"{name}: {word}"
 
 
-def test_the_readme_names_only_attributes_that_a_result_has():
+def test_the_pages_name_only_attributes_that_a_result_has():
     result = sketchmatch.match(SCENE, SCENE)
-    names = re.findall(r"result\.(\w+)", README)
+    names = re.findall(r"result\.(\w+)", README + GUIDE)
     assert names
     for name in names:
         assert hasattr(result, name), name
@@ -117,6 +118,7 @@ def test_every_file_that_the_documents_link_to_exists():
         "clients/python/README.md",
         "proto/README.md",
         "plugins/README.md",
+        "engine/GUIDE.md",
         "engine/RUNNING.md",
         "SECURITY.md",
     ):
