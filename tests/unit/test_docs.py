@@ -110,7 +110,14 @@ def test_the_code_of_the_tutorial_is_that_of_the_example():
         assert any(block in file for file in files), block
 
 
-def test_every_file_that_the_documents_link_to_exists():
+def sections_of(document):
+    """Return the names by which links reach the sections of a document, in their order."""
+    text = re.sub(r"^(```|~~~).*?^\1$", "", document.read_text(encoding="utf-8"), flags=re.M | re.S)
+    headings = re.findall(r"^#+ (.*)$", text, re.M)
+    return [re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-") for each in headings]
+
+
+def test_every_file_and_section_that_the_documents_link_to_exists():
     for name in (
         "README.md",
         "CONTRIBUTING.md",
@@ -123,9 +130,13 @@ def test_every_file_that_the_documents_link_to_exists():
         "SECURITY.md",
     ):
         document = ROOT / name
-        links = re.findall(r"\]\((?!https?:|#)([^)#]+)", document.read_text(encoding="utf-8"))
-        for link in links:
-            assert (document.parent / link).exists(), f"{name} links to {link}"
+        text = document.read_text(encoding="utf-8")
+        for link, section in re.findall(r"\]\((?!https?:)([^)#]*)#?([^)]*)\)", text):
+            target = document.parent / link if link else document
+            assert target.exists(), f"{name} links to {link}"
+            if section:
+                page = target / "README.md" if target.is_dir() else target
+                assert sections_of(page).count(section) == 1, f"{name} links to {link}#{section}"
 
 
 def test_the_changelog_has_a_section_for_the_version():
