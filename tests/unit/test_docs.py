@@ -15,6 +15,7 @@ from sketchmatch.api import (
     documents,
     hookimpl,
 )
+from sketchmatch.config.configuration import load
 from sketchmatch.io.files import _KINDS, JSON_SUFFIXES
 from sketchmatch.model import LabelledPolygon, PolygonSet, Scene
 from sketchmatch.registry import OWN_DISTRIBUTION, Kind, default_registry
@@ -52,6 +53,16 @@ def test_the_guide_names_the_files_of_every_reader():
         assert words.get(item.name, item.name).lower() in rows.lower()
     for suffix in {*_KINDS, *JSON_SUFFIXES} - {*PICTURE_SUFFIXES}:
         assert f"`{suffix}`" in rows
+
+
+def test_the_guide_gives_the_defaults_of_the_server():
+    server = load(search=False).settings.server
+    rows = re.findall(r"^\| `--([a-z-]+)` \| .* \| (\d+)(?: MiB)? \|$", GUIDE, re.M)
+    assert rows
+    for option, shown in rows:
+        name = option.replace("-", "_")
+        value = getattr(server, f"{name}_seconds", None) or getattr(server, name)
+        assert value == int(shown), option
 
 
 def test_the_reader_that_is_shown_reads():
