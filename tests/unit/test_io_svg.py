@@ -123,6 +123,10 @@ def test_every_subpath_is_a_stroke():
         ('id="rect10-5"', "", ""),
         ('id="SVGID_1_"', "", ""),
         ('id="line_of_chairs"', "", "line_of_chairs"),
+        ('id="dining_x0020_table"', "", "dining table"),
+        ('id="_x31_2_x5F_chairs_x1F6CB_"', "", "12_chairs\U0001f6cb"),
+        ('id="Layer_x0020_1"', "", ""),
+        ('id="a_x0000_b_xD800_c_xFFFFF_d"', "", "a_x0000_b_xD800_c_xFFFFF_d"),
         ("", "<title/>", ""),
     ],
 )

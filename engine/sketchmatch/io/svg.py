@@ -14,8 +14,8 @@ followed, as a turn in space, is refused.
 
 A shape's label is the first that it has of: its ``<title>``, ``aria-label``, ``inkscape:label``,
 ``serif:id``, ``data-name``, and an ``id`` that a person gave (``desk-2``, but not a tool's
-``path123``); or else that of the innermost group with one of all these but an ``id`` which is no
-layer.
+``path123``; ``_x0020_`` in it is a space); or else that of the innermost group with one of all
+these but an ``id`` which is no layer.
 
 A line with an arrowhead, or another marker, at both of its ends says how long something is, and is
 no shape. Paper is none: a filled rectangle without a line that covers the whole page, or lies under
@@ -76,6 +76,8 @@ _TOOLS_ID = re.compile(
     r"|vector|element|layer)?[\W\d_]*",
     re.IGNORECASE,
 )
+# How Illustrator and CorelDRAW write what an ``id`` may not contain.
+_ESCAPED = re.compile(r"_x([0-9A-F]{2,5})_", re.IGNORECASE)
 # Paper may leave this share of the page uncovered at each side, and so much of its own box.
 _MARGIN, _ROUNDED = 0.01, 0.03
 # Things on a ground that is no paper by its size.
@@ -533,8 +535,14 @@ def _for_us(element: ElementTree.Element) -> bool:
 
 
 def _label(element: ElementTree.Element) -> str:
-    own = element.get("id", "")
+    own = _ESCAPED.sub(_unescaped, element.get("id", ""))
     return _given_label(element) or ("" if _TOOLS_ID.fullmatch(own) else _spaced(own))
+
+
+def _unescaped(escaped: re.Match[str]) -> str:
+    """Return the character that an escape stands for; one that cannot be seen stays as it is."""
+    char = chr(int(escaped[1], 16))
+    return char if char == " " or char.isprintable() else escaped[0]
 
 
 def _groups_label(element: ElementTree.Element) -> str:
