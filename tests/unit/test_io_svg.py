@@ -271,7 +271,9 @@ def test_a_shape_that_cannot_be_read_is_named(shape):
         strokes(f'<path d="M0 0 1 1"/>{shape}')
     assert caught.value.field == "shapes[1]"
     assert 'id="sofa">) has ' in caught.value.problem
-    assert caught.value.problem.endswith("; draw it again")
+    assert caught.value.problem.endswith(
+        ("; draw it again", "; write it in px", "; give <svg> a viewBox")
+    )
 
 
 def test_a_file_is_read_by_its_suffix(tmp_path):

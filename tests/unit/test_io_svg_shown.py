@@ -335,6 +335,11 @@ def test_what_lies_beyond_the_page_is_read():
             '<svg id="n" x="wide"/>',
             '(<svg id="n"> on line 3 of the file) has a place or size that is no length',
         ),
+        (
+            '<rect id="r" width="5vw" height="3"/>',
+            """(<rect id="r">) has width='5vw', which is no length here, on line 3 of the file; """
+            "write it in px",
+        ),
         ("<style>g{.a{display:none}}</style>", "has a style sheet that has rules within rules"),
     ],
 )
@@ -404,6 +409,46 @@ def test_clips_count_among_the_elements():
     with limited_to(SourceLimits(max_vertices=1000)), pytest.raises(InvalidInputError) as caught:
         decoded(clip + f'<g clip-path="url(#c)">{SMALL}</g>' * 5)
     assert caught.value.reason == Reason.LIMIT_EXCEEDED
+
+
+def test_a_share_of_a_page_that_says_no_size_is_refused_with_the_remedy():
+    with pytest.raises(InvalidInputError) as caught:
+        decoded('<rect width="50%" height="3"/>', "")
+    assert caught.value.problem == (
+        "(<rect>) has width='50%' of a page that says no size, on line 1 of the file; "
+        "give <svg> a viewBox"
+    )
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        ('<rect x="1em" y="10%" width="5em" height="4ex"/>', (16, 60, 96, 92)),
+        (
+            '<g font-size="2em"><rect style="width:2em;height:2ch" font-size="50%"/></g>',
+            (0, 0, 32, 16),
+        ),
+        (
+            '<symbol id="s"><rect width="9" height="9"/></symbol><use href="#s" x="2em"/>',
+            (32, 0, 41, 9),
+        ),
+        ('<svg y="1em"><rect width="9" height="9"/></svg>', (0, 16, 9, 25)),
+    ],
+)
+def test_lengths_may_be_as_large_as_letters(body, expected):
+    assert boxes(body) == [expected]
+
+
+def test_shares_of_a_page_as_large_as_letters_are_known():
+    assert boxes('<rect width="50%" height="50%"/>', 'width="20em" height="10em"') == [
+        (0, 0, 160, 80)
+    ]
+
+
+def test_texts_are_where_their_first_letter_is():
+    texts = '<text x="50%" y="2em">a</text><text x="3,9" y="4 8" font-size="2em">b</text>'
+    found = decoded(KEPT + texts).landmarks
+    assert [(each.point, each.size) for each in found] == [((400, -32), 16), ((3, -4), 32)]
 
 
 # Paper

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 from xml.etree import ElementTree
 
@@ -13,6 +13,7 @@ import svgelements
 
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.io._svg_frame import Frame, length
+from sketchmatch.io._svg_style import Look
 from sketchmatch.io._svg_tree import invalid, named_element, tag_of
 from sketchmatch.model import FloatArray
 
@@ -59,7 +60,7 @@ _CSS_PATH = re.compile(r"""path\(\s*(?:(?:nonzero|evenodd)\s*,\s*)?(["'])(.*)\1\
 
 def subpaths_of(
     element: ElementTree.Element,
-    said: Mapping[str, str],
+    look: Look,
     frame: Frame | None,
     matrix: Any,
     field: str,
@@ -71,8 +72,8 @@ def subpaths_of(
     ----------
     element
         The shape.
-    said
-        What CSS says of its geometry, by property.
+    look
+        How it is shown.
     frame
         The viewport that percentages are shares of.
     matrix
@@ -85,8 +86,8 @@ def subpaths_of(
     InvalidInputError
         If it cannot be read.
     """
+    geometry = _geometry(element, look, frame, field, line)
     try:
-        geometry = _geometry(element, said, frame)
         path = svgelements.Path(SHAPES[tag_of(element)](geometry)) * matrix
         segments = [
             part
@@ -116,9 +117,10 @@ def subpaths_of(
 
 
 def _geometry(
-    element: ElementTree.Element, said: Mapping[str, str], frame: Frame | None
+    element: ElementTree.Element, look: Look, frame: Frame | None, field: str, line: int
 ) -> dict[str, Any]:
     """Return what says where a shape is; what has no extent is not drawn."""
+    said = look.geometry
     extent = _EXTENT.get(tag_of(element), ())
     geometry: dict[str, Any] = dict.fromkeys(extent, 0.0)
     for name, text in (*element.items(), *said.items()):
@@ -126,7 +128,14 @@ def _geometry(
             path = _CSS_PATH.fullmatch(text) if name in said else None
             geometry[name] = path[2] if path else text
         elif name in _ALONG and text.strip() != "auto":
-            value = length(text, _ALONG[name](frame) if frame else None)
+            try:
+                value = length(text, _ALONG[name](frame) if frame else None, look.font_size)
+            except ValueError:
+                problem, remedy = f"{name}={text[:40]!r}, which is no length here", "write it in px"
+                if text.rstrip().endswith("%"):
+                    problem = f"{name}={text[:40]!r} of a page that says no size"
+                    remedy = "give <svg> a viewBox"
+                raise _unreadable(element, field, problem, line, remedy) from None
             geometry[name] = max(0.0, value) if name in extent else value
     if tag_of(element) == "ellipse":
         told = {*element.keys(), *said}
@@ -182,9 +191,13 @@ def steps_of(controls: FloatArray, tolerance: float) -> int:
 
 
 def _unreadable(
-    element: ElementTree.Element, field: str, problem: str, line: int
+    element: ElementTree.Element,
+    field: str,
+    problem: str,
+    line: int,
+    remedy: str = "draw it again",
 ) -> InvalidInputError:
     return invalid(
         field,
-        f"({named_element(element)}) has {problem}, on line {line} of the file; draw it again",
+        f"({named_element(element)}) has {problem}, on line {line} of the file; {remedy}",
     )

@@ -20,11 +20,13 @@ __all__ = ["NUMBER", "Frame", "css_transform", "fitted", "length", "view_box"]
 NUMBER = r"[-+]?(?:\d++\.?+\d*+|\.\d++)(?:e[-+]?\d++)?+"
 """Pattern of a number, in whatever case; it looks at a character once."""
 
-_LENGTH = re.compile(rf"\s*+({NUMBER})(px|pt|pc|mm|cm|in|q|%|)\s*", re.IGNORECASE)
+_LENGTH = re.compile(rf"\s*+({NUMBER})(px|pt|pc|mm|cm|in|q|em|ex|ch|%|)\s*", re.IGNORECASE)
 _UNITS = {
     **{"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "in": 96.0},
     **{"mm": 96 / 25.4, "cm": 96 / 2.54, "q": 96 / 101.6},
 }
+# As browsers have it for a font of which they know nothing.
+_FONTS = {"em": 1.0, "ex": 0.5, "ch": 0.5}
 _DEGREES = {"deg": 1.0, "rad": 180.0 / math.pi, "grad": 0.9, "turn": 360.0}
 _ALIGN = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
 _ASPECT = re.compile(r"\s*(?:defer\s+)?x(Min|Mid|Max)Y(Min|Mid|Max)(?:\s+(meet|slice))?\s*")
@@ -44,7 +46,7 @@ class Frame:
     height: float
 
 
-def length(text: str, along: float | None) -> float:
+def length(text: str, along: float | None, font_size: float = 16.0) -> float:
     """Return a length in user units.
 
     Parameters
@@ -53,6 +55,8 @@ def length(text: str, along: float | None) -> float:
         As in the attribute.
     along
         What percentages are shares of, or None where that is unknown.
+    font_size
+        In user units.
 
     Raises
     ------
@@ -62,11 +66,12 @@ def length(text: str, along: float | None) -> float:
     match = _LENGTH.fullmatch(text)
     if match is None:
         raise ValueError(text)
-    if match[2] == "%":
+    unit = match[2].lower()
+    if unit == "%":
         if along is None:
             raise ValueError(text)
         return float(match[1]) / 100.0 * along
-    return float(match[1]) * _UNITS[match[2].lower()]
+    return float(match[1]) * (_FONTS[unit] * font_size if unit in _FONTS else _UNITS[unit])
 
 
 def view_box(element: ElementTree.Element) -> Frame | None:

@@ -199,7 +199,9 @@ class Styles:
         changes: dict[str, Any] = {}
         for name in _INHERITED & values.keys():
             text = values[name].lower()
-            if text not in _WIDE:
+            if name == "font-size" and text not in _WIDE:
+                changes["font_size"] = length(text, parent.font_size, parent.font_size)
+            elif text not in _WIDE:
                 changes[name.replace("-", "_")] = _VALUES[name](values[name])
             elif text == "initial":
                 attribute = _attribute(name)
@@ -413,12 +415,8 @@ def _share(text: str | None) -> float:
     return float(match[1]) / (100.0 if match[2] else 1.0)
 
 
-def _width(text: str) -> float:
+def _length(text: str) -> float:
     return length(text, 100.0)
-
-
-def _font_size(text: str) -> float:
-    return length(text, None)
 
 
 def _target(text: str) -> str:
@@ -430,8 +428,7 @@ _VALUES: dict[str, Any] = {
     **dict.fromkeys(_PAINTS, _paint_text),
     **dict.fromkeys(_SHARES, _share),
     "color": _paint_text,
-    "stroke-width": _width,
-    "font-size": _font_size,
+    **dict.fromkeys(("stroke-width", "font-size"), _length),
     "visibility": lambda text: _VISIBLE[text.lower()],
     "fill-rule": lambda text: _RULES[text.lower()],
     "marker-start": _target,

@@ -270,7 +270,7 @@ class _Drawing:
             if not look.displayed or not _for_us(element):
                 continue
             if tag_of(element) == "text":
-                self.names.extend(self._written(element, look, outer.matrix))
+                self.names.extend(self._written(element, look, outer))
                 continue
             inner = replace(
                 outer, look=look, size=(None, None), matrix=self._placed(element, look, outer)
@@ -300,21 +300,31 @@ class _Drawing:
             self._visit(len(children))
             stack.extend((child, inner) for child in reversed(children))
 
-    def _written(self, text: ElementTree.Element, look: Look, matrix: Any) -> Iterator[Landmark]:
+    def _written(
+        self, text: ElementTree.Element, look: Look, context: _Context
+    ) -> Iterator[Landmark]:
         """Yield what a text says, where it begins and how large it is, unless that is not known."""
         name = _spaced(" ".join("".join(text.itertext()).split()))
-        placed = [text, *(part for part in text if tag_of(part) == "tspan")]
+        spans = [part for part in text if tag_of(part) == "tspan"]
+        looks = [look, *(self._styles.look(part, look) for part in spans)]
+        placed = [*zip((text, *spans), looks, strict=True)]
         try:
-            own = svgelements.Matrix(text.get("transform", "")) * matrix
+            own = svgelements.Matrix(text.get("transform", "")) * context.matrix
             x, y = (
-                next((float(part.get(axis, "").split()[0]) for part in placed if part.get(axis)), 0)
-                for axis in ("x", "y")
+                next(
+                    (
+                        length(re.split(r"[\s,]+", places.strip())[0], along, shown.font_size)
+                        for part, shown in placed
+                        if (places := part.get(axis))
+                    ),
+                    0.0,
+                )
+                for axis, along in zip("xy", _sides(context.frame), strict=True)
             )
             point = own.point_in_matrix_space((x, y))
         except (ValueError, IndexError, TypeError):
             return
         scale = math.sqrt(abs(own.a * own.d - own.b * own.c))
-        looks = [look, *(self._styles.look(part, look) for part in placed[1:])]
         size = scale * max(each.font_size for each in looks)
         if look.visible and name and all(map(math.isfinite, (point.x, point.y, size))):
             yield Landmark(name, (float(point.x), -float(point.y)), "room", size)
@@ -341,7 +351,7 @@ class _Drawing:
         field: str,
     ) -> _Shape:
         line, look = self._lines[element], context.look
-        subpaths = subpaths_of(element, look.geometry, context.frame, context.matrix, field, line)
+        subpaths = subpaths_of(element, look, context.frame, context.matrix, field, line)
         # Whoever gives both the same colour has fattened the ink.
         pen = tag_of(element) in ("path", "polygon") and fill is not None and stroke in (None, fill)
         return _Shape(
@@ -414,15 +424,17 @@ class _Drawing:
             return None
         line = self._lines[element]
         identity = svgelements.Matrix()
-        subpaths = subpaths_of(element, look.geometry, frame, identity, "", line)
+        subpaths = subpaths_of(element, look, frame, identity, "", line)
         x0, y0, x1, y1 = _box(subpaths)
         return Frame(x0, y0, x1 - x0, y1 - y0)
 
     def _offset(self, use: ElementTree.Element, context: _Context) -> Any:
         frame, said = context.frame, context.look.geometry
         try:
-            x = length(said.get("x", use.get("x", "0")), frame.width if frame else None)
-            y = length(said.get("y", use.get("y", "0")), frame.height if frame else None)
+            x, y = (
+                length(said.get(axis, use.get(axis, "0")), along, context.look.font_size)
+                for axis, along in zip("xy", _sides(frame), strict=True)
+            )
         except ValueError:
             raise self._invalid(use, "has a <use> whose x or y is no length; correct it") from None
         return svgelements.Matrix.translate(x, y) * context.matrix
@@ -441,10 +453,12 @@ class _Drawing:
             return self._first_viewport(element, context, shown)
         said, frame = context.look.geometry, context.frame
         frame = frame or (shown and Frame(0.0, 0.0, shown.width, shown.height))
-        across, down = (frame.width, frame.height) if frame else (None, None)
+        across, down = _sides(frame)
         try:
             x, y, width, height = (
-                None if frame is None and text.endswith("%") else length(text, along)
+                None
+                if frame is None and text.endswith("%")
+                else length(text, along, context.look.font_size)
                 for text, along in (
                     (said.get("x", element.get("x", "0")), across),
                     (said.get("y", element.get("y", "0")), down),
@@ -476,9 +490,11 @@ class _Drawing:
         """Return the context within the document, in its user units unless it is stretched."""
         size: Frame | None
         try:
-            size = Frame(
-                0.0, 0.0, length(root.get("width", ""), None), length(root.get("height", ""), None)
+            width, height = (
+                length(root.get(side, ""), None, context.look.font_size)
+                for side in ("width", "height")
             )
+            size = Frame(0.0, 0.0, width, height)
         except ValueError:
             size = None
         if size is not None and not (size.width > 0.0 and size.height > 0.0):
@@ -512,12 +528,16 @@ class _Drawing:
                 inner = replace(context, matrix=matrix)
                 placed = self._placed(child, look, inner)
                 line = self._lines[child]
-                subpaths += subpaths_of(child, look.geometry, context.frame, placed, "", line)
+                subpaths += subpaths_of(child, look, context.frame, placed, "", line)
         return _box(subpaths)
 
     def _invalid(self, element: ElementTree.Element, problem: str) -> InvalidInputError:
         where = f"({named_element(element)} on line {self._lines[element]} of the file)"
         return invalid("", f"{where} {problem}")
+
+
+def _sides(frame: Frame | None) -> tuple[float, float] | tuple[None, None]:
+    return (frame.width, frame.height) if frame else (None, None)
 
 
 def _is_whole(element: ElementTree.Element) -> bool:
