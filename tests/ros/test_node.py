@@ -1,8 +1,10 @@
 """The node between stand-ins for rclpy and a server: its life, its goals, and what it publishes."""
 
+import time
 from array import array
 from copy import deepcopy
-from threading import Thread
+from itertools import groupby
+from threading import Thread, get_ident
 
 import grpc
 import numpy as np
@@ -387,6 +389,33 @@ def test_what_cannot_be_carried_takes_away_what_an_earlier_sketch_had_left(
     assert not any(told["keepout_mask"].data)
     # Whoever hears of the new objects has no way of the former sketch any more.
     assert [*told] == ["route", "keepout_mask", "keepout_filter_info", "object_map", "markers"]
+
+
+def test_what_is_published_of_goals_at_the_same_time_stays_together(carrying, monkeypatch):
+    order = []
+
+    def publish(_):
+        order.append(get_ident())
+        time.sleep(0.005)
+
+    for publisher in carrying.publishers.values():
+        monkeypatch.setattr(publisher, "publish", publish)
+    goals = [Thread(target=executed, args=(carrying,)) for _ in range(2)]
+    for each in goals:
+        each.start()
+    for each in goals:
+        each.join(20)
+    assert [len([*same]) for _, same in groupby(order)] == [5, 5]
+
+
+def test_a_goal_that_begins_after_the_node_was_cleaned_up_is_aborted(carrying):
+    handle = GoalHandle(carrying.action_server, goal())
+    carrying.go("deactivate", "inactive")
+    carrying.go("cleanup", "unconfigured")
+    result = carrying.action_server.execute(handle)
+    assert handle.status == "aborted"
+    assert "cleaned up" in result.error
+    carrying.go("configure", "inactive")
 
 
 def test_routes_are_carried_onto_the_map_that_the_server_keeps(carrying, carrier, server):

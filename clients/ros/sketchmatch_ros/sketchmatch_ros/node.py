@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from threading import Lock
 
 import rclpy
 from nav2_msgs.msg import CostmapFilterInfo
@@ -47,13 +48,20 @@ _PARAMETERS = {
 
 
 @dataclass(frozen=True)
+class _Map:
+    """A map as it came, and as the server is told of it."""
+
+    grid: OccupancyGrid
+    source: Source
+
+
+@dataclass(frozen=True)
 class _Matched:
-    """The last match: what was matched, which sketched object is which, and on what grid."""
+    """The last match: what was matched, which sketched object is which, and on what map."""
 
     sketch: Source
-    map_: Source
+    map_: _Map
     partners: Mapping[int, int]
-    grid: OccupancyGrid
 
 
 class SketchmatchNode(LifecycleNode):
@@ -72,9 +80,10 @@ class SketchmatchNode(LifecycleNode):
             self.declare_parameter(name, default)
         self._carry = carry
         self._active = False
-        self._grid: OccupancyGrid | None = None
-        self._map: Source | None = None
+        self._map: _Map | None = None
         self._last: _Matched | None = None
+        # Goals are executed beside each other: what is published of one belongs together.
+        self._publishing = Lock()
 
     def on_configure(self, state: object) -> TransitionCallbackReturn:
         """Make the client and all topics; the server need not be there yet."""
@@ -146,7 +155,7 @@ class SketchmatchNode(LifecycleNode):
         except SketchmatchError as error:
             self.get_logger().error(f"the map cannot be used, and the one before stays: {error}")
             return
-        self._grid, self._map = grid, source
+        self._map = _Map(grid, source)
         self.get_logger().info(
             f"has a map of {grid.info.width} x {grid.info.height} cells in {grid.header.frame_id}"
         )
@@ -168,23 +177,25 @@ class SketchmatchNode(LifecycleNode):
 
     def execute(self, goal_handle: object) -> MatchSketch.Result:
         """Match, publish the answer, and end the goal."""
-        goal, grid, map_ = goal_handle.request, self._grid, self._map
+        goal, map_ = goal_handle.request, self._map
         answer = ObjectMap()
 
         def is_over() -> bool:
             return goal_handle.is_cancel_requested or not self._active
 
         try:
+            if map_ is None:
+                raise CallCancelledError("the node was cleaned up since it took the goal")
             sketch = conversions.sketch_source(goal.sketch)
             match = self._matching.match(
                 sketch,
-                map_,
+                map_.source,
                 self._options(goal),
                 on_progress=lambda now: goal_handle.publish_feedback(conversions.feedback(now)),
                 is_over=is_over,
             )
-            answer = conversions.object_map(match, self._header(grid))
-            matched = _Matched(sketch, map_, match.object_map, grid)
+            answer = conversions.object_map(match, self._header(map_.grid))
+            matched = _Matched(sketch, map_, match.object_map)
             drawn = conversions.drawn_features(goal.sketch, match)
             self._publish(matched, answer, drawn, is_over)
         except SketchmatchError as error:
@@ -209,7 +220,7 @@ class SketchmatchNode(LifecycleNode):
         )
         try:
             found = self._carried(last, drawn, is_over=lambda: not self._active)
-            return conversions.carried(found, self._header(last.grid))
+            return conversions.carried(found, self._header(last.map_.grid))
         except SketchmatchError as error:
             response.error = str(error)
             return response
@@ -230,15 +241,17 @@ class SketchmatchNode(LifecycleNode):
                 if is_over():
                     raise
                 error = problem
-        self._last = last
-        if self._carry is not None:
-            header = self._header(last.grid)
-            route = next(iter(carried.routes), ())
-            self._route.publish(conversions.route_path(route, header))
-            self._mask.publish(conversions.keepout_mask(carried.zones, last.grid))
-            self._filter.publish(conversions.filter_info(self._mask.topic_name, header))
-        self._answers.publish(answer)
-        self._markers.publish(conversions.markers(answer))
+        grid = last.map_.grid
+        with self._publishing:
+            self._last = last
+            if self._carry is not None:
+                header = self._header(grid)
+                route = next(iter(carried.routes), ())
+                self._route.publish(conversions.route_path(route, header))
+                self._mask.publish(conversions.keepout_mask(carried.zones, grid))
+                self._filter.publish(conversions.filter_info(self._mask.topic_name, header))
+            self._answers.publish(answer)
+            self._markers.publish(conversions.markers(answer))
         if error is not None:
             raise error
 
@@ -247,7 +260,7 @@ class SketchmatchNode(LifecycleNode):
             radius = self._said("radius")
             return self._carry(self._client, last.sketch, map_, last.partners, drawn, radius)
 
-        return self._matching.carried(carry, last.map_, is_over)
+        return self._matching.carried(carry, last.map_.source, is_over)
 
     def _header(self, grid: OccupancyGrid) -> Header:
         return Header(stamp=self.get_clock().now().to_msg(), frame_id=grid.header.frame_id)
@@ -271,7 +284,7 @@ class SketchmatchNode(LifecycleNode):
         if self._carry is not None:
             self.destroy_service(self._service)
         self._client.close()
-        self._grid = self._map = self._last = None
+        self._map = self._last = None
         del self._client
 
 
