@@ -607,6 +607,8 @@ def assert_one_line(done, code, *words):
         (["match", *ROOM, "--time-budget", "nan"], ["time_budget", "give a positive time"]),
         (["match", *ROOM, "--overlay", "x.txt"], ["x.txt", ".png"]),
         (["match", "missing.svg", LIVING_ROOM_MAP], ["missing.svg does not exist", "check"]),
+        (["match", "", LIVING_ROOM_MAP], ["SKETCH", "it is empty where a file belongs"]),
+        (["segment", LIVING_ROOM_MAP, "--out", ""], ["--out", "it is empty"]),
         (["match", LIVING_ROOM_SKETCH, "."], [". is a folder without a map", "give the .yaml"]),
         (["segment", __file__], ["is of no known kind", ".yaml"]),
         (["plugins", "lits"], ["lits", "--help"]),

@@ -1,11 +1,15 @@
 """Options that several commands share are one list."""
 
 import inspect
+from pathlib import Path
+from typing import get_args
 
 import pytest
+import typer
 
+from sketchmatch.cli.app import app
 from sketchmatch.cli.match import match
-from sketchmatch.cli.options import Access, Search, asking
+from sketchmatch.cli.options import Access, Search, asking, to_path
 from sketchmatch.cli.transfer import carry, transfer
 
 _TYPED = Search(seed=9)
@@ -55,3 +59,25 @@ def test_the_options_of_a_request_are_those_that_were_typed():
         "allow_unmatched": False,
         "unmatched_price": 0.5,
     }
+
+
+def commands(of):
+    for each in of.registered_commands:
+        yield each.callback
+    for group in of.registered_groups:
+        yield from commands(group.typer_instance)
+
+
+def test_no_command_takes_an_empty_path_for_the_folder_one_is_in():
+    with pytest.raises(typer.BadParameter, match="it is empty where a file belongs"):
+        to_path("")
+    assert to_path("a b") == Path("a b")
+    taken = [
+        hint.__metadata__[0].parser
+        for command in commands(app)
+        for each in inspect.signature(command, eval_str=True).parameters.values()
+        for hint in [each.annotation]
+        if Path in (hint.__origin__, *get_args(hint.__origin__))
+    ]
+    assert len(taken) > 30
+    assert set(taken) == {to_path}

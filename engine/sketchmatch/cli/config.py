@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from sketchmatch.cli import output
-from sketchmatch.cli.options import Config, say
+from sketchmatch.cli.options import Config, say, to_path
 from sketchmatch.cli.output import answering
 from sketchmatch.errors import InvalidInputError, Reason
 
@@ -56,7 +56,11 @@ def show(
 def check(
     file: Annotated[
         Path | None,
-        typer.Argument(metavar="[FILE]", help="The file; left out, the one that would be read."),
+        typer.Argument(
+            metavar="[FILE]",
+            help="The file; left out, the one that would be read.",
+            parser=to_path,
+        ),
     ] = None,
 ) -> None:
     """Check a configuration, with every profile and the environment, against what is installed."""
@@ -73,9 +77,9 @@ def check(
 @app.command("init")
 @answering
 def init(
-    file: Annotated[Path, typer.Argument(metavar="[FILE]", help="Where to write it.")] = Path(
-        "sketchmatch.toml"
-    ),
+    file: Annotated[
+        Path, typer.Argument(metavar="[FILE]", help="Where to write it.", parser=to_path)
+    ] = Path("sketchmatch.toml"),
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
 ) -> None:
     """Write a file with every setting and its default, commented out."""

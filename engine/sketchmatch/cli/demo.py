@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from sketchmatch.cli.options import Access, say
+from sketchmatch.cli.options import Access, say, to_path
 from sketchmatch.cli.output import answering, clean, tell
 
 __all__ = ["demo"]
@@ -25,7 +25,8 @@ _STOP_SECONDS = 10.0
 @answering
 def demo(
     overlay: Annotated[
-        Path, typer.Option("--overlay", metavar="FILE", help="Where to draw the answer.")
+        Path,
+        typer.Option("--overlay", metavar="FILE", help="Where to draw the answer.", parser=to_path),
     ] = Path("demo-overlay.png"),
     seed: Annotated[int, typer.Option(help="Same seed, same answer.")] = 0,
 ) -> None:

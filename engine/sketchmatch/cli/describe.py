@@ -20,7 +20,12 @@ __all__ = ["describe"]
 @answering
 def describe(
     scene: Annotated[
-        Path, typer.Argument(metavar="SCENE", help="A sketch or a map, as `match` takes them.")
+        Path,
+        typer.Argument(
+            metavar="SCENE",
+            help="A sketch or a map, as `match` takes them.",
+            parser=options.to_path,
+        ),
     ],
     config: options.Config = None,
     profile: options.Profile = "",
@@ -39,11 +44,21 @@ def describe(
     json: options.JsonDocument = False,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE", help="Save the histograms: .npz or .csv."),
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="Save the histograms: .npz or .csv.",
+            parser=options.to_path,
+        ),
     ] = None,
     plot: Annotated[
         Path | None,
-        typer.Option("--plot", metavar="FILE", help="Draw the histograms beside the scene."),
+        typer.Option(
+            "--plot",
+            metavar="FILE",
+            help="Draw the histograms beside the scene.",
+            parser=options.to_path,
+        ),
     ] = None,
     verbose: options.Verbose = False,
 ) -> None:

@@ -26,6 +26,7 @@ def match(
             metavar="SKETCH",
             help="Sketch: .svg, .json, .excalidraw, .geojson, image; FILE#PART names a part of it, "
             "such as a frame.",
+            parser=options.to_path,
         ),
     ],
     map_: Annotated[
@@ -35,6 +36,7 @@ def match(
             help="Map: ROS map .yaml, its picture or folder, bag, .geojson, .dxf, .svg, image, "
             "annotations, scene graph; `sketchmatch plugins list` shows all readers. FILE#PART "
             "names a part of it, such as layers. scene:NAME is a scene that the server keeps.",
+            parser=options.to_path,
         ),
     ],
     server: options.Server = None,

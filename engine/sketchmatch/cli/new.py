@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import sketchmatch
-from sketchmatch.cli.options import say
+from sketchmatch.cli.options import say, to_path
 from sketchmatch.cli.output import answering, write_line
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 
@@ -39,7 +39,13 @@ def new(
         ),
     ],
     into: Annotated[
-        Path, typer.Option("--into", metavar="DIR", help="Folder to write it into; here if not.")
+        Path,
+        typer.Option(
+            "--into",
+            metavar="DIR",
+            help="Folder to write it into; here if not.",
+            parser=to_path,
+        ),
     ] = Path(),
 ) -> None:
     """Write a plugin that works: a package with a small algorithm of a kind, and its tests.

@@ -51,7 +51,22 @@ __all__ = [
     "refuse_config",
     "say",
     "say_renamed",
+    "to_path",
 ]
+
+
+def to_path(text: str) -> Path:
+    """Return what was typed for a file or a folder.
+
+    Raises
+    ------
+    typer.BadParameter
+        If it is empty, as a variable is that nobody set: that would be the folder one is in.
+    """
+    if not str(text):
+        raise typer.BadParameter("it is empty where a file belongs")
+    return Path(text)
+
 
 Address = Annotated[
     str,
@@ -75,6 +90,7 @@ Config = Annotated[
         "--config",
         metavar="FILE",
         help="Configuration; sketchmatch.toml here or in your configuration folder by default.",
+        parser=to_path,
     ),
 ]
 Profile = Annotated[
@@ -137,7 +153,10 @@ Histogram = Annotated[
     str, typer.Option(help="Histogram; `constant` unless the configuration names another.")
 ]
 Overlay = Annotated[
-    Path | None, typer.Option("--overlay", metavar="FILE", help="Draw the answer into a picture.")
+    Path | None,
+    typer.Option(
+        "--overlay", metavar="FILE", help="Draw the answer into a picture.", parser=to_path
+    ),
 ]
 
 Verbose = Annotated[
@@ -164,7 +183,9 @@ class Access:
     token_file: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="The token to show to the server; or say SKETCHMATCH_TOKEN."
+            metavar="FILE",
+            help="The token to show to the server; or say SKETCHMATCH_TOKEN.",
+            parser=to_path,
         ),
     ] = None
     tls: Annotated[
@@ -174,14 +195,22 @@ class Access:
     root_certificates: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Authorities to trust for the server's certificate, in PEM."
+            metavar="FILE",
+            help="Authorities to trust for the server's certificate, in PEM.",
+            parser=to_path,
         ),
     ] = None
     certificate: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Certificate to show to the server, in PEM.")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Certificate to show to the server, in PEM.", parser=to_path
+        ),
     ] = None
     key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Private key of the certificate, in PEM.")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Private key of the certificate, in PEM.", parser=to_path
+        ),
     ] = None
     server_name: Annotated[
         str | None,

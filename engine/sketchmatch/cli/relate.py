@@ -24,8 +24,16 @@ __all__ = ["relate"]
 
 @answering
 def relate(
-    sketch: Annotated[Path, typer.Argument(metavar="SKETCH", help="Sketch, as `match` takes it.")],
-    map_: Annotated[Path, typer.Argument(metavar="MAP", help="Map, as `match` takes it.")],
+    sketch: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SKETCH", help="Sketch, as `match` takes it.", parser=options.to_path
+        ),
+    ],
+    map_: Annotated[
+        Path,
+        typer.Argument(metavar="MAP", help="Map, as `match` takes it.", parser=options.to_path),
+    ],
     sketch_pair: Annotated[
         list[str] | None,
         typer.Option(

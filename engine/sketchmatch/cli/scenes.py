@@ -37,7 +37,10 @@ def scenes() -> None:
 @options.asking
 def put(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A sketch or a map, as `match` takes them.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="A sketch or a map, as `match` takes them.", parser=options.to_path
+        ),
     ],
     server: _Server = _HERE,
     access: options.Access = options.Access(),  # noqa: B008

@@ -17,7 +17,10 @@ __all__ = ["segment"]
 @options.asking
 def segment(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A sketch or a map, as `match` takes them.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="A sketch or a map, as `match` takes them.", parser=options.to_path
+        ),
     ],
     server: options.Server = None,
     access: options.Access = options.Access(),  # noqa: B008
@@ -34,6 +37,7 @@ def segment(
             metavar="FILE",
             help="Save the objects as polygons, in .geojson. Beside a robot's map and named as it "
             "is with .objects.geojson, they are its objects from then on: edit them at will.",
+            parser=options.to_path,
         ),
     ] = None,
     verbose: options.Verbose = False,

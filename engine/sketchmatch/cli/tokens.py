@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sketchmatch.cli import output
-from sketchmatch.cli.options import Config, say
+from sketchmatch.cli.options import Config, say, to_path
 from sketchmatch.cli.output import answering
 from sketchmatch.errors import InvalidInputError, Reason, quoted
 
@@ -26,7 +26,10 @@ _Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the caller, 
 _File = Annotated[
     Path | None,
     typer.Option(
-        "--file", metavar="FILE", help="File of tokens; the one of the configuration by default."
+        "--file",
+        metavar="FILE",
+        help="File of tokens; the one of the configuration by default.",
+        parser=to_path,
     ),
 ]
 

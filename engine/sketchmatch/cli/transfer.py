@@ -25,7 +25,9 @@ class _Direction(StrEnum):
 
 _Out = Annotated[
     Path | None,
-    typer.Option("--out", metavar="FILE", help="Save what was carried, in .geojson."),
+    typer.Option(
+        "--out", metavar="FILE", help="Save what was carried, in .geojson.", parser=options.to_path
+    ),
 ]
 _Keepout = Annotated[
     Path | None,
@@ -33,6 +35,7 @@ _Keepout = Annotated[
         "--keepout",
         metavar="FILE",
         help="Save the zones as a mask for nav2's keep-out filter: .yaml, and a .pgm beside it.",
+        parser=options.to_path,
     ),
 ]
 _Waypoints = Annotated[
@@ -41,6 +44,7 @@ _Waypoints = Annotated[
         "--waypoints",
         metavar="FILE",
         help="Save points and routes as waypoints in .yaml, as nav2's panel in RViz does.",
+        parser=options.to_path,
     ),
 ]
 _Radius = Annotated[
@@ -60,15 +64,22 @@ _AllowUnknown = Annotated[
 @options.asking
 def transfer(
     sketch: Annotated[
-        Path, typer.Argument(metavar="SKETCH", help="A sketch, as `match` takes it.")
+        Path,
+        typer.Argument(
+            metavar="SKETCH", help="A sketch, as `match` takes it.", parser=options.to_path
+        ),
     ],
-    map_: Annotated[Path, typer.Argument(metavar="MAP", help="A map, as `match` takes it.")],
+    map_: Annotated[
+        Path,
+        typer.Argument(metavar="MAP", help="A map, as `match` takes it.", parser=options.to_path),
+    ],
     features: Annotated[
         Path | None,
         typer.Argument(
             metavar="[FEATURES]",
             help="Points, routes and zones: GeoJSON in the sketch's coordinates, y upwards; a "
             "keep-out mask or waypoints of nav2. A route that is drawn in the sketch needs none.",
+            parser=options.to_path,
         ),
     ] = None,
     server: options.Server = None,
@@ -155,10 +166,21 @@ def carry(
             metavar="FEATURES",
             help="Zones, routes and points on the old map: GeoJSON, a keep-out mask of nav2, or "
             "waypoints as its panel in RViz saves them.",
+            parser=options.to_path,
         ),
     ],
-    old: Annotated[Path, typer.Argument(metavar="OLD", help="The old map, as `match` takes it.")],
-    new: Annotated[Path, typer.Argument(metavar="NEW", help="The new map of the same place.")],
+    old: Annotated[
+        Path,
+        typer.Argument(
+            metavar="OLD", help="The old map, as `match` takes it.", parser=options.to_path
+        ),
+    ],
+    new: Annotated[
+        Path,
+        typer.Argument(
+            metavar="NEW", help="The new map of the same place.", parser=options.to_path
+        ),
+    ],
     server: options.Server = None,
     access: options.Access = options.Access(),  # noqa: B008
     config: options.Config = None,
