@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -186,6 +187,26 @@ def test_an_answer_that_cannot_be_written_is_one_sentence_and_an_exit_code(argum
     assert done.stderr == (
         "sketchmatch: standard output cannot be written (no space left on device); make room "
         "there, or send it elsewhere\n"
+    )
+
+
+@pytest.mark.skipif(os.name != "posix", reason="of shells that can close a file")
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [(["--version"], True), slow(["segment", ROOM[0]], True), slow(["-h"], False)],
+)
+def test_an_answer_that_nobody_could_read_is_one_sentence_and_an_exit_code(arguments, told):
+    command = shlex.join([*processes.COMMAND, *map(str, arguments)])
+    done = subprocess.run(
+        ["sh", "-c", f"{command} >&-" if told else f"{command} >&- 2>&-"],
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+        timeout=200,
+    )
+    assert done.returncode == ExitCode.INVALID_INPUT
+    assert done.stderr == told * (
+        "sketchmatch: standard output is closed; send the answer to a file, or to /dev/null\n"
     )
 
 

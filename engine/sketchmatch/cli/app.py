@@ -65,6 +65,10 @@ app.add_typer(scenes.app, name="scenes")
 app.add_typer(matches.app, name="matches")
 
 
+# A full disk, and what was closed before the command began.
+_UNWRITABLE = {errno.ENOSPC, errno.EBADF}
+
+
 class ExitCode(IntEnum):
     """What the exit code of a command means."""
 
@@ -96,6 +100,7 @@ def main() -> NoReturn:
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")
     # An odd tag in a picture is no news to whoever drew it.
     warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\.")
+    output.open_again()
     output.use_any_encoding()
     interrupts.listen()
     code, message = _run()
@@ -109,8 +114,7 @@ def _run() -> tuple[int, str]:
     """Run the command line and return its exit code and what to say about it."""
     try:
         code = app(standalone_mode=False) or ExitCode.OK
-        if sys.stdout:
-            sys.stdout.flush()
+        sys.stdout.flush()
         return code, "interrupted" if code == ExitCode.INTERRUPTED else ""
     except (typer.Abort, KeyboardInterrupt) as end:
         # Typer makes an abort of the end of a file, too.
@@ -124,7 +128,7 @@ def _run() -> tuple[int, str]:
         output.discard()  # whoever read standard output has had enough
         return ExitCode.OK, ""
     except Exception as error:
-        if isinstance(error, OSError) and error.errno == errno.ENOSPC and not error.filename:
+        if isinstance(error, OSError) and error.errno in _UNWRITABLE and not error.filename:
             output.discard()
             error = output.unwritable(error)
         return _exit_code(error), _sentence(error)

@@ -7,6 +7,7 @@ objects, no text of theirs moves a cursor or ends a line.
 from __future__ import annotations
 
 import codecs
+import errno
 import functools
 import io
 import json
@@ -29,6 +30,7 @@ __all__ = [
     "console",
     "discard",
     "for_people",
+    "open_again",
     "show",
     "tell",
     "unwritable",
@@ -58,6 +60,17 @@ _answer: TextIO | None = None
 """Standard output, while ``sys.stdout`` is something else."""
 
 
+def open_again() -> None:
+    """Let standard output that was closed take nothing, as a full disk does.
+
+    Without this nobody would hear that the answer was lost, or it would go to the next file that
+    is opened.
+    """
+    if sys.stdout is None:
+        nothing = os.fdopen(os.open(os.devnull, os.O_RDONLY), "wb", buffering=0)
+        sys.stdout = io.TextIOWrapper(nothing, encoding="utf-8", write_through=True)
+
+
 def use_any_encoding() -> None:
     """Let what an encoding lacks be spelled, on both standard streams, instead of failing."""
     for stream in (sys.stdout, sys.stderr):
@@ -81,8 +94,7 @@ def answering(command: Callable[_Parameters, _Value]) -> Callable[_Parameters, _
 
 def for_people() -> bool:
     """Whether answers go to a terminal."""
-    stream = _stream()
-    return stream is not None and stream.isatty()
+    return _stream().isatty()
 
 
 def console(*, error: bool = False) -> Console:
@@ -107,13 +119,11 @@ def write(text: str) -> None:
     Raises
     ------
     InvalidInputError
-        If standard output takes no more, as a full disk does.
+        If standard output takes no more, as a full disk does, or was closed.
     BrokenPipeError
         If nobody reads it any longer.
     """
     stream = _stream()
-    if stream is None:  # it was closed before the command began
-        return
     try:
         stream.write(text)
         stream.flush()
@@ -171,18 +181,17 @@ def discard() -> None:
 def unwritable(error: OSError) -> InvalidInputError:
     """Return what to tell of an answer that could not be written."""
     why = (error.strerror or str(error)).lower()
-    return InvalidInputError(
-        Reason.INVALID_FILE,
-        "standard output",
-        f"cannot be written ({why}); make room there, or send it elsewhere",
-    )
+    problem = f"cannot be written ({why}); make room there, or send it elsewhere"
+    if error.errno == errno.EBADF:
+        problem = "is closed; send the answer to a file, or to /dev/null"
+    return InvalidInputError(Reason.INVALID_FILE, "standard output", problem)
 
 
 @contextmanager
 def _answers_apart() -> Iterator[None]:
     global _answer
     own = sys.stdout
-    if own is None or _answer is not None:
+    if _answer is not None:
         yield
         return
     own.flush()
@@ -219,7 +228,7 @@ def _flush_c() -> None:
         ctypes.CDLL(None).fflush(None)
 
 
-def _stream() -> TextIO | None:
+def _stream() -> TextIO:
     return _answer or sys.stdout
 
 
@@ -240,7 +249,7 @@ def _seen(found: re.Match[str]) -> str:
     return " " if found[0].isspace() else found[0].encode("unicode_escape").decode()
 
 
-def _json_for(stream: TextIO | None, text: str) -> str:
+def _json_for(stream: TextIO, text: str) -> str:
     """Return JSON in an encoding's characters, the others escaped as JSON does it."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     unsafe = _OBEYED_IN_JSON if encoding.lower().startswith("utf") else _NOT_ASCII
