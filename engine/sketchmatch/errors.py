@@ -28,6 +28,7 @@ __all__ = [
     "StoreError",
     "TooBusyError",
     "WorkerLostError",
+    "counted",
     "quoted",
 ]
 
@@ -53,6 +54,17 @@ def quoted(value: object) -> str:
         text = "a number of thousands of digits"
     text = re.sub(r"\n\s*", " ", text)  # of an array
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
+
+
+def counted(number: int, noun: str, several: str = "") -> str:
+    """Return a number of things as a sentence has it.
+
+    Examples
+    --------
+    >>> counted(1, "object"), counted(0, "object"), counted(2, "sketch", "sketches")
+    ('1 object', '0 objects', '2 sketches')
+    """
+    return f"{number} {noun if number == 1 else several or f'{noun}s'}"
 
 
 class Reason(StrEnum):

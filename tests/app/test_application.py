@@ -158,7 +158,7 @@ async def test_the_same_request_is_answered_alike_in_this_thread(app):
 @limited(max_concurrent_matches=1, max_waiting=0)
 async def test_a_place_is_taken_until_the_work_has_ended_even_if_nobody_waits_for_it(app, held):
     with begun(app, held):
-        with pytest.raises(TooBusyError, match="runs 1 requests already") as refused:
+        with pytest.raises(TooBusyError, match="runs 1 request already") as refused:
             begun(app, held).__enter__()
         assert refused.value.reason is Reason.LIMIT_EXCEEDED
         await until(Held.began.is_set, "the search does not begin")
@@ -192,7 +192,7 @@ async def test_callers_take_turns_and_a_full_queue_loses_the_last_of_the_greedie
     with contextlib.ExitStack() as stack:
         stack.enter_context(begun(app, held, flood))
         waiting = [stack.enter_context(begun(app, small, flood)) for _ in range(3)]
-        with pytest.raises(TooBusyError, match="runs 1 requests already and 3 wait"):
+        with pytest.raises(TooBusyError, match="runs 1 request already and 3 wait"):
             begun(app, small, flood).__enter__()
         last = stack.enter_context(begun(app, small, polite))
         with pytest.raises(TooBusyError, match="3 wait"):

@@ -110,7 +110,7 @@ def test_nobody_has_more_sketches_than_one_may_and_all_together_may():
         with pytest.raises(TooBusyError, match="you have 2 sketches in progress, the limit"):
             await made(sketches)
         await made(sketches, BERT)
-        with pytest.raises(TooBusyError, match="there are 3 sketches in progress, the limit"):
+        with pytest.raises(TooBusyError, match="the server has 3 sketches in progress, the limit"):
             await made(sketches, BERT)
         await sketches.delete(DeleteSketchRequest(sketch_id=first), ANNA)
         await made(sketches)

@@ -449,7 +449,7 @@ def test_options_of_serve_say_how_many_sketches_there_are_and_how_long_and_how_m
         service = SketchServiceStub(channel)
         request = CreateSketchRequest(match=MatchRequest(map=MAP))
         assert service.CreateSketch(request).idle_timeout.ToMilliseconds() == 7500
-        with pytest.raises(grpc.RpcError, match="you have 1 sketches in progress, the limit"):
+        with pytest.raises(grpc.RpcError, match="you have 1 sketch in progress, the limit"):
             service.CreateSketch(request)
         client.put_scene(MAP)
         with pytest.raises(StoreError, match="is full; delete what is not needed"):

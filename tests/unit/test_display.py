@@ -281,6 +281,8 @@ def test_progress_shows_no_figure_that_there_is_none_of():
 
     begun = said(phase=match_pb2.PHASE_SEARCH)
     assert begun.endswith("searching  3.0 s")
+    once = said(confidence=0.5, upper_bound=1.0, iteration=1, evaluations=1)
+    assert once.endswith("iteration 1  1 evaluation")
     trivial = said(confidence=0.5, upper_bound=1.0, iteration=2, evaluations=9)
     assert trivial.endswith("3.0 s  ζ 0.5000  iteration 2  9 evaluations")
     assert "ζ 0.5000  ≤ 0.7500" in said(confidence=0.5, upper_bound=0.75)

@@ -41,6 +41,7 @@ from sketchmatch.errors import (
     ServerStoppingError,
     TooBusyError,
     WorkerLostError,
+    counted,
 )
 from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.memory import Lookups
@@ -536,7 +537,7 @@ class Application:
 
     def _busy(self, full: str) -> TooBusyError:
         """Return the error of a request for which there is no room."""
-        there_are = f"the server runs {len(self._running)} requests already"
+        there_are = f"the server runs {counted(len(self._running), 'request')} already"
         return TooBusyError(f"{there_are}{full}", self._retry_seconds())
 
     def _dispatch(self) -> None:

@@ -7,7 +7,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 
-from sketchmatch.errors import TooBusyError
+from sketchmatch.errors import TooBusyError, counted
 
 __all__ = ["Rates"]
 
@@ -43,8 +43,8 @@ class Rates:
         left = min(float(per_minute), left + (now - at) * per_minute / _MINUTE)
         if left < 1.0:
             raise TooBusyError(
-                f"you have sent {per_minute} requests in a minute, which is the limit for each "
-                "caller",
+                f"you have sent {counted(per_minute, 'request')} in a minute, which is the limit "
+                "for each caller",
                 max(1, math.ceil(round((1.0 - left) * _MINUTE / per_minute, 6))),
             )
         self._left[caller] = left - 1.0, now

@@ -16,7 +16,7 @@ import math
 import secrets
 import time
 from collections import Counter
-from collections.abc import AsyncGenerator, Coroutine, Iterator, Mapping
+from collections.abc import AsyncGenerator, Coroutine, Iterator, Mapping, Sized
 from contextlib import aclosing, suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -34,6 +34,7 @@ from sketchmatch.errors import (
     ServerStoppingError,
     SketchmatchError,
     TooBusyError,
+    counted,
     quoted,
 )
 from sketchmatch_proto.v1 import match_pb2
@@ -314,7 +315,7 @@ class Sketches:
         if len(theirs) >= self._limits.of_one:
             self._drop_one(theirs)
         if len(self._all) >= self._limits.sketches:
-            raise TooBusyError(f"there are {len(self._all)} sketches in progress, the limit")
+            raise TooBusyError(f"the server has {_in_progress(self._all)}, the limit")
 
     def _drop_one(self, theirs: dict[str, _Sketch]) -> None:
         """End the sketch that nobody drew or watched for longest, if that is long enough.
@@ -324,13 +325,13 @@ class Sketches:
         idle = {name: each.touched for name, each in theirs.items() if not each.watchers}
         if not idle:
             raise TooBusyError(
-                f"you have {len(theirs)} sketches in progress, the limit, and watch all; delete one"
+                f"you have {_in_progress(theirs)}, the limit, and watch all; delete one"
             )
         name = min(idle, key=idle.__getitem__)
         seconds = time.monotonic() - idle[name]
         if seconds < _SPARED:
             raise TooBusyError(
-                f"you have {len(theirs)} sketches in progress, the limit; delete one",
+                f"you have {_in_progress(theirs)}, the limit; delete one",
                 max(1, math.ceil(_SPARED - seconds)),
             )
         self._end(
@@ -544,3 +545,7 @@ def _too_large(field_: str, count: int, what: str, most: int) -> InvalidInputErr
         field_,
         f"makes {count} {what}, more than the limit of {most}; erase some, or draw with fewer",
     )
+
+
+def _in_progress(sketches: Sized) -> str:
+    return f"{counted(len(sketches), 'sketch', 'sketches')} in progress"

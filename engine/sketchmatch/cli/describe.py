@@ -9,6 +9,7 @@ import typer
 
 from sketchmatch.cli import options, output
 from sketchmatch.cli.output import answering
+from sketchmatch.errors import counted
 
 if TYPE_CHECKING:
     from sketchmatch.cli.inspection import Description
@@ -141,7 +142,7 @@ def _table(found: Description) -> Rows:
     from sketchmatch.cli.display import numbered
     from sketchmatch.cli.tables import Column, Rows, plain
 
-    shown, labels = len(found.pairs), found.scene.labels
+    relations, labels = counted(len(found.pairs), "relation"), found.scene.labels
     columns = [
         Column("object", least=12),
         Column("is", least=12),
@@ -157,5 +158,5 @@ def _table(found: Description) -> Rows:
         ]
         for (a, b), relation in zip(found.pairs, found.relations, strict=True)
     ]
-    title = f"{shown} relations of {len(labels)} objects, by {found.histogram.name}"
+    title = f"{relations} of {len(labels)} objects, by {found.histogram.name}"
     return Rows(title, columns, rows)

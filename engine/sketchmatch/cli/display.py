@@ -19,6 +19,7 @@ from rich.text import Text
 from sketchmatch.cli import interrupts, output
 from sketchmatch.cli.options import say
 from sketchmatch.cli.tables import Column, Rows, plain
+from sketchmatch.errors import counted
 from sketchmatch_client import Match, MatchCollector
 from sketchmatch_proto.v1 import match_pb2
 from sketchmatch_proto.v1.match_service_pb2 import MatchResponse
@@ -255,7 +256,8 @@ def summary_of(notes: Sequence[str]) -> list[str]:
         for alike in list(kinds.values())[:_MOST_NOTES]
     ]
     untold = len(notes) - sum(map(len, list(kinds.values())[:_MOST_NOTES]))
-    others = f"{untold} others were noted; " if untold else ""
+    were = "was" if untold == 1 else "were"
+    others = f"{counted(untold, 'other')} {were} noted; " if untold else ""
     return [*told, f"{others}with -v all {len(notes)} notes are told"]
 
 
@@ -511,8 +513,10 @@ def _headline(match: Match) -> str:
 def _effort(result: match_pb2.MatchResult) -> str:
     statistics = result.statistics
     return (
-        f"{_OUTCOMES.get(result.outcome, 'ended')} after {statistics.iterations} iterations, "
-        f"{statistics.evaluations} evaluations, {_seconds(statistics.total_elapsed):.2f} s"
+        f"{_OUTCOMES.get(result.outcome, 'ended')} after "
+        f"{counted(statistics.iterations, 'iteration')}, "
+        f"{counted(statistics.evaluations, 'evaluation')}, "
+        f"{_seconds(statistics.total_elapsed):.2f} s"
     )
 
 
@@ -522,7 +526,7 @@ def _progress(screen: Console, progress: match_pb2.MatchProgress) -> RenderableT
         said.append(f"ζ {progress.confidence:.4f}")
         if progress.HasField("upper_bound") and progress.upper_bound < 1.0:
             said.append(f"≤ {progress.upper_bound:.4f}")
-        said += [f"iteration {progress.iteration}", f"{progress.evaluations} evaluations"]
+        said += [f"iteration {progress.iteration}", counted(progress.evaluations, "evaluation")]
     bar = None
     if progress.HasField("fraction"):
         bar = _bar(progress.fraction)

@@ -11,6 +11,7 @@ import typer
 
 from sketchmatch.cli import options, output
 from sketchmatch.cli.output import answering
+from sketchmatch.errors import counted
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -160,8 +161,9 @@ def _table(found: Listing) -> Rows:
         ]
         for entry in found.best
     ]
-    shown = f"{len(found.best)} of {found.total}" if len(found.best) < found.total else found.total
-    title = f"{shown} comparisons, by {found.similarity.name} of {found.histogram.name}"
+    shown = f"{len(found.best)} of " if len(found.best) < found.total else ""
+    comparisons = f"{shown}{counted(found.total, 'comparison')}"
+    title = f"{comparisons}, by {found.similarity.name} of {found.histogram.name}"
     return Rows(title, columns, rows)
 
 

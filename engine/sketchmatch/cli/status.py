@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from sketchmatch.cli import options, output
 from sketchmatch.cli.output import answering
+from sketchmatch.errors import counted
 
 if TYPE_CHECKING:
     from sketchmatch_client import Client
@@ -102,7 +103,7 @@ def _lines(
 
 def _limits(limits: ServerLimits) -> Iterator[str]:
     if limits.HasField("max_concurrent_matches"):
-        yield f"{limits.max_concurrent_matches} requests at once"
+        yield f"{counted(limits.max_concurrent_matches, 'request')} at once"
     if limits.HasField("max_request_bytes"):
         yield f"{limits.max_request_bytes / _MIB:g} MiB a request"
     if limits.HasField("max_objects"):

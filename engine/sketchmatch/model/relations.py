@@ -14,6 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from sketchmatch.errors import counted
 from sketchmatch.model.arrays import FloatArray, IntArray, frozen, frozen_floats, sealed
 from sketchmatch.model.caching import cached_property
 
@@ -136,7 +137,7 @@ class SceneDescriptor:
 
     def __repr__(self) -> str:
         by = f", by {self.described_by.split()[0]}" if self.described_by else ""
-        size = f"{len(self.histograms)} histograms in {self.directions} directions"
+        size = f"{counted(len(self.histograms), 'histogram')} in {self.directions} directions"
         return f"<{type(self).__name__}: {size} of {self.objects} objects{by}>"
 
     def histogram(self, a: int, b: int) -> FloatArray:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, counted
 from sketchmatch.io._targets import check_target, writing
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene
 from sketchmatch.pictures._canvas import printable
@@ -299,9 +299,8 @@ def draw_relations(
     ]
     if title is None:
         total = len(relations) + len(left_out)
-        counted = f"{total} relation" if total == 1 else f"{total} relations"
         rest = f", {len(left_out)} of them not drawn" if left_out else ""
-        title = f"{counted} of {len(scene)} objects{rest}"
+        title = f"{counted(total, 'relation')} of {len(scene)} objects{rest}"
     others = [f"{a + 1},{b + 1}" for a, b in left_out]
     return RelationsPage(panel, _labelled(scene), plots, others).drawn(title, caption, width)
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from sketchmatch.api import Histogram, Similarity
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, counted
 from sketchmatch.kernels.evidence import SelfRelations
 from sketchmatch.model import (
     ConfidenceWeights,
@@ -116,8 +116,9 @@ class Comparison(Tabular):
 
     def _headline(self) -> str:
         return (
-            f"{self.table.similarity.size} pairs of relations, {len(self.sketch)} sketched objects "
-            f"with {len(self.map)} mapped ones, similarity up to {self.table.similarity.max():.3f}"
+            f"{counted(self.table.similarity.size, 'pair')} of relations, "
+            f"{len(self.sketch)} sketched objects with {len(self.map)} mapped ones, "
+            f"similarity up to {self.table.similarity.max():.3f}"
         )
 
     def _table(self) -> Table:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from sketchmatch.api import Judge, Searcher, Segmentation
-from sketchmatch.errors import InvalidInputError, Reason, quoted
+from sketchmatch.errors import InvalidInputError, Reason, counted, quoted
 from sketchmatch.model import ConfidenceWeights, RequestWeights, Scene, Source
 from sketchmatch.model.maps import MAX_DISTANCE, MAX_WEIGHT, WEIGHT_COUNTS
 from sketchmatch.pipeline.former import Former
@@ -200,8 +200,8 @@ def alternatives_wanted(requested: int | None, sketch: Scene, map_: Scene) -> in
     if requested > there_are:
         raise _refused(
             "alternatives",
-            f"is {requested}, but {few} objects in {many} have {there_are} other maps; "
-            "ask for no more",
+            f"is {requested}, but {few} objects in {many} have "
+            f"{counted(there_are, 'other map')}; ask for no more",
         )
     return requested
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from sketchmatch.api import Segmentation
-from sketchmatch.errors import InvalidInputError, Reason, quoted
+from sketchmatch.errors import InvalidInputError, Reason, counted, quoted
 from sketchmatch.model import OccupancyGrid, Scene, Source
 from sketchmatch.model.text import Table, Tabular
 from sketchmatch.pipeline.clock import Clock
@@ -138,11 +138,9 @@ class TransferResult(Tabular):
         return likely is not None and likely < _UNLIKELY, mean
 
     def _headline(self) -> str:
-        count = len(self.carried)
-        things = "1 feature" if count == 1 else f"{count} features"
-        return f"{things} carried by a warp of kind {self.warp.kind} through " + (
-            f"{len(self.object_map)} objects"
-        )
+        things = counted(len(self.carried), "feature")
+        through = f"{len(self.object_map)} objects"
+        return f"{things} carried by a warp of kind {self.warp.kind} through {through}"
 
     def _table(self) -> Table:
         rows = [
