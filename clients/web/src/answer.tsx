@@ -47,7 +47,7 @@ import {
   unit,
   wantsToken,
 } from "./state";
-import { language, type Texts, texts } from "./texts";
+import { language, type Texts, texts, told } from "./texts";
 
 type Sureness = keyof Texts["words"];
 
@@ -123,12 +123,12 @@ function askForToken(): void {
 
 function failedText(failed: RequestFailed): string {
   const t = texts.value;
-  const { failure, reason, message } = failed;
+  const { failure, reason } = failed;
   if (failure === "away") return t.away;
   if (failure === "busy") return t.busy;
   if (wantsToken(failed)) return t.token;
   if (reason === "TOO_FEW_OBJECTS" || reason === "INVALID_STROKE") return t.oneMore;
-  return message;
+  return told(failed);
 }
 
 function Verdict() {

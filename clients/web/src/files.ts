@@ -43,8 +43,8 @@ export function parseStrokes(text: string): Stroke[] | null {
   let document: unknown;
   try {
     document = JSON.parse(text);
-  } catch (error) {
-    throw broken((error as Error).message);
+  } catch {
+    throw broken(texts.peek().noJson);
   }
   if (typeof document !== "object" || document === null || !("strokes" in document)) return null;
   const down = "y_axis" in document && document.y_axis === "down" ? 1 : -1;
@@ -60,14 +60,14 @@ export function parseStrokes(text: string): Stroke[] | null {
 }
 
 function parsed(list: unknown, field: string, down: number): Stroke[] {
-  if (!Array.isArray(list)) throw broken(`${field} is no list`);
+  if (!Array.isArray(list)) throw broken(texts.peek().noList(field));
   return list.map((stroke: unknown, k): Stroke => {
     const { points, label } = (stroke ?? {}) as { points?: unknown; label?: unknown };
-    if (!Array.isArray(points)) throw broken(`${field}[${k}].points is no list`);
+    if (!Array.isArray(points)) throw broken(texts.peek().noList(`${field}[${k}].points`));
     const read = points.map((point: unknown, i): InkPoint => {
       const [x, y, t = 0] = Array.isArray(point) ? (point as unknown[]) : [];
       if (!Number.isFinite(x) || !Number.isFinite(y)) {
-        throw broken(`${field}[${k}].points[${i}] is no [x, y]`);
+        throw broken(texts.peek().noPoint(`${field}[${k}].points[${i}]`));
       }
       return [x as number, down * (y as number), typeof t === "number" ? t : 0, 0.5];
     });
@@ -305,13 +305,7 @@ export function download(name: string, data: Blob): void {
 }
 
 function broken(why: string): RequestFailed {
-  return new RequestFailed(
-    `The file holds no strokes that can be read: ${why}.`,
-    "invalid",
-    "",
-    "",
-    undefined,
-  );
+  return new RequestFailed(texts.peek().broken(why), "invalid", "", "", undefined);
 }
 
 function round(value: number, digits = 1): number {

@@ -310,10 +310,15 @@ async function pictureOf(blob: Blob): Promise<Underlay | null> {
 export async function openOutlines(
   client: SketchmatchClient,
   file: File,
-): Promise<{ outlines: { points: Xy[]; label: string }[]; route: Xy[] }> {
+): Promise<{
+  outlines: { points: Xy[]; label: string }[];
+  route: Xy[];
+  warnings: readonly string[];
+}> {
   const source = sources.file(file.name, await bytesOf(client, file));
-  const { scene, route } = await naming(file.name, () => client.segment(source));
+  const { scene, route, warnings } = await naming(file.name, () => client.segment(source));
   return {
+    warnings,
     outlines: thingsOf(scene).map(({ rings, label }) => {
       const ring = (rings[0] ?? []).map(([x, y]) => [x, -y] as const);
       return { points: [...ring, ...ring.slice(0, 1)], label };

@@ -41,7 +41,7 @@ import {
 import { NotSent, type Robot, robots, send } from "./robot";
 import { type Answered, type Progress, Session } from "./session";
 import { remember, remembered } from "./settings";
-import { texts } from "./texts";
+import { texts, told } from "./texts";
 
 export type Tool = "pen" | "route" | "zone" | "eraser" | "move" | "name";
 export type Theme = "auto" | "light" | "dark";
@@ -411,7 +411,7 @@ export async function bringMap(files: readonly File[] | Promise<File[]>): Promis
     const map = await openMap(client, await files, texts.peek());
     show(map);
     forget();
-    notice.value = map.warnings.join(" ");
+    tellOf(map.title, map.warnings);
     refit.value++;
   });
 }
@@ -428,9 +428,9 @@ export async function lookForStored(): Promise<void> {
     storedMaps.value = await listStored(client);
   } catch (thrown) {
     storedMaps.value = null;
-    const { failure, message } = RequestFailed.from(thrown);
+    const { failure, message, reason } = RequestFailed.from(thrown);
     // The answer's pane tells of a server that does not answer.
-    if (failure === "store" || failure === "failed") storeTrouble.value = message;
+    if (failure === "store" || failure === "failed") storeTrouble.value = told({ reason, message });
   }
 }
 
@@ -456,13 +456,16 @@ export async function keepShown(title: string): Promise<void> {
 export async function bringSketch(file: File): Promise<void> {
   await telling(async () => {
     let strokes: Stroke[] | null = null;
+    let noted: readonly string[] = [];
     if (file.name.toLowerCase().endsWith(".json")) strokes = parseStrokes(await file.text());
     if (!strokes) {
-      const { outlines, route } = await openOutlines(client, file);
+      const { outlines, route, warnings } = await openOutlines(client, file);
       strokes = inkOf(outlines, route);
+      noted = warnings;
     }
     const brought = strokes;
     change(() => ({ strokes: brought, pins: [] }));
+    tellOf(file.name, noted);
     refit.value++;
   });
 }
@@ -480,7 +483,7 @@ export async function findOtherwise(chosen: Chosen): Promise<void> {
     if (place.peek() !== map || asked !== finding) return;
     show(other);
     forget();
-    if (!other.things.length) notice.value = other.warnings.join(" ");
+    if (!other.things.length) tellOf(other.title, other.warnings);
     if (other.found.segmenter !== map.found.segmenter) refit.value++;
   });
 }
@@ -637,6 +640,11 @@ async function mapped(map: string | PlaceMap): Promise<void> {
   }
 }
 
+/** Tell what the server noted of a file, as what it left out. */
+function tellOf(file: string, noted: readonly string[]): void {
+  if (noted.length) notice.value = texts.peek().noted(file, noted.join(" "));
+}
+
 async function telling(work: () => Promise<void>): Promise<void> {
   notice.value = "";
   try {
@@ -644,7 +652,7 @@ async function telling(work: () => Promise<void>): Promise<void> {
   } catch (thrown) {
     const failed = RequestFailed.from(thrown);
     if (failed.failure === "away") trouble.value = failed;
-    else notice.value = failed.message;
+    else notice.value = told(failed);
   }
 }
 

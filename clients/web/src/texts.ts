@@ -52,7 +52,14 @@ const en = {
   saveWaypoints: "Save waypoints (nav2 YAML)",
   copyLink: "Copy a link to this",
   brokenLink: "The link is broken; ask for it once more.",
+  broken: (why: string) => `The file holds no strokes that can be read: ${why}.`,
+  noJson: "it is no JSON, or only a part of some",
   noStrokes: "it has none",
+  noList: (place: string) => `${place} is no list`,
+  noPoint: (place: string) => `${place} is no [x, y]`,
+  noted: (_file: string, said: string) => said,
+  /** What the server says, by its reason; it says all in English itself. */
+  refusals: {} as Readonly<Record<string, string>>,
   tooLarge: (file: string, size: string, most: string) =>
     `${file} has ${size}, and this server reads ${most} at most; scale it down.`,
   linkCopied: "The link is copied. Whoever opens it here sees this sketch and its match.",
@@ -205,6 +212,28 @@ const de: Texts = {
   copyLink: "Link hierzu kopieren",
   brokenLink: "Der Link ist beschädigt; lass ihn dir noch einmal geben.",
   noStrokes: "es sind keine darin",
+  broken: (why) => `In der Datei sind keine Striche, die sich lesen lassen: ${why}.`,
+  noJson: "sie ist kein JSON, oder nur ein Teil davon",
+  noList: (place) => `${place} ist keine Liste`,
+  noPoint: (place) => `${place} ist kein [x, y]`,
+  noted: (file, said) => `Der Server sagt${file ? ` zu ${file}` : ""}: ${said}`,
+  refusals: {
+    TOO_FEW_OBJECTS: "Darin sind weniger als zwei Dinge; gib jedem einen eigenen Umriss.",
+    INVALID_FILE: "Die Datei lässt sich so nicht lesen.",
+    INVALID_IMAGE: "Das Bild lässt sich nicht lesen; speichere es noch einmal als PNG.",
+    INVALID_GRID: "Die Karte lässt sich so nicht lesen.",
+    INVALID_POLYGON: "Ein Umriss darin ist keiner.",
+    INVALID_STROKE: "Ein Strich darin ist keiner.",
+    INVALID_PARAMETER: "Ein Wert passt nicht.",
+    LIMIT_EXCEEDED: "Das ist mehr, als dieser Server annimmt.",
+    MESSAGE_TOO_LARGE: "Das ist mehr, als dieser Server annimmt.",
+    NOT_FOUND: "Das gibt es beim Server nicht, oder nicht mehr.",
+    STORE_UNAVAILABLE: "Der Server kann nichts aufbewahren.",
+    TIME_BUDGET_EXHAUSTED: "Die Zeit reichte nicht für eine Antwort.",
+    SERVER_STOPPING: "Der Server wird gerade beendet.",
+    WORKER_LOST: "Der Server hat die Arbeit verloren; versuche es noch einmal.",
+    PLUGIN_FAILED: "Ein Verfahren des Servers ist fehlgeschlagen.",
+  },
   tooLarge: (file, size, most) =>
     `${file} hat ${size}, und dieser Server liest höchstens ${most}; verkleinere es.`,
   linkCopied: "Der Link ist kopiert. Wer ihn hier öffnet, sieht diese Skizze und ihre Zuordnung.",
@@ -322,6 +351,12 @@ function preferred(): Language {
 
 export const language = signal<Language>(preferred());
 export const texts = computed<Texts>(() => LANGUAGES[language.value]);
+
+/** Return what went wrong in the person's language, with what the server says of it. */
+export function told({ reason, message }: { reason: string; message: string }): string {
+  const own = texts.value.refusals[reason];
+  return own ? `${own} (${message})` : message;
+}
 
 export function speak(name: Language): void {
   remember("language", name);

@@ -293,6 +293,30 @@ def test_a_broken_sketch_is_refused_in_words_and_the_drawing_stays(pad, visit, t
     assert strokes(page) == 1
 
 
+HOUSE = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 400 300">
+<g fill="none" stroke="black"><rect width="90" height="60" x="9" y="9"/>
+<rect width="60" height="90" x="300" y="90"/><path d="M150 20L200 24"/></g></svg>"""
+
+
+def test_what_was_left_out_of_a_sketch_is_told_and_faults_are_in_the_persons_language(
+    pad, visit, tmp_path
+):
+    page = visit(pad, place=None, locale="de-DE")
+    notice = page.get_by_test_id("notice")
+    for name, text, said in (
+        ("a.svg", HOUSE, "Der Server sagt zu a.svg: strokes[2]"),
+        ("b.json", "{", "sie ist kein JSON"),
+        ("c.json", '{"strokes": [{"points": [[1]]}]}', "strokes[0].points[0] ist kein [x, y]"),
+        ("d.svg", "<svg", "Die Datei lässt sich so nicht lesen. (d.svg"),
+        ("e.svg", "<svg><path d='M1 1h9v9z'/></svg>", "Darin sind weniger als zwei Dinge"),
+    ):
+        file = tmp_path / name
+        file.write_text(text)
+        page.get_by_test_id("sketch-file").set_input_files(file)
+        notice.get_by_text(said).wait_for()
+    assert strokes(page) == 2
+
+
 def test_each_tab_has_its_own_sheet_and_a_new_one_begins_with_the_latest(pad, visit):
     page = visit(pad)
     kitchen_drawn(page)
