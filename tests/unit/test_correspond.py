@@ -7,14 +7,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sketchmatch.kernels import confidence as kernels
 from sketchmatch.model import Fmap, Occm, RelationTable
 from sketchmatch.pipeline.correspond import (
+    confidence_relations,
     fmap_confidence,
     global_dilation,
     global_rotation,
+    map_confidence,
     object_map,
     occm,
 )
+from sketchmatch.pipeline.unmatched import omission_confidences
 from tests.interpreted import examples
 from tests.oracle import maps as oracle
 from tests.strategies import tables, tables_and_object_maps
@@ -122,3 +126,20 @@ def test_duals_count_with_their_half_turn():
     assert global_rotation(Fmap(np.array([0])), table) == pytest.approx(math.radians(30))
     assert global_rotation(Fmap(np.array([1])), table) == pytest.approx(math.radians(-150))
     assert global_dilation(Fmap(np.array([1])), table) == pytest.approx(2.5)
+
+
+def test_the_sines_of_a_whole_table_are_not_needed_for_one_map():
+    random = np.random.default_rng(0)
+    table = RelationTable(*random.uniform(0.1, 0.9, (3, 6, 10)), 4, 5)
+    partners = np.array([2, 0, 4, 1])
+    fmap = Fmap.from_object_map(partners, 5)
+    global_rotation(fmap, table)
+    omission_confidences(fmap, table, (1.0, 1.0, 1.0))
+    whole = map_confidence(partners, table)
+    map_confidence(np.array([2, -1, 4, 1]), table)
+    assert not {"cosine", "sine", "normalized_dilation"} & vars(table).keys()
+    relations = confidence_relations(table, (1.0, 1.0, 1.0))
+    expected = kernels.fmap_confidence(fmap.entries, np.empty(6), *relations)
+    assert (whole.total, whole.similarity, whole.rotation, whole.dilation) == pytest.approx(
+        expected
+    )

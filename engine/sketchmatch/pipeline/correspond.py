@@ -9,6 +9,7 @@ import numpy as np
 from sketchmatch.kernels import confidence as kernels
 from sketchmatch.kernels.evidence import SelfRelations, mean_parts
 from sketchmatch.model import (
+    DILATION_SCALE,
     Confidence,
     FloatArray,
     Fmap,
@@ -24,6 +25,7 @@ from sketchmatch.model.arrays import sealed
 
 __all__ = [
     "confidence_relations",
+    "entry_relations",
     "fmap_confidence",
     "global_dilation",
     "global_rotation",
@@ -65,10 +67,7 @@ def fmap_confidence(
     >>> fmap_confidence(Fmap([0]), table)
     Confidence(total=1.0, similarity=1.0, rotation=1.0, dilation=1.0, shape=None, size=None)
     """
-    scratch, relations = np.empty(table.template_pairs), confidence_relations(table, weights)
-    total, similarity, rotation, dilation = kernels.fmap_confidence(
-        fmap.entries, scratch, *relations
-    )
+    total, similarity, rotation, dilation = _alone(entry_relations(fmap, table, weights))
     if table.evidence is not None:
         similarity = _entry_similarity(fmap, table).mean()
     shape, size = (None, None) if own is None else own_confidence(fmap, table, own)
@@ -88,6 +87,47 @@ def confidence_relations(
         table.normalized_dilation,
         np.array(weights, dtype=np.float64),
     )
+
+
+def entry_relations(
+    fmap: Fmap, table: RelationTable, weights: Weights, rows: IntArray | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return what :func:`confidence_relations` does, of the entries of one histogram map alone.
+
+    Each has one column; sines of a whole table would take seconds where objects are many.
+
+    Parameters
+    ----------
+    fmap
+        The histogram map.
+    table, weights
+        The relations, and the weights of the parts of ζ.
+    rows
+        The template pairs that the map is of, where these are not all.
+    """
+    rows = np.arange(table.template_pairs) if rows is None else rows
+    entries, half = fmap.entries, table.argument_pairs
+    columns = entries % half
+    turns = table.rotation[rows, columns]
+    turned = np.where(entries >= half, -1.0, 1.0) * table.rotation_weights[rows]
+    evidence = table.entry_evidence[rows, columns if table.evidence is None else entries]
+    level = DILATION_SCALE * np.log(table.dilation[rows, columns])
+    return (
+        sealed(evidence[:, None]),
+        sealed((turned * np.cos(turns))[:, None]),
+        sealed((turned * np.sin(turns))[:, None]),
+        sealed(level[:, None]),
+        np.array(weights, dtype=np.float64),
+    )
+
+
+def _alone(
+    relations: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
+) -> tuple[float, float, float, float]:
+    """Return ζ and its parts of the one histogram map that relations are of."""
+    count = len(relations[0])
+    first = sealed(np.zeros(count, dtype=np.int64))
+    return kernels.fmap_confidence(first, np.empty(count), *relations)
 
 
 def own_confidence(fmap: Fmap, table: RelationTable, own: SelfRelations) -> tuple[float, float]:
@@ -138,18 +178,11 @@ def map_confidence(
     if len(kept) == table.template_objects:
         return fmap_confidence(fmap, table, weights, own)
     rows, entries = _rows_of(kept, table), fmap.entries
-    columns, dual = entries % table.argument_pairs, entries >= table.argument_pairs
-    turned = np.where(dual, -1.0, 1.0) / table.rotation_weights[rows].mean()
-    evidence = table.entry_evidence[rows, columns if table.evidence is None else entries]
-    first, scratch = np.zeros(len(rows), dtype=np.int64), np.empty(len(rows))
-    total, similarity, rotation, dilation = kernels.fmap_confidence(
-        sealed(first),  # each row is of its entry alone
-        scratch,
-        sealed(evidence[:, None]),
-        sealed((turned * table.cosine[rows, columns])[:, None]),
-        sealed((turned * table.sine[rows, columns])[:, None]),
-        sealed(table.normalized_dilation[rows, columns][:, None]),
-        np.array(weights, dtype=np.float64),
+    columns = entries % table.argument_pairs
+    evidence, cosine, sine, level, shares = entry_relations(fmap, table, weights, rows)
+    mean = table.rotation_weights[rows].mean()
+    total, similarity, rotation, dilation = _alone(
+        (evidence, sealed(cosine / mean), sealed(sine / mean), level, shares)
     )
     if table.evidence is not None:
         similarity = table.similarity[rows, columns].mean()
@@ -222,7 +255,7 @@ def object_map(matrix: Occm) -> ObjectMap:
 
 def global_rotation(fmap: Fmap, table: RelationTable) -> float:
     """Return the turn from template to argument, arg Σ e^{iR}, in radians within [−π, π]."""
-    cosine, sine = _turned(fmap, table, table.cosine), _turned(fmap, table, table.sine)
+    _, cosine, sine, *_ = entry_relations(fmap, table, (1.0, 1.0, 1.0))
     return math.atan2(sine.sum(), cosine.sum())
 
 
@@ -237,10 +270,3 @@ def _entry_similarity(fmap: Fmap, table: RelationTable) -> FloatArray:
     rows = np.arange(table.template_pairs)
     sigma: FloatArray = table.similarity[rows, fmap.entries % table.argument_pairs]
     return sigma
-
-
-def _turned(fmap: Fmap, table: RelationTable, values: FloatArray) -> FloatArray:
-    """Return one value for each entry, negated where the entry is a dual."""
-    rows, half = np.arange(table.template_pairs), table.argument_pairs
-    picked = values[rows, fmap.entries % half]
-    return np.where(fmap.entries < half, picked, -picked)

@@ -29,7 +29,7 @@ from sketchmatch.model import (
 from sketchmatch.model.arrays import sealed
 from sketchmatch.model.caching import cached_property
 from sketchmatch.pipeline.correspond import (
-    confidence_relations,
+    entry_relations,
     fmap_confidence,
     induced_map,
     object_map,
@@ -307,7 +307,10 @@ def omission_confidences(fmap: Fmap, table: RelationTable, weights: Weights) -> 
     if objects <= FEWEST or objects * len(pairs) > _MOST_ENTRIES:
         return None
     return exchange.omission_confidences(
-        fmap.entries, pairs, table.rotation_weights, confidence_relations(table, weights)
+        sealed(np.zeros(len(pairs), dtype=np.int64)),
+        pairs,
+        table.rotation_weights,
+        entry_relations(fmap, table, weights),
     )
 
 
