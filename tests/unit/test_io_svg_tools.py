@@ -58,6 +58,38 @@ def test_paper_is_no_shape(rect, root, paper):
     assert len(found) == (1 if paper else 2)
 
 
+GRAPHVIZ = (
+    '<g class="edge"><title>hall-&gt;bath</title>'
+    '<path fill="none" stroke="black" d="M155,-143C167,-133 183,-121 197.2,-111"/>'
+    '<polygon fill="black" stroke="black" '
+    'points="199.4,-113.7 205.1,-104.8 195.1,-108.2 199.4,-113.7"/></g>'
+)
+DRAWIO = (
+    '<path d="M80 30L193.6 30" fill="none" stroke="#000"/>'
+    '<path d="M198.8 30L191.8 33.5L193.6 30L191.8 26.5Z" fill="#000" stroke="#000"/>'
+)
+OTHER_END = '<path d="M74.8 30L81.8 26.5L80 30L81.8 33.5Z" fill="#000"/>'
+
+
+@pytest.mark.parametrize(
+    ("drawn", "count"),
+    [
+        (GRAPHVIZ, 1),
+        (DRAWIO, 1),
+        (DRAWIO.replace('fill="#000"', 'fill="red"'), 2),
+        (DRAWIO + OTHER_END, 0),
+        (DRAWIO + '<path d="M190 26H198V34H190z"/>', 2),
+        ('<path d="M0 0H9" fill="none" stroke="#000"/><path d="M9 -9V9L29 0z"/>', 2),
+        ('<path d="M0 0H99" fill="none" stroke="#000"/><path d="M99 0L88 2"/>', 2),
+        (OTHER_END, 1),
+    ],
+)
+def test_arrowheads_are_no_shapes(drawn, count):
+    found = decode_svg(f'<svg><path d="M300 0h50v50z"/>{drawn}</svg>'.encode())
+    assert len(found.strokes) == 1 + count
+    assert bool(found.notes) == (count == 0)
+
+
 @pytest.mark.parametrize(
     ("transform", "expected"),
     [

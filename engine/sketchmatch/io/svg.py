@@ -18,11 +18,12 @@ A shape's label is the first that it has of: its ``<title>``, ``aria-label``, ``
 these but an ``id`` which is no layer.
 
 A line with an arrowhead, or another marker, at both of its ends says how long something is, and is
-no shape. Paper is none: a filled rectangle without a line that covers the whole page, or lies under
-all else. Of a shape that is drawn once filled and once as a line, the line is taken; of the paths
-with which Excalidraw draws one, its hatching or filling first, the last: the outline, every line of
-which is drawn twice. A pen stroke that was exported as the outline of its ink becomes the line
-again (:mod:`sketchmatch.io._svg_ink`).
+no shape; nor is an arrowhead that is drawn by itself. Paper is none: a filled rectangle without a
+line that covers the whole page, or lies under all else. Of a shape that is drawn
+once filled and once as a line, the line is taken; of the paths with which Excalidraw draws one, its
+hatching or filling first, the last: the outline, every line of which is drawn twice. A pen stroke
+that was exported as the outline of its ink becomes the line again
+(:mod:`sketchmatch.io._svg_ink`).
 
 Nothing outside the document is ever opened. Entities may be short words, as Illustrator's are; a
 document that defines others is refused.
@@ -38,6 +39,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+import shapely
 import svgelements
 
 from sketchmatch.api.documents import load_xml
@@ -82,6 +84,8 @@ _ESCAPED = re.compile(r"_x([0-9A-F]{2,5})_", re.IGNORECASE)
 _MARGIN, _ROUNDED = 0.01, 0.03
 # Things on a ground that is no paper by its size.
 _FEW = 3
+# An arrowhead is at most so large beside its line, and fills so much of the box around it.
+_HEAD, _POINTED = 0.5, 0.6
 # A filling of this share of its box, squared, encloses nothing.
 _FLAT = 1e-9
 
@@ -120,7 +124,7 @@ def decode_svg(data: bytes) -> StrokeSet:
     drawing = _Drawing(root, lines, _EXCALIDRAW in data)
     shapes = [shape for shape in drawing.shapes() if shape.subpaths]
     shapes, ground = _without_paper(shapes, drawing.page, drawing.background)
-    shapes = _without_twins(shapes)
+    shapes, dimensions = _without_heads(_without_twins(shapes))
     if not shapes:
         raise invalid(
             "", "has nothing drawn in it; text and embedded pictures are not read, so draw paths"
@@ -140,7 +144,7 @@ def decode_svg(data: bytes) -> StrokeSet:
         ),
         (
             *(f"{each.place} was taken for the paper: all else lies on it." for each in ground),
-            *_note_on_dimensions(drawing.dimensions),
+            *_note_on_dimensions([*drawing.dimensions, *dimensions]),
         ),
         tuple(drawing.names),
     )
@@ -700,6 +704,49 @@ def _without_twins(shapes: list[_Shape]) -> list[_Shape]:
         else:
             kept.append(shape)
     return kept
+
+
+def _without_heads(shapes: list[_Shape]) -> tuple[list[_Shape], list[str]]:
+    """Leave out arrowheads that are shapes of their own, and where lines are that have two.
+
+    Tools that use no markers draw them after the line, in its colour and upon its end.
+    """
+    kept: list[_Shape] = []
+    dimensions = []
+    ends: list[FloatArray] = []  # of the last shape, as far as they have no head
+    for shape in shapes:
+        head = next((k for k, end in enumerate(ends) if _is_head(shape, kept[-1], end)), None)
+        if head is None:
+            kept.append(shape)
+            ends = _free_ends(shape)
+            continue
+        del ends[head]
+        if not ends:
+            dimensions.append(kept.pop().place)
+    return kept, dimensions
+
+
+def _free_ends(shape: _Shape) -> list[FloatArray]:
+    """Return both ends of an open line; none of all else."""
+    if shape.filled or len(shape.subpaths) != 1 or _is_closed(shape.subpaths[0]):
+        return []
+    return [shape.subpaths[0][0][0], shape.subpaths[0][-1][-1]]
+
+
+def _is_head(shape: _Shape, line: _Shape, end: FloatArray) -> bool:
+    """Whether a shape is pointed, in a line's colour, small beside it, and upon its end."""
+    if not shape.fill or shape.fill != line.stroke or shape.stroke not in (None, line.stroke):
+        return False
+    curves = shape.subpaths[0]
+    if len(shape.subpaths) != 1 or len(curves) < 2 or any(len(curve) != 2 for curve in curves):
+        return False
+    x0, y0, x1, y1 = shape.box
+    size = max(x1 - x0, y1 - y0)
+    within = x0 <= end[0] <= x1 and y0 <= end[1] <= y1
+    if not within or size > _HEAD * max(line.box[2] - line.box[0], line.box[3] - line.box[1]):
+        return False
+    outline = shapely.Polygon(_ends(curves))
+    return bool(outline.area <= _POINTED * outline.minimum_rotated_rectangle.area)
 
 
 def _same(first: _Shape, second: _Shape) -> bool:
