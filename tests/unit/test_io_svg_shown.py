@@ -518,6 +518,22 @@ def test_a_ground_smaller_than_the_page_is_told_of():
     assert len(decoded(floor + THINGS[: THINGS.index("<path")]).strokes) == 3, "of two on a table"
 
 
+XKCD = """<g><path d="M0 1L400 2L800 0L799 600L400 598L1 600z" style="fill:#fff;stroke:#fff"/></g>
+<path d="M9 9h90v60h-90z" style="fill:none;stroke:#ffffff;stroke-width:5"/>
+<path d="M9 9h90v60h-90z" style="fill:none;stroke:#000"/>
+<path d="M99 99h600v400h-600z" style="fill:#fff;stroke:#fff"/>
+<path d="M300 300h90v60h-90z" fill="red"/>
+<path d="M310 310h50" stroke="#fff" fill="none"/>"""
+
+
+def test_what_is_white_on_white_paper_is_not_seen():
+    assert boxes(XKCD) == [(9, 9, 99, 69), (300, 300, 390, 360), (310, 310, 360, 310)]
+
+
+def test_white_lines_on_a_page_that_says_no_colour_are_seen():
+    assert boxes('<path d="M9 9h90v60h-90z" fill="none" stroke="#fff"/>') == [(9, 9, 99, 69)]
+
+
 def test_on_dark_paper_white_is_seen():
     white = '<rect x="600" width="90" height="90" fill="white"/>'
     for page, paper in (

@@ -19,7 +19,7 @@ these but an ``id`` which is no layer.
 
 A line with an arrowhead, or another marker, at both of its ends says how long something is, and is
 no shape; nor is an arrowhead that is drawn by itself. Paper is none: a filled rectangle without a
-line that covers the whole page, or lies under all else. Of a shape that is drawn
+line that is seen, which covers the whole page, or lies under all else. Of a shape that is drawn
 once filled and once as a line, the line is taken; of the paths with which Excalidraw draws one, its
 hatching or filling first, the last: the outline, every line of which is drawn twice. A pen stroke
 that was exported as the outline of its ink becomes the line again
@@ -635,9 +635,11 @@ def _without_paper(
 ) -> tuple[list[_Shape], list[_Shape]]:
     """Return the shapes that are not the paper, and paper that may have been meant as something.
 
-    Paper is a filled rectangle without a line that covers the page, or that all else lies on.
-    What has the paper's colour and no line is not seen on it.
+    Paper is a filled rectangle that covers the page, or that all else lies on, and has no line, or
+    one in the page's own colour. What has the paper's colour and no line is not seen on it; nor is
+    a line in that colour where there is paper in it: a page that says nothing may be dark.
     """
+    white, papered = background, False
     boxes = np.array([shape.box for shape in shapes]).reshape(-1, 4)
     lows = np.minimum.accumulate(boxes[::-1, :2])[::-1]
     highs = np.maximum.accumulate(boxes[::-1, 2:])[::-1]
@@ -645,9 +647,11 @@ def _without_paper(
     ground: list[_Shape] = []
     filled = np.zeros(len(shapes), dtype=bool)
     for k, shape in enumerate(shapes):
-        sheet = shape.bare and _rectangular(shape)
+        sheet = shape.bare or (shape.filled and shape.stroke == white)
+        sheet = sheet and _rectangular(shape)
         if sheet and page is not None and _covers(shape.box, page, _MARGIN):
             background = shape.fill or ()
+            papered = background == white
         elif (
             sheet
             and not (kept or ground)
@@ -656,14 +660,18 @@ def _without_paper(
         ):
             background = shape.fill or ()
             ground = [shape]
-        elif not (_like_paper(shape, background) and not _meets_any(boxes[k], boxes[filled])):
+        elif not (
+            _like_paper(shape, background, papered) and not _meets_any(boxes[k], boxes[filled])
+        ):
             kept.append(shape)
             filled[k] = shape.filled
     return kept, ground
 
 
-def _like_paper(shape: _Shape, background: Colour) -> bool:
-    """Whether a shape is a filling in the paper's colour without a line."""
+def _like_paper(shape: _Shape, background: Colour, papered: bool) -> bool:
+    """Whether a shape has no colour but the paper's, or, of a page without, no line either."""
+    if papered and shape.stroke == background != ():
+        return shape.fill in (None, background)
     return (
         shape.bare
         and shape.fill == background != ()
