@@ -75,9 +75,12 @@ _NUMBER = re.compile(NUMBER, re.IGNORECASE)
 _ARITY = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 1}
 _TOOLS_ID = re.compile(
     r"(path|line|polyline|polygon|rect|circle|ellipse|use|g|svg|svgid|xmlid|shape|stroke|object"
-    r"|vector|element|layer)?[\W\d_]*",
+    r"|vector|element|layer|rectangle|square|oval|triangle|star|curve|arrow|group|frame|artboard"
+    r"|fill|union|subtract|intersect|exclude|combined[\W_]shape|compound[\W_]path)?[\W\d_]*",
     re.IGNORECASE,
 )
+# What Illustrator adds to the names of all but one of several that are called alike.
+_COPY = re.compile(r"(?<=.)_\d+_$")
 # How Illustrator and CorelDRAW write what an ``id`` may not contain.
 _ESCAPED = re.compile(r"_x([0-9A-F]{2,5})_", re.IGNORECASE)
 # Paper may leave this share of the page uncovered at each side, and so much of its own box.
@@ -560,7 +563,9 @@ def _for_us(element: ElementTree.Element) -> bool:
 
 def _label(element: ElementTree.Element) -> str:
     own = _ESCAPED.sub(_unescaped, element.get("id", ""))
-    return _given_label(element) or ("" if _TOOLS_ID.fullmatch(own) else _spaced(own))
+    if label := _given_label(element):
+        return label
+    return "" if _TOOLS_ID.fullmatch(own) else _spaced(_COPY.sub("", own))
 
 
 def _unescaped(escaped: re.Match[str]) -> str:
