@@ -451,6 +451,37 @@ def test_texts_are_where_their_first_letter_is():
     assert [(each.point, each.size) for each in found] == [((400, -32), 16), ((3, -4), 32)]
 
 
+@pytest.mark.parametrize(
+    ("text", "said", "point"),
+    [
+        (
+            '<text><tspan x="5" y="9">writing</tspan><tspan x="5" y="19">desk</tspan></text>',
+            "writing desk",
+            (5, -9),
+        ),
+        (
+            '<text x="5" y="9"><tspan>so</tspan><tspan x="8" y="9">fa</tspan></text>',
+            "sofa",
+            (5, -9),
+        ),
+        (
+            '<text x="5">book<tspan x="5" dy="1em">shelf</tspan><tspan dy="1em">1</tspan></text>',
+            "book shelf 1",
+            (5, 0),
+        ),
+        (
+            '<text><tspan><tspan x="5" y="9"><tspan>rug</tspan></tspan></tspan></text>',
+            "rug",
+            (5, -9),
+        ),
+        ('<text x="5" y="9"><title>t</title>a <tspan>big</tspan> bed</text>', "a big bed", (5, -9)),
+    ],
+)
+def test_the_lines_of_a_text_are_words(text, said, point):
+    (found,) = decoded(KEPT + text).landmarks
+    assert (found.name, found.point) == (said, point)
+
+
 # Paper
 
 
@@ -714,3 +745,17 @@ def test_what_is_written_is_read_where_it_is_seen():
         ("room 0", (0.0, -5.0)),
         ("room 4", (4.0, -5.0)),
     ]
+
+
+DIAGRAM = """<rect width="80" height="60" fill="white" stroke="black"/><switch>
+<foreignObject width="100%" height="100%"><div xmlns="http://www.w3.org/1999/xhtml">desk</div>
+</foreignObject><text x="40" y="34">desk</text></switch>
+<rect id="sofa" x="200" width="80" height="60" fill="white" stroke="black"/>
+<text x="240" y="34">long one</text>
+<circle cx="400" cy="300" r="90" fill="white" stroke="black"/><text x="340" y="390">aside</text>
+<switch><g requiredFeatures="x"/><text x="240" y="300">cannot display</text></switch>"""
+
+
+def test_the_text_in_a_shape_without_a_name_is_its_name():
+    scene = StrokeSegmenter().segment(decoded(DIAGRAM)).scene
+    assert scene.labels == ("desk", "sofa", "")

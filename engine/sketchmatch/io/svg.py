@@ -311,10 +311,11 @@ class _Drawing:
         self, text: ElementTree.Element, look: Look, context: _Context
     ) -> Iterator[Landmark]:
         """Yield what a text says, where it begins and how large it is, unless that is not known."""
-        name = _spaced(" ".join("".join(text.itertext()).split()))
-        spans = [part for part in text if tag_of(part) == "tspan"]
-        looks = [look, *(self._styles.look(part, look) for part in spans)]
-        placed = [*zip((text, *spans), looks, strict=True)]
+        name = _said(text)
+        placed = [(text, look)]
+        for part, around in placed:
+            spans = (child for child in part if tag_of(child) == "tspan")
+            placed += [(span, self._styles.look(span, around)) for span in spans]
         try:
             own = svgelements.Matrix(text.get("transform", "")) * context.matrix
             x, y = (
@@ -332,7 +333,7 @@ class _Drawing:
         except (ValueError, IndexError, TypeError):
             return
         scale = math.sqrt(abs(own.a * own.d - own.b * own.c))
-        size = scale * max(each.font_size for each in looks)
+        size = scale * max(shown.font_size for _, shown in placed)
         if look.visible and name and all(map(math.isfinite, (point.x, point.y, size))):
             yield Landmark(name, (float(point.x), -float(point.y)), "room", size)
 
@@ -383,7 +384,9 @@ class _Drawing:
             return ([] if target is None else [target]), context
         children = [child for child in element if tag_of(child) in {*_DRAWN, "text"}]
         if tag_of(element) == "switch":
-            shown = next((child for child in element if tag_of(child) and _for_us(child)), None)
+            # What is written as HTML is written once more, as text, for those who read none.
+            able = (child for child in element if tag_of(child) not in ("", "foreignObject"))
+            shown = next((child for child in able if _for_us(child)), None)
             return [child for child in children if child is shown], context
         if self._excalidraw and tag_of(element) == "g":
             last = next((child for child in reversed(children) if tag_of(child) == "path"), None)
@@ -585,6 +588,26 @@ def _given_label(element: ElementTree.Element) -> str:
     titles = ("".join(child.itertext()) for child in element if tag_of(child) == "title")
     names = (next(titles, ""), *(element.get(name, "") for name in _NAMES))
     return next((name for name in map(_spaced, names) if name), "")
+
+
+def _said(text: ElementTree.Element) -> str:
+    """Return what a text says, its lines with spaces between them."""
+    said, last = "", None
+    for line, part in _lines_of(text, ""):
+        said += f" {part}" if line != last else part
+        last = line
+    return _spaced(said)
+
+
+def _lines_of(part: ElementTree.Element, line: object) -> Iterator[tuple[object, str]]:
+    """Yield the parts of a text, each with what tells its line from others."""
+    line = part if part.get("dy") else part.get("y", line)
+    yield line, part.text or ""
+    for child in part:
+        if tag_of(child) not in ("", "title", "desc"):
+            yield from _lines_of(child, line)
+        if child.tail:
+            yield line, child.tail
 
 
 def _spaced(text: str) -> str:

@@ -14,8 +14,9 @@ import shapely
 from pydantic import Field
 
 from sketchmatch.api import InvalidInputError, Params, Reason, Segmentation, Segmenter
-from sketchmatch.model import FloatArray, Scene, SceneObject, Stroke, StrokeSet
+from sketchmatch.model import FloatArray, Landmark, Scene, SceneObject, Stroke, StrokeSet
 
+from ._landmarks import labels_of, names_of_rooms
 from ._strokes_chains import closed_chains
 from ._strokes_drawing import (
     DOT,
@@ -76,6 +77,8 @@ class StrokeSegmenter(Segmenter):
     continuation of [2]_. What is left is a stroke drawn over an outline again, a mark inside an
     object, a flick, or the route. Small strokes close to each other in a row are writing if some
     are open, or if there are several such rows.
+
+    An outline without a label is called by the text in it, where the drawing has texts.
 
     Sizes of a stroke are the larger side of its bounding box; spans, of chains and of the sketch,
     are the largest distance between two points.
@@ -174,7 +177,7 @@ class StrokeSegmenter(Segmenter):
                 drawing.note(k, f"{drawing.named([k], found=True)} was left out: {why}")
         if len(objects) < 2:
             raise _too_few(len(objects), len(points) - len(drawn), self.params.max_gap)
-        scene = tuple(map(_object, objects))
+        scene = tuple(map(_object, _named(objects, source.landmarks)))
         way = None if route is None else points[route]
         warnings = (*_without_points(empty), *drawing.sentences())
         return Segmentation(Scene(scene), warnings, way)
@@ -346,6 +349,15 @@ def _typical(outlines: list[Outline]) -> float:
 
 def _second_largest(outlines: list[Outline]) -> float:
     return sorted([0.0, 0.0, *(outline.span for outline in outlines)])[-2]
+
+
+def _named(outlines: list[Outline], texts: Sequence[Landmark]) -> list[Outline]:
+    """Return outlines of which those without a label have the text that is written in them."""
+    labels, _ = labels_of([each.area for each in outlines], names_of_rooms(texts), 0.0)
+    return [
+        replace(each, label=each.label or label)
+        for each, label in zip(outlines, labels, strict=True)
+    ]
 
 
 def _labelled_route(drawing: Drawing) -> int | None:
