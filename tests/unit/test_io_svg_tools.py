@@ -130,7 +130,8 @@ def test_groups_give_their_labels_to_shapes_without_one_and_layers_do_not():
         '<g inkscape:label="Layer" inkscape:groupmode="layer"><path d="M0 0 1 1"/>'
         '<g aria-label="desk"><g><path d="M0 0 1 1"/></g><path id="lamp" d="M0 0 1 1"/></g>'
         '<g><title>bed</title><path d="M0 0 1 1"/></g></g>'
+        '<g id="Layer_1" data-name="Layer 1"><path d="M0 0 1 1"/></g>'
     )
     space = 'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"'
     found = decode_svg(f"<svg {space}><title>Room</title>{body}</svg>".encode()).strokes
-    assert [stroke.label for stroke in found] == ["", "desk", "lamp", "bed"]
+    assert [stroke.label for stroke in found] == ["", "desk", "lamp", "bed", ""]

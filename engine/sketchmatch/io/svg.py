@@ -79,6 +79,10 @@ _TOOLS_ID = re.compile(
     r"|fill|union|subtract|intersect|exclude|combined[\W_]shape|compound[\W_]path)?[\W\d_]*",
     re.IGNORECASE,
 )
+# What tools call layers, where nothing but the name says that it is one.
+_LAYER = re.compile(
+    r"(layer|ebene|calque|capa|livello|laag|слой|图层|レイヤー)\W*\d*", re.IGNORECASE
+)
 # What Illustrator adds to the names of all but one of several that are called alike.
 _COPY = re.compile(r"(?<=.)_\d+_$")
 # How Illustrator and CorelDRAW write what an ``id`` may not contain.
@@ -581,7 +585,8 @@ def _groups_label(element: ElementTree.Element) -> str:
     """Return what the shapes of a group are called: nothing, if it is a layer or the drawing."""
     if tag_of(element) == "svg" or element.get(f"{_INKSCAPE}groupmode") == "layer":
         return ""
-    return _given_label(element)
+    label = _given_label(element)
+    return "" if _LAYER.fullmatch(label) else label
 
 
 def _given_label(element: ElementTree.Element) -> str:
