@@ -12,7 +12,7 @@ import numpy as np
 import svgelements
 
 from sketchmatch.errors import InvalidInputError
-from sketchmatch.io._svg_frame import Frame, length
+from sketchmatch.io._svg_frame import NUMBER, Frame, length
 from sketchmatch.io._svg_style import Look
 from sketchmatch.io._svg_tree import invalid, named_element, tag_of
 from sketchmatch.model import FloatArray
@@ -55,6 +55,7 @@ _ALONG: dict[str, Callable[[Frame], float]] = {
 }
 LISTS = {"d", "points"}
 """Attributes that are lists of vertices."""
+_NUMBER = re.compile(NUMBER, re.IGNORECASE)
 _CSS_PATH = re.compile(r"""path\(\s*(?:(?:nonzero|evenodd)\s*,\s*)?(["'])(.*)\1\s*\)""", re.DOTALL)
 
 
@@ -127,6 +128,8 @@ def _geometry(
         if name in LISTS:
             path = _CSS_PATH.fullmatch(text) if name in said else None
             geometry[name] = path[2] if path else text
+            if name == "points":  # read here: of a number of many digits others never come back
+                geometry[name] = [float(each) for each in _NUMBER.findall(text)]
         elif name in _ALONG and text.strip() != "auto":
             try:
                 value = length(text, _ALONG[name](frame) if frame else None, look.font_size)

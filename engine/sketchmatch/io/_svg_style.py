@@ -60,6 +60,8 @@ _SHARE = re.compile(rf"({NUMBER})(%?)", re.IGNORECASE)
 # A number without a unit, as attributes may have it.
 _UNITLESS = re.compile(rf"(?<![\w.%+-])({NUMBER})(?=[\s,]|$)", re.IGNORECASE)
 _CUSTOM = "--"
+# What no number needs, and Python refuses from 4300 on.
+_MANY_DIGITS = re.compile(r"(\d{400})\d++")
 # How long a value may become by the custom properties that it refers to, and how many these are.
 _LONGEST_VALUE, _MOST_REFERENCES = 1000, 16
 
@@ -147,7 +149,7 @@ class Styles:
             and element.get("type", "").strip().lower() in ("", "text/css")
             and _SCREEN.fullmatch(element.get("media", ""))
         ]
-        text = _EMBEDDED.sub("url()", "\n".join(sheets))
+        text = _shortened(_EMBEDDED.sub("url()", "\n".join(sheets)))
         if len(text) > _LONGEST:
             raise _costly("is longer than a million characters")
         try:
@@ -255,7 +257,7 @@ class Styles:
     ) -> tuple[dict[str, str], Mapping[str, str]]:
         """Return the legal values that hold for an element, by property, and the custom ones."""
         said: list[_Said] = [
-            (name, _with_units(name, text), False)
+            (name, _with_units(name, _shortened(text)), False)
             for name, text in element.items()
             if name in _ATTRIBUTES
         ]
@@ -263,7 +265,7 @@ class Styles:
         if wrapped is not None:
             for *_, declared in self._matcher.match(wrapped):
                 said += declared
-        said += _inline(element.get("style", ""))
+        said += _inline(_shortened(element.get("style", "")))
         said.sort(key=lambda each: each[2])
         custom = inherited
         if named := {name: text for name, text, _ in said if name.startswith(_CUSTOM)}:
@@ -325,6 +327,11 @@ def _inline(style: str) -> tuple[_Said, ...]:
     return tuple(
         (name, text, False) for name, text in named if name in _KNOWN or name.startswith(_CUSTOM)
     )
+
+
+def _shortened(text: str) -> str:
+    """Return CSS without digits that are more than Python makes a number of."""
+    return _MANY_DIGITS.sub(r"\1", text)
 
 
 def _with_units(name: str, text: str) -> str:
