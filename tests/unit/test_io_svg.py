@@ -89,6 +89,20 @@ def test_use_repeats_what_it_names_where_it_says():
     ]
 
 
+@pytest.mark.parametrize(
+    "circle",
+    [
+        '<g id="a"><path d="M0 0 1 1"/><use href="#a" x="9"/></g>',
+        '<defs><g id="a"><use href="#b"/><path d="M0 0 1 1"/></g><g id="b"><use href="#a"/></g>'
+        '</defs><use href="#a"/>',
+        '<path d="M0 0 1 1"/><use href="#whole"/>',
+    ],
+)
+def test_what_uses_itself_is_drawn_once(circle):
+    document = f'<svg id="whole"><g stroke="red">{circle}</g></svg>'.encode()
+    assert len(decode_svg(document).strokes) == 1
+
+
 def test_x_and_y_of_use_are_within_its_transform():
     body = (
         '<defs><path id="a" d="M0 0 1 0"/></defs><g transform="translate(100 0)">'

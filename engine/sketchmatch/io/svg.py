@@ -254,6 +254,7 @@ class _Context:
     frame: Frame | None
     clip: Box | None
     size: tuple[str | None, str | None] = (None, None)
+    used: frozenset[ElementTree.Element] = frozenset()
 
 
 class _Drawing:
@@ -263,6 +264,7 @@ class _Drawing:
         self._root = root
         self._lines = dict(zip(root.iter(), lines, strict=True))
         self._named = {each.get("id", ""): each for each in reversed([*root.iter()])}
+        self._parents = {child: each for each in root.iter() for child in each}
         self._excalidraw = excalidraw
         self._styles = Styles(root, self._named)
         self._visited = 1
@@ -383,9 +385,14 @@ class _Drawing:
         """Return what is drawn of an element, and in which context."""
         if tag_of(element) == "use":
             target = self._used(element)
-            size = (element.get("width"), element.get("height"))
-            context = replace(context, matrix=self._offset(element, context), size=size)
-            return ([] if target is None else [target]), context
+            if target is None or target in context.used or target in self._around(element):
+                return [], context  # what would draw itself without end is not drawn
+            return [target], replace(
+                context,
+                matrix=self._offset(element, context),
+                size=(element.get("width"), element.get("height")),
+                used=context.used | {target},
+            )
         children = [child for child in element if tag_of(child) in {*_DRAWN, "text"}]
         if tag_of(element) == "switch":
             # What is written as HTML is written once more, as text, for those who read none.
@@ -406,6 +413,11 @@ class _Drawing:
         target = self._named.get(href[1:]) if href else None
         drawn = target is not None and tag_of(target) in {*_DRAWN, "symbol"}
         return target if drawn else None
+
+    def _around(self, element: ElementTree.Element | None) -> Iterator[ElementTree.Element]:
+        while element is not None:
+            yield element
+            element = self._parents.get(element)
 
     def _placed(self, element: ElementTree.Element, look: Look, context: _Context) -> Any:
         """Return the matrix from an element's coordinates to the drawing's."""
