@@ -38,8 +38,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 from xml.etree import ElementTree
 
-import numpy as np
-import shapely
 import svgelements
 
 from sketchmatch.api.documents import load_xml
@@ -48,18 +46,25 @@ from sketchmatch.io._svg_curves import (
     LISTS,
     SHAPES,
     TOLERANCE,
-    Subpath,
-    flattened,
-    signed_area,
     size_of,
     steps_of,
     subpaths_of,
 )
 from sketchmatch.io._svg_frame import NUMBER, Frame, css_transform, fitted, length, view_box
-from sketchmatch.io._svg_ink import pen_lines
+from sketchmatch.io._svg_names import groups_label, label_of, written_in
+from sketchmatch.io._svg_shapes import (
+    Box,
+    Shape,
+    box_of,
+    is_closed,
+    lines_of,
+    without_heads,
+    without_paper,
+    without_twins,
+)
 from sketchmatch.io._svg_style import INITIAL, Colour, Look, Styles
 from sketchmatch.io._svg_tree import LONGEST_CAUSE, invalid, named_element, tag_of
-from sketchmatch.model import FloatArray, Landmark, Stroke, StrokeSet
+from sketchmatch.model import Landmark, Stroke, StrokeSet
 from sketchmatch.model.limits import check_vertices, source_limits
 
 __all__ = ["decode_svg"]
@@ -67,37 +72,10 @@ __all__ = ["decode_svg"]
 _DRAWN = {*SHAPES, "svg", "g", "a", "switch", "use"}
 _VIEWPORTS = {"svg", "symbol"}
 _HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
-_INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
-_NAMES = ("aria-label", f"{_INKSCAPE}label", "{http://www.serif.com/}id", "data-name")
 _EXCALIDRAW = b"svg-source:excalidraw"
 _COMMAND = re.compile(r"([MLHVCSQTAZ])([^MLHVCSQTAZ]*)", re.IGNORECASE)
 _NUMBER = re.compile(NUMBER, re.IGNORECASE)
 _ARITY = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 1}
-_TOOLS_ID = re.compile(
-    r"(path|line|polyline|polygon|rect|circle|ellipse|use|g|svg|svgid|xmlid|shape|stroke|object"
-    r"|vector|element|layer|rectangle|square|oval|triangle|star|curve|arrow|group|frame|artboard"
-    r"|fill|union|subtract|intersect|exclude|combined[\W_]shape|compound[\W_]path)?[\W\d_]*",
-    re.IGNORECASE,
-)
-# What tools call layers, where nothing but the name says that it is one.
-_LAYER = re.compile(
-    r"(layer|ebene|calque|capa|livello|laag|слой|图层|レイヤー)\W*\d*", re.IGNORECASE
-)
-# What Illustrator adds to the names of all but one of several that are called alike.
-_COPY = re.compile(r"(?<=.)_\d+_$")
-# How Illustrator and CorelDRAW write what an ``id`` may not contain.
-_ESCAPED = re.compile(r"_x([0-9A-F]{2,5})_", re.IGNORECASE)
-# Paper may leave this share of the page uncovered at each side, and so much of its own box.
-_MARGIN, _ROUNDED = 0.01, 0.03
-# Things on a ground that is no paper by its size.
-_FEW = 3
-# An arrowhead is at most so large beside its line, and fills so much of the box around it.
-_HEAD, _POINTED = 0.5, 0.6
-# A filling of this share of its box, squared, encloses nothing.
-_FLAT = 1e-9
-
-Box = tuple[float, float, float, float]
-"""Least x and y, largest x and y."""
 
 
 def decode_svg(data: bytes) -> StrokeSet:
@@ -130,8 +108,8 @@ def decode_svg(data: bytes) -> StrokeSet:
         )
     drawing = _Drawing(root, lines, _EXCALIDRAW in data)
     shapes = [shape for shape in drawing.shapes() if shape.subpaths]
-    shapes, ground = _without_paper(shapes, drawing.page, drawing.background)
-    shapes, dimensions = _without_heads(_without_twins(shapes))
+    shapes, ground = without_paper(shapes, drawing.page, drawing.background)
+    shapes, dimensions = without_heads(without_twins(shapes))
     if not shapes:
         raise invalid(
             "", "has nothing drawn in it; text and embedded pictures are not read, so draw paths"
@@ -147,7 +125,7 @@ def decode_svg(data: bytes) -> StrokeSet:
         tuple(
             Stroke(points * (1.0, -1.0), None, shape.label)
             for shape in shapes
-            for points in _lines(shape, tolerance)
+            for points in lines_of(shape, tolerance)
         ),
         (
             *(f"{each.place} was taken for the paper: all else lies on it." for each in ground),
@@ -202,48 +180,6 @@ def _vertices(data: str) -> int:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Shape:
-    """A shape that can be seen.
-
-    Attributes
-    ----------
-    subpaths
-        Its curves in the drawing's coordinates.
-    label
-        A name for people.
-    fill, stroke
-        The colours of its filling and its line, None where it has none.
-    evenodd
-        Whether its filling is by that rule.
-    pen
-        Whether its filling may be the ink of a pen.
-    place
-        How a person finds it in the file.
-    box
-        Around its control points.
-    """
-
-    subpaths: list[Subpath]
-    label: str
-    fill: Colour | None
-    stroke: Colour | None
-    evenodd: bool
-    pen: bool
-    place: str
-    box: Box
-
-    @property
-    def filled(self) -> bool:
-        """Whether it has a filling."""
-        return self.fill is not None
-
-    @property
-    def bare(self) -> bool:
-        """Whether it is a filling without a line."""
-        return self.fill is not None and self.stroke is None
-
-
 @dataclass(frozen=True, slots=True)
 class _Context:
     """What an element inherits from those around it, and from those that use it."""
@@ -273,7 +209,7 @@ class _Drawing:
         self.names: list[Landmark] = []
         self.dimensions: list[str] = []
 
-    def shapes(self) -> Iterator[_Shape]:
+    def shapes(self) -> Iterator[Shape]:
         """Yield the shapes that are shown, in the order they are drawn."""
         count = 0
         stack = [(self._root, _Context(svgelements.Matrix(), INITIAL, "", None, None))]
@@ -302,7 +238,7 @@ class _Drawing:
                     elif shape.subpaths and _meet(shape.box, inner.clip):
                         yield shape
                 continue
-            if label := _groups_label(element):
+            if label := groups_label(element):
                 inner = replace(inner, label=label)
             if tag_of(element) in _VIEWPORTS:
                 inside = self._viewport(element, inner, outer.size)
@@ -317,7 +253,7 @@ class _Drawing:
         self, text: ElementTree.Element, look: Look, context: _Context
     ) -> Iterator[Landmark]:
         """Yield what a text says, where it begins and how large it is, unless that is not known."""
-        name = _said(text)
+        name = written_in(text)
         placed = [(text, look)]
         for part, around in placed:
             spans = (child for child in part if tag_of(child) == "tspan")
@@ -343,11 +279,11 @@ class _Drawing:
         if look.visible and name and all(map(math.isfinite, (point.x, point.y, size))):
             yield Landmark(name, (float(point.x), -float(point.y)), "room", size)
 
-    def _says_a_length(self, look: Look, shape: _Shape) -> bool:
+    def _says_a_length(self, look: Look, shape: Shape) -> bool:
         """Whether a shape is an open line, both ends of which are marked."""
         ends = (self._named.get(look.marker_start), self._named.get(look.marker_end))
         marked = all(end is not None and tag_of(end) == "marker" for end in ends)
-        return marked and shape.stroke is not None and not any(map(_is_closed, shape.subpaths))
+        return marked and shape.stroke is not None and not any(map(is_closed, shape.subpaths))
 
     def _place(self, element: ElementTree.Element) -> str:
         return f"{named_element(element)} on line {self._lines[element]} of the file"
@@ -363,20 +299,20 @@ class _Drawing:
         fill: Colour | None,
         stroke: Colour | None,
         field: str,
-    ) -> _Shape:
+    ) -> Shape:
         line, look = self._lines[element], context.look
         subpaths = subpaths_of(element, look, context.frame, context.matrix, field, line)
         # Whoever gives both the same colour has fattened the ink.
         pen = tag_of(element) in ("path", "polygon") and fill is not None and stroke in (None, fill)
-        return _Shape(
+        return Shape(
             subpaths,
-            _label(element) or context.label,
+            label_of(element) or context.label,
             fill,
             stroke,
             look.fill_rule,
             pen,
             self._place(element),
-            _box(subpaths),
+            box_of(subpaths),
         )
 
     def _children(
@@ -451,7 +387,7 @@ class _Drawing:
         line = self._lines[element]
         identity = svgelements.Matrix()
         subpaths = subpaths_of(element, look, frame, identity, "", line)
-        x0, y0, x1, y1 = _box(subpaths)
+        x0, y0, x1, y1 = box_of(subpaths)
         return Frame(x0, y0, x1 - x0, y1 - y0)
 
     def _offset(self, use: ElementTree.Element, context: _Context) -> Any:
@@ -555,7 +491,7 @@ class _Drawing:
                 placed = self._placed(child, look, inner)
                 line = self._lines[child]
                 subpaths += subpaths_of(child, look, context.frame, placed, "", line)
-        return _box(subpaths)
+        return box_of(subpaths)
 
     def _invalid(self, element: ElementTree.Element, problem: str) -> InvalidInputError:
         where = f"({named_element(element)} on line {self._lines[element]} of the file)"
@@ -580,67 +516,6 @@ def _for_us(element: ElementTree.Element) -> bool:
     return english and "requiredExtensions" not in element.attrib
 
 
-def _label(element: ElementTree.Element) -> str:
-    own = _ESCAPED.sub(_unescaped, element.get("id", ""))
-    if label := _given_label(element):
-        return label
-    return "" if _TOOLS_ID.fullmatch(own) else _spaced(_COPY.sub("", own))
-
-
-def _unescaped(escaped: re.Match[str]) -> str:
-    """Return the character that an escape stands for; one that cannot be seen stays as it is."""
-    char = chr(int(escaped[1], 16))
-    return char if char == " " or char.isprintable() else escaped[0]
-
-
-def _groups_label(element: ElementTree.Element) -> str:
-    """Return what the shapes of a group are called: nothing, if it is a layer or the drawing."""
-    if tag_of(element) == "svg" or element.get(f"{_INKSCAPE}groupmode") == "layer":
-        return ""
-    label = _given_label(element)
-    return "" if _LAYER.fullmatch(label) else label
-
-
-def _given_label(element: ElementTree.Element) -> str:
-    titles = ("".join(child.itertext()) for child in element if tag_of(child) == "title")
-    names = (next(titles, ""), *(element.get(name, "") for name in _NAMES))
-    return next((name for name in map(_spaced, names) if name), "")
-
-
-def _said(text: ElementTree.Element) -> str:
-    """Return what a text says, its lines with spaces between them."""
-    said, last = "", None
-    for line, part in _lines_of(text, ""):
-        said += f" {part}" if line != last else part
-        last = line
-    return _spaced(said)
-
-
-def _lines_of(part: ElementTree.Element, line: object) -> Iterator[tuple[object, str]]:
-    """Yield the parts of a text, each with what tells its line from others."""
-    line = part if part.get("dy") else part.get("y", line)
-    yield line, part.text or ""
-    for child in part:
-        if tag_of(child) not in ("", "title", "desc"):
-            yield from _lines_of(child, line)
-        if child.tail:
-            yield line, child.tail
-
-
-def _spaced(text: str) -> str:
-    """Return text with its white space as a browser shows it."""
-    return " ".join(text.split())
-
-
-def _box(subpaths: list[Subpath]) -> Box:
-    if not subpaths:
-        return (0.0, 0.0, -1.0, -1.0)
-    points = np.concatenate([curve for subpath in subpaths for curve in subpath])
-    x0, y0 = points.min(axis=0).tolist()
-    x1, y1 = points.max(axis=0).tolist()
-    return (x0, y0, x1, y1)
-
-
 def _boxed(frame: Frame, matrix: Any) -> Box:
     """Return the box around a viewport, in the drawing's coordinates."""
     right, low = frame.x + frame.width, frame.y + frame.height
@@ -662,169 +537,3 @@ def _meet(box: Box, other: Box | None) -> bool:
     return other is None or (
         box[0] <= other[2] and other[0] <= box[2] and box[1] <= other[3] and other[1] <= box[3]
     )
-
-
-def _covers(box: Box, other: Box, margin: float = 0.0) -> bool:
-    """Whether a box covers another but for a share of its size at each side."""
-    across, down = margin * (other[2] - other[0]), margin * (other[3] - other[1])
-    return (
-        box[0] <= other[0] + across
-        and box[1] <= other[1] + down
-        and box[2] >= other[2] - across
-        and box[3] >= other[3] - down
-    )
-
-
-def _without_paper(
-    shapes: list[_Shape], page: Box | None, background: Colour
-) -> tuple[list[_Shape], list[_Shape]]:
-    """Return the shapes that are not the paper, and paper that may have been meant as something.
-
-    Paper is a filled rectangle that covers the page, or that all else lies on, and has no line, or
-    one in the page's own colour. What has the paper's colour and no line is not seen on it; nor is
-    a line in that colour where there is paper in it: a page that says nothing may be dark.
-    """
-    white, papered = background, False
-    boxes = np.array([shape.box for shape in shapes]).reshape(-1, 4)
-    lows = np.minimum.accumulate(boxes[::-1, :2])[::-1]
-    highs = np.maximum.accumulate(boxes[::-1, 2:])[::-1]
-    kept: list[_Shape] = []
-    ground: list[_Shape] = []
-    filled = np.zeros(len(shapes), dtype=bool)
-    for k, shape in enumerate(shapes):
-        sheet = shape.bare or (shape.filled and shape.stroke == white)
-        sheet = sheet and _rectangular(shape)
-        if sheet and page is not None and _covers(shape.box, page, _MARGIN):
-            background = shape.fill or ()
-            papered = background == white
-        elif (
-            sheet
-            and not (kept or ground)
-            and len(shapes) - k > _FEW
-            and _covers(shape.box, (*lows[k + 1], *highs[k + 1]))
-        ):
-            background = shape.fill or ()
-            ground = [shape]
-        elif not (
-            _like_paper(shape, background, papered) and not _meets_any(boxes[k], boxes[filled])
-        ):
-            kept.append(shape)
-            filled[k] = shape.filled
-    return kept, ground
-
-
-def _like_paper(shape: _Shape, background: Colour, papered: bool) -> bool:
-    """Whether a shape has no colour but the paper's, or, of a page without, no line either."""
-    if papered and shape.stroke == background != ():
-        return shape.fill in (None, background)
-    return (
-        shape.bare
-        and shape.fill == background != ()
-        and any(signed_area(_ends(subpath)) != 0.0 for subpath in shape.subpaths)
-    )
-
-
-def _meets_any(box: FloatArray, others: FloatArray) -> bool:
-    low, high = others[:, :2] <= box[2:], others[:, 2:] >= box[:2]
-    return bool((low & high).all(axis=1).any())
-
-
-def _rectangular(shape: _Shape) -> bool:
-    """Whether a shape fills its box, but for rounded corners."""
-    if len(shape.subpaths) != 1:
-        return False
-    x0, y0, x1, y1 = shape.box
-    share = abs(signed_area(_ends(shape.subpaths[0]))) / max((x1 - x0) * (y1 - y0), 1e-300)
-    return 1.0 - _ROUNDED <= share <= 1.0 + _ROUNDED
-
-
-def _is_closed(subpath: Subpath) -> bool:
-    return bool((subpath[0][0] == subpath[-1][-1]).all())
-
-
-def _ends(subpath: Subpath) -> FloatArray:
-    return np.array([curve[0] for curve in subpath] + [subpath[-1][-1]])
-
-
-def _without_twins(shapes: list[_Shape]) -> list[_Shape]:
-    """Leave out fillings whose line follows, or went before, as a shape of its own."""
-    kept: list[_Shape] = []
-    for shape in shapes:
-        last = kept[-1] if kept else None
-        if last is not None and last.bare != shape.bare and _same(last, shape):
-            line, other = (shape, last) if last.bare else (last, shape)
-            kept[-1] = replace(line, label=line.label or other.label, fill=other.fill)
-        else:
-            kept.append(shape)
-    return kept
-
-
-def _without_heads(shapes: list[_Shape]) -> tuple[list[_Shape], list[str]]:
-    """Leave out arrowheads that are shapes of their own, and where lines are that have two.
-
-    Tools that use no markers draw them after the line, in its colour and upon its end.
-    """
-    kept: list[_Shape] = []
-    dimensions = []
-    ends: list[FloatArray] = []  # of the last shape, as far as they have no head
-    for shape in shapes:
-        head = next((k for k, end in enumerate(ends) if _is_head(shape, kept[-1], end)), None)
-        if head is None:
-            kept.append(shape)
-            ends = _free_ends(shape)
-            continue
-        del ends[head]
-        if not ends:
-            dimensions.append(kept.pop().place)
-    return kept, dimensions
-
-
-def _free_ends(shape: _Shape) -> list[FloatArray]:
-    """Return both ends of an open line; none of all else."""
-    if shape.filled or len(shape.subpaths) != 1 or _is_closed(shape.subpaths[0]):
-        return []
-    return [shape.subpaths[0][0][0], shape.subpaths[0][-1][-1]]
-
-
-def _is_head(shape: _Shape, line: _Shape, end: FloatArray) -> bool:
-    """Whether a shape is pointed, in a line's colour, small beside it, and upon its end."""
-    if not shape.fill or shape.fill != line.stroke or shape.stroke not in (None, line.stroke):
-        return False
-    curves = shape.subpaths[0]
-    if len(shape.subpaths) != 1 or len(curves) < 2 or any(len(curve) != 2 for curve in curves):
-        return False
-    x0, y0, x1, y1 = shape.box
-    size = max(x1 - x0, y1 - y0)
-    within = x0 <= end[0] <= x1 and y0 <= end[1] <= y1
-    if not within or size > _HEAD * max(line.box[2] - line.box[0], line.box[3] - line.box[1]):
-        return False
-    outline = shapely.Polygon(_ends(curves))
-    return bool(outline.area <= _POINTED * outline.minimum_rotated_rectangle.area)
-
-
-def _same(first: _Shape, second: _Shape) -> bool:
-    if first.box != second.box or len(first.subpaths) != len(second.subpaths):
-        return False
-    return all(
-        len(a) == len(b) and all(map(np.array_equal, a, b))
-        for a, b in zip(first.subpaths, second.subpaths, strict=True)
-    )
-
-
-def _lines(shape: _Shape, tolerance: float) -> list[FloatArray]:
-    """Return the lines that a shape is drawn with, points of shape (k, 2) each."""
-    lines = [flattened(subpath, tolerance) for subpath in shape.subpaths]
-    if not shape.filled:
-        return lines
-    x0, y0, x1, y1 = shape.box
-    flat = _FLAT * max(x1 - x0, y1 - y0) ** 2
-    bounding = [k for k, line in enumerate(lines) if abs(signed_area(line)) > flat]
-    for k in bounding:
-        if (lines[k][0] != lines[k][-1]).any():
-            lines[k] = np.concatenate([lines[k], lines[k][:1]])
-    if not (shape.bare or shape.pen):
-        return lines
-    corners = [len(shape.subpaths[k]) if shape.pen else 0 for k in bounding]
-    drawn = pen_lines([lines[k] for k in bounding], corners, shape.evenodd)
-    found = dict(zip(bounding, drawn, strict=True))
-    return [each for k, line in enumerate(lines) for each in found.get(k, [line])]

@@ -1,0 +1,81 @@
+"""What shapes, groups and texts of an SVG document are called."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from xml.etree import ElementTree
+
+from sketchmatch.io._svg_tree import tag_of
+
+__all__ = ["groups_label", "label_of", "written_in"]
+
+_INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
+_NAMES = ("aria-label", f"{_INKSCAPE}label", "{http://www.serif.com/}id", "data-name")
+_TOOLS_ID = re.compile(
+    r"(path|line|polyline|polygon|rect|circle|ellipse|use|g|svg|svgid|xmlid|shape|stroke|object"
+    r"|vector|element|layer|rectangle|square|oval|triangle|star|curve|arrow|group|frame|artboard"
+    r"|fill|union|subtract|intersect|exclude|combined[\W_]shape|compound[\W_]path)?[\W\d_]*",
+    re.IGNORECASE,
+)
+# What tools call layers, where nothing but the name says that it is one.
+_LAYER = re.compile(
+    r"(layer|ebene|calque|capa|livello|laag|слой|图层|レイヤー)\W*\d*", re.IGNORECASE
+)
+# What Illustrator adds to the names of all but one of several that are called alike.
+_COPY = re.compile(r"(?<=.)_\d+_$")
+# How Illustrator and CorelDRAW write what an ``id`` may not contain.
+_ESCAPED = re.compile(r"_x([0-9A-F]{2,5})_", re.IGNORECASE)
+
+
+def label_of(element: ElementTree.Element) -> str:
+    """Return what a shape is called: nothing, if a tool gave it its name."""
+    own = _ESCAPED.sub(_unescaped, element.get("id", ""))
+    if label := _given_label(element):
+        return label
+    return "" if _TOOLS_ID.fullmatch(own) else _spaced(_COPY.sub("", own))
+
+
+def _unescaped(escaped: re.Match[str]) -> str:
+    """Return the character that an escape stands for; one that cannot be seen stays as it is."""
+    char = chr(int(escaped[1], 16))
+    return char if char == " " or char.isprintable() else escaped[0]
+
+
+def groups_label(element: ElementTree.Element) -> str:
+    """Return what the shapes of a group are called: nothing, if it is a layer or the drawing."""
+    if tag_of(element) == "svg" or element.get(f"{_INKSCAPE}groupmode") == "layer":
+        return ""
+    label = _given_label(element)
+    return "" if _LAYER.fullmatch(label) else label
+
+
+def _given_label(element: ElementTree.Element) -> str:
+    titles = ("".join(child.itertext()) for child in element if tag_of(child) == "title")
+    names = (next(titles, ""), *(element.get(name, "") for name in _NAMES))
+    return next((name for name in map(_spaced, names) if name), "")
+
+
+def written_in(text: ElementTree.Element) -> str:
+    """Return what a text says, its lines with spaces between them."""
+    said, last = "", None
+    for line, part in _lines_of(text, ""):
+        said += f" {part}" if line != last else part
+        last = line
+    return _spaced(said)
+
+
+def _lines_of(part: ElementTree.Element, line: object) -> Iterator[tuple[object, str]]:
+    """Yield the parts of a text, each with what tells its line from others."""
+    line = part if part.get("dy") else part.get("y", line)
+    yield line, part.text or ""
+    for child in part:
+        if tag_of(child) not in ("", "title", "desc"):
+            yield from _lines_of(child, line)
+        if child.tail:
+            yield line, child.tail
+
+
+def _spaced(text: str) -> str:
+    """Return text with its white space as a browser shows it."""
+    return " ".join(text.split())
