@@ -254,3 +254,20 @@ def test_what_is_around_few_things_or_hardly_larger_ones_is_an_object():
     found = segmented(pixels)
     assert len(found.scene.objects) == 5
     assert not any("walls" in sentence for sentence in found.warnings)
+
+
+def beside_dark(pale, pen=cv2.FILLED):
+    """Two outlines of a black pen, and three shapes in another shade, filled or outlined."""
+    pixels = paper((600, 800), 250)
+    cv2.rectangle(pixels, (60, 60), (240, 160), 30, 4)
+    cv2.circle(pixels, (600, 130), 60, 30, 4)
+    cv2.rectangle(pixels, (100, 330), (270, 470), pale, pen)
+    cv2.circle(pixels, (460, 400), 70, pale, pen, cv2.LINE_AA)
+    cv2.rectangle(pixels, (600, 360), (730, 500), pale, pen)
+    return pixels
+
+
+def test_filled_areas_are_no_ruled_lines():
+    found = segmented(beside_dark(170))
+    assert len(found.scene) == 5
+    assert found.warnings == ()

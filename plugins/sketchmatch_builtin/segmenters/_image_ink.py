@@ -238,10 +238,10 @@ def _threshold(absorbed: Mask) -> tuple[Mask, bool]:
     darkest = min(visible / 2.0, 0.004 * absorbed.size)
     pen = int(np.flatnonzero(shades >= darkest).max())
     floor = max(floor, _FAINT * pen)
-    ruling = _ruling(absorbed, floor, pen)
+    window = np.ones((max(7, odd(0.012 * max(absorbed.shape))),) * 2, np.uint8)
+    ruling = _ruling(absorbed, floor, pen, window)
     if ruling is not None:
         floor = max(floor, ruling)
-    window = np.ones((max(7, odd(0.012 * max(absorbed.shape))),) * 2, np.uint8)
     half = cv2.dilate(absorbed, window) // 2
     lowest = min(254, math.ceil(floor) - 1)
     mask = np.asarray(absorbed > np.maximum(half, lowest), np.uint8)
@@ -271,11 +271,12 @@ def _rough(absorbed: Mask) -> float:
     return float(np.percentile(some, 30)) + _TEXTURE * spread
 
 
-def _ruling(absorbed: Mask, floor: float, pen: int) -> float | None:
+def _ruling(absorbed: Mask, floor: float, pen: int, window: Mask) -> float | None:
     """Return the shade between ruled lines and ink, if there are lines all over the picture.
 
-    Ruled lines are fainter than the pen, straight, span half of the picture, and have at least
-    three parallel ones at regular distances; they are looked for with the Hough transform [1]_.
+    Ruled lines are fainter than the pen, thinner than a window, straight, span half of the picture,
+    and have at least three parallel ones at regular distances; they are looked for with the Hough
+    transform [1]_.
 
     References
     ----------
@@ -285,6 +286,7 @@ def _ruling(absorbed: Mask, floor: float, pen: int) -> float | None:
     strong = np.asarray(absorbed >= 0.65 * pen, np.uint8)
     beside = cv2.dilate(strong, np.ones((7, 7), np.uint8))
     faint = np.asarray((absorbed >= floor) & (beside == 0), np.uint8)
+    faint[cv2.dilate(cv2.morphologyEx(faint, cv2.MORPH_OPEN, window), window) > 0] = 0
     if faint.sum() < 2.0 * max(faint.shape):
         return None
     small = _reduced(faint * 255, 700)
