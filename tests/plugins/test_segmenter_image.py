@@ -271,3 +271,20 @@ def test_filled_areas_are_no_ruled_lines():
     found = segmented(beside_dark(170))
     assert len(found.scene) == 5
     assert found.warnings == ()
+
+
+def test_evenly_filled_areas_are_found_however_much_fainter_than_a_pen():
+    found = segmented(beside_dark(225))
+    assert len(found.scene) == 5
+    assert found.scene.objects[3].area == pytest.approx(np.pi * 70.5**2, rel=0.02)
+
+
+def test_a_faint_area_that_fades_out_or_that_others_are_drawn_on_is_none():
+    pixels = beside_dark(250)
+    shadow = np.zeros(pixels.shape, np.float32)
+    cv2.circle(shadow, (300, 450), 90, 25.0, cv2.FILLED)
+    pixels -= np.rint(cv2.GaussianBlur(shadow, (0, 0), 6.0)).astype(np.uint8)
+    assert len(segmented(pixels).scene) == 2
+    floor = np.where(beside_dark(250) < 200, np.uint8(30), np.uint8(225))
+    floor[:20] = floor[-20:] = floor[:, :20] = floor[:, -20:] = 250
+    assert len(segmented(floor).scene) == 2

@@ -30,7 +30,8 @@ __all__ = ["Ink", "find_ink"]
 _WORKING_SIDE = 2048
 _LIGHT_SIDE = 512
 # Ink absorbs at least this share of the light that paper returns, this many standard deviations
-# of the paper's texture, and this share of what the picture's dark ink absorbs.
+# of the paper's texture, and, but for evenly filled areas, this share of what the picture's dark
+# ink absorbs.
 _LEAST_INK = 0.05
 _TEXTURE = 4.5
 _FAINT = 0.2
@@ -38,6 +39,8 @@ _FAINT = 0.2
 # twice this wide at most.
 _EVEN = 10
 _EDGE = 9
+# So much of their rim is such an edge where they are fainter than that.
+_SHARP = 0.9
 
 _INVERTED = (
     "The picture is light on dark and was read as its negative: set ink to 'dark' if the dark is "
@@ -234,6 +237,7 @@ def _threshold(absorbed: Mask) -> tuple[Mask, bool]:
     visible = shades[min(255, math.ceil(floor))]
     if visible == 0:
         return np.zeros_like(absorbed), False
+    bare = math.ceil(floor) - 1
     # The dark pen's shade: what the darkest 0.4 % of the picture reach, or half of all ink.
     darkest = min(visible / 2.0, 0.004 * absorbed.size)
     pen = int(np.flatnonzero(shades >= darkest).max())
@@ -245,7 +249,9 @@ def _threshold(absorbed: Mask) -> tuple[Mask, bool]:
     half = cv2.dilate(absorbed, window) // 2
     lowest = min(254, math.ceil(floor) - 1)
     mask = np.asarray(absorbed > np.maximum(half, lowest), np.uint8)
-    return mask | _pale(absorbed, lowest, window), ruling is not None
+    mask |= _pale(absorbed, lowest, window)
+    mask |= _alone(absorbed, _pale(absorbed, bare, window), mask)
+    return mask, ruling is not None
 
 
 def _pale(absorbed: Mask, lowest: int, window: Mask) -> Mask:
@@ -260,6 +266,28 @@ def _pale(absorbed: Mask, lowest: int, window: Mask) -> Mask:
     level = cv2.dilate(np.asarray(absorbed * wide, np.uint8), np.ones((_EDGE, _EDGE), np.uint8))
     near = np.asarray(level, np.uint8)
     return np.asarray((near > 0) & (absorbed > np.maximum(near // 2, lowest)), np.uint8)
+
+
+def _alone(absorbed: Mask, pale: Mask, ink: Mask) -> Mask:
+    """Return the pale areas that end at an edge all around, and that no darker ink touches.
+
+    What fades out somewhere is a shadow or a smudge, and what others are drawn on is a floor.
+    """
+    contours, _ = cv2.findContours(pale, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    areas = np.zeros(pale.shape, np.int32)
+    for k, contour in enumerate(contours, 1):
+        cv2.drawContours(areas, [contour], 0, k, cv2.FILLED)
+    count = len(contours) + 1
+    size = np.maximum(np.bincount(areas.ravel(), minlength=count), 1)
+    level = (np.bincount(areas.ravel(), absorbed.ravel(), count) / size)[areas]
+    darker = np.bincount(areas[(ink > 0) & (absorbed > 2.0 * level)], minlength=count) > 0
+    inside = np.asarray(areas > 0, np.uint8)
+    rim = np.asarray(inside > np.asarray(cv2.erode(inside, np.ones((3, 3), np.uint8))))
+    fall = cv2.morphologyEx(absorbed, cv2.MORPH_GRADIENT, np.ones((_EDGE, _EDGE), np.uint8))
+    steep = np.bincount(areas[rim & (np.asarray(fall) >= 0.5 * level)], minlength=count)
+    drawn = ~darker & (steep >= _SHARP * np.bincount(areas[rim], minlength=count))
+    drawn[0] = False
+    return np.asarray(drawn[areas] & (pale > 0), np.uint8)
 
 
 def _rough(absorbed: Mask) -> float:
