@@ -288,3 +288,19 @@ def test_a_faint_area_that_fades_out_or_that_others_are_drawn_on_is_none():
     floor = np.where(beside_dark(250) < 200, np.uint8(30), np.uint8(225))
     floor[:20] = floor[-20:] = floor[:, :20] = floor[:, -20:] = 250
     assert len(segmented(floor).scene) == 2
+
+
+def test_outlines_far_fainter_than_the_darkest_are_left_out_and_said():
+    pixels = beside_dark(220, 5)
+    found = segmented(pixels)
+    assert len(found.scene) == 2
+    assert found.warnings == (
+        "3 shapes far fainter than the darkest were left out: draw with one pen, or lower faint, "
+        "to have them.",
+    )
+    found = segmented(pixels, faint=0.05)
+    assert len(found.scene) == 5
+    assert found.warnings == ()
+    pixels[:300, 400:] = 250
+    with pytest.raises(InvalidInputError, match="3 others were left out as far fainter"):
+        segmented(pixels)

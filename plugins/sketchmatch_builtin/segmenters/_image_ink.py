@@ -30,11 +30,9 @@ __all__ = ["Ink", "find_ink"]
 _WORKING_SIDE = 2048
 _LIGHT_SIDE = 512
 # Ink absorbs at least this share of the light that paper returns, this many standard deviations
-# of the paper's texture, and, but for evenly filled areas, this share of what the picture's dark
-# ink absorbs.
+# of the paper's texture.
 _LEAST_INK = 0.05
 _TEXTURE = 4.5
-_FAINT = 0.2
 # Filled areas are even to this many grey levels beside one another, and their edges, in pixels,
 # twice this wide at most.
 _EVEN = 10
@@ -61,6 +59,8 @@ class Ink:
     ----------
     mask
         Shape (rows, columns), 1 on ink.
+    fainter
+        Likewise, 1 in pieces of what shows on the paper that were mostly left out, as too faint.
     absorbed
         Shape (rows, columns, 1) for grey and (rows, columns, 3) for red, green and blue: the share
         of the paper's light that is missing, in 1/255.
@@ -71,12 +71,13 @@ class Ink:
     """
 
     mask: Mask
+    fainter: Mask
     absorbed: Mask
     scale: tuple[float, float]
     warnings: tuple[str, ...]
 
 
-def find_ink(pixels: Mask, blur: float, whole: bool, shade: Shade) -> Ink:
+def find_ink(pixels: Mask, blur: float, whole: bool, shade: Shade, faint: float) -> Ink:
     """Find the ink of a picture.
 
     In a picture in colour, ink is what absorbs light of any colour, as a yellow pen absorbs blue:
@@ -95,6 +96,9 @@ def find_ink(pixels: Mask, blur: float, whole: bool, shade: Shade) -> Ink:
         Whether all of the picture is the drawing; otherwise a table around the sheet is left out.
     shade
         Whether ink is darker or lighter than what it is drawn on; the picture decides with "auto".
+    faint
+        The share of what the picture's dark ink absorbs that other ink absorbs, but for evenly
+        filled areas.
 
     Raises
     ------
@@ -117,8 +121,9 @@ def find_ink(pixels: Mask, blur: float, whole: bool, shade: Shade) -> Ink:
         inside = cv2.resize(view.sheet, size, interpolation=cv2.INTER_NEAREST)
         absorbed *= np.asarray(inside, np.uint8)[:, :, None]
     most = np.ascontiguousarray(absorbed.max(axis=2))
-    mask, ruled = _threshold(most)
-    mask[edgeless(most, mask)] = 0
+    mask, fainter, ruled = _threshold(most, faint)
+    for some in (mask, fainter):
+        some[edgeless(most, some)] = 0
     said = (
         (_INVERTED, inverted and shade == "auto"),
         (_TABLE, view.sheet is not None),
@@ -126,6 +131,7 @@ def find_ink(pixels: Mask, blur: float, whole: bool, shade: Shade) -> Ink:
     )
     return Ink(
         mask,
+        fainter,
         absorbed,
         (columns / mask.shape[1], rows / mask.shape[0]),
         tuple(warning for warning, true in said if true),
@@ -230,28 +236,31 @@ def _absorbed(channels: list[Mask], lights: list[Mask]) -> Mask:
 # Ink
 
 
-def _threshold(absorbed: Mask) -> tuple[Mask, bool]:
-    """Return the ink, and whether ruled lines had to be told from it."""
-    floor = max(255.0 * _LEAST_INK, _rough(absorbed))
+def _threshold(absorbed: Mask, faint: float) -> tuple[Mask, Mask, bool]:
+    """Return the ink, what is too faint for it, and whether ruled lines had to be told from it."""
+    bare = max(255.0 * _LEAST_INK, _rough(absorbed))
     shades = np.cumsum(np.bincount(absorbed.ravel(), minlength=256)[::-1])[::-1]
-    visible = shades[min(255, math.ceil(floor))]
+    visible = shades[min(255, math.ceil(bare))]
     if visible == 0:
-        return np.zeros_like(absorbed), False
-    bare = math.ceil(floor) - 1
+        return np.zeros_like(absorbed), np.zeros_like(absorbed), False
     # The dark pen's shade: what the darkest 0.4 % of the picture reach, or half of all ink.
     darkest = min(visible / 2.0, 0.004 * absorbed.size)
     pen = int(np.flatnonzero(shades >= darkest).max())
-    floor = max(floor, _FAINT * pen)
     window = np.ones((max(7, odd(0.012 * max(absorbed.shape))),) * 2, np.uint8)
+    floor = max(bare, faint * pen)
     ruling = _ruling(absorbed, floor, pen, window)
-    if ruling is not None:
-        floor = max(floor, ruling)
+    floor = floor if ruling is None else max(floor, ruling)
     half = cv2.dilate(absorbed, window) // 2
-    lowest = min(254, math.ceil(floor) - 1)
+    lowest, least = (min(254, math.ceil(level) - 1) for level in (floor, bare))
     mask = np.asarray(absorbed > np.maximum(half, lowest), np.uint8)
     mask |= _pale(absorbed, lowest, window)
-    mask |= _alone(absorbed, _pale(absorbed, bare, window), mask)
-    return mask, ruling is not None
+    mask |= _alone(absorbed, _pale(absorbed, least, window), mask)
+    if ruling is not None or _ruling(absorbed, bare, pen, window) is not None:
+        return mask, np.zeros_like(mask), ruling is not None
+    pieces = cv2.connectedComponents(np.asarray(absorbed > np.maximum(half, least), np.uint8))[1]
+    left_out = 2 * np.bincount(pieces.ravel(), mask.ravel()) < np.bincount(pieces.ravel())
+    left_out[0] = False
+    return mask, np.asarray(left_out[pieces], np.uint8), False
 
 
 def _pale(absorbed: Mask, lowest: int, window: Mask) -> Mask:

@@ -15,7 +15,7 @@ from sketchmatch_builtin.segmenters._image_light import Mask
 from sketchmatch_builtin.segmenters._strokes_marks import typical_span
 from sketchmatch_builtin.segmenters._writing import written
 
-__all__ = ["MOST_SHAPES", "Tracing", "trace"]
+__all__ = ["MOST_SHAPES", "Tracing", "closed_beside", "trace"]
 
 MOST_SHAPES = 1000
 """A picture with more shapes is noise, and refused before they are looked at."""
@@ -128,6 +128,19 @@ def trace(ink: Mask, least: float, gap: float, frames: bool) -> Tracing:
         before = [*found.shapes]
         found.shapes += [each for each in rest if not any(_overlap(each, one) for one in before)]
     return found
+
+
+def closed_beside(ink: Mask, shapes: list[Shape], least: float) -> int:
+    """Return how many shapes ink fills or encloses beside those that were found."""
+    drawing = Drawing(without_specks(ink, math.sqrt(least)), least)
+    others = drawing.outermost()
+    pen = drawing.pen()
+    radius = 1 + math.ceil(1.2 * pen)
+    count = 0
+    for other in (drawing.filled(k) for k in others[:MOST_SHAPES]):
+        beside = not any(_overlap(other, one) or _overlap(one, other) for one in shapes)
+        count += beside and _is_whole(other.mask, radius, least)
+    return count
 
 
 def _writing(drawing: Drawing, shapes: list[int], whole: list[int]) -> frozenset[int]:

@@ -16,7 +16,7 @@ from sketchmatch_builtin.segmenters._border import outer_border
 from sketchmatch_builtin.segmenters._image_colours import areas_of_colours
 from sketchmatch_builtin.segmenters._image_drawing import Shape
 from sketchmatch_builtin.segmenters._image_ink import Ink, find_ink
-from sketchmatch_builtin.segmenters._image_shapes import Tracing, trace
+from sketchmatch_builtin.segmenters._image_shapes import Tracing, closed_beside, trace
 
 __all__ = ["ImageSegmenter"]
 
@@ -105,6 +105,15 @@ class ImageSegmenter(Segmenter):
                 "a blackboard is; 'auto' tells it from the picture."
             ),
         )
+        faint: float = Field(
+            0.2,
+            ge=0.0,
+            le=1.0,
+            description=(
+                "Lines that absorb less than this share of what the darkest absorb are left out, "
+                "as smudges, erased lines and what shows through the paper are."
+            ),
+        )
         frame: Literal["auto", "keep"] = Field(
             "auto",
             description=(
@@ -134,20 +143,22 @@ class ImageSegmenter(Segmenter):
 
     def segment(self, source: Image) -> Segmentation:
         """Return the shapes as objects, in pixels from the picture's lower left corner."""
-        keep = self.params.frame == "keep"
-        ink = find_ink(source.pixels, self.params.blur, keep, self.params.ink)
-        least = (self.params.min_size * max(ink.mask.shape)) ** 2
-        found = trace(ink.mask, least, self.params.max_gap, not keep)
-        if self.params.colours == "separate":
+        params, keep = self.params, self.params.frame == "keep"
+        ink = find_ink(source.pixels, params.blur, keep, params.ink, params.faint)
+        least = (params.min_size * max(ink.mask.shape)) ** 2
+        found = trace(ink.mask, least, params.max_gap, not keep)
+        fainter = closed_beside(ink.fainter, found.shapes, least)
+        if params.colours == "separate":
             found.shapes = areas_of_colours(ink, found.shapes, least)
         rows, columns = source.pixels.shape[:2]
-        _check_count(len(found.shapes), math.ceil(self.params.min_size * max(rows, columns)))
+        side = math.ceil(params.min_size * max(rows, columns))
+        _check_count(len(found.shapes), fainter, side)
         outlines = sorted(
             (self._simplified(_outline(shape, ink, rows)) for shape in found.shapes),
             key=lambda outline: (-outline[:, 1].max(), outline[:, 0].min()),
         )
         scene = Scene(tuple(SceneObject.from_rings([outline]) for outline in outlines))
-        return Segmentation(scene, (*ink.warnings, *_said(found)))
+        return Segmentation(scene, (*ink.warnings, *_said(found), *_said_of_fainter(fainter)))
 
     def _simplified(self, outline: FloatArray) -> FloatArray:
         tolerance = self.params.simplify * float(np.ptp(outline, axis=0).max())
@@ -196,6 +207,14 @@ def _said(found: Tracing) -> Iterator[str]:
         )
 
 
+def _said_of_fainter(number: int) -> Iterator[str]:
+    if number:
+        yield (
+            f"{_count(number, 'shape')} far fainter than the darkest {_was(number)} left out: "
+            f"draw with one pen, or lower faint, to have {'it' if number == 1 else 'them'}."
+        )
+
+
 def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'s' * (number != 1)}"
 
@@ -204,12 +223,16 @@ def _was(number: int) -> str:
     return "was" if number == 1 else "were"
 
 
-def _check_count(found: int, side: int) -> None:
+def _check_count(found: int, fainter: int, side: int) -> None:
     if found < 2:
+        remedy = "draw objects apart from each other, lower min_size, or choose the segmenter "
+        remedy += "rooms if it is a floor plan"
+        if fainter:
+            remedy = f"{_count(fainter, 'other')} {_was(fainter)} left out as far fainter than the "
+            remedy += "darkest: draw with one pen, or lower faint"
         raise InvalidInputError(
             Reason.TOO_FEW_OBJECTS,
             "pixels",
             f"has {'no shape' if not found else 'only one shape'} of at least {side} "
-            "pixels' side, and a match needs two; draw objects apart from each other, lower "
-            "min_size, or choose the segmenter rooms if it is a floor plan",
+            f"pixels' side, and a match needs two; {remedy}",
         )
