@@ -304,3 +304,65 @@ def test_outlines_far_fainter_than_the_darkest_are_left_out_and_said():
     pixels[:300, 400:] = 250
     with pytest.raises(InvalidInputError, match="3 others were left out as far fainter"):
         segmented(pixels)
+
+
+def table(*chairs):
+    """A table with chairs that touch it, beside a disc."""
+    pixels = paper((450, 600))
+    cv2.rectangle(pixels, (150, 150), (330, 300), 20, 3)
+    cv2.circle(pixels, (500, 100), 50, 20, 3)
+    for x, y in chairs:
+        cv2.rectangle(pixels, (x, y), (x + 46, y + 46), 20, 3)
+    return pixels
+
+
+PARTED = (
+    "1 drawing of touching or overlapping outlines was parted into the likely objects: draw "
+    "objects apart to be sure."
+)
+DIVIDED = (
+    "1 outline divided by lines from side to side was taken as one object: leave a gap between "
+    "objects that share a side."
+)
+
+
+@pytest.mark.parametrize("overlap", [0, 24])
+def test_a_table_and_the_chairs_that_touch_it_are_objects_of_their_own(overlap):
+    far, near = 46 - overlap, overlap
+    around = [(217, 150 - far), (217, 300 - near), (150 - far, 200), (330 - near, 200)]
+    found = segmented(table(*around))
+    assert len(found.scene) == 6
+    assert found.warnings == (PARTED,)
+    areas = sorted(item.area for item in found.scene.objects)
+    assert areas[:4] == pytest.approx([48 * 48] * 4, rel=0.15)
+    assert areas[5] == pytest.approx(183 * 153, rel=0.1)
+
+
+def test_two_chairs_at_one_side_of_a_table_are_parted_from_it():
+    found = segmented(table((160, 104), (270, 104)))
+    assert len(found.scene) == 4
+    assert found.warnings == (PARTED,)
+
+
+def test_an_outline_that_a_line_divides_is_one_object_and_this_is_said():
+    pixels = table()
+    cv2.line(pixels, (240, 150), (240, 300), 20, 3)
+    found = segmented(pixels)
+    assert len(found.scene) == 2
+    assert found.warnings == (DIVIDED,)
+
+
+def test_what_is_drawn_within_an_outline_is_no_division():
+    pixels = table()
+    cv2.circle(pixels, (240, 220), 30, 20, 3)
+    found = segmented(pixels)
+    assert len(found.scene) == 2
+    assert found.warnings == ()
+
+
+def test_a_chair_s_narrow_back_belongs_to_it():
+    pixels = table()
+    cv2.rectangle(pixels, (144, 138), (336, 150), 20, 3)
+    found = segmented(pixels)
+    assert len(found.scene) == 2
+    assert found.warnings == (DIVIDED,)

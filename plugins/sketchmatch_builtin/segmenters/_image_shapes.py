@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -29,7 +30,12 @@ _FULL = 0.15
 _WRITING = 0.15
 # Faces of a drawing belong to one object if together they fill this share of their convex hull.
 _CONVEX = 0.88
-_MOST_FACES = 7
+_MOST_FACES = 10
+# Faces stick out of a group if the dents that they add are larger than this share of them.
+_STICKS_OUT = 0.5
+# A group costs 1 and the share of its hull that are dents; a face in two groups, where objects
+# overlap, saves this.
+_SHARED = 0.01
 
 
 @dataclass
@@ -42,6 +48,7 @@ class Tracing:
     attached: int = 0
     closed: int = 0
     parted: int = 0
+    divided: int = 0
     written: int = 0
     open_lines: int = 0
 
@@ -100,8 +107,9 @@ def trace(ink: Mask, least: float, gap: float, frames: bool) -> Tracing:
     found.written, known = len(writing.intersection(whole)), writing.union(whole)
     lines = [shape for shape in shapes if shape not in known]
     for shape in (each for each in whole if each not in writing):
-        parts = _parts(drawing.ink_of(shape), drawing.filled(shape), radius, least)
+        parts, faces = _parts(drawing.ink_of(shape), drawing.filled(shape), radius, least)
         found.parted += len(parts) > 1
+        found.divided += len(parts) == 1 and faces > 1
         found.shapes.extend(parts)
     if not radius:
         return found
@@ -304,24 +312,25 @@ def _enlarged(shape: Shape, along_x: float, along_y: float) -> Shape:
 # Drawings that touch or overlap
 
 
-def _parts(ink: Mask, whole: Shape, radius: int, least: float) -> list[Shape]:
+def _parts(ink: Mask, whole: Shape, radius: int, least: float) -> tuple[list[Shape], int]:
     """Return a shape, or the shapes that it is drawn of where they touch or overlap.
 
-    What is drawn within a shape says nothing as long as the whole is convex, as a table with
-    things on it is. Otherwise the fewest convex groups of faces that cover it are taken.
+    The fewest convex groups of faces that cover it are taken, so that lines within a convex shape
+    part nothing. With them comes the number of faces at its outside.
     """
     if not radius:
-        return [whole]
+        return [whole], 0
     core = _core(whole.mask, radius)
-    if core.sum() < _CONVEX * _hull_area(core):
-        faces = _faces(ink & whole.mask, whole.mask, core, least)
-        groups = _fewest_convex(faces, radius) if 2 <= len(faces) <= _MOST_FACES else []
-        if len(groups) > 1:
-            return [_cropped(group & whole.mask, whole.corner) for group in groups]
+    faces = _faces(ink & whole.mask, whole.mask, core, least)
+    outside = cv2.erode(np.pad(whole.mask, 1), _disk(radius))[1:-1, 1:-1] == 0
+    outer = sum(bool(face[outside].any()) for face in faces)
+    groups = _fewest_convex(faces, radius) if 2 <= len(faces) <= _MOST_FACES else []
+    if len(groups) > 1:
+        return [_cropped(group & whole.mask, whole.corner) for group in groups], outer
     near = np.asarray(cv2.dilate(core, _disk(radius)), np.uint8)
     if (whole.mask & ~near).any() or _pieces(core) > 1:
-        return _opened(whole, radius, least) or [whole]
-    return [whole]
+        return _opened(whole, radius, least) or [whole], outer
+    return [whole], outer
 
 
 def _pieces(mask: Mask) -> int:
@@ -339,40 +348,105 @@ def _faces(ink: Mask, filled: Mask, core: Mask, least: float) -> list[Mask]:
 
 def _fewest_convex(faces: list[Mask], radius: int) -> list[Mask]:
     """Return the fewest groups of faces, each nearly convex, that cover all; none if there are."""
-    line = _disk(radius)
-    wide = [np.asarray(cv2.dilate(np.pad(face, radius), line), np.uint8) for face in faces]
-    candidates: list[tuple[float, int, Mask]] = []
-    for chosen in range(1, 1 << len(faces)):
-        union: Mask = np.zeros_like(wide[0])
-        for k, face in enumerate(wide):
-            if chosen >> k & 1:
-                union |= face
-        if cv2.connectedComponents(union)[0] == 2:
-            solidity = float(union.sum()) / max(_hull_area(union), 1.0)
-            if solidity >= _CONVEX:
-                candidates.append((solidity, chosen, union))
-    groups = _cover(candidates, (1 << len(faces)) - 1)
-    inner = slice(radius, -radius)
-    back = _disk(max(1, radius // 2))
-    return [np.asarray(cv2.erode(group, back), np.uint8)[inner, inner] for group in groups]
+    groups = _Groups(faces, radius)
+    everything = (1 << len(faces)) - 1
+    if groups.cost(everything) < math.inf:
+        return [groups.mask(everything)]
+    costs = {group: groups.cost(group) for group in range(1, everything)}
+    found = _cover({group: cost for group, cost in costs.items() if cost < math.inf}, len(faces))
+    return [groups.mask(group) for group in found]
 
 
-def _cover(candidates: list[tuple[float, int, Mask]], everything: int) -> list[Mask]:
-    """Return the cover by the fewest candidates that overlap least and are most convex."""
-    best: tuple[float, list[Mask]] = (-math.inf, [])
+class _Groups:
+    """Groups of faces, as bits of a number, and how convex each is.
 
-    def extend(taken: int, start: int, groups: list[Mask], worth: float) -> None:
+    A group's dents are what its convex hull has besides [1]_. No part of a convex group sticks out
+    of it, as a chair does of a table of at least twice its width: it adds dents of half its size.
+
+    References
+    ----------
+    .. [1] D. D. Hoffman, W. A. Richards, "Parts of recognition", Cognition 18, 1984: shapes are
+       parted where they are concave.
+    """
+
+    def __init__(self, faces: list[Mask], radius: int) -> None:
+        line = _disk(radius)
+        self._wide = [np.asarray(cv2.dilate(np.pad(f, radius), line), np.uint8) for f in faces]
+        outlines = [
+            cv2.findContours(f, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)[0] for f in self._wide
+        ]
+        self._hulls = [cv2.convexHull(np.concatenate(contours)) for contours in outlines]
+        self._shared = [
+            [int(np.count_nonzero(f & other)) for other in self._wide] for f in self._wide
+        ]
+        self._thick = sum(1 << k for k, face in enumerate(faces) if _core(face, radius).any())
+        self._sizes = [int(face.sum()) for face in faces]
+        self._radius = radius
+        self._measured: dict[int, tuple[float, float]] = {}
+
+    def mask(self, group: int) -> Mask:
+        """Return a group's faces and the lines between them."""
+        union = np.bitwise_or.reduce([self._wide[k] for k in self._members(group)])
+        back, inner = _disk(max(1, self._radius // 2)), slice(self._radius, -self._radius)
+        return np.asarray(cv2.erode(union, back), np.uint8)[inner, inner]
+
+    def cost(self, group: int) -> float:
+        """Return 1 and the share of a group's hull that are dents; infinite if it is not convex."""
+        area, dents = self._measure(group)
+        share = dents / max(area + dents, 1.0)
+        convex = share <= 1.0 - _CONVEX and self._connected(group) and not self._sticks_out(group)
+        return 1.0 + share if convex else math.inf
+
+    def _members(self, group: int) -> list[int]:
+        return [k for k in range(len(self._wide)) if group >> k & 1]
+
+    def _measure(self, group: int) -> tuple[float, float]:
+        """Return the area of a group with its lines, and that of its dents."""
+        if group not in self._measured:
+            members = self._members(group)
+            pairs = itertools.combinations(members, 2)
+            area = sum(self._shared[k][k] for k in members)
+            area -= sum(self._shared[one][other] for one, other in pairs)
+            hull = cv2.convexHull(np.concatenate([self._hulls[k] for k in members]))
+            self._measured[group] = float(area), max(0.0, cv2.contourArea(hull) - area)
+        return self._measured[group]
+
+    def _sticks_out(self, group: int) -> bool:
+        dents = self._measure(group)[1]
+        if dents <= _STICKS_OUT * min(self._sizes[k] for k in self._members(group)):
+            return False
+        part = (group - 1) & group
+        while part:
+            size = sum(self._sizes[k] for k in self._members(part))
+            added = dents - self._measure(group ^ part)[1] if dents > _STICKS_OUT * size else 0.0
+            if part & self._thick and added > _STICKS_OUT * size:
+                return True
+            part = (part - 1) & group
+        return False
+
+    def _connected(self, group: int) -> bool:
+        members = self._members(group)
+        reached = [members[0]]
+        for one in reached:
+            reached += [k for k in members if k not in reached and self._shared[one][k]]
+        return len(reached) == len(members)
+
+
+def _cover(costs: dict[int, float], faces: int) -> list[int]:
+    """Return the groups of least cost that cover all faces."""
+    choices = [[group for group in costs if group >> k & 1] for k in range(faces)]
+    order = sorted(range(faces), key=lambda k: len(choices[k]))
+    best: tuple[float, list[int]] = (math.inf, [])
+
+    def extend(taken: int, groups: list[int], cost: float) -> None:
         nonlocal best
-        if taken == everything:
-            best = max(best, (worth, groups), key=lambda cover: cover[0])
-            return
-        if len(groups) == 3:
-            return
-        for k in range(start, len(candidates)):
-            solidity, chosen, union = candidates[k]
-            if chosen & ~taken:
-                shared = (chosen & taken).bit_count()
-                extend(taken | chosen, k + 1, [*groups, union], worth + solidity - 2 - 0.1 * shared)
+        left = next((k for k in order if not taken >> k & 1), None)
+        if left is None:
+            best = min(best, (cost, groups), key=lambda cover: cover[0])
+        elif cost + 1.0 - _SHARED * faces < best[0]:
+            for group in choices[left]:
+                saved = _SHARED * (group & taken).bit_count()
+                extend(taken | group, [*groups, group], cost + costs[group] - saved)
 
-    extend(0, 0, [], 0.0)
+    extend(0, [], 0.0)
     return best[1]

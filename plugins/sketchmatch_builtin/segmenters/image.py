@@ -194,6 +194,12 @@ def _said(found: Tracing) -> Iterator[str]:
             f"{_count(found.parted, 'drawing')} of touching or overlapping outlines "
             f"{_was(found.parted)} parted into the likely objects: draw objects apart to be sure."
         )
+    if found.divided:
+        yield (
+            f"{_count(found.divided, 'outline')} divided by lines from side to side "
+            f"{_was(found.divided)} taken as one object{' each' * (found.divided > 1)}: leave a "
+            "gap between objects that share a side."
+        )
     if found.closed:
         yield (
             f"{_count(found.closed, 'outline')} with gaps {_was(found.closed)} closed: lower "
