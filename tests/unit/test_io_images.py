@@ -38,6 +38,20 @@ def test_pictures_of_browsers_are_read_whatever_they_are_called(tmp_path, kind, 
     assert (read_source(path).pixels == GREY).all()
 
 
+@pytest.mark.parametrize("kind", ["PNG", "WEBP", "GIF", "TIFF"])
+@pytest.mark.parametrize("mode", ["L", "RGB"])
+def test_of_several_pages_or_frames_the_first_is_read_and_this_is_said(kind, mode):
+    first, second = (PIL.Image.new(mode, (30, 20), colour) for colour in ("white", "black"))
+    alone = decode_image(saved(first, kind))
+    several = decode_image(saved(first, kind, save_all=True, append_images=[second]))
+    assert (several.pixels == alone.pixels).all()
+    assert alone.notes == ()
+    assert several.notes == (
+        "Of the file's several pages or frames the first alone was read: save another by itself "
+        "to have that one.",
+    )
+
+
 COLOURS = np.zeros((40, 60, 3), np.uint8) + np.array([255, 250, 240], np.uint8)
 COLOURS[5:15, 5:25], COLOURS[20:35, 30:50] = [250, 220, 0], [200, 30, 40]
 

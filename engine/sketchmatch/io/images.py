@@ -37,6 +37,11 @@ _VISIBLE = 64
 # Pixels that are looked at together.
 _STRIP = 1 << 20
 
+_SEVERAL = (
+    "Of the file's several pages or frames the first alone was read: save another by itself to "
+    "have that one."
+)
+
 
 def decode_image(data: bytes) -> Image:
     """Decode a picture of a map or of a sketch, in grey unless it has colours.
@@ -49,7 +54,7 @@ def decode_image(data: bytes) -> Image:
     ----------
     data
         A whole PNG, JPEG, WebP, GIF, BMP, TIFF, PGM, PPM or PBM file; of several pictures the
-        first.
+        first, which the picture's notes say.
 
     Raises
     ------
@@ -57,14 +62,16 @@ def decode_image(data: bytes) -> Image:
         With the path ``data``, if it is no such file, is damaged or cut short, or announces more
         pixels than :func:`sketchmatch.model.limits.source_limits` allows.
     """
-    picture = _upright(scaled_to_8_bits(load_picture(data, "data"), "data"))
+    loaded = load_picture(data, "data")
+    notes = (_SEVERAL,) if getattr(loaded, "is_animated", False) else ()
+    picture = _upright(scaled_to_8_bits(loaded, "data"))
     if picture.has_transparency_data:
         picture = _on_paper(np.array(picture.convert("RGBA")))
     if picture.mode in _GREY:
-        return Image(np.asarray(picture.convert("L")))
+        return Image(np.asarray(picture.convert("L")), notes)
     if picture.mode != "RGB":
         picture = picture.convert("RGB")
-    return Image(np.asarray(picture if _has_colour(picture) else picture.convert("L")))
+    return Image(np.asarray(picture if _has_colour(picture) else picture.convert("L")), notes)
 
 
 def _on_paper(pixels: NDArray[np.uint8]) -> PIL.Image.Image:

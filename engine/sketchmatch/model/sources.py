@@ -245,9 +245,12 @@ class Image:
     pixels
         uint8, row 0 the highest; 0 is black. Shape (rows, columns) if grey, (rows, columns, 3)
         if in colour: red, green, blue.
+    notes
+        What whoever read the file left out or had to decide, as in :class:`StrokeSet`.
     """
 
     pixels: NDArray[np.uint8]
+    notes: tuple[str, ...] = ()
 
     field = "image"
 
