@@ -103,6 +103,14 @@ def test_a_line_around_everything_is_a_frame():
     )
 
 
+def test_walls_of_double_lines_are_a_frame():
+    pixels = framed()
+    cv2.rectangle(pixels, (25, 25), (374, 274), 20, 4)
+    found = segmented(pixels)
+    assert len(found.scene) == 3
+    assert len(found.warnings) == 1
+
+
 def test_a_frame_can_be_kept_as_the_one_object_that_it_is():
     with pytest.raises(InvalidInputError, match="has only one shape"):
         segmented(framed(), frame="keep")

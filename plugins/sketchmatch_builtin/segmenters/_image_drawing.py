@@ -54,15 +54,20 @@ class Drawing:
         return self._children(np.flatnonzero(self._parents == shape))
 
     def frame(self, shapes: list[int]) -> int | None:
-        """Return the shape around at least two others that spans most of the drawing."""
+        """Return the shape around at least two others that spans most of the drawing.
+
+        Between it and these there may be others of that kind, as where walls are double lines.
+        """
         if not shapes:
             return None
         boxes = np.array([self.box(shape) for shape in shapes])
         low, high = boxes[:, :2].min(axis=0), (boxes[:, :2] + boxes[:, 2:]).max(axis=0)
-        areas = boxes[:, 2] * boxes[:, 3]
-        largest = int(areas.argmax())
-        spans = areas[largest] >= _FRAME * np.prod(high - low)
-        return shapes[largest] if spans and len(self.inside(shapes[largest])) >= 2 else None
+        least = _FRAME * float(np.prod(high - low))
+        largest = shapes[int((boxes[:, 2] * boxes[:, 3]).argmax())]
+        inside = [largest]
+        while len(inside) == 1 and math.prod(self.box(inside[0])[2:]) >= least:
+            inside = self.inside(inside[0])
+        return largest if len(inside) >= 2 else None
 
     def room(self, shapes: list[int]) -> int | None:
         """Return a shape around others that is far larger than these, as the walls of a room are.
