@@ -578,6 +578,11 @@ def test_small_holes_of_walls_are_rooms_though_larger_ones_open_into_each_other(
     assert len(found) == 27
 
 
+def test_small_outlines_alone_are_rooms():
+    boxes = [box(3 * x, 3 * y, 3, 3) for x in range(5) for y in range(4)]
+    assert areas(strokes(boxes)) == pytest.approx([9.0] * 20, rel=0.05)
+
+
 @SLOW
 def test_in_a_drawing_of_very_many_lines_furniture_is_not_looked_for(monkeypatch):
     lines = [*HALL, *doors("apart"), box(7, 6.0, 2, 1)]

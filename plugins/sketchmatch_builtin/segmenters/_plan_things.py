@@ -135,6 +135,8 @@ def things_in(lines: Sequence[FloatArray], names: Sequence[Landmark]) -> Things:
     rest = [line for k, line in enumerate(lines) if k not in set(which.tolist())]
     near = _NEAR * float(np.ptp(shapely.get_coordinates(whole), axis=0).max())
     walls = [shapely.LineString(line) for line in rest if len(line) > 1]
+    if not walls:
+        return Things([], [])
     pairs = shapely.STRtree(outlines).query(outlines, "dwithin", near)
     group = groups(len(outlines), pairs)
     touches = np.zeros(len(outlines), dtype=bool)
