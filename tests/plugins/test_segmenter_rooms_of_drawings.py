@@ -583,6 +583,20 @@ def test_small_outlines_alone_are_rooms():
     assert areas(strokes(boxes)) == pytest.approx([9.0] * 20, rel=0.05)
 
 
+def test_closets_of_a_large_building_are_rooms():
+    rooms = [box(3 * x, 3 * y, 3, 3) for x in range(6) for y in range(5)]
+    closets = [box(18, 1.4 * y, 1.5, 1.4) for y in range(4)]
+    found = sorted(areas(strokes([*rooms, *closets])))
+    assert found == pytest.approx([2.1] * 4 + [9.0] * 30, rel=0.12)
+
+
+def test_tiles_are_no_rooms():
+    rooms = [box(4 * x, 4 * y, 4, 4) for x in range(3) for y in range(3)]
+    tiles = [[(0, y), (4, y)] for y in (0.7, 1.5, 2.1, 2.9, 3.4)]
+    tiles += [[(x, 0), (x, 4)] for x in (0.5, 1.2, 2.0, 2.6, 3.3)]
+    assert areas(strokes([*rooms, *tiles])) == pytest.approx([16.0] * 8, rel=0.05)
+
+
 @SLOW
 def test_in_a_drawing_of_very_many_lines_furniture_is_not_looked_for(monkeypatch):
     lines = [*HALL, *doors("apart"), box(7, 6.0, 2, 1)]

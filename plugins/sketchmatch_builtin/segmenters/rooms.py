@@ -78,8 +78,8 @@ _MOST_LINES = 3000
 _FEWEST = 2
 # Of its longer side: half the width from which a room counts.
 _NARROWEST = 0.006
-# Of all rooms: the smallest.
-_SMALLEST_SHARE = 0.01
+# The smallest room: of all of them together, and of the mean one where they are many.
+_SMALLEST_SHARE, _SMALL = 0.01, 0.2
 
 
 class RoomSegmenter(Segmenter):
@@ -188,7 +188,7 @@ class RoomSegmenter(Segmenter):
             le=1e6,
             description=(
                 "Rooms smaller than this are left out; when left out 2 m², and in a drawing a "
-                "hundredth of all rooms."
+                "hundredth of all rooms, or where these are many a fifth of the mean room."
             ),
             json_schema_extra={"unit": "m²"},
         )
@@ -231,14 +231,13 @@ class RoomSegmenter(Segmenter):
             yield self._of_map(source)
             return
         plan = self._plan(source)
-        if self.params.door_width is not None:
-            yield self._of_plan(source, plan, divided(plan.free, plan.door, self._cells(plan)))
-            return
-        (parts,) = self._by_width(plan, [_NARROW])
-        yield self._of_plan(source, plan, parts)
-        for parts in self._by_width(plan, _OTHERWISE_NARROW):
-            with suppress(InvalidInputError):
-                yield self._of_plan(source, plan, parts)
+        least = self._least(plan)
+        (parts,) = self._parts(plan, [_NARROW], least)
+        yield self._of_plan(source, plan, parts, least)
+        if self.params.door_width is None:
+            for parts in self._parts(plan, _OTHERWISE_NARROW, least):
+                with suppress(InvalidInputError):
+                    yield self._of_plan(source, plan, parts, least)
 
     def _of_map(self, source: OccupancyGrid) -> Segmentation:
         params, cell = self.params, source.resolution
@@ -300,8 +299,9 @@ class RoomSegmenter(Segmenter):
         """Return a plan in larger cells without some lines, and the number of each cell's room."""
         width = self.params.door_width
         plan = self._emptied(drawn(source, width, left_out=left_out, side=_COARSE_SIDE))
-        (parts,) = self._by_width(plan, [_NARROW])
-        return plan, _numbered(parts, self._cells(plan))
+        least = self._least(plan)
+        (parts,) = self._parts(plan, [_NARROW], least)
+        return plan, _numbered(parts, least)
 
     def _emptied(self, plan: Plan) -> Plan:
         """Return a plan without the things that stand free."""
@@ -309,29 +309,37 @@ class RoomSegmenter(Segmenter):
         longest = plan.door if longest is None else longest / plan.cell
         return replace(plan, free=_furnished(plan.free, longest))
 
-    def _by_width(self, plan: Plan, shares: Sequence[float]) -> list[Mask]:
+    def _parts(self, plan: Plan, shares: Sequence[float], least: float) -> list[Mask]:
+        """Return the rooms of a plan, for each share, from so many cells on."""
+        if self.params.door_width is not None:
+            return [divided(plan.free, plan.door, least)]
         narrowest = _NARROWEST * max(plan.free.shape)
-        return divided_by_width(plan.free, shares, narrowest, self._cells(plan))
-
-    def _cells(self, plan: Plan) -> float:
-        """Return the area of the smallest room in a drawing, in cells."""
-        return max(self._least(plan) / plan.cell**2, 1.0)
+        return divided_by_width(plan.free, shares, narrowest, least)
 
     def _least(self, plan: Plan) -> float:
-        """Return the area of the smallest room in a drawing."""
+        """Return the area of the smallest room in a drawing, in cells."""
         if self.params.min_area is not None:
-            return self.params.min_area
-        return float(_SMALLEST_SHARE * np.count_nonzero(plan.free) * plan.cell**2)
+            return max(self.params.min_area / plan.cell**2, 1.0)
+        most = float(max(_SMALLEST_SHARE * np.count_nonzero(plan.free), 1.0))
+        (parts,) = self._parts(plan, [_NARROW], most)
+        rooms = [area for area in _areas(parts) if area >= most]
+        closets = [area for area in _areas(plan.free) if area < most]
+        areas = np.sort([*rooms, *closets])[::-1]
+        means = areas.cumsum() / np.arange(1, len(areas) + 1)
+        # Up to where they become much smaller at once, as what is hatched does.
+        count = int(np.argmin(np.append(areas >= _SMALL * means, False)))
+        smallest = _SMALL * float(means[count - 1]) if count else most
+        return max(min(most, smallest), 1.0)
 
     def _of_plan(
-        self, source: StrokeSet | PolygonSet | Image, plan: Plan, parts: Mask
+        self, source: StrokeSet | PolygonSet | Image, plan: Plan, parts: Mask, least: float
     ) -> Segmentation:
         width = self.params.door_width
         cut = "where it is less than half as wide"
         if width is not None:
             cut = f"at passages of up to {width:.2g}"
         path = {"stroke_set": "strokes", "polygon_set": "polygons", "image": "pixels"}[source.field]
-        area = self._least(plan)
+        area = least * plan.cell**2
         found, passages = self._outlines(plan.free | plan.doors, parts, area, plan.cell, path, cut)
         rooms = [[plan.cell * ring + plan.corner for ring in _rings(room)] for room in found]
         labels, warnings = _named(
@@ -362,6 +370,12 @@ class RoomSegmenter(Segmenter):
         place[np.add(order, 1)] = np.arange(1, len(found) + 1)
         meeting = parts_that_meet(free, place[labels]) - 1
         return [found[k] for k in order], tuple((a, b) for a, b in meeting.tolist())
+
+
+def _areas(mask: Mask) -> list[int]:
+    """Return how many cells each component of a mask has."""
+    _, _, statistics, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    return cast(list[int], statistics[1:, cv2.CC_STAT_AREA].tolist())
 
 
 def _numbered(rooms: Mask, least: float) -> Labels:
