@@ -597,6 +597,12 @@ def test_tiles_are_no_rooms():
     assert areas(strokes([*rooms, *tiles])) == pytest.approx([16.0] * 8, rel=0.05)
 
 
+def test_rings_that_fill_most_of_an_outline_are_rooms_in_a_wall():
+    rings = [box(4.2 * x + 0.2, 3.2 * y + 0.2, 4, 3) for x in range(3) for y in range(3)]
+    found = areas(strokes([*rings, box(0, 0, 12.8, 9.8), box(12.8, 0, 12, 9.8)]))
+    assert sorted(found) == pytest.approx([12.0] * 9 + [12 * 9.8], rel=0.05)
+
+
 @SLOW
 def test_in_a_drawing_of_very_many_lines_furniture_is_not_looked_for(monkeypatch):
     lines = [*HALL, *doors("apart"), box(7, 6.0, 2, 1)]

@@ -21,6 +21,8 @@ __all__ = ["Things", "dimensions", "paper", "standing", "things_in"]
 _LARGEST = 0.06
 # … and most of all that touch walls.
 _FULL = 0.3
+# Of a room: what things fill at most.
+_MOST = 0.5
 # Of the square of the way around it: the least area. What is longer than seven times its width is
 # a wall.
 _THICK = 0.027
@@ -159,7 +161,8 @@ def standing(
 ) -> list[int]:
     """Return the lines of free things that stand in a room.
 
-    Of several with names in a place without one of its own, these are rooms.
+    Of several with names in a place without one of its own, these are rooms, and so are those that
+    fill most of a place, between which there is hardly a way.
 
     Parameters
     ----------
@@ -172,8 +175,8 @@ def standing(
     cells
         The side of a cell, and where the first one is: (side, x, y).
     """
-    hulls = [shapely.Polygon(lines[k]) for each in free for k in each]
-    things = shapely.union_all(shapely.make_valid(hulls))
+    outlines = [shapely.union_all([_outline(lines[k]) for k in each]) for each in free]
+    things = shapely.union_all(outlines)
     spots = [shapely.Point(item.point) for item in names]
     own = Counter(
         _room_at(np.array([item.point]), rooms, cells)
@@ -183,15 +186,21 @@ def standing(
     where = [_room_at(np.concatenate([lines[k] for k in each]), rooms, cells) for each in free]
     named = Counter(
         room
-        for room, each in zip(where, free, strict=True)
-        if any(shapely.Polygon(lines[k]).intersects(spot) for k in each for spot in spots)
+        for room, outline in zip(where, outlines, strict=True)
+        if shapely.intersects(outline, spots).any()
     )
+    filled = np.bincount(where, shapely.area(outlines), minlength=int(rooms.max()) + 1)
+    full = filled > _MOST * np.bincount(rooms.ravel()) * cells[0] ** 2
     return [
         k
         for room, each in zip(where, free, strict=True)
-        if room and (named[room] < 2 or own[room])
+        if room and not full[room] and (named[room] < 2 or own[room])
         for k in each
     ]
+
+
+def _outline(line: FloatArray) -> shapely.Geometry:
+    return shapely.make_valid(shapely.Polygon(line))
 
 
 def _room_at(points: FloatArray, rooms: Labels, cells: FloatArray) -> int:
