@@ -208,8 +208,7 @@ def test_what_a_pad_exported_is_what_was_drawn(name):
         assert item.polygon.intersection(thing).area > 0.93 * item.polygon.union(thing).area
 
 
-def walls(*holes):
-    outline = "M0 0H100V70H0z"
+def walls(*holes, outline="M0 0H100V70H0z"):
     path = f'<path fill="#333" fill-rule="evenodd" d="{outline}{"".join(holes)}"/>'
     document = f'<svg xmlns="http://www.w3.org/2000/svg">{path}</svg>'
     return [stroke.points.tolist() for stroke in decode_svg(document.encode()).strokes]
@@ -235,3 +234,11 @@ def test_a_hole_that_winds_around_walls_is_no_pen_stroke():
 def test_a_ring_of_ink_around_one_hole_is_still_the_loop_in_its_middle():
     (loop,) = walls("M4 4H96V66H4z")
     assert np.ptp(loop, axis=0) == pytest.approx([96, 66], abs=0.5)
+
+
+def test_ink_that_leads_on_from_a_ring_is_walls_and_not_the_ring_alone():
+    # A closet between two rooms, with their walls.
+    closet = "M53 3H67V67H53z"
+    outer, hole = walls(closet, outline="M0 0H120V3H70V67H120V70H0V67H50V3H0z")
+    assert np.ptp(outer, axis=0).tolist() == [120, 70]
+    assert np.ptp(hole, axis=0).tolist() == [14, 64]

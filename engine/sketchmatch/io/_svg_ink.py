@@ -31,6 +31,8 @@ _MOST, _FAR = 0.9, 3.0
 _WIDEST_RING = 0.25
 # From so many holes on, or if all is so many times as long as around it, it is walls of rooms.
 _FEWEST_ROOMS, _WINDING = 3, 2.5
+# … or if less of it is rings: a pen's ends are shorter.
+_ALL_BUT_ENDS = 0.75
 # Where ends are looked for first, places compared for that, and how often the search is refined.
 _STARTS, _PLACES, _ROUNDS = 96, 24, 8
 _FEWEST, _MOST_POINTS = 48, 1000
@@ -223,16 +225,20 @@ def _overlapping(shapes: list[shapely.Polygon]) -> list[list[int]]:
 def _around(shape: shapely.Polygon, outline: FloatArray) -> list[FloatArray]:
     """Return the lines in the middle of rings of ink; of another shape with holes its outline.
 
-    Around several holes, or one that winds, ink is walls: what bounds it are its sides.
+    Around several holes, or one that winds, or if much of it leads elsewhere, ink is walls: what
+    bounds it are its sides.
     """
     outer = shapely.Polygon(shape.exterior)
     width = 2.0 * shape.area / shape.length
     x0, y0, x1, y1 = shape.bounds
     if not shape.interiors or not 0.0 < width <= _WIDEST_RING * min(x1 - x0, y1 - y0):
         return [outline]
+    sides = [outline, *map(shapely.get_coordinates, shape.interiors)]
     if len(shape.interiors) >= _FEWEST_ROOMS or shape.length > _WINDING * outer.length:
-        return [outline, *map(shapely.get_coordinates, shape.interiors)]
+        return sides
     # Ends of the line that stick out, and lines from ring to ring, are as thin as it is and vanish.
     rings = shapely.buffer(shapely.buffer(outer, -0.75 * width), 0.25 * width)
     parts = [part for part in shapely.get_parts(rings) if part.area > width**2]
-    return [shapely.get_coordinates(part.exterior) for part in parts] or [outline]
+    if width * sum(part.exterior.length for part in parts) < _ALL_BUT_ENDS * shape.area:
+        return sides
+    return [shapely.get_coordinates(part.exterior) for part in parts]
