@@ -508,6 +508,12 @@ def test_furniture_is_of_the_room_that_it_stands_in():
     }
 
 
+def test_lines_within_furniture_are_of_it():
+    table = [box(4, 4, 3, 1.2), [(4, 4), (7, 5.2)], [(4, 5.2), (7, 4)], box(4.4, 5, 2, 0.1)]
+    found = areas(strokes([*HALL, *doors("apart"), *table]))
+    assert sorted(found) == pytest.approx(HALL_AREAS, rel=0.1)
+
+
 def test_closed_lines_side_by_side_are_rooms_however_small():
     boxes = [box(0, 0, 9, 4), box(0, 4, 4, 3), box(4, 4, 1.5, 1.5), box(4, 5.5, 1.5, 1.5)]
     found = areas(strokes([*boxes, box(5.5, 4, 3.5, 3)]))

@@ -15,7 +15,7 @@ from sketchmatch_builtin.segmenters._doorways import Labels
 from sketchmatch_builtin.segmenters._lines import is_closed, is_straight
 from sketchmatch_builtin.segmenters._merging import groups
 
-__all__ = ["Things", "dimensions", "paper", "standing", "things_in"]
+__all__ = ["Things", "dimensions", "paper", "standing", "things_in", "within"]
 
 # Of the area of the hull of all that is drawn: the largest thing.
 _LARGEST = 0.06
@@ -134,8 +134,9 @@ def things_in(lines: Sequence[FloatArray], names: Sequence[Landmark]) -> Things:
     small = (areas > 0.0) & (areas <= _LARGEST * whole.convex_hull.area)
     small &= areas >= _THICK * shapely.length(outlines) ** 2
     which, outlines = np.array(closed)[small], outlines[small]
-    rest = [line for k, line in enumerate(lines) if k not in set(which.tolist())]
     near = _NEAR * float(np.ptp(shapely.get_coordinates(whole), axis=0).max())
+    aside = {*which.tolist()} | within(lines, which.tolist())
+    rest = [line for k, line in enumerate(lines) if k not in aside]
     walls = [shapely.LineString(line) for line in rest if len(line) > 1]
     if not walls:
         return Things([], [])
@@ -150,6 +151,18 @@ def things_in(lines: Sequence[FloatArray], names: Sequence[Landmark]) -> Things:
     unnamed &= shapely.area(outlines[unnamed]).sum() <= _FULL * whole.convex_hull.area
     free = [which[~touching & (group == k)].tolist() for k in np.unique(group[~touching])]
     return Things(free, which[unnamed].tolist())
+
+
+def within(lines: Sequence[FloatArray], outlines: Sequence[int]) -> set[int]:
+    """Return which lines, each of shape (k, 2), are drawn in others that are closed."""
+    others = np.array([k for k, line in enumerate(lines) if len(line) > 1], dtype=np.int64)
+    drawn = np.array([shapely.LineString(lines[k]) for k in others], dtype=object)
+    if not len(drawn):
+        return set()
+    near = _NEAR * float(np.ptp(shapely.get_coordinates(drawn), axis=0).max())
+    around = shapely.buffer(np.array([_outline(lines[k]) for k in outlines], dtype=object), near)
+    inner = shapely.STRtree(drawn).query(around, "contains")[1]
+    return {*others[inner].tolist()} - {*outlines}
 
 
 def standing(

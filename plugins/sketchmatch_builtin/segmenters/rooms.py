@@ -52,6 +52,7 @@ from sketchmatch_builtin.segmenters._plan_things import (
     paper,
     standing,
     things_in,
+    within,
 )
 from sketchmatch_builtin.segmenters._plans import Plan, drawn, lines_of
 from sketchmatch_builtin.segmenters._widths import divided_by_width
@@ -282,12 +283,14 @@ class RoomSegmenter(Segmenter):
         free, touching = things_in(lines, names)
         if not (free or touching):
             return aside
-        plan, rooms = self._rooms_without(source, {*aside, *touching, *itertools.chain(*free)})
+        things = [*touching, *itertools.chain(*free)]
+        plan, rooms = self._rooms_without(source, aside.union(things, within(lines, things)))
         count = int(rooms.max())
         if count < _FEWEST:
             return aside
         cells = np.array([plan.cell, *plan.corner])
-        found = aside.union(standing(free, lines, names, rooms, cells))
+        stand = standing(free, lines, names, rooms, cells)
+        found = aside.union(stand, within(lines, stand))
         opening = np.unique(parts_that_meet(plan.free | plan.doors, rooms))
         # Where rooms open into each other, what bounds one is more than a line, or has gaps; but
         # of a line that bounds a wall more rooms are found without it.
