@@ -508,6 +508,14 @@ def test_furniture_is_of_the_room_that_it_stands_in():
     }
 
 
+def test_a_narrow_hall_that_is_entered_from_outside_is_no_outside():
+    lines = [[(0, 1.6), (0, 5), (12, 5), (12, -4), (0, -4), (0, 0.7)], [(6, 1.9), (6, 5)]]
+    lines += [[(0, 1.9), (2, 1.9)], [(2.9, 1.9), (8, 1.9)], [(8.9, 1.9), (12, 1.9)]]
+    lines += [[(0, 0.4), (3, 0.4)], [(3.9, 0.4), (9, 0.4)], [(9.9, 0.4), (12, 0.4)]]
+    found = areas(strokes([*lines, [(6, 0.4), (6, -4)]]))
+    assert sorted(found) == pytest.approx([18, 18.6, 18.6, 26.4, 26.4], rel=0.05)
+
+
 def test_lines_within_furniture_are_of_it():
     table = [box(4, 4, 3, 1.2), [(4, 4), (7, 5.2)], [(4, 5.2), (7, 4)], box(4.4, 5, 2, 0.1)]
     found = areas(strokes([*HALL, *doors("apart"), *table]))

@@ -159,7 +159,10 @@ def _between(walls: Mask, door: float | None) -> tuple[Mask, float]:
     inside = _hull(walls) & free
     for _ in range(2):
         width = door or (doorway(inside, math.inf) if inside.any() else 1.0)
-        inside = _off_border(divided(free, width, width**2 / 2.0)) & free
+        # Outside is wider than any doorway, and joins no hall through the door of a building.
+        around = math.ceil(width)
+        parts = divided(np.pad(free, around, constant_values=1), width, width**2 / 2.0)
+        inside = _off_border(parts)[around:-around, around:-around] & free
     # What was cut within the building is joined again, to be cut once for all sources.
     reach = np.ones((5, 5), np.uint8)
     return np.asarray(cv2.dilate(inside, reach), dtype=np.uint8) & free, width
