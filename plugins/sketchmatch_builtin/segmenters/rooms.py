@@ -232,8 +232,7 @@ class RoomSegmenter(Segmenter):
             yield self._of_map(source)
             return
         plan = self._plan(source)
-        least = self._least(plan)
-        (parts,) = self._parts(plan, [_NARROW], least)
+        parts, least = self._rooms(plan)
         yield self._of_plan(source, plan, parts, least)
         if self.params.door_width is None:
             for parts in self._parts(plan, _OTHERWISE_NARROW, least):
@@ -302,9 +301,7 @@ class RoomSegmenter(Segmenter):
         """Return a plan in larger cells without some lines, and the number of each cell's room."""
         width = self.params.door_width
         plan = self._emptied(drawn(source, width, left_out=left_out, side=_COARSE_SIDE))
-        least = self._least(plan)
-        (parts,) = self._parts(plan, [_NARROW], least)
-        return plan, _numbered(parts, least)
+        return plan, _numbered(*self._rooms(plan))
 
     def _emptied(self, plan: Plan) -> Plan:
         """Return a plan without the things that stand free."""
@@ -312,27 +309,31 @@ class RoomSegmenter(Segmenter):
         longest = plan.door if longest is None else longest / plan.cell
         return replace(plan, free=_furnished(plan.free, longest))
 
+    def _rooms(self, plan: Plan) -> tuple[Mask, float]:
+        """Return the rooms of a plan, and the area of the smallest, in cells."""
+        area = self.params.min_area
+        share = _SMALLEST_SHARE * float(np.count_nonzero(plan.free))
+        least = max(share if area is None else area / plan.cell**2, 1.0)
+        (parts,) = self._parts(plan, [_NARROW], least)
+        if area is not None:
+            return parts, least
+        rooms = [cells for cells in _areas(parts) if cells >= least]
+        closets = [cells for cells in _areas(plan.free) if cells < least]
+        areas = np.sort([*rooms, *closets])[::-1]
+        means = areas.cumsum() / np.arange(1, len(areas) + 1)
+        # Up to where they become much smaller at once, as what is hatched does.
+        count = int(np.argmin(np.append(areas >= _SMALL * means, False)))
+        if count and _SMALL * means[count - 1] < least:
+            least = max(_SMALL * float(means[count - 1]), 1.0)
+            (parts,) = self._parts(plan, [_NARROW], least)
+        return parts, least
+
     def _parts(self, plan: Plan, shares: Sequence[float], least: float) -> list[Mask]:
         """Return the rooms of a plan, for each share, from so many cells on."""
         if self.params.door_width is not None:
             return [divided(plan.free, plan.door, least)]
         narrowest = _NARROWEST * max(plan.free.shape)
         return divided_by_width(plan.free, shares, narrowest, least)
-
-    def _least(self, plan: Plan) -> float:
-        """Return the area of the smallest room in a drawing, in cells."""
-        if self.params.min_area is not None:
-            return max(self.params.min_area / plan.cell**2, 1.0)
-        most = float(max(_SMALLEST_SHARE * np.count_nonzero(plan.free), 1.0))
-        (parts,) = self._parts(plan, [_NARROW], most)
-        rooms = [area for area in _areas(parts) if area >= most]
-        closets = [area for area in _areas(plan.free) if area < most]
-        areas = np.sort([*rooms, *closets])[::-1]
-        means = areas.cumsum() / np.arange(1, len(areas) + 1)
-        # Up to where they become much smaller at once, as what is hatched does.
-        count = int(np.argmin(np.append(areas >= _SMALL * means, False)))
-        smallest = _SMALL * float(means[count - 1]) if count else most
-        return max(min(most, smallest), 1.0)
 
     def _of_plan(
         self, source: StrokeSet | PolygonSet | Image, plan: Plan, parts: Mask, least: float
