@@ -24,7 +24,7 @@ GEOJSON = PAGE.take_one("py", "to_geojson")
 
 
 @pytest.mark.parametrize(
-    "example", EXAMPLES, ids=["first answer", "pen", "asyncio", "anyio", "carry", "tls"]
+    "example", EXAMPLES, ids=["first answer", "pen", "loop", "asyncio", "anyio", "transfer", "tls"]
 )
 def test_the_examples_run(example, server, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -81,7 +81,7 @@ def test_every_way_into_a_server_is_listed():
 
 
 def test_every_option_of_a_transfer_is_listed():
-    section = README.partition("\n## Carry routes and zones\n")[2].partition("\n## ")[0]
+    section = README.partition("\n## Routes and zones\n")[2].partition("\n## ")[0]
     for name in TransferOptions.__annotations__.keys() - MatchOptions.__annotations__.keys():
         assert f"| `{name}` |" in section
 

@@ -29,6 +29,7 @@ room = sources.map_server_map("room.yaml")
 SAID = (
     "8 of 8 sketched objects matched",
     "  in the sketch ",
+    "the bed 0? 4 of 4 sketched objects matched",
     "object_matches {",
     "3 of 3 sketched objects matched",
     "[map_object: ",
@@ -68,6 +69,7 @@ def test_every_block_runs(address, here, number):
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", code.replace("localhost:50051", address)],
         cwd=here,
+        input="1\n",
         capture_output=True,
         text=True,
         timeout=200,
