@@ -22,6 +22,7 @@ from sketchmatch.registry import OWN_DISTRIBUTION, Kind, default_registry
 from sketchmatch.testing import check_plugin
 from sketchmatch.testing.conformance.readers import CONTRACTS
 from sketchmatch_map_files import PICTURE_SUFFIXES
+from tests.pages import page_names
 from tests.tools import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -121,28 +122,24 @@ def test_the_code_of_the_tutorial_is_that_of_the_example():
         assert any(block in file for file in files), block
 
 
+def prose_of(document):
+    """Return the text of a document without its blocks of code."""
+    text = document.read_text(encoding="utf-8")
+    return re.sub(r"^(```|~~~).*?^\1$", "", text, flags=re.M | re.S)
+
+
 def sections_of(document):
     """Return the names by which links reach the sections of a document, in their order."""
-    text = re.sub(r"^(```|~~~).*?^\1$", "", document.read_text(encoding="utf-8"), flags=re.M | re.S)
-    headings = re.findall(r"^#+ (.*)$", text, re.M)
+    headings = re.findall(r"^#+ (.*)$", prose_of(document), re.M)
     return [re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-") for each in headings]
 
 
 def test_every_file_and_section_that_the_documents_link_to_exists():
-    for name in (
-        "README.md",
-        "CONTRIBUTING.md",
-        "clients/README.md",
-        "clients/python/README.md",
-        "proto/README.md",
-        "plugins/README.md",
-        "engine/GUIDE.md",
-        "engine/RUNNING.md",
-        "SECURITY.md",
-    ):
+    others = "CONTRIBUTING.md", "SECURITY.md", "engine/RUNNING.md", "plugins/README.md"
+    for name in (*page_names(), *others, "plugins/sketchmatch-example-searcher/README.md"):
         document = ROOT / name
-        text = document.read_text(encoding="utf-8")
-        for link, section in re.findall(r"\]\((?!https?:)([^)#]*)#?([^)]*)\)", text):
+        links = re.findall(r"\]\((?!https?:)([^)#]*)#?([^)]*)\)", prose_of(document))
+        for link, section in links:
             target = document.parent / link if link else document
             assert target.exists(), f"{name} links to {link}"
             if section:
