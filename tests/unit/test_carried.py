@@ -147,6 +147,17 @@ def test_a_route_through_a_wall_is_led_through_its_door():
     assert points[change.last][0] > 5.2
 
 
+def test_a_route_there_and_back_has_the_changes_of_each_way():
+    found, _ = led(route((3, 3), (7, 3), (3, 3)), floor(walls=[np.s_[28:32, 48:52]]))
+    around = [each for each in found.changes if each.reason is ChangeReason.OBSTACLE]
+    (sources,) = found.sources
+    assert [sources[each.first] // 1 for each in around] == [0, 1]
+    told = np.zeros(len(sources), dtype=bool)
+    for each in around:
+        told[each.first : each.last + 1] = True
+    assert found.feature.points[~told][:, 1] == pytest.approx(3.0)
+
+
 def test_a_door_that_is_too_narrow_is_none():
     grid = floor(walls=[np.s_[:70, 48:52], np.s_[73:, 48:52]])
     found, _ = led(route((2, 2), (8, 2)), grid, radius=0.3)

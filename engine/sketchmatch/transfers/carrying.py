@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 
@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from sketchmatch.errors import InvalidInputError, quoted
-from sketchmatch.model import FloatArray, Scene
+from sketchmatch.model import FloatArray, IntArray, Scene
 from sketchmatch.pipeline.slices import retold
 from sketchmatch.transfers.features import Carried, Change, ChangeReason, Feature, FeatureKind
 from sketchmatch.transfers.obstacles import Obstacles
@@ -170,7 +170,7 @@ def _carried_line(
     if feature.kind is FeatureKind.ROUTE:
         return (yield from _carried_route(feature, course, obstacles, radius, unit))
     ways = [_dense(ring, course, closed=True) for ring in feature.rings]
-    thin = [_thinned(way, course.extent * _COARSE) for way in ways]
+    thin = [way.at(_kept(way, course.extent * _COARSE)) for way in ways]
     if not _is_area(thin):
         thin = ways  # as narrow as it was simplified by
     found = _result(feature, thin, course)
@@ -193,26 +193,21 @@ def _carried_route(
     way: Way | None = _dense(feature.points, course, closed=False, step=step)
     assert way is not None
     if obstacles is None:
-        return _result(feature, [_thinned(way, course.extent * _COARSE)], course)
+        return _result(feature, [way.at(_kept(way, course.extent * _COARSE))], course)
     way, changes = yield from kept_clear(way, obstacles, radius, course.landmarks, unit)
     if way is None:
         return Carried(feature.kind, feature.name, None, (), (), changes)
-    thin = _thinned(way, obstacles.resolution / 2.0, obstacles, radius)
-    return _result(feature, [thin], course).changed(*_placed(changes, way, thin))
+    kept = _kept(way, obstacles.resolution / 2.0, obstacles, radius)
+    return _result(feature, [way.at(kept)], course).changed(*_placed(changes, kept))
 
 
-def _placed(changes: Sequence[Change], way: Way, thin: Way) -> list[Change]:
-    """Return changes with the indices that points have once there are fewer of them."""
-    where = {tuple(point): k for k, point in reversed([*enumerate(thin.points.tolist())])}
-    kept = np.array([where.get(tuple(point), -1) for point in way.points.tolist()])
-    before = np.maximum.accumulate(kept)
-    total = len(thin.points) - 1
+def _placed(changes: Sequence[Change], kept: IntArray) -> list[Change]:
+    """Return changes with the indices that points have once only some of them are kept."""
     return [
-        Change(
-            each.reason,
-            int(max(0, before[each.first])),
-            int(min(total, before[each.last] + (kept[each.last] < 0))),
-            each.sentence,
+        replace(
+            each,
+            first=int(np.searchsorted(kept, each.first, side="right")) - 1,
+            last=int(np.searchsorted(kept, each.last)),
         )
         for each in changes
     ]
@@ -237,10 +232,10 @@ def _dense(ring: FloatArray, course: Course, closed: bool, step: float | None = 
     return Way(course.warp(between), sources, between)
 
 
-def _thinned(
+def _kept(
     way: Way, tolerance: float, obstacles: Obstacles | None = None, radius: float = 0.0
-) -> Way:
-    """Return a line with the given points, and of others those that it takes."""
+) -> IntArray:
+    """Return which points of a line are kept: those that were given, and others that it takes."""
     given = np.flatnonzero(way.sources == np.floor(way.sources))
     pinned = np.unique(np.concatenate([[0], given, [len(way.points) - 1]]))
     kept: list[int] = [0]
@@ -258,8 +253,7 @@ def _thinned(
             if finer < 0.0:
                 break
         kept += [first + k for k in chosen[1:]]
-    index = np.array(kept)
-    return Way(way.points[index], way.sources[index], way.drawn[index])
+    return np.array(kept)
 
 
 def _simplified(leg: FloatArray, tolerance: float) -> list[int]:

@@ -92,7 +92,10 @@ class Way:
 
     def part(self, first: int, last: int) -> Way:
         """Return the part from one point up to another, with both."""
-        chosen = slice(first, last + 1)
+        return self.at(slice(first, last + 1))
+
+    def at(self, chosen: slice | IntArray) -> Way:
+        """Return the way through some of its points."""
         return Way(self.points[chosen], self.sources[chosen], self.drawn[chosen])
 
     def __add__(self, other: Way) -> Way:
