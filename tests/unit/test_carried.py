@@ -192,10 +192,13 @@ def test_ends_in_obstacles_are_moved_out_of_them():
     assert [change.first for change in found.changes] == [0, len(found.feature.points) - 1]
 
 
-def test_of_a_route_that_lies_in_obstacles_nothing_is_left():
-    found, _ = led(route((2, 2), (3, 2)), floor(walls=[np.s_[:, :]]))
+@pytest.mark.parametrize(("x", "share"), [(2.0, "All"), (4.95, "Nearly all")])
+def test_of_a_route_that_lies_in_obstacles_nothing_is_left(x, share):
+    walls = [np.s_[:, :45], np.s_[:, 54:]]  # at x = 4.95 one place between is clear
+    found, _ = led(route((x, 2), (8, 2)), floor(walls=walls), radius=0.45)
     assert found.feature is None
     assert reasons(found) == [ChangeReason.UNREACHABLE]
+    assert found.changes[0].sentence == f"{share} of it is blocked."
 
 
 def test_unknown_cells_are_obstacles_unless_they_are_allowed():

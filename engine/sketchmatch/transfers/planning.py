@@ -132,9 +132,10 @@ def kept_clear(
         Their indices are those of the returned way.
     """
     clear = _clear_stretches(way, obstacles, radius)
-    if not clear.any():
-        where = "is beyond the grid" if not obstacles.inside(way.points).any() else "is blocked"
-        return None, (Change(ChangeReason.UNREACHABLE, 0, 0, f"All of it {where}."),)
+    if clear.sum() < 2:
+        share = "Nearly all" if clear.any() else "All"
+        where = "is blocked" if obstacles.inside(way.points).any() else "is beyond the grid"
+        return None, (Change(ChangeReason.UNREACHABLE, 0, 0, f"{share} of it {where}."),)
     first, last = (int(k) for k in np.flatnonzero(clear)[[0, -1]])
     changes: list[Change] = []
     kept = obstacles.kept(radius)
