@@ -139,6 +139,15 @@ CRS84 = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}
 WGS84 = {"type": "name", "properties": {"name": "EPSG:4326"}}
 
 
+def test_speeds_that_are_no_routes_are_properties_as_all_others():
+    zone, point = {"speed": 0.3, "name": "slow"}, {"speeds": [1, 2], "name": "post"}
+    lost = {"speed": 0.5, "name": "attic"}
+    carried = [kept("zone", ZONE), kept("point", [[4, 5]]), Carried("route", "attic", None, (), ())]
+    text = encode_carried(carried, [zone, point, lost], 0.0)
+    for each, said in zip(json.loads(text)["features"], (zone, point, lost), strict=True):
+        assert said.items() <= each["properties"].items()
+
+
 def around(middle, metres):
     """Return the longitude and latitude of points in metres east and north of a place."""
     unit = 2 * math.pi * 6_371_008.8 / 360.0

@@ -57,7 +57,8 @@ _KINDS = {
 }
 _SEVERAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
 _JSON_SUFFIXES = (".geojson", ".json")
-_REPLACED = ("speed", "speeds", "yaw", "deviation", "deviations", "changes")
+_SPEEDS = ("speed", "speeds")
+_ANSWERS = ("deviation", "deviations", "changes")
 _FREE, _FORBIDDEN = 254, 0
 _NEAR = 1.0
 """Degrees, from the middle of a scene: features of it lie nearer."""
@@ -457,13 +458,15 @@ def _encoded(
     rotation: float,
     origin: tuple[float, float] | None,
 ) -> dict[str, Any]:
-    kept = {key: value for key, value in said.items() if key not in _REPLACED}
+    speeds = None if carried.feature is None else carried.feature.speeds
+    replaced = _ANSWERS if speeds is None else (*_ANSWERS, *_SPEEDS)
+    kept = {key: value for key, value in said.items() if key not in replaced}
     kept.setdefault("name", carried.name)
     if (yaw := _yaw(said, rotation)) is not None:
         kept["yaw"] = round(yaw, 6)
+    if speeds is not None:
+        kept["speeds"] = [round(float(each), 6) for each in speeds]
     if carried.feature is not None:
-        if carried.feature.speeds is not None:
-            kept["speeds"] = [round(float(each), 6) for each in carried.feature.speeds]
         kept["deviation"] = round(carried.deviation, 6)
         kept["deviations"] = [
             [round(float(each), 6) for each in ring] for ring in carried.deviations
