@@ -92,7 +92,19 @@ def test_geojson_is_read_kind_by_kind(tmp_path):
         ),
         (
             collection(feature("LineString", [[0, 0], [1, 0]], speeds=[1])),
-            "are 1 for 2 points",
+            r"features\[0\]\.properties\.speeds are 1 for 2 points",
+        ),
+        (
+            collection(feature("LineString", [[0, 0], [1, 0]], speeds=[1, "slow"])),
+            r"features\[0\]\.properties\.speeds\[1\] is \"slow\"; give a finite number",
+        ),
+        (
+            feature("LineString", [[0, 0], [1, 0]], speed="fast"),
+            r": properties\.speed is \"fast\"; give a finite number",
+        ),
+        (
+            collection(feature("Point", [1, 2], yaw="1.57")),
+            r"features\[0\]\.properties\.yaw is \"1.57\"; give a finite number",
         ),
         (collection(3), r"features\[0\] is 3; give a feature"),
     ],
@@ -139,8 +151,8 @@ CRS84 = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}
 WGS84 = {"type": "name", "properties": {"name": "EPSG:4326"}}
 
 
-def test_speeds_that_are_no_routes_are_properties_as_all_others():
-    zone, point = {"speed": 0.3, "name": "slow"}, {"speeds": [1, 2], "name": "post"}
+def test_speeds_and_headings_of_other_things_are_properties_as_all_others():
+    zone, point = {"speed": 0.3, "yaw": "any"}, {"speeds": [1, 2], "name": "post"}
     lost = {"speed": 0.5, "name": "attic"}
     carried = [kept("zone", ZONE), kept("point", [[4, 5]]), Carried("route", "attic", None, (), ())]
     text = encode_carried(carried, [zone, point, lost], 0.0)

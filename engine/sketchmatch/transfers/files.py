@@ -284,7 +284,8 @@ def _of_geojson(document: Any) -> FeatureFile:
     if kind == "FeatureCollection":
         members = sequence(document.get("features"), "features", _FILE, "a list of features")
     for k, member in enumerate(members):
-        field = f"features[{k}]" if members is not None and kind == "FeatureCollection" else ""
+        field = f"features[{k}]" if kind == "FeatureCollection" else ""
+        about = f"{field}.properties" if field else "properties"
         said: Mapping[str, Any] = {}
         geometry: Any = mapping(member, field, _FILE, "a feature")
         if geometry.get("type") == "Feature":
@@ -307,7 +308,7 @@ def _of_geojson(document: Any) -> FeatureFile:
         if geometry is None:
             continue
         for part, at in _parts(mapping(geometry, field, _FILE, "a geometry"), field):
-            features.append(_of_part(part, at, name, said))
+            features.append(_of_part(part, at, name, said, about))
             properties.append(said)
     return FeatureFile(tuple(features), tuple(properties))
 
@@ -357,7 +358,9 @@ def _parts(geometry: dict[str, Any], field: str) -> list[tuple[dict[str, Any], s
     )
 
 
-def _of_part(part: dict[str, Any], at: str, name: str, said: Mapping[str, Any]) -> Feature:
+def _of_part(
+    part: dict[str, Any], at: str, name: str, said: Mapping[str, Any], about: str
+) -> Feature:
     kind, given = _KINDS[part["type"]], part.get("coordinates")
     if kind is FeatureKind.POINT:
         rings = [_line([given], at)]
@@ -366,11 +369,14 @@ def _of_part(part: dict[str, Any], at: str, name: str, said: Mapping[str, Any]) 
     else:
         lines = sequence(given, at, _FILE, "a list of rings")
         rings = [_line(each, f"{at}[{k}]") for k, each in enumerate(lines)]
+    if kind is FeatureKind.POINT and said.get("yaw") is not None:
+        number(said["yaw"], f"{about}.yaw", _FILE)
+    speeds = _speeds(said, len(rings[0]), about) if kind is FeatureKind.ROUTE else None
     try:
-        speeds = _speeds(said, len(rings[0])) if kind is FeatureKind.ROUTE else None
         return Feature(kind, tuple(rings), name, speeds)
     except InvalidInputError as error:
-        raise InvalidInputError(_FILE, at, error.problem) from None
+        place = f"{about}.speeds" if error.field == "speeds" else at
+        raise InvalidInputError(_FILE, place, error.problem) from None
 
 
 def _line(given: Any, field: str) -> FloatArray:
@@ -384,12 +390,13 @@ def _line(given: Any, field: str) -> FloatArray:
     return np.array(rows, dtype=np.float64).reshape(-1, 2)
 
 
-def _speeds(said: Mapping[str, Any], count: int) -> FloatArray | None:
+def _speeds(said: Mapping[str, Any], count: int, about: str) -> FloatArray | None:
     if said.get("speeds") is not None:
-        given = sequence(said["speeds"], "speeds", _FILE, "a list of numbers")
-        return np.array([number(each, "speeds", _FILE) for each in given])
+        field = f"{about}.speeds"
+        given = sequence(said["speeds"], field, _FILE, "a list of numbers")
+        return np.array([number(each, f"{field}[{k}]", _FILE) for k, each in enumerate(given)])
     if said.get("speed") is not None:
-        return np.full(count, number(said["speed"], "speed", _FILE))
+        return np.full(count, number(said["speed"], f"{about}.speed", _FILE))
     return None
 
 
