@@ -64,6 +64,7 @@ def test_geojson_is_read_kind_by_kind(tmp_path):
         feature("Polygon", [ring, HOLE.tolist()], name="no-go"),
         feature("MultiPolygon", [[ring], [(ZONE + 5).tolist()]], name="both"),
         {"type": "Feature", "properties": None, "geometry": None},
+        {"type": "Feature", "properties": {"name": "attic"}, "geometry": None},
     )
     found = read_features(written(tmp_path, document))
     kinds = [str(each.kind) for each in found.features]
@@ -75,6 +76,10 @@ def test_geojson_is_read_kind_by_kind(tmp_path):
     assert [ring.tolist() for ring in found.features[3].rings] == [ZONE.tolist(), HOLE.tolist()]
     assert found.features[5].points.tolist() == (ZONE + 5).tolist()
     assert found.properties[0] == {"name": "dock", "yaw": 0.5}
+    assert found.notes == (
+        "features[5] is without a place: left out.",
+        "features[6] 'attic' is without a place: left out.",
+    )
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ import numpy as np
 import shapely
 
 from sketchmatch.api.documents import decode_text, load_json, mapping, number, plain_name, sequence
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, quoted
 from sketchmatch.io._targets import check_target, writing
 from sketchmatch.io.degrees import SPAN, from_metres, in_metres, may_be_degrees, names_degrees
 from sketchmatch.io.files import read_bytes, read_map_files
@@ -279,6 +279,7 @@ def _read(path: Path, origin: tuple[float, float] | None) -> FeatureFile:
 def _of_geojson(document: Any) -> FeatureFile:
     features: list[Feature] = []
     properties: list[Mapping[str, Any]] = []
+    notes: list[str] = []
     kind = mapping(document, "", _FILE, "GeoJSON").get("type")
     members = [document]
     if kind == "FeatureCollection":
@@ -306,11 +307,13 @@ def _of_geojson(document: Any) -> FeatureFile:
         else:
             name = ""
         if geometry is None:
+            which = f" {quoted(name)}" if name else ""
+            notes.append(f"{field.removesuffix('.geometry')}{which} is without a place: left out.")
             continue
         for part, at in _parts(mapping(geometry, field, _FILE, "a geometry"), field):
             features.append(_of_part(part, at, name, said, about))
             properties.append(said)
-    return FeatureFile(tuple(features), tuple(properties))
+    return FeatureFile(tuple(features), tuple(properties), tuple(notes))
 
 
 def _in_metres(
