@@ -381,6 +381,11 @@ def test_waypoints_are_written_in_order_and_read_back(tmp_path):
         [-1.0, 2.0],
     ]
     assert [each.name for each in found.features] == ["dock", "waypoint1", "waypoint2", "waypoint3"]
+    assert [said.get("speed") for said in found.properties] == [None, 0.5, 0.25, 0.1]
+    again = [kept("point", each.points, name=each.name) for each in found.features]
+    speeds = [line for line in text.splitlines() if "speed" in line]
+    text = encode_waypoints(again, found.properties, 0.0)
+    assert [line for line in text.splitlines() if "speed" in line] == speeds
     headings = [said["yaw"] for said in found.properties]
     expected = [0.75, math.pi / 2, math.pi, math.pi]
     assert np.cos(headings) == pytest.approx(np.cos(expected), abs=1e-5)
@@ -407,6 +412,14 @@ def test_a_waypoint_where_a_route_stays_looks_to_where_it_goes_on(tmp_path, poin
     [
         ("waypoints: [1, 2]", "waypoints is a list of 2; give waypoints by name"),
         ("waypoints: {a: {pose: [1, x, 0]}}", r"waypoints\.a\.pose\[0\]\[1\] is \"x\""),
+        (
+            "waypoints: {a: {pose: [1, 2, 0], orientation: [1, 0, 0]}}",
+            r"waypoints\.a\.orientation has 3 numbers; give \[w, x, y, z\]",
+        ),
+        (
+            "waypoints: {a: {pose: [1, 2, 0], speed: fast}}",
+            r"waypoints\.a\.speed is \"fast\"; give a finite number",
+        ),
         ("waypoints: {}", "holds no point, route or zone"),
         ("key: [", "YAML"),
     ],

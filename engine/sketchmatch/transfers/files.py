@@ -221,6 +221,9 @@ def encode_waypoints(
             continue
         points = each.feature.points
         headings = _headings(points) if len(points) > 1 else [_yaw(said, rotation) or 0.0]
+        speeds: Sequence[float | None] = [_number_of(said, "speed")] * len(points)
+        if each.feature.speeds is not None:
+            speeds = each.feature.speeds.tolist()
         for k, (point, heading) in enumerate(zip(points, headings, strict=True)):
             w, z = math.cos(heading / 2.0), math.sin(heading / 2.0)
             lines += [
@@ -230,8 +233,8 @@ def encode_waypoints(
             ]
             if each.name:
                 lines.append(f"    name: {in_yaml(each.name)}")
-            if each.feature.speeds is not None:
-                lines.append(f"    speed: {each.feature.speeds[k]:.6g}")
+            if (speed := speeds[k]) is not None:
+                lines.append(f"    speed: {speed:.6g}")
             count += 1
     return "\n".join(lines if count else ["waypoints: {}"]) + "\n"
 
@@ -412,13 +415,22 @@ def _of_waypoints(given: Any) -> FeatureFile:
         place = _line([_numbers(item.get("pose"))], f"{field}.pose")
         name = plain_name(item.get("name")) or str(key)
         said: dict[str, Any] = {"name": name}
-        turned = _numbers(item.get("orientation"))
-        if isinstance(turned, list) and len(turned) == 4:
-            w, _, _, z = (number(each, f"{field}.orientation", _FILE) for each in turned)
-            said["yaw"] = 2.0 * math.atan2(z, w)
+        if (turned := _numbers(item.get("orientation"))) is not None:
+            said["yaw"] = _heading(turned, f"{field}.orientation")
+        if (speed := _numbers(item.get("speed"))) is not None:
+            said["speed"] = number(speed, f"{field}.speed", _FILE)
         features.append(Feature(FeatureKind.POINT, (place,), name))
         properties.append(said)
     return FeatureFile(tuple(features), tuple(properties))
+
+
+def _heading(given: Any, field: str) -> float:
+    """Return where a robot looks that was turned by a quaternion, about z alone."""
+    values = sequence(given, field, _FILE, "[w, x, y, z]")
+    if len(values) != 4:
+        raise InvalidInputError(_FILE, field, f"has {len(values)} numbers; give [w, x, y, z]")
+    w, _, _, z = (number(each, field, _FILE) for each in values)
+    return 2.0 * math.atan2(z, w)
 
 
 def _numbers(value: Any) -> Any:
@@ -521,7 +533,12 @@ def _headings(points: FloatArray) -> list[float]:
 
 
 def _yaw(said: Mapping[str, Any], rotation: float) -> float | None:
-    given = said.get("yaw")
+    given = _number_of(said, "yaw")
+    return None if given is None else math.remainder(given + rotation, 2.0 * math.pi)
+
+
+def _number_of(said: Mapping[str, Any], key: str) -> float | None:
+    given = said.get(key)
     if isinstance(given, bool) or not isinstance(given, int | float) or not math.isfinite(given):
         return None
-    return math.remainder(float(given) + rotation, 2.0 * math.pi)
+    return float(given)
