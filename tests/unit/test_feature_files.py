@@ -431,11 +431,13 @@ def test_a_yaml_that_is_neither_waypoints_nor_a_mask_is_refused(tmp_path, text, 
     assert refused.value.field.startswith(str(path))
 
 
-def test_what_a_map_names_are_points():
+def test_what_a_map_names_are_points_and_no_waypoints():
     grid = OccupancyGrid(
         np.zeros((2, 2)), 1.0, landmarks=(Landmark("desk", (1.0, 2.0), "furniture"),)
     )
     found = landmarks_of(grid)
     assert found.features[0].name == "desk"
     assert found.features[0].points.tolist() == [[1.0, 2.0]]
-    assert found.properties == ({"name": "desk", "type": "furniture"},)
+    assert found.properties == ({"name": "desk", "type": "furniture", "waypoint": False},)
+    carried = [kept("point", each.points, name=each.name) for each in found.features]
+    assert encode_waypoints(carried, found.properties, 0.0) == "waypoints: {}\n"

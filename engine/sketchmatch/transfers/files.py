@@ -4,8 +4,8 @@ In GeoJSON a ``Point`` is a point, a ``LineString`` a route, a ``Polygon`` a zon
 has several is one of its own. The coordinates are those of the scene, x right and y up, in its own
 units. The property ``name``, or else ``label``, or else the ``id``, is the name; ``speed``, one
 number, or ``speeds``, one for each point, says how fast a route is driven; ``yaw``, in radians,
-where a robot looks at a point; ``keepout: false`` leaves a zone out of the keep-out mask. All
-properties are kept.
+where a robot looks at a point; ``keepout: false`` leaves a zone out of the keep-out mask,
+``waypoint: false`` a point or route out of the waypoints. All properties are kept.
 
 A mask of nav2's keep-out filter, which is a map in which the forbidden cells are occupied, is read
 as zones that cover all of these, and a list of waypoints as nav2's panel in RViz saves it as points
@@ -131,12 +131,13 @@ def read_features(path: str | Path, origin: tuple[float, float] | None = None) -
 
 
 def landmarks_of(grid: OccupancyGrid) -> FeatureFile:
-    """Return the names that a map's own file gives to places of it."""
+    """Return the names that a map's own file gives to things of it, which are no waypoints."""
     features = [
         Feature(FeatureKind.POINT, (np.array([item.point]),), item.name) for item in grid.landmarks
     ]
     properties = [
-        {"name": item.name, **({"type": item.kind} if item.kind else {})} for item in grid.landmarks
+        {"name": item.name, **({"type": item.kind} if item.kind else {}), "waypoint": False}
+        for item in grid.landmarks
     ]
     return FeatureFile(tuple(features), tuple(properties))
 
@@ -212,12 +213,12 @@ def encode_waypoints(
 ) -> str:
     """Return points and the points of routes, in their order, as nav2's panel in RViz saves them.
 
-    A robot looks along a route, and at a point as its ``yaw`` said, turned by the rotation. Names
-    and speeds stand beside, where there are some.
+    Those with ``waypoint: false`` are left out. A robot looks along a route, and at a point as its
+    ``yaw`` said, turned by the rotation. Names and speeds stand beside, where there are some.
     """
     lines, count = ["waypoints:"], 0
     for each, said in zip(carried, properties, strict=True):
-        if each.feature is None or each.kind is FeatureKind.ZONE:
+        if each.feature is None or each.kind is FeatureKind.ZONE or said.get("waypoint") is False:
             continue
         points = each.feature.points
         headings = _headings(points) if len(points) > 1 else [_yaw(said, rotation) or 0.0]
