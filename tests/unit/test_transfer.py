@@ -63,6 +63,16 @@ def test_a_radius_keeps_routes_out_of_the_objects_of_a_map_without_cells():
     assert [str(change.reason) for change in kept.carried[0].changes] == ["obstacle"]
 
 
+@pytest.mark.parametrize("others", [[], [WAY]])
+def test_of_a_map_without_cells_nothing_lies_beyond_and_its_objects_are_no_places(others):
+    far = Feature("point", ([[40.0, 40.0]],), "far")
+    within = Feature("point", ([[1.0, 0.5]],), "within")
+    zone = Feature("zone", ([[40.0, 40.0], [45.0, 40.0], [45.0, 45.0]],), "zone")
+    found = transfer(SCENE, SCENE, [far, within, zone, *others], object_map=KNOWN, radius=0.3)
+    reasons = [[str(change.reason) for change in each.changes] for each in found.carried[:3]]
+    assert reasons == [[], ["blocked"], []]
+
+
 def test_a_table_sums_it_up():
     text = str(transfer(SCENE, TURNED, [HERE, WAY], object_map=KNOWN))
     assert text.splitlines()[0].startswith("2 features carried by a warp of kind ")

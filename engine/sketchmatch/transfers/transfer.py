@@ -251,10 +251,11 @@ def _obstacles(
     """Return what routes are kept out of, if anything."""
     if isinstance(given, OccupancyGrid):
         return Obstacles.of_grid(given, request.allow_unknown)
-    routes = [each.points for each in features if each.kind is FeatureKind.ROUTE]
-    if request.radius is None or not routes:
+    if request.radius is None:
         return None
-    return Obstacles.of_scene(target, course.warp(np.vstack(routes)), request.radius)
+    # All of them: beyond the cells that are drawn here there is no border.
+    around = np.vstack([ring for each in features for ring in each.rings])
+    return Obstacles.of_scene(target, course.warp(around), request.radius)
 
 
 def _check_pairs(pairs: tuple[tuple[int, int], ...]) -> None:
