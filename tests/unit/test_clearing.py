@@ -106,17 +106,20 @@ def test_a_carried_route_keeps_its_radius_from_every_square(seed, origin, radius
         np.testing.assert_allclose(found.feature.points[[0, -1]], points[[0, -1]], atol=1e-6)
 
 
-@pytest.mark.parametrize("radius", [0.2, 0.34, 0.345])
-def test_a_door_as_wide_as_the_robot_and_a_little_is_taken(radius):
-    """A door of seven cells: 0.7 m. Between the middles of its cells there is 0.343 m of room."""
+@pytest.mark.parametrize(
+    ("wide", "radius", "is_taken"),
+    [(7, 0.2, True), (7, 0.345, True), (7, 0.351, False), (6, 0.28, True), (6, 0.301, False)],
+)
+def test_a_door_as_wide_as_the_robot_and_a_little_is_taken(wide, radius, is_taken):
+    """Doors of 0.6 and 0.7 m; along the middles of their cells there is less room, but for 0.2."""
     cells = np.zeros((80, 80), dtype=np.int8)
     cells[:, 40:42] = 100
-    cells[50:57, 40:42] = 0
+    cells[50 : 50 + wide, 40:42] = 0
     obstacles = Obstacles.of_grid(OccupancyGrid(cells, 0.1), False)
     way = Feature(FeatureKind.ROUTE, (np.array([[2.0, 4.0], [6.0, 4.0]]),), "way")
     course = course_between(SCENE, SCENE, SAME, features=[way])
     (found,) = finish(carried([way], course, obstacles, radius, "m"))
-    expected = ChangeReason.OBSTACLE if radius <= 0.34 else ChangeReason.UNREACHABLE
+    expected = ChangeReason.OBSTACLE if is_taken else ChangeReason.UNREACHABLE
     assert found.changes[0].reason is expected
     line = shapely.LineString(found.feature.points)
     assert line.distance(squares(obstacles)) >= radius - 1e-9

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -33,8 +34,11 @@ _FARTHEST_CELLS = 128
 _UNSURE = 0.25
 """In cells: what middles may have more room than is said."""
 _BESIDE = 4
+_FINER = 3
+"""An odd number: the middle of a cell is one of a finer cell, too."""
 
 PixelsArray = NDArray[np.uint8]
+_T = TypeVar("_T", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +160,13 @@ class Obstacles:
     def line_is_clear(self, points: FloatArray, radius: float) -> bool:
         """Whether a line through points stays clear all along."""
         return bool(self.legs_clear(points, radius).all())
+
+    def finer(self, window: Window) -> Obstacles:
+        """Return a part of them on cells of a third of the side; beyond it all is blocked."""
+        (corner,) = self.placed(window.low[None, :].astype(np.float64))
+        blocked = window.of(self.blocked).repeat(_FINER, axis=0).repeat(_FINER, axis=1)
+        pose = (float(corner[0]), float(corner[1]), self.origin[2])
+        return Obstacles(blocked, self.resolution / _FINER, pose)
 
     def beside(
         self, point: FloatArray, radius: float, open_: BoolArray, low: IntArray
@@ -286,6 +297,6 @@ class Window:
         """Whether it is the whole grid."""
         return not self.low.any() and tuple(self.high) == obstacles.blocked.shape
 
-    def of(self, array: Float32Array) -> Float32Array:
+    def of(self, array: NDArray[_T]) -> NDArray[_T]:
         """Return that part of an array of the whole grid."""
         return array[self.low[0] : self.high[0], self.low[1] : self.high[1]]

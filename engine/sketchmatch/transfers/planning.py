@@ -237,7 +237,14 @@ def _around(
     closed: set[int] = set()
     found = line = yield from _planned(carried, obstacles, radius, barriers)
     if line is None:
-        return None, []
+        # A passage that is little wider than the robot may have no middle of a cell to go along.
+        window = _window(carried, obstacles, radius)
+        if window.of(obstacles.blocked).size > _MANY_CELLS:
+            return None, []
+        obstacles, radius = obstacles.finer(window), obstacles.kept(radius)
+        found = line = yield from _planned(carried, obstacles, radius, barriers)
+        if line is None:
+            return None, []
     odd = on_other_side(line)
     longest = _DETOUR * _along(line)[-1] + max(_MARGIN, 8.0 * radius)
     while found is not None and len(closed) < _MOST_BARRIERS:
@@ -301,11 +308,9 @@ def _planned(
     carried: Way, obstacles: Obstacles, radius: float, barriers: Sequence[FloatArray]
 ) -> Generator[None, None, FloatArray | None]:
     """Return the cheapest way between the ends of a carried part; None if there is none."""
-    cells = obstacles.cells(carried.points)
-    within = ((cells >= 0) & (cells < obstacles.blocked.shape)).all(axis=1)
-    margin = math.ceil(max(_MARGIN, 8.0 * radius) / obstacles.resolution)
+    cells, wider = obstacles.cells(carried.points), 1
     while True:
-        window = Window.around(obstacles, cells[within], margin)
+        window = _window(carried, obstacles, radius, wider)
         open_ = window.of(obstacles.clearance) >= obstacles.needed(radius)
         for barrier in barriers:
             open_ &= ~_drawn(obstacles.cells(barrier) - window.low, open_.shape)
@@ -319,7 +324,14 @@ def _planned(
             return np.vstack([first, obstacles.places(path + window.low), last])
         if window.is_all_of(obstacles):
             return None
-        margin *= 4
+        wider *= 4
+
+
+def _window(carried: Way, obstacles: Obstacles, radius: float, wider: int = 1) -> Window:
+    """Return the part of the grid around a carried part."""
+    within = obstacles.cells(carried.points[obstacles.inside(carried.points)])
+    margin = math.ceil(max(_MARGIN, 8.0 * radius) / obstacles.resolution)
+    return Window.around(obstacles, within, margin * wider)
 
 
 @dataclass(frozen=True, eq=False)
