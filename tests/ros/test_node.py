@@ -290,7 +290,7 @@ class Carrier:
     """Carries a hundredth of everything; fails where it is told to."""
 
     def __init__(self, features):
-        self.features, self.asked, self.error = features, [], None
+        self.features, self.asked, self.error, self.notes = features, [], None, []
 
     def __call__(self, client, sketch, map_, partners, drawn, radius):
         assert radius == 0.0
@@ -302,7 +302,8 @@ class Carrier:
             *(
                 [[(x / 100, y / 100) for x, y in line] for line in lines]
                 for lines in (drawn.routes, drawn.zones)
-            )
+            ),
+            self.notes,
         )
 
 
@@ -440,7 +441,10 @@ def test_more_of_the_latest_sketch_is_carried_on_demand(carrying, carrier):
     assert (early.routes, early.zones) == ([], [])
     assert "send a goal to match_sketch first" in early.error
     executed(carrying)
+    carrier.notes = ["route 0: What comes after point 1 cannot be reached."]
     found = carrying.services["~/carry"](wanted)
+    assert found.notes == carrier.notes
+    assert carrying.said[-1] == ("warning", f"carried otherwise than drawn: {carrier.notes[0]}")
     places = [(pose.pose.position.x, pose.pose.position.y) for pose in found.routes[0].poses]
     assert places == [(1, 2), (3, 2)]
     assert [(p.x, p.y) for p in found.zones[0].points] == [(1, 2), (3, 2)]
@@ -459,6 +463,16 @@ def transferring(ros, server):
     made.subscriptions["map"].callback(room())
     server.kept = put("kept")
     return made
+
+
+def test_what_the_server_changed_about_a_route_is_a_warning(transferring, server):
+    change = transfer_service_pb2.FeatureChange(sentence="The route ends there.")
+    server.transferred = transfer_service_pb2.TransferResponse(
+        features=[transfer_service_pb2.CarriedFeature(changes=[change])]
+    )
+    executed(transferring)
+    told = "carried otherwise than drawn: route 0: The route ends there."
+    assert ("warning", told) in transferring.said
 
 
 def test_every_call_ends_after_the_timeout(transferring, server):

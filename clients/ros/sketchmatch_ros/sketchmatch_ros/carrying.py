@@ -24,11 +24,19 @@ def carry(
     given += [features.zone(zone) for zone in drawn.zones]
     answer = client.transfer(sketch, map_, given, object_map=partners, radius=radius)
     # The route that the segmenter finds comes first and unasked; it is among those given, too.
-    carried = [each.feature for each in answer.features if not each.drawn]
+    carried = [each for each in answer.features if not each.drawn]
     count = len(drawn.routes)
+    routes, zones = carried[:count], carried[count:]
+    outlines = [each.feature.zone.rings for each in zones]
     return Features(
-        [_places(each.route.points) for each in carried[:count]],
-        [_places(each.zone.rings[0].points if each.zone.rings else ()) for each in carried[count:]],
+        [_places(each.feature.route.points) for each in routes],
+        [_places(rings[0].points if rings else ()) for rings in outlines],
+        [
+            f"{kind} {k}: {change.sentence}"
+            for kind, some in (("route", routes), ("zone", zones))
+            for k, each in enumerate(some)
+            for change in each.changes
+        ],
     )
 
 

@@ -214,7 +214,9 @@ def carried(features: Features, header: Header) -> Carry.Response:
         for zone in features.zones
     ]
     return Carry.Response(
-        routes=[route_path(route, header) for route in features.routes], zones=outlines
+        routes=[route_path(route, header) for route in features.routes],
+        zones=outlines,
+        notes=list(features.notes),
     )
 
 

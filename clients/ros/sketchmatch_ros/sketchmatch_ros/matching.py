@@ -59,10 +59,13 @@ class Features:
         Ways to drive, each a list of places; empty where one cannot be carried.
     zones
         Outlines of areas to keep out of; empty where one cannot be carried.
+    notes
+        What was changed about them in carrying, or could not be had, each a sentence for people.
     """
 
     routes: Sequence[Sequence[XY]] = ()
     zones: Sequence[Sequence[XY]] = ()
+    notes: Sequence[str] = ()
 
 
 class Carrier(Protocol):

@@ -260,7 +260,10 @@ class SketchmatchNode(LifecycleNode):
             radius = self._said("radius")
             return self._carry(self._client, last.sketch, map_, last.partners, drawn, radius)
 
-        return self._matching.carried(carry, last.map_.source, is_over)
+        found = self._matching.carried(carry, last.map_.source, is_over)
+        for note in found.notes:
+            self.get_logger().warning(f"carried otherwise than drawn: {note}")
+        return found
 
     def _header(self, grid: OccupancyGrid) -> Header:
         return Header(stamp=self.get_clock().now().to_msg(), frame_id=grid.header.frame_id)
