@@ -180,6 +180,15 @@ def test_no_warp_folds(seed, count):
     assert (dx[:, 0] * dy[:, 1] - dx[:, 1] * dy[:, 0]).min() > 0.0
 
 
+def test_what_lies_far_away_does_not_hide_a_fold_between_the_objects():
+    rng = np.random.default_rng(17)
+    places = rng.uniform(0.0, 10.0, (10, 2))
+    goals = places + rng.normal(0.0, 0.8, places.shape)
+    warp = fit_warp(places, goals)
+    other = fit_warp(places, goals, around=np.array([[1000.0, 300.0]]))
+    assert other(places) == pytest.approx(warp(places), abs=1e-6)
+
+
 @given(seeds, st.integers(3, 16))
 def test_a_mirror_image_is_refused(seed, count):
     rng = np.random.default_rng(seed)

@@ -286,11 +286,14 @@ def fit_warp(
     unit = float(np.sqrt(np.mean(np.abs(wanted - middle) ** 2)))
     goals = (wanted - middle) / unit
     fitted = _fitted(frame, goals, certain * _agreeing(frame, goals, certain), certain)
-    near = given if around is None else np.concatenate([given, _complex(around)])
-    lattice = _lattice((near - frame.middle) / frame.spread, frame.reach)
+    # One of its own around the objects, where details are: with far points it would be too coarse.
+    lattices = [_lattice(frame.places, frame.reach)]
+    if around is not None:
+        near = np.concatenate([frame.places, (_complex(around) - frame.middle) / frame.spread])
+        lattices.append(_lattice(near, frame.reach))
     for stiffer in _stiffer(fitted):
         warp = Warp(stiffer, frame, middle, unit, goals)
-        if not warp.folds(lattice):
+        if not any(map(warp.folds, lattices)):
             return warp
     raise InvalidInputError(
         Reason.INVALID_FIELD,
