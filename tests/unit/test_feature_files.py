@@ -12,6 +12,7 @@ from sketchmatch.io.ros_map import MapServerHeader, decode_map_server
 from sketchmatch.model import Landmark, OccupancyGrid
 from sketchmatch.transfers.features import Carried, Change, ChangeReason, Feature
 from sketchmatch.transfers.files import (
+    check_targets,
     encode_carried,
     encode_keepout,
     encode_waypoints,
@@ -429,6 +430,14 @@ def test_a_yaml_that_is_neither_waypoints_nor_a_mask_is_refused(tmp_path, text, 
     with pytest.raises(InvalidInputError, match=words) as refused:
         read_features(path)
     assert refused.value.field.startswith(str(path))
+
+
+def test_mask_and_waypoints_do_not_overwrite_each_other(tmp_path):
+    mask, way = tmp_path / "nav2.yaml", tmp_path / "way.yaml"
+    check_targets(None, mask, way)
+    with pytest.raises(InvalidInputError, match="which --keepout is saved under") as refused:
+        check_targets(None, mask, tmp_path / ".." / tmp_path.name / "nav2.yaml")
+    assert refused.value.field == "--waypoints"
 
 
 def test_what_a_map_names_are_points_and_no_waypoints():

@@ -247,6 +247,9 @@ def check_targets(out: Path | None, keepout: Path | None, waypoints: Path | None
     for path, field in ((keepout, "--keepout"), (waypoints, "--waypoints")):
         if path is not None:
             check_target(path, field, YAML_SUFFIXES, ".yaml")
+    if keepout and waypoints and keepout.resolve() == waypoints.resolve():
+        problem = f"is {str(waypoints)!r}, which --keepout is saved under; give another name"
+        raise InvalidInputError(_FILE, "--waypoints", problem)
 
 
 def save_text(path: Path, text: str, field: str) -> None:
