@@ -345,6 +345,11 @@ def test_a_feature_that_is_none_is_refused_by_field(feature, field):
     assert refused.value.field == field
 
 
+def test_a_zone_without_area_is_told_so():
+    with pytest.raises(InvalidInputError, match="enclose no area; draw a zone around what"):
+        Feature("zone", ([[0, 0], [2, 0], [5, 0]],))
+
+
 def test_a_zone_may_repeat_its_first_point():
     ring = np.array([*box(0, 0), (0, 0)])
     assert len(Feature("zone", (ring,)).points) == 4

@@ -81,8 +81,8 @@ class Feature:
             numbers = tuple(np.arange(len(line), dtype=np.float64) for line in lines)
         object.__setattr__(self, "rings", tuple(map(frozen_floats, lines)))
         object.__setattr__(self, "numbers", tuple(map(frozen_floats, numbers)))
-        if kind is FeatureKind.ZONE and not shapely.Polygon(lines[0], lines[1:]).is_valid:
-            raise _refused("rings", "cross themselves or each other; draw a zone without crossing")
+        if kind is FeatureKind.ZONE:
+            _check_area(shapely.Polygon(lines[0], lines[1:]))
         checked = None if speeds is None else self._checked_speeds(speeds, len(lines[0]))
         object.__setattr__(self, "speeds", checked)
 
@@ -192,6 +192,14 @@ class Carried:
     def changed(self, *changes: Change) -> Carried:
         """Return it with more changes."""
         return replace(self, changes=(*self.changes, *changes))
+
+
+def _check_area(zone: shapely.Polygon) -> None:
+    if zone.is_valid:
+        return
+    if zone.convex_hull.area == 0.0:
+        raise _refused("rings", "enclose no area; draw a zone around what it is to cover")
+    raise _refused("rings", "cross themselves or each other; draw a zone without crossing")
 
 
 def _refused(field: str, problem: str) -> InvalidInputError:
