@@ -255,6 +255,15 @@ def test_a_turned_map_has_its_zones_turned_back(ros):
     assert occupied(mask) == {(0, 2), (0, 3)}
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.1, 0.7, -2.0])
+def test_a_zone_along_cells_of_a_turned_map_takes_none_beside_them(ros, yaw):
+    cells = np.array([(0.5, 1.0), (2.0, 1.0), (2.0, 2.5), (0.5, 2.5)])
+    c, s = math.cos(yaw), math.sin(yaw)
+    zone = (cells @ [[c, s], [-s, c]] + (-7.3, 4.1)).tolist()
+    mask = ros.conversions.keepout_mask([zone], grid(np.zeros((9, 12)), at=(-7.3, 4.1), yaw=yaw))
+    assert occupied(mask) == {(row, column) for row in range(2, 5) for column in range(1, 4)}
+
+
 def test_zones_beyond_the_map_are_cut_and_several_are_joined(ros):
     zones = [[(-9, -9), (0.4, -9), (0.4, 0.4), (-9, 0.4)], [(1.6, 1.1), (99, 1.1), (99, 99)]]
     mask = ros.conversions.keepout_mask(zones, grid(np.zeros((3, 5))))

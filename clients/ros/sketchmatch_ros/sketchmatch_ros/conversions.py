@@ -41,6 +41,7 @@ XY = Sequence[float]
 
 _KEEPOUT = 0  # nav2's type of filter
 _OCCUPIED = 100
+_TOUCH = 1e-6  # in cells: what reaches no farther into one touches it, up to rounding
 _NAN = math.nan
 _LINE_METRES, _LETTER_METRES = 0.05, 0.3
 
@@ -279,9 +280,11 @@ def _along(outline: Sequence[XY], info: MapMetaData) -> Iterator[tuple[int, int]
     for start, end in zip(outline, [*outline[1:], *outline[:1]], strict=True):
         (ax, ay), (bx, by) = sorted((start, end), key=lambda point: point[1])
         run, rise = bx - ax, by - ay
-        for row in range(max(0, math.floor(ay)), min(info.height, math.ceil(by))):
+        first, last = math.floor(ay + _TOUCH), math.ceil(by - _TOUCH)
+        for row in range(max(0, first), min(info.height, last)):
             enters = max(0.0, (row - ay) / rise) if rise else 0.0
             leaves = min(1.0, (row + 1 - ay) / rise) if rise else 1.0
             left, right = sorted((ax + enters * run, ax + leaves * run))
-            for column in range(max(0, math.floor(left)), min(info.width, math.ceil(right))):
+            first_column, last_column = math.floor(left + _TOUCH), math.ceil(right - _TOUCH)
+            for column in range(max(0, first_column), min(info.width, last_column)):
                 yield row, column
