@@ -325,6 +325,17 @@ def test_a_mask_is_read_as_zones(tmp_path):
         assert shared > 0.8
 
 
+def test_what_a_mask_forbids_in_part_is_said_to_be_left_out(tmp_path):
+    _, text, picture = mask(kept("zone", ZONE))
+    shades = bytearray(picture)
+    shades[-2:] = 128, 128
+    (tmp_path / "mask.pgm").write_bytes(shades)
+    path = written(tmp_path, text.replace("trinary", "scale"), "mask.yaml")
+    found = read_features(path)
+    assert len(found.features) == 1
+    assert found.notes == ("2 cells of the mask are neither free nor forbidden: left out.",)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_zones_of_a_mask_cover_each_forbidden_cell_and_hardly_more(tmp_path, seed):
     rng = np.random.default_rng(seed)

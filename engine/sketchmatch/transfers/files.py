@@ -69,6 +69,7 @@ _STEP = 0.5
 _ROUNDING = 1e-9
 _CRS84 = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}
 _OCCUPIED = 65
+_PALER = "{} cells of the mask are neither free nor forbidden: left out."
 
 
 @dataclass(frozen=True, eq=False)
@@ -464,7 +465,9 @@ def _of_mask(grid: OccupancyGrid) -> FeatureFile:
         )
         for k, zone in enumerate(zones)
     )
-    return FeatureFile(features, tuple({"name": each.name} for each in features))
+    paler = int(((grid.cells > 0) & (grid.cells < _OCCUPIED)).sum())
+    notes = (_PALER.format(paler),) if paler else ()
+    return FeatureFile(features, tuple({"name": each.name} for each in features), notes)
 
 
 def _plainer(area: shapely.Polygon) -> shapely.Polygon:
