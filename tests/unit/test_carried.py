@@ -177,6 +177,16 @@ def test_a_route_through_a_thing_of_which_only_the_outline_was_seen_goes_on_behi
     assert reasons(into) == [ChangeReason.UNREACHABLE]
 
 
+def test_a_room_that_a_route_cannot_enter_is_said_to_be_left_out():
+    grid = floor(walls=[np.s_[:, 50:52]])
+    found, _ = led(route((2, 2), (8, 2), (8, 8), (2, 8)), grid)
+    assert reasons(found)[0] is ChangeReason.OBSTACLE
+    assert found.feature.points[-1] == pytest.approx([2.0, 8.0], abs=1e-6)
+    assert found.changes[0].sentence.endswith("; what was drawn in between cannot be reached.")
+    short, _ = led(route((2, 2), (8, 2)), floor(walls=[np.s_[15:25, 45:52]]))
+    assert short.changes[0].sentence.endswith("away from obstacles.")
+
+
 def test_a_clear_route_is_left_as_it_was_carried():
     found, _ = led(route((2, 2), (8, 2.5), (8, 8)), floor())
     assert found.changes == ()

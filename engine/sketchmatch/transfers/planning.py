@@ -153,6 +153,7 @@ def kept_clear(
             continue
         leave = max(joint, int(np.searchsorted(along, along[at] - lead)))
         # What is clear may be the hollow of a thing of which only the outline was seen.
+        missed: list[int] = []
         for beyond in _reappearing(clear[: last + 1], along, at, 2.0 * lead):
             again = int(np.searchsorted(along, along[beyond] + lead, side="right")) - 1
             still = np.flatnonzero(~clear[beyond : min(again, last) + 1])
@@ -160,6 +161,7 @@ def kept_clear(
             found, sides = yield from _around(way, leave, again, obstacles, radius, landmarks)
             if found is not None:
                 break
+            missed.append(beyond)
         if found is None:
             sentence = (
                 f"What comes after point {len(done.points)} cannot be reached: obstacles leave no "
@@ -171,7 +173,9 @@ def kept_clear(
         begin = len(done.points) - 1 - (at - leave)
         done = done.part(0, begin) + found
         named = _named(way.part(at, beyond), landmarks)
-        sentence = f"Led around{named}, to stay {kept:.6g} {unit} away from obstacles."
+        without = min(missed, default=beyond) < beyond
+        left_out = "; what was drawn in between cannot be reached" if without else ""
+        sentence = f"Led around{named}, to stay {kept:.6g} {unit} away from obstacles{left_out}."
         changes.append(Change(ChangeReason.OBSTACLE, begin, len(done.points) - 1, sentence))
         changes += [replace(each, first=begin, last=len(done.points) - 1) for each in sides]
         at = joint = again
