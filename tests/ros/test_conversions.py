@@ -190,16 +190,25 @@ def test_a_busy_server_says_when_to_come_back(ros):
     assert ros.conversions.failure(busy, None).retry_after == 2.0
 
 
-def test_a_route_looks_where_it_goes(ros, header):
-    path = ros.conversions.route_path([(0, 0), (2, 0), (2, 0), (2, 3)], header)
+@pytest.mark.parametrize(
+    ("places", "expected"),
+    [
+        ([(0, 0), (2, 0), (2, 0), (2, 3)], [0, 0.5, 0.5, 0.5]),
+        ([(0, 0), (0, 0), (0, 1), (-1, 1), (-1, 1)], [0.5, 0.5, 1, 1, 1]),
+        ([(2, 2), (2, 2)], [0, 0]),
+        ([(2, 2)], [0]),
+        ([], []),
+    ],
+)
+def test_a_route_looks_where_it_goes(ros, header, places, expected):
+    path = ros.conversions.route_path(places, header)
     found = read(wire(path), "nav_msgs/msg/Path")
-    assert {pose.header.frame_id for pose in found.poses} == {found.header.frame_id} == {"map"}
-    places = [(pose.pose.position.x, pose.pose.position.y) for pose in found.poses]
-    assert places == [(0, 0), (2, 0), (2, 0), (2, 3)]
+    assert {found.header.frame_id, *(pose.header.frame_id for pose in found.poses)} == {"map"}
+    assert [(pose.pose.position.x, pose.pose.position.y) for pose in found.poses] == places
     headings = [
         2 * math.atan2(pose.pose.orientation.z, pose.pose.orientation.w) for pose in found.poses
     ]
-    assert headings == pytest.approx([0, 0, math.pi / 2, math.pi / 2])
+    assert headings == pytest.approx([math.pi * each for each in expected])
 
 
 def test_a_zone_is_occupied_in_a_mask_of_the_maps_own_cells(ros):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import chain
+from itertools import accumulate, chain, pairwise
 
 from geometry_msgs.msg import Point, Point32, Polygon, Pose, PoseStamped, Quaternion
 from nav2_msgs.msg import CostmapFilterInfo
@@ -174,14 +174,9 @@ def markers(answer: ObjectMap) -> MarkerArray:
 
 
 def route_path(points: Sequence[XY], header: Header) -> Path:
-    """Return a route as nav2 follows it: each pose looks to the next one, the last as before it."""
+    """Return a route as nav2 follows it: poses look to the next elsewhere, the last as before."""
     poses = []
-    heading = 0.0
-    for k, (x, y) in enumerate(points):
-        if k + 1 < len(points):
-            ahead_x, ahead_y = points[k + 1][0] - x, points[k + 1][1] - y
-            if ahead_x or ahead_y:
-                heading = math.atan2(ahead_y, ahead_x)
+    for (x, y), heading in zip(points, _headings(points), strict=True):
         turned = Quaternion(x=0.0, y=0.0, z=math.sin(heading / 2), w=math.cos(heading / 2))
         place = Pose(position=Point(x=float(x), y=float(y), z=0.0), orientation=turned)
         poses.append(PoseStamped(header=header, pose=place))
@@ -234,6 +229,13 @@ def yaw_of(turned: Quaternion) -> float:
         2.0 * (turned.w * turned.z + turned.x * turned.y),
         1.0 - 2.0 * (turned.y * turned.y + turned.z * turned.z),
     )
+
+
+def _headings(points: Sequence[XY]) -> list[float]:
+    steps = [(bx - ax, by - ay) for (ax, ay), (bx, by) in pairwise(points)]
+    moving = [math.atan2(y, x) for x, y in steps if x or y] or [0.0]
+    gone = accumulate((bool(x or y) for x, y in steps), initial=0)
+    return [moving[min(k, len(moving) - 1)] for k in gone][: len(points)]
 
 
 def _known(value: float | None) -> float:
