@@ -104,7 +104,7 @@ export function geoJson(carried: readonly Carried[]): string {
       type: "Feature",
       properties: {
         name: name || kind,
-        ...(lines.length ? { deviation: Math.max(...deviations.flat(), 0), deviations } : {}),
+        ...(lines.length ? { deviation: median(deviations.flat()), deviations } : {}),
         ...(changes.length ? { changes: changes.map(changeOf) } : {}),
       },
       geometry: geometryOf(kind, lines),
@@ -115,7 +115,8 @@ export function geoJson(carried: readonly Carried[]): string {
 }
 
 function changeOf({ reason, firstPoint, lastPoint, sentence }: FeatureChange) {
-  return { reason: ChangeReason[reason], first: firstPoint, last: lastPoint, sentence };
+  const named = ChangeReason[reason].toLowerCase();
+  return { reason: named, first: firstPoint, last: lastPoint, sentence };
 }
 
 function geometryOf(kind: Carried["kind"], lines: readonly CarriedLine[]) {
@@ -143,11 +144,23 @@ export function waypoints(carried: readonly Carried[]): string {
   return `waypoints:\n${texts.join("\n")}\n`;
 }
 
-/** Return where a robot looks at a point of a route: to the next, and at the last as before. */
+/** Return where a robot looks at a point of a route: to the next elsewhere, the last as before. */
 export function yawAt(points: readonly Xy[], k: number): number {
-  const [from, to] = k + 1 < points.length ? [k, k + 1] : [k - 1, k];
-  const [a, b] = [points[from], points[to]];
-  return a && b ? Math.atan2(b[1] - a[1], b[0] - a[0]) : 0;
+  const moves = (from: number): Xy | undefined => {
+    const [a, b] = [points[from], points[from + 1]];
+    return a && b && (a[0] !== b[0] || a[1] !== b[1]) ? [b[0] - a[0], b[1] - a[1]] : undefined;
+  };
+  let step: Xy | undefined;
+  for (let from = k; !step && from + 1 < points.length; from++) step = moves(from);
+  for (let from = k - 1; !step && from >= 0; from--) step = moves(from);
+  return step ? Math.atan2(step[1], step[0]) : 0;
+}
+
+function median(values: readonly number[]): number {
+  const sorted = [...values].sort((a, b) => a - b);
+  const half = sorted.length / 2;
+  const [low, high] = [sorted[Math.ceil(half) - 1], sorted[Math.floor(half)]];
+  return round(((low ?? 0) + (high ?? 0)) / 2, 6);
 }
 
 function round(value: number, digits: number): number {

@@ -3,6 +3,7 @@
 import json
 import math
 
+import numpy as np
 import pytest
 import yaml
 
@@ -47,6 +48,9 @@ def test_a_route_through_a_thing_is_led_around_it_and_the_page_says_so(pad, visi
     hand.draw([(-90, -100), (40, 90)], closed=False)  # right through the island
     said = page.get_by_test_id("carried")
     said.get_by_text("It goes around what is in the way.").wait_for()
+    told = json.loads(saved_text(page, "save-carried"))["features"][0]["properties"]
+    assert told["changes"][0]["reason"] == "obstacle"  # as the command line saves it
+    assert told["deviation"] == pytest.approx(np.median(told["deviations"][0]), abs=1e-6)
     before = page.get_by_test_id("route").locator("polyline").get_attribute("points")
     page.get_by_test_id("radius").fill("0.35")
     page.get_by_test_id("radius").press("Enter")
