@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
+from sketchmatch.cli.carried import Carriage, save
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.io.ros_map import MapServerHeader, decode_map_server
 from sketchmatch.model import Landmark, OccupancyGrid
@@ -22,6 +23,7 @@ from sketchmatch.transfers.files import (
 )
 from sketchmatch.transfers.obstacles import Obstacles
 from sketchmatch_map_files import parse
+from sketchmatch_proto.v1.transfer_service_pb2 import TransferResponse
 
 ZONE = np.array([[1.0, 1.0], [3.0, 1.0], [3.0, 2.5], [1.0, 2.5]])
 HOLE = np.array([[1.5, 1.5], [2.0, 1.5], [2.0, 2.0]])
@@ -441,6 +443,17 @@ def test_a_yaml_that_is_neither_waypoints_nor_a_mask_is_refused(tmp_path, text, 
     with pytest.raises(InvalidInputError, match=words) as refused:
         read_features(path)
     assert refused.value.field.startswith(str(path))
+
+
+@pytest.mark.parametrize(("yaw", "said"), [(0.0, ""), (0.4, "origin is turned by 0.4 rad")])
+def test_that_nav2_takes_no_notice_of_a_turned_mask_is_said(tmp_path, capsys, yaw, said):
+    text = MapServerHeader(0.5, (0.0, 0.0, yaw), False, 0.65, 0.25, "trinary").text("map.pgm")
+    (tmp_path / "map.pgm").write_bytes(b"P5\n8 6\n255\n" + bytes([254] * 48))
+    path, out = written(tmp_path, text, "map.yaml"), tmp_path / "mask.yaml"
+    found = Carriage(TransferResponse(), (None,), (kept("zone", ZONE),), ({},), True)
+    save(found, path, None, out, None)
+    assert read_features(out).features
+    assert said in capsys.readouterr().err
 
 
 def test_mask_and_waypoints_do_not_overwrite_each_other(tmp_path):

@@ -193,6 +193,11 @@ def save(
         picture = keepout.with_suffix(".pgm").name
         document, cells = files.encode_keepout(found.carried, found.properties, grid, picture)
         files.save_keepout(keepout, document, cells, "--keepout")
+        if yaw := grid.origin[2]:
+            say(
+                f"the map's origin is turned by {yaw:.3g} rad, and so is the mask's; nav2's "
+                "costmaps take no notice of that: save the map upright for them"
+            )
     if waypoints is not None:
         text = files.encode_waypoints(found.carried, found.properties, found.rotation)
         files.save_text(waypoints, text, "--waypoints")
