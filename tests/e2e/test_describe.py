@@ -298,5 +298,5 @@ def test_ctrl_c_ends_a_long_one_soon(tmp_path, command):
 def test_help_says_how_objects_are_counted(command_line):
     for command in ("describe", "relate"):
         text = " ".join(command_line(command, "--help").stdout.replace("│", " ").split())
-        assert "counted from 1 as in tables and pictures" in text
-        assert "the lines count from 0" in text
+        assert "numbered from 1 as in tables and pictures" in text
+        assert "number them from 0" in text

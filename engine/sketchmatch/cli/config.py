@@ -28,9 +28,9 @@ def show(
     config: Config = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
 ) -> None:
-    """Show what is in force, and where each value comes from.
+    """Show the settings in force, and where each value comes from.
 
-    What it prints is a configuration file that says the same.
+    The output is a configuration file with the same settings.
     """
     from sketchmatch.config import entries, load, shown_file
     from sketchmatch.registry import default_registry
@@ -58,12 +58,12 @@ def check(
         Path | None,
         typer.Argument(
             metavar="[FILE]",
-            help="The file; left out, the one that would be read.",
+            help="Configuration file; by default the one that would be read.",
             parser=to_path,
         ),
     ] = None,
 ) -> None:
-    """Check a configuration, with every profile and the environment, against what is installed."""
+    """Check a configuration, its profiles and the environment against what is installed."""
     from sketchmatch.config import check as find_faults
 
     path, faults = find_faults(file)
@@ -78,9 +78,9 @@ def check(
 @answering
 def init(
     file: Annotated[
-        Path, typer.Argument(metavar="[FILE]", help="Where to write it.", parser=to_path)
+        Path, typer.Argument(metavar="[FILE]", help="File to write.", parser=to_path)
     ] = Path("sketchmatch.toml"),
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
     """Write a file with every setting and its default, commented out."""
     from sketchmatch.config import builtin, template

@@ -26,9 +26,11 @@ _STOP_SECONDS = 10.0
 def demo(
     overlay: Annotated[
         Path,
-        typer.Option("--overlay", metavar="FILE", help="Where to draw the answer.", parser=to_path),
+        typer.Option(
+            "--overlay", metavar="FILE", help="Draw the answer into this picture.", parser=to_path
+        ),
     ] = Path("demo-overlay.png"),
-    seed: Annotated[int, typer.Option(help="Same seed, same answer.")] = 0,
+    seed: Annotated[int, typer.Option(help="Random seed: same seed, same answer.")] = 0,
 ) -> None:
     """Match a sketch of a living room with a robot's map of it.
 

@@ -24,13 +24,15 @@ def describe(
         Path,
         typer.Argument(
             metavar="SCENE",
-            help="A sketch or a map, as `match` takes them.",
+            help="Sketch or map, in any format that `match` reads.",
             parser=options.to_path,
         ),
     ],
     config: options.Config = None,
     profile: options.Profile = "",
-    segmenter: Annotated[str, typer.Option(help="Segmenter; the file's kind decides.")] = "",
+    segmenter: Annotated[
+        str, typer.Option(help="Segmenter; depends on the kind of file by default.")
+    ] = "",
     histogram: options.Histogram = "",
     settings: options.Settings = None,
     pair: Annotated[
@@ -38,8 +40,8 @@ def describe(
         typer.Option(
             "--pair",
             metavar="A,B",
-            help="Describe A as seen from B, numbers counted from 1 as in tables and pictures; "
-            "may be repeated. All pairs if left out.",
+            help="Describe A as seen from B, numbered from 1 as in tables and pictures; all pairs "
+            "by default. May be repeated.",
         ),
     ] = None,
     json: options.JsonDocument = False,
@@ -48,7 +50,7 @@ def describe(
         typer.Option(
             "--out",
             metavar="FILE",
-            help="Save the histograms: .npz or .csv.",
+            help="Save the histograms (.npz or .csv).",
             parser=options.to_path,
         ),
     ] = None,
@@ -63,12 +65,11 @@ def describe(
     ] = None,
     verbose: options.Verbose = False,
 ) -> None:
-    """Say how the objects of a scene lie to each other.
+    """Describe how the objects of a scene lie relative to each other.
 
-    Each line says of two objects that the first "is … the second", and the degree to which that
-    describes the histogram of forces between them. On a terminal the table counts objects from 1,
-    as pictures and --pair do; in a pipe the lines count from 0, as --json and --out do. Parameters
-    are set as in --set histogram.directions=360.
+    Each line states that one object "is … the other", and the degree to which that describes the
+    histogram of forces between them. Tables, pictures and --pair number objects from 1; pipes,
+    --json and --out number them from 0. Set parameters as in --set histogram.directions=360.
     """
     from sketchmatch.cli import places
 

@@ -20,7 +20,7 @@ def health(
         str,
         typer.Argument(
             metavar="ADDRESS",
-            help="HOST:PORT or unix:PATH of the server, or http://HOST:PORT where it tells its "
+            help="Address of the server: HOST:PORT or unix:PATH; or http://HOST:PORT of its "
             "metrics, which needs no certificate.",
         ),
     ],
@@ -30,15 +30,15 @@ def health(
         typer.Option(
             "--of",
             metavar="NAME",
-            help="Ask of a service, as in sketchmatch.v1.MatchService, or an algorithm, as in "
+            help="Check one service, e.g. sketchmatch.v1.MatchService, or one algorithm, e.g. "
             "searcher/easm.",
         ),
     ] = "",
     timeout: options.Timeout = 5.0,
 ) -> None:
-    """Say whether a server serves: the exit code is 0 if it does, and 3 otherwise.
+    """Check whether a server serves: the exit code is 0 if it does, otherwise 3.
 
-    It needs no token, and is made for containers and scripts; `sketchmatch status` tells more.
+    For containers and scripts; needs no token. `sketchmatch status` shows more.
     """
     from sketchmatch.cli.app import ExitCode
 

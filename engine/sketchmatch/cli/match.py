@@ -24,7 +24,7 @@ def match(
         Path,
         typer.Argument(
             metavar="SKETCH",
-            help="Sketch: .svg, .json, .excalidraw, .geojson, image; FILE#PART names a part of it, "
+            help="Sketch: .svg, .json, .excalidraw, .geojson or picture; FILE#PART selects a part, "
             "such as a frame.",
             parser=options.to_path,
         ),
@@ -33,9 +33,9 @@ def match(
         Path,
         typer.Argument(
             metavar="MAP",
-            help="Map: ROS map .yaml, its picture or folder, bag, .geojson, .dxf, .svg, image, "
-            "annotations, scene graph; `sketchmatch plugins list` shows all readers. FILE#PART "
-            "names a part of it, such as layers. scene:NAME is a scene that the server keeps.",
+            help="Map: ROS map .yaml, its picture or folder, bag, .geojson, .dxf, .svg, picture, "
+            "annotations or scene graph; `sketchmatch plugins list` shows all readers. FILE#PART "
+            "selects a part, such as layers; scene:NAME is a scene stored on the server.",
             parser=options.to_path,
         ),
     ],
@@ -50,7 +50,7 @@ def match(
     segmenter_map: options.FormerMapSegmenter = "",
     settings: options.Settings = None,
     alternatives: Annotated[
-        int | None, typer.Option(metavar="K", help="How many of the next best maps; 3 by default.")
+        int | None, typer.Option(metavar="K", help="Number of next best object maps; 3 by default.")
     ] = None,
     pin: options.Pins = None,
     no_pin: options.Exclusions = None,
@@ -59,8 +59,8 @@ def match(
         bool,
         typer.Option(
             "--keep-running",
-            help="With --server: let the match go on there if this command is ended; "
-            "`sketchmatch matches` finds it again.",
+            help="With --server: let the match continue if this command ends; `sketchmatch "
+            "matches` finds it again.",
         ),
     ] = False,
     json: options.Json = False,
@@ -69,10 +69,10 @@ def match(
 ) -> None:
     """Find which sketched object is which mapped object.
 
-    On a terminal it shows the search while it runs and then a table that counts the objects of
-    each side from 1, as `segment` and all pictures do, and says how each sketched object lies to
-    the nearest other. In a pipe it prints tab-separated lines; these and --json, which says that
-    too, count the same objects from 0, as the API does.
+    On a terminal, shows the search while it runs, then a table, which also gives how each sketched
+    object lies relative to the nearest other one; so does --json. In a pipe, prints tab-separated
+    lines. Tables and pictures number the objects of each side from 1; pipes and --json number them
+    from 0.
     """
     from sketchmatch.cli import display, output, pictures, places
     from sketchmatch.cli.answering import answerer

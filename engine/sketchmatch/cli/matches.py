@@ -27,7 +27,7 @@ _Name = Annotated[
 def matches() -> None:
     """List, show, watch and cancel your matches on a server.
 
-    A server keeps matches beyond their end, and shows each to the caller alone who began it.
+    A server keeps matches after their end, and shows each only to the caller who started it.
     """
 
 
@@ -37,11 +37,11 @@ def matches() -> None:
 def list_(
     address: options.Address,
     access: options.Access = options.Access(),  # noqa: B008
-    limit: Annotated[int, typer.Option(min=1, help="How many at most.")] = 20,
+    limit: Annotated[int, typer.Option(min=1, help="Largest number of matches.")] = 20,
     timeout: options.Timeout = 10.0,
     json: options.JsonDocument = False,
 ) -> None:
-    """List your matches, the latest first: name, state, outcome, begin, and what was wrong."""
+    """List your matches, the latest first: name, state, outcome, start time, error."""
     from itertools import islice
 
     from sketchmatch.cli.answering import client_of
@@ -64,10 +64,11 @@ def show(
     access: options.Access = options.Access(),  # noqa: B008
     timeout: options.Timeout = 10.0,
     json: Annotated[
-        bool, typer.Option("--json", help="Print the contract's message, with all events.")
+        bool,
+        typer.Option("--json", help="Print the gRPC contract's message in JSON, with all events."),
     ] = False,
 ) -> None:
-    """Show how a match is, and its answer if it has one."""
+    """Show the state of a match, and its answer if it has one."""
     from sketchmatch.cli import display
     from sketchmatch.cli.answering import client_of
     from sketchmatch_client import MatchCollector
@@ -95,7 +96,7 @@ def watch(
     access: options.Access = options.Access(),  # noqa: B008
     json: options.Json = False,
 ) -> None:
-    """Follow a match to its end, and show the answer; one that has ended shows it at once."""
+    """Follow a match to its end, then show its answer; at once if it has ended."""
     from sketchmatch.cli import display
     from sketchmatch.cli.answering import client_of
 

@@ -31,7 +31,9 @@ _LIBRARIES = {"segmenter": ("pydantic>=2.7",)}
 
 @answering
 def new(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="What the algorithm is selected by.")],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="Name by which the algorithm is selected.")
+    ],
     kind: Annotated[
         str,
         typer.Option(
@@ -43,15 +45,15 @@ def new(
         typer.Option(
             "--into",
             metavar="DIR",
-            help="Folder to write it into; here if not.",
+            help="Folder to write it into.",
             parser=to_path,
         ),
     ] = Path(),
 ) -> None:
-    """Write a plugin that works: a package with a small algorithm of a kind, and its tests.
+    """Create a working plugin: a package with a small algorithm of a kind, and its tests.
 
-    The distribution and its folder are called sketchmatch-NAME. The commands that install, test
-    and use it are printed.
+    The distribution and its folder are called sketchmatch-NAME. Prints the commands that install,
+    test and use it.
     """
     chosen = _kind(kind)
     _check_name(name, chosen)

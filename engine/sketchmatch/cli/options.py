@@ -70,18 +70,18 @@ def to_path(text: str) -> Path:
 
 Address = Annotated[
     str,
-    typer.Argument(metavar="ADDRESS", help="HOST:PORT or unix:PATH of the server."),
+    typer.Argument(metavar="ADDRESS", help="Address of the server: HOST:PORT or unix:PATH."),
 ]
 Timeout = Annotated[
     float,
-    typer.Option("--timeout", metavar="SECONDS", min=0.001, help="How long to wait for an answer."),
+    typer.Option("--timeout", metavar="SECONDS", min=0.001, help="Longest wait for an answer."),
 ]
 Server = Annotated[
     str | None,
     typer.Option(
         "--server",
         metavar="ADDRESS",
-        help="Ask the server at this HOST:PORT or unix:PATH instead of computing here.",
+        help="Ask the server at HOST:PORT or unix:PATH instead of computing locally.",
     ),
 ]
 Config = Annotated[
@@ -89,7 +89,8 @@ Config = Annotated[
     typer.Option(
         "--config",
         metavar="FILE",
-        help="Configuration; sketchmatch.toml here or in your configuration folder by default.",
+        help="Configuration file; by default sketchmatch.toml here or in your configuration "
+        "folder.",
         parser=to_path,
     ),
 ]
@@ -98,7 +99,7 @@ Profile = Annotated[
     typer.Option(
         "--profile",
         metavar="NAME",
-        help="Start from this pipeline: proof, thesis, thesis-easm, thesis-fsnn or one of your "
+        help="Named pipeline to start from: proof, thesis, thesis-easm, thesis-fsnn or one of your "
         "own.",
     ),
 ]
@@ -107,8 +108,8 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="STAGE.PARAMETER=VALUE",
-        help="Set a parameter, e.g. searcher.population=400; may be repeated. "
-        "`sketchmatch plugins list` shows what there is.",
+        help="Set a parameter, e.g. searcher.population=400; may be repeated. `sketchmatch plugins "
+        "show NAME` lists them.",
     ),
 ]
 Pins = Annotated[
@@ -116,15 +117,17 @@ Pins = Annotated[
     typer.Option(
         "--pin",
         metavar="SKETCHED=MAPPED",
-        help="This object is that one, by label or by number, from 1 as in tables and pictures; "
-        "desk=none: it is on no map. A label that looks like a number, or has a = in it, goes in "
-        "double quotes. May be repeated.",
+        help="State which mapped object a sketched one is, by label or by number (from 1, as in "
+        "tables and pictures); desk=none: it is not on the map. Put labels that contain = or look "
+        "like numbers in double quotes. May be repeated.",
     ),
 ]
 Exclusions = Annotated[
     list[str] | None,
     typer.Option(
-        "--no-pin", metavar="SKETCHED=MAPPED", help="This object is not that one; as --pin."
+        "--no-pin",
+        metavar="SKETCHED=MAPPED",
+        help="State which mapped object a sketched one is not; as --pin.",
     ),
 ]
 Synonyms = Annotated[
@@ -136,34 +139,38 @@ Synonyms = Annotated[
     ),
 ]
 Json = Annotated[
-    bool, typer.Option("--json", help="Print the answer as the contract's message in JSON.")
+    bool,
+    typer.Option("--json", help="Print the answer as the gRPC contract's message in JSON."),
 ]
 JsonDocument = Annotated[
-    bool, typer.Option("--json", help="Print one JSON document, which counts objects from 0.")
+    bool, typer.Option("--json", help="Print one JSON document; objects are numbered from 0.")
 ]
 SketchSegmenter = Annotated[
-    str, typer.Option("--sketch-segmenter", help="Segmenter of the sketch; its form decides.")
+    str,
+    typer.Option(
+        "--sketch-segmenter",
+        help="Segmenter of the sketch; depends on its kind by default.",
+    ),
 ]
 MapSegmenter = Annotated[
-    str, typer.Option("--map-segmenter", help="Segmenter of the map; its form decides.")
+    str,
+    typer.Option("--map-segmenter", help="Segmenter of the map; depends on its kind by default."),
 ]
 FormerSketchSegmenter = Annotated[str, typer.Option("--segmenter-sketch", hidden=True)]
 FormerMapSegmenter = Annotated[str, typer.Option("--segmenter-map", hidden=True)]
 Histogram = Annotated[
-    str, typer.Option(help="Histogram; `constant` unless the configuration names another.")
+    str, typer.Option(help="Histogram; by default `constant` or the configured one.")
 ]
 Overlay = Annotated[
     Path | None,
     typer.Option(
-        "--overlay", metavar="FILE", help="Draw the answer into a picture.", parser=to_path
+        "--overlay", metavar="FILE", help="Draw the answer into this picture.", parser=to_path
     ),
 ]
 
 Verbose = Annotated[
     bool,
-    typer.Option(
-        "--verbose", "-v", help="Tell all that was noted in the files, not one note of each kind."
-    ),
+    typer.Option("--verbose", "-v", help="Show all notes on the files, not one of each kind."),
 ]
 
 
@@ -184,39 +191,43 @@ class Access:
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="The token to show to the server; or say SKETCHMATCH_TOKEN.",
+            help="File with the token for the server; or set SKETCHMATCH_TOKEN.",
             parser=to_path,
         ),
     ] = None
     tls: Annotated[
         bool | None,
-        typer.Option("--tls/--no-tls", help="Encrypt, as certificates do.", show_default=False),
+        typer.Option(
+            "--tls/--no-tls",
+            help="Encrypt; implied by certificates.",
+            show_default=False,
+        ),
     ] = None
     root_certificates: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Authorities to trust for the server's certificate, in PEM.",
+            help="Certificate authorities to trust for the server's certificate (PEM).",
             parser=to_path,
         ),
     ] = None
     certificate: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Certificate to show to the server, in PEM.", parser=to_path
+            metavar="FILE", help="Client certificate for the server (PEM).", parser=to_path
         ),
     ] = None
     key: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Private key of the certificate, in PEM.", parser=to_path
+            metavar="FILE", help="Private key of the client certificate (PEM).", parser=to_path
         ),
     ] = None
     server_name: Annotated[
         str | None,
         typer.Option(
             metavar="NAME",
-            help="What the server's certificate is for, where that is not in the address.",
+            help="Name in the server's certificate, if it is not in the address.",
         ),
     ] = None
 
@@ -233,33 +244,33 @@ unmatched_price
     """
 
     searcher: Annotated[str | None, typer.Option(help="Searcher.")] = None
-    judge: Annotated[str | None, typer.Option(help="Judge of the maps found.")] = None
+    judge: Annotated[str | None, typer.Option(help="Judge of the object maps found.")] = None
     histogram: Annotated[str | None, typer.Option(help="Histogram.")] = None
     similarity: Annotated[str | None, typer.Option(help="Similarity measure.")] = None
-    seed: Annotated[int, typer.Option(help="Same seed, same answer.")] = 0
+    seed: Annotated[int, typer.Option(help="Random seed: same seed, same answer.")] = 0
     time_budget: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="Give the best answer so far after this time."),
+        typer.Option(metavar="SECONDS", help="Stop after this time with the best answer so far."),
     ] = None
     weights: Annotated[
         str | None,
         typer.Option(
             metavar="W1,W2,W3[,W4,W5[,β]]",
-            help="Weights of ζσ, ζR and ζL in ζ, and of the objects' shapes and sizes; rotations "
-            "of pairs d apart count for d^β; 1,1,1 by default.",
+            help="Weights in ζ: of ζσ, ζR and ζL; of the objects' shapes and sizes; and β, where "
+            "the rotation of a pair at distance d counts d^β. 1,1,1 by default.",
         ),
     ] = None
     allow_unmatched: Annotated[
         bool | None,
         typer.Option(
             "--allow-unmatched/--no-allow-unmatched",
-            help="Leave objects without partner on both sides where that is likelier.",
+            help="Let objects of either side stay without partner where that is more likely.",
             show_default=False,
         ),
     ] = None
     unmatched_price: Annotated[
         float | None,
-        typer.Option(metavar="PRICE", help="What leaving out all objects costs, in units of ζ."),
+        typer.Option(metavar="PRICE", help="Price of leaving out all objects, in units of ζ."),
     ] = None
 
     def chosen(self) -> MatchOptions:

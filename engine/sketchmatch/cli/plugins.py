@@ -17,22 +17,22 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
-app = typer.Typer(
-    help="List and describe what there is to choose from, or begin and check a plugin."
-)
+app = typer.Typer(help="List and describe algorithms, create and check plugins.")
 app.command("new")(new.new)
 
 _Kind = Annotated[
     str,
     typer.Option(
-        "--kind", metavar="KIND", help="Only segmenter, histogram, similarity, searcher or judge."
+        "--kind",
+        metavar="KIND",
+        help="Only this kind: segmenter, histogram, similarity, searcher or judge.",
     ),
 ]
 
 
 @app.callback()
 def plugins() -> None:
-    """List and describe what there is to choose from, or begin and check a plugin."""
+    """List and describe algorithms, create and check plugins."""
 
 
 @app.command("list")
@@ -45,9 +45,9 @@ def list_(
     config: Config = None,
     json: Json = False,
 ) -> None:
-    """List the algorithms, the profiles, what became of each plugin, and the readers of files.
+    """List algorithms, profiles, the state of each plugin, and file readers.
 
-    In a pipe these are four tables of tab-separated lines, with an empty line between them.
+    In a pipe, prints four tables of tab-separated lines, separated by empty lines.
     """
     from sketchmatch.cli import listing
 
@@ -69,7 +69,7 @@ def show(
     config: Config = None,
     json: Json = False,
 ) -> None:
-    """Describe one algorithm: what it does, its source, and its parameters."""
+    """Describe one algorithm: what it does, its publications and its parameters."""
     from sketchmatch.cli import listing
 
     item = _named(_catalogue(kind, server, access, config), name, kind)
@@ -84,7 +84,9 @@ def show(
 def check(
     distribution: Annotated[
         str,
-        typer.Argument(metavar="DISTRIBUTION", help="What pip calls it, as in sketchmatch-tabu."),
+        typer.Argument(
+            metavar="DISTRIBUTION", help="Name of the distribution for pip, e.g. sketchmatch-tabu."
+        ),
     ],
     time_limit: Annotated[
         float,
@@ -93,15 +95,15 @@ def check(
             metavar="SECONDS",
             min=0.001,
             max=86400.0,
-            help="How long one check may take; a warm-up, which compiles, five times as long.",
+            help="Time limit of one check; five times as long for a warm-up, which compiles.",
         ),
     ] = 120.0,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
 ) -> None:
-    """Check whether all that an installed distribution offers keeps the contracts of its kind.
+    """Check that the algorithms of an installed distribution keep the contracts of their kinds.
 
-    Each check is listed with its result, what it took and a sentence. One that does not end is
-    ended. The exit code is 0 if none failed, and 5 otherwise.
+    Lists each check with its result, duration and a sentence. A check that exceeds the time limit
+    is stopped. The exit code is 0 if none failed, otherwise 5.
     """
     from sketchmatch.cli import checks
     from sketchmatch.cli.app import ExitCode
@@ -116,10 +118,10 @@ def check(
 @answering
 def reference(
     distribution: Annotated[
-        str, typer.Option(metavar="NAME", help="The Python distribution that offers them.")
+        str, typer.Option(metavar="NAME", help="Python distribution that offers them.")
     ] = "sketchmatch",
 ) -> None:
-    """Write the reference page of a distribution's algorithms, in Markdown."""
+    """Print the reference page of a distribution's algorithms, in Markdown."""
     from sketchmatch.app import responses
     from sketchmatch.cli import reference
     from sketchmatch.registry import discover

@@ -28,25 +28,29 @@ def relate(
     sketch: Annotated[
         Path,
         typer.Argument(
-            metavar="SKETCH", help="Sketch, as `match` takes it.", parser=options.to_path
+            metavar="SKETCH",
+            help="Sketch, in any format that `match` reads.",
+            parser=options.to_path,
         ),
     ],
     map_: Annotated[
         Path,
-        typer.Argument(metavar="MAP", help="Map, as `match` takes it.", parser=options.to_path),
+        typer.Argument(
+            metavar="MAP", help="Map, in any format that `match` reads.", parser=options.to_path
+        ),
     ],
     sketch_pair: Annotated[
         list[str] | None,
         typer.Option(
             "--sketch-pair",
             metavar="A,B",
-            help="Compare A as seen from B, numbers counted from 1 as in tables and pictures; "
-            "may be repeated. All pairs if left out.",
+            help="Compare A as seen from B, numbered from 1 as in tables and pictures; all pairs "
+            "by default. May be repeated.",
         ),
     ] = None,
     map_pair: Annotated[
         list[str] | None,
-        typer.Option("--map-pair", metavar="C,D", help="The same on the map."),
+        typer.Option("--map-pair", metavar="C,D", help="The same for the map."),
     ] = None,
     config: options.Config = None,
     profile: options.Profile = "",
@@ -54,7 +58,7 @@ def relate(
     similarity: Annotated[
         str,
         typer.Option(
-            help="Similarity measure; `cross-correlation` unless the configuration names another."
+            help="Similarity measure; by default `cross-correlation` or the configured one."
         ),
     ] = "",
     sketch_segmenter: options.SketchSegmenter = "",
@@ -63,19 +67,18 @@ def relate(
     segmenter_map: options.FormerMapSegmenter = "",
     settings: options.Settings = None,
     limit: Annotated[
-        int, typer.Option(min=1, metavar="K", help="Show the K most similar ones.")
+        int, typer.Option(min=1, metavar="K", help="Show the K most similar comparisons.")
     ] = 20,
     json: options.JsonDocument = False,
     verbose: options.Verbose = False,
 ) -> None:
     """Compare relations of a sketch with relations of a map.
 
-    Each line compares two sketched objects with two mapped ones: how similar the relations are
-    (σ), by how many degrees the sketched one is turned counter-clockwise to lie like the mapped
-    one (R), and how much larger the mapped one is (L). With the objects of one pair exchanged, σ
-    and L stay and R turns by 180°. The most similar come first. On a terminal the table counts
-    objects from 1, as pictures and the options do; in a pipe the lines count from 0, as --json
-    does.
+    Each line compares the relation of two sketched objects with that of two mapped ones: their
+    similarity (σ), the counter-clockwise rotation in degrees from the sketched to the mapped one
+    (R), and how much larger the mapped one is (L). Exchanging the objects of one pair keeps σ and
+    L and changes R by 180°. The most similar come first. Tables and options number objects from 1;
+    pipes and --json number them from 0.
     """
     from sketchmatch.cli import places
 

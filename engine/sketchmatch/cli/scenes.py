@@ -14,21 +14,23 @@ from sketchmatch.errors import InvalidInputError, Reason, quoted
 
 __all__ = ["app"]
 
-app = typer.Typer(help="Keep scenes on a server, for matches to come.")
+app = typer.Typer(help="Store scenes on a server for later matches.")
 
 _Server = Annotated[
-    str, typer.Option(metavar="HOST:PORT", help="The server that keeps them.", show_default=True)
+    str, typer.Option(metavar="HOST:PORT", help="Server that stores them.", show_default=True)
 ]
-_Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of a scene, or how it begins.")]
+_Name = Annotated[
+    str, typer.Argument(metavar="NAME", help="Name of a scene, or its first characters.")
+]
 _HERE = "127.0.0.1:50051"
 
 
 @app.callback()
 def scenes() -> None:
-    """Keep scenes on a server, for matches to come.
+    """Store scenes on a server for later matches.
 
-    A scene has the hash of what it is as its name, and `match`, `transfer` and `carry` take
-    scene:NAME for a file. You see what you have put yourself.
+    A scene is named by the hash of its content; `match`, `transfer` and `carry` take scene:NAME in
+    place of a file. You see only the scenes that you have put.
     """
 
 
@@ -39,20 +41,25 @@ def put(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="A sketch or a map, as `match` takes them.", parser=options.to_path
+            metavar="FILE",
+            help="Sketch or map, in any format that `match` reads.",
+            parser=options.to_path,
         ),
     ],
     server: _Server = _HERE,
     access: options.Access = options.Access(),  # noqa: B008
     profile: options.Profile = "",
-    segmenter: Annotated[str, typer.Option(help="Segmenter; the file's kind decides.")] = "",
+    segmenter: Annotated[
+        str, typer.Option(help="Segmenter; depends on the kind of file by default.")
+    ] = "",
     settings: options.Settings = None,
     json: options.Json = False,
     verbose: options.Verbose = False,
 ) -> None:
-    """Have a file's objects kept, and print the scene's name.
+    """Store the objects of a file, and print the scene's name.
 
-    Parameters are set as in --set segmenter.min_size=0.3. What is kept already stays as it is.
+    Set parameters as in --set segmenter.min_size=0.3. A scene that is already stored stays as it
+    is.
     """
     from sketchmatch.cli import display, output, places
     from sketchmatch.cli.answering import client_of
@@ -76,7 +83,7 @@ def list_(
     server: _Server = _HERE,
     access: options.Access = options.Access(),  # noqa: B008
 ) -> None:
-    """List what you have put, the latest first: name, objects, when, and labels."""
+    """List your scenes, the latest first: name, number of objects, time, labels."""
     from sketchmatch.cli import output
     from sketchmatch.cli.answering import client_of
 
@@ -125,13 +132,13 @@ def label(
         list[str],
         typer.Argument(
             metavar="OBJECT=LABEL…",
-            help="By number, from 1 as tables count; 3= takes the label away.",
+            help="Object number, from 1 as in tables, and its label; 3= removes the label.",
         ),
     ],
     server: _Server = _HERE,
     access: options.Access = options.Access(),  # noqa: B008
 ) -> None:
-    """Give objects labels, and print the name of the scene with them, which is another one."""
+    """Label objects, and print the name of the resulting scene, which is another one."""
     from sketchmatch.cli import output
     from sketchmatch.cli.answering import client_of
     from sketchmatch.cli.sources import whole_name
@@ -154,7 +161,7 @@ def delete(
     server: _Server = _HERE,
     access: options.Access = options.Access(),  # noqa: B008
 ) -> None:
-    """Have a scene forgotten; it stays for others who have put it."""
+    """Delete a scene; it stays for other callers who have put it."""
     from sketchmatch.cli.answering import client_of
     from sketchmatch.cli.sources import whole_name
 

@@ -19,14 +19,18 @@ def segment(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="A sketch or a map, as `match` takes them.", parser=options.to_path
+            metavar="FILE",
+            help="Sketch or map, in any format that `match` reads.",
+            parser=options.to_path,
         ),
     ],
     server: options.Server = None,
     access: options.Access = options.Access(),  # noqa: B008
     config: options.Config = None,
     profile: options.Profile = "",
-    segmenter: Annotated[str, typer.Option(help="Segmenter; the file's kind decides.")] = "",
+    segmenter: Annotated[
+        str, typer.Option(help="Segmenter; depends on the kind of file by default.")
+    ] = "",
     settings: options.Settings = None,
     json: options.Json = False,
     overlay: options.Overlay = None,
@@ -35,8 +39,8 @@ def segment(
         typer.Option(
             "--out",
             metavar="FILE",
-            help="Save the objects as polygons, in .geojson. Beside a robot's map and named as it "
-            "is with .objects.geojson, they are its objects from then on: edit them at will.",
+            help="Save the objects as polygons (.geojson). Beside a robot's map NAME.yaml, "
+            "NAME.objects.geojson replaces the objects found in it: edit it at will.",
             parser=options.to_path,
         ),
     ] = None,
@@ -44,8 +48,8 @@ def segment(
 ) -> None:
     """Show which objects are found in a file.
 
-    Parameters are set as in --set segmenter.min_size=0.3. On a terminal the table counts objects
-    from 1, as the overlay does; in a pipe the lines count from 0, as the API does.
+    Set parameters as in --set segmenter.min_size=0.3. Tables and pictures number objects from 1;
+    pipes and --json number them from 0.
     """
     from sketchmatch.cli import display, output, pictures, places, sources
     from sketchmatch.cli.answering import answerer

@@ -40,21 +40,21 @@ def serve(
     ] = None,
     max_matches: Annotated[
         int | None,
-        typer.Option(help="Requests at the same time; 4 a processor by default."),
+        typer.Option(help="Requests at the same time; 4 per processor by default."),
     ] = None,
     workers: Annotated[
         int | None,
         typer.Option(
-            help="Processes that wait for requests at least; 0 to answer in the server's own "
-            "process, slower and with less memory; one a processor by default."
+            help="Minimum of worker processes, by default one per processor; 0 to answer in "
+            "the server's own process, slower but with less memory."
         ),
     ] = None,
     max_waiting: Annotated[
-        int | None, typer.Option(help="Requests that wait for their turn; 500 by default.")
+        int | None, typer.Option(help="Requests waiting for their turn; 500 by default.")
     ] = None,
     max_waiting_mib: Annotated[
         int | None,
-        typer.Option(help="Most that these may have together, in MiB; 256 by default."),
+        typer.Option(help="Total size of waiting requests, in MiB; 256 by default."),
     ] = None,
     max_wait: Annotated[
         float | None,
@@ -66,35 +66,40 @@ def serve(
     default_time_budget: Annotated[
         float | None,
         typer.Option(
-            metavar="SECONDS", help="Longest match where a request does not say; 300 by default."
+            metavar="SECONDS", help="Longest match if the request does not say; 300 by default."
         ),
     ] = None,
     max_matches_per_caller: Annotated[
-        int | None, typer.Option(help="Requests of one caller at the same time; more wait.")
+        int | None, typer.Option(help="Requests of one caller at the same time; further ones wait.")
     ] = None,
     max_requests_per_minute: Annotated[
-        int | None, typer.Option(help="Requests that one caller may begin in a minute.")
+        int | None, typer.Option(help="Requests that one caller may start per minute.")
     ] = None,
     max_stored_mib_per_caller: Annotated[
         int | None,
-        typer.Option(metavar="MIB", help="Scenes that one caller keeps, with their sources."),
+        typer.Option(
+            metavar="MIB", help="Size of the scenes that one caller stores, with their sources."
+        ),
     ] = None,
     max_comparisons: Annotated[
         int | None,
         typer.Option(
-            help="Pairs of sketched objects × pairs of mapped objects × directions of a match."
+            help="Comparisons of a match: pairs of sketched objects × pairs of mapped objects × "
+            "directions."
         ),
     ] = None,
     max_candidates: Annotated[
         int | None,
         typer.Option(
-            help="Maps that a search may weigh by its parameters, such as population × generations."
+            help="Object maps that a search may evaluate by its parameters, such as population × "
+            "generations."
         ),
     ] = None,
     grace: Annotated[
         float | None,
         typer.Option(
-            metavar="SECONDS", help="Time for running matches when stopped; 5 by default."
+            metavar="SECONDS",
+            help="Time for running matches at shutdown; 5 by default.",
         ),
     ] = None,
     max_bytes: Annotated[
@@ -116,29 +121,34 @@ def serve(
     ] = None,
     tls_certificate: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="Certificate to show to clients, in PEM: encrypt."),
+        typer.Option(
+            metavar="FILE", help="Certificate of the server (PEM), for encrypted connections."
+        ),
     ] = None,
     tls_key: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Private key of the certificate, in PEM.")
+        str | None, typer.Option(metavar="FILE", help="Private key of the certificate (PEM).")
     ] = None,
     tls_client_ca: Annotated[
         str | None,
         typer.Option(
-            metavar="FILE", help="Authorities of which clients must show a certificate, in PEM."
+            metavar="FILE",
+            help="Certificate authorities of clients (PEM); each client must then show a "
+            "certificate.",
         ),
     ] = None,
     tokens: Annotated[
         str | None,
         typer.Option(
             metavar="FILE",
-            help="Tokens of which calls must show one, as `sketchmatch tokens add` writes them.",
+            help="Token file written by `sketchmatch tokens add`; calls must carry one of its "
+            "tokens.",
         ),
     ] = None,
     insecure: Annotated[
         bool,
         typer.Option(
             "--insecure",
-            help="Listen where other machines reach the server though strangers may call then, or "
+            help="Allow an address that other machines reach, although anyone may then call or "
             "read along.",
         ),
     ] = False,
@@ -146,24 +156,24 @@ def serve(
         str | None,
         typer.Option(
             metavar="FOLDER",
-            help="Where the server keeps things; in the user's folder for application state by "
-            "default. A folder serves one server at a time.",
+            help="Folder for what the server keeps; by default in the user's folder for "
+            "application state. Each server needs a folder of its own.",
         ),
     ] = None,
     no_store: Annotated[
-        bool, typer.Option("--no-store", help="Keep nothing beyond the life of the server.")
+        bool, typer.Option("--no-store", help="Keep nothing after the server stops.")
     ] = False,
     keep_matches_days: Annotated[
         float | None,
-        typer.Option(metavar="DAYS", help="Keep a match so long after its end; 30 by default."),
+        typer.Option(metavar="DAYS", help="Time to keep a match after its end; 30 by default."),
     ] = None,
     keep_matches_mib: Annotated[
         int | None,
-        typer.Option(help="Most that kept matches may take, in MiB; 1024 by default."),
+        typer.Option(help="Size limit of all kept matches, in MiB; 1024 by default."),
     ] = None,
     keep_scenes_mib: Annotated[
         int | None,
-        typer.Option(help="Most that kept scenes may take, in MiB; 1024 by default."),
+        typer.Option(help="Size limit of all stored scenes, in MiB; 1024 by default."),
     ] = None,
     max_sketches: Annotated[
         int | None,
@@ -176,59 +186,59 @@ def serve(
         float | None,
         typer.Option(
             metavar="SECONDS",
-            help="Keep a sketch so long that nobody draws or watches; 1800 by default.",
+            help="Time to keep a sketch in progress that nobody draws or watches; 1800 by default.",
         ),
     ] = None,
     metrics_address: Annotated[
         str | None,
         typer.Option(
             metavar="HOST:PORT",
-            help="Tell metrics, as Prometheus reads them, and probes over HTTP here.",
+            help="Serve Prometheus metrics and health probes over HTTP here.",
         ),
     ] = None,
     traces_endpoint: Annotated[
         str | None,
         typer.Option(
-            metavar="URL", help="Send OpenTelemetry traces to the collector here, OTLP over gRPC."
+            metavar="URL", help="Send OpenTelemetry traces to this collector, OTLP over gRPC."
         ),
     ] = None,
     web: Annotated[
         bool,
         typer.Option(
             "--web",
-            help="Show the sketch pad to browsers, at 127.0.0.1:8080 unless told otherwise.",
+            help="Serve the sketch pad to browsers, at 127.0.0.1:8080 by default.",
         ),
     ] = False,
     web_address: Annotated[
         str | None,
         typer.Option(
             metavar="HOST:PORT",
-            help="Show the sketch pad, and answer Connect, gRPC-Web and JSON, here.",
+            help="Serve the sketch pad and Connect, gRPC-Web and JSON here.",
         ),
     ] = None,
     web_robots: Annotated[
         str | None,
         typer.Option(
             metavar="URL,…",
-            help="Let the sketch pad send routes to these ROS bridges, as in ws://robot.local:9090.",
+            help="Let the sketch pad send routes to these ROS bridges, e.g. ws://robot.local:9090.",
         ),
     ] = None,
     strict_plugins: Annotated[
         bool,
         typer.Option(
             "--strict-plugins",
-            help="Do not start while a plugin fails, a name is taken twice, or the configuration "
-            "names what is not there.",
+            help="Refuse to start if a plugin fails, a name is taken twice, or the configuration "
+            "names something that does not exist.",
         ),
     ] = False,
 ) -> None:
     """Serve the gRPC API until SIGTERM or Ctrl-C.
 
-    Where no option says it, the configuration does. SIGHUP reads the configuration again, but for
-    addresses, grace, workers and the names of files of certificates and tokens; what is in these is
-    read again whenever it changes. Requests under way keep what they began with. Health is
-    NOT_SERVING until the kernels are compiled or loaded. A server that hangs ends with exit code 70
-    after 30 s: let what starts it start it again.
+    Options override the configuration. SIGHUP rereads the configuration except addresses, grace,
+    workers and the paths of certificate and token files, whose content is reread whenever it
+    changes. Requests in progress keep the settings they began with. Health is NOT_SERVING until the
+    kernels are compiled or loaded. A server that hangs exits with code 70 after 30 s: have its
+    supervisor restart it.
     """
     import asyncio
 

@@ -39,9 +39,9 @@ def status(
     timeout: options.Timeout = 5.0,
     json: options.JsonDocument = False,
 ) -> None:
-    """Show what a server is, what it allows, and which of its algorithms are ready.
+    """Show a server's version, limits and plugins, and which algorithms are ready.
 
-    In a pipe the lines are a name and a text with a tab between them.
+    In a pipe, each line is a name and a text, separated by a tab.
     """
     from sketchmatch.cli.answering import client_of
 

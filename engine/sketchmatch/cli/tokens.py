@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
-app = typer.Typer(help="Say who may call a server: make, list and remove tokens.")
+app = typer.Typer(help="Create, list and remove the tokens that admit callers to a server.")
 
-_Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the caller, as in robot-7.")]
+_Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the caller, e.g. robot-7.")]
 _File = Annotated[
     Path | None,
     typer.Option(
         "--file",
         metavar="FILE",
-        help="File of tokens; the one of the configuration by default.",
+        help="Token file; by default the configured one.",
         parser=to_path,
     ),
 ]
@@ -36,19 +36,19 @@ _File = Annotated[
 
 @app.callback()
 def tokens() -> None:
-    """Say who may call a server: make, list and remove tokens.
+    """Create, list and remove the tokens that admit callers to a server.
 
-    The file holds a salted hash of each token, not the token. A running server reads the file again
-    when it has changed.
+    The file holds a salted hash of each token, not the token. A running server rereads the file
+    when it changes.
     """
 
 
 @app.command("add")
 @answering
 def add(name: _Name, file: _File = None, config: Config = None) -> None:
-    """Make a token, add its hash to the file, and print the token: it is shown this once.
+    """Create a token, add its hash to the file, and print the token, which is shown only once.
 
-    Earlier tokens of the same name stay good until `sketchmatch tokens remove --old`.
+    Earlier tokens of the same name stay valid until `sketchmatch tokens remove --old`.
     """
     from sketchmatch.server.tokens import new_token
 
@@ -77,9 +77,11 @@ def remove(
     name: _Name,
     file: _File = None,
     config: Config = None,
-    old: Annotated[bool, typer.Option("--old", help="Keep the newest of the name.")] = False,
+    old: Annotated[
+        bool, typer.Option("--old", help="Keep the newest token of the caller.")
+    ] = False,
 ) -> None:
-    """Remove the tokens of a name from the file: who shows one is refused from then on."""
+    """Remove the tokens of a caller from the file; calls with them are refused from then on."""
     path = _file(file, config)
 
     def without(lines: list[str], known: list[KnownToken | None]) -> list[str]:

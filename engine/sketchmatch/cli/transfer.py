@@ -26,7 +26,10 @@ class _Direction(StrEnum):
 _Out = Annotated[
     Path | None,
     typer.Option(
-        "--out", metavar="FILE", help="Save what was carried, in .geojson.", parser=options.to_path
+        "--out",
+        metavar="FILE",
+        help="Save what was transferred (.geojson).",
+        parser=options.to_path,
     ),
 ]
 _Keepout = Annotated[
@@ -34,7 +37,7 @@ _Keepout = Annotated[
     typer.Option(
         "--keepout",
         metavar="FILE",
-        help="Save the zones as a mask for nav2's keep-out filter: .yaml, and a .pgm beside it.",
+        help="Save the zones as a mask for nav2's keep-out filter: .yaml, with a .pgm beside it.",
         parser=options.to_path,
     ),
 ]
@@ -43,7 +46,7 @@ _Waypoints = Annotated[
     typer.Option(
         "--waypoints",
         metavar="FILE",
-        help="Save points and routes as waypoints in .yaml, as nav2's panel in RViz does.",
+        help="Save points and routes as waypoints (.yaml), as nav2's RViz panel does.",
         parser=options.to_path,
     ),
 ]
@@ -52,11 +55,11 @@ _Radius = Annotated[
     typer.Option(
         metavar="METRES",
         min=0.0,
-        help="How far routes are kept away from obstacles: half the robot's width; 0 on a grid.",
+        help="Distance of routes from obstacles: half the robot's width; on a grid 0 by default.",
     ),
 ]
 _AllowUnknown = Annotated[
-    bool, typer.Option("--allow-unknown", help="Let routes go where nobody has seen the floor.")
+    bool, typer.Option("--allow-unknown", help="Let routes cross unknown cells.")
 ]
 
 
@@ -66,19 +69,23 @@ def transfer(
     sketch: Annotated[
         Path,
         typer.Argument(
-            metavar="SKETCH", help="A sketch, as `match` takes it.", parser=options.to_path
+            metavar="SKETCH",
+            help="Sketch, in any format that `match` reads.",
+            parser=options.to_path,
         ),
     ],
     map_: Annotated[
         Path,
-        typer.Argument(metavar="MAP", help="A map, as `match` takes it.", parser=options.to_path),
+        typer.Argument(
+            metavar="MAP", help="Map, in any format that `match` reads.", parser=options.to_path
+        ),
     ],
     features: Annotated[
         Path | None,
         typer.Argument(
             metavar="[FEATURES]",
-            help="Points, routes and zones: GeoJSON in the sketch's coordinates, y upwards; a "
-            "keep-out mask or waypoints of nav2. A route that is drawn in the sketch needs none.",
+            help="Points, routes and zones: GeoJSON in the sketch's coordinates, y upwards; or a "
+            "keep-out mask or waypoints of nav2. Not needed for a route drawn in the sketch.",
             parser=options.to_path,
         ),
     ] = None,
@@ -94,7 +101,7 @@ def transfer(
     no_pin: options.Exclusions = None,
     synonyms: options.Synonyms = None,
     direction: Annotated[
-        _Direction, typer.Option(help="From where to where.")
+        _Direction, typer.Option(help="Direction of the transfer.")
     ] = _Direction.SKETCH_TO_MAP,
     radius: _Radius = None,
     allow_unknown: _AllowUnknown = False,
@@ -105,11 +112,11 @@ def transfer(
     overlay: options.Overlay = None,
     verbose: options.Verbose = False,
 ) -> None:
-    """Carry points, routes and zones from a sketch to a map, or back.
+    """Transfer points, routes and zones from a sketch to a map, or back.
 
-    Routes are kept out of what a robot's map says is occupied or unknown, and planned again where
-    they lead into it. Every point has a standard deviation. On a terminal there is a table; in a
-    pipe tab-separated lines: name, kind, standard deviation, points, changes.
+    Routes are replanned where they would cross occupied or unknown cells of a robot's map. Every
+    point has a standard deviation. On a terminal, prints a table; in a pipe, tab-separated lines:
+    name, kind, standard deviation, points, changes.
     """
     from sketchmatch.cli import carried, pictures, places
     from sketchmatch.cli.answering import answerer
@@ -165,21 +172,19 @@ def carry(
         typer.Argument(
             metavar="FEATURES",
             help="Zones, routes and points on the old map: GeoJSON, a keep-out mask of nav2, or "
-            "waypoints as its panel in RViz saves them.",
+            "waypoints saved by its RViz panel.",
             parser=options.to_path,
         ),
     ],
     old: Annotated[
         Path,
         typer.Argument(
-            metavar="OLD", help="The old map, as `match` takes it.", parser=options.to_path
+            metavar="OLD", help="Old map, in any format that `match` reads.", parser=options.to_path
         ),
     ],
     new: Annotated[
         Path,
-        typer.Argument(
-            metavar="NEW", help="The new map of the same place.", parser=options.to_path
-        ),
+        typer.Argument(metavar="NEW", help="New map of the same place.", parser=options.to_path),
     ],
     server: options.Server = None,
     access: options.Access = options.Access(),  # noqa: B008
@@ -189,7 +194,8 @@ def carry(
     segmenter: Annotated[
         str,
         typer.Option(
-            help="Segmenter of both maps; rooms or objects, whichever tells more, by default."
+            help="Segmenter of both maps; by default objects or rooms, whichever gives more "
+            "information."
         ),
     ] = "",
     settings: options.Settings = None,
@@ -205,10 +211,10 @@ def carry(
     overlay: options.Overlay = None,
     verbose: options.Verbose = False,
 ) -> None:
-    """Carry names, zones, routes and points of an old map to a new one of the same place.
+    """Transfer names, zones, routes and points from an old map to a new one of the same place.
 
-    The new map may begin elsewhere, be turned, and show some things where they were not. What the
-    old map's own file names is carried with the rest. What cannot be carried is said.
+    The new map may have another origin, be rotated, and show some objects elsewhere. Names in the
+    old map's own file are transferred too. What cannot be transferred is reported.
     """
     from sketchmatch.cli import carried, pictures, places
     from sketchmatch.cli.answering import answerer
