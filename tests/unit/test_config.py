@@ -561,7 +561,7 @@ def test_the_file_to_begin_with_has_every_setting():
         for name in item.algorithm.Params.model_fields
     }
     for name in set_:
-        assert re.search(rf"^#+ {name} (= |is left out)", text, re.M), name
+        assert re.search(rf"^#+ {name} (= |is not set)", text, re.M), name
     uncommented = tomllib.loads(re.sub(r"^# ", "", text, flags=re.M))
     assert uncommented["algorithms"]["searcher"]["easm"]["patience"] == 400
 

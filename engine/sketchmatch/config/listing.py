@@ -25,10 +25,10 @@ _BOUNDS = (
     ("exclusiveMaximum", "less than"),
 )
 _HEAD = """\
-## Configuration of sketchmatch. Every setting is here with its default, commented out: to change
-## one, remove the "# " before it. `sketchmatch config check` tells whether all is sound, and
-## `sketchmatch config show` what is in force. Environment variables are stronger than this file,
-## such as SKETCHMATCH_SERVER__ADDRESS for address in [server], and options are stronger than both.
+## Configuration of sketchmatch. Every setting is listed with its default, commented out: to change
+## one, remove the "# " before it. `sketchmatch config check` finds errors, and `sketchmatch config
+## show` prints the settings in force. Environment variables override this file, such as
+## SKETCHMATCH_SERVER__ADDRESS for address in [server]; options override both.
 """
 
 
@@ -82,7 +82,7 @@ def template(registry: Registry) -> str:
             parts += [f"## {line}\n" for line in _wrapped(entry.text)]
             key = _key(entry.path[-1])
             parts.append(
-                f"## {key} is left out by default.\n"
+                f"## {key} is not set by default.\n"
                 if entry.value is None
                 else f"# {key} = {_toml(entry.value)}\n"
             )
@@ -96,9 +96,7 @@ def shown_file(configuration: Configuration, registry: Registry) -> str:
         parts.append(f"\n[{section}]\n" if section else "")
         for entry in group:
             key = _key(entry.path[-1])
-            line = (
-                f"# {key} is left out" if entry.value is None else f"{key} = {_toml(entry.value)}"
-            )
+            line = f"# {key} is not set" if entry.value is None else f"{key} = {_toml(entry.value)}"
             parts.append(f"{line}  # {entry.place or entry.origin}\n")
     return "".join(parts)
 
@@ -116,7 +114,7 @@ def _sections(configuration: Configuration, registry: Registry) -> _Found:
         kind = kind_of(stage)
         default = None if kind is Kind.SEGMENTER else registry.default(kind)
         text = f"Name of the {kind}"
-        text += "; left out, that for the form of the source." if default is None else "."
+        text += "; by default the one for the kind of source." if default is None else "."
         yield ("pipeline", stage, "name"), choice.name or default, text
         for name, value in choice.parameters.items():
             yield ("pipeline", stage, "parameters", name), value, ""

@@ -81,7 +81,7 @@ _Stages: Any = create_model("_Stages", __base__=Plain, **_EACH_STAGE)
 
 
 class _Pipeline(_Stages):
-    """What does each stage of a match, where neither request nor profile says it."""
+    """The algorithm of each stage of a match, if neither request nor profile chooses one."""
 
 
 class _Profile(_Stages):
@@ -90,13 +90,13 @@ class _Profile(_Stages):
     summary: str = Field("", description="One line for lists.")
     weights: _Weights | None = Field(
         None,
-        description="Weights of ζσ, ζR and ζL in ζ, perhaps of the objects' shapes and sizes, and "
-        "perhaps the exponent of distance in ζR; 1, 1, 1, when left out.",
+        description="Weights in ζ: of ζσ, ζR and ζL; optionally of the objects' shapes and sizes; "
+        "optionally the exponent of distance in ζR. 1, 1, 1 by default.",
     )
     allow_unmatched: bool | None = Field(
         None,
-        description="Leave objects without partner on both sides where that is likelier; as "
-        "searcher and judge do, when left out.",
+        description="Let objects of either side stay without partner where that is more likely; by "
+        "default as searcher and judge do.",
     )
 
 
@@ -115,119 +115,117 @@ class _Plugins(Plain):
 
     allow: _Names | None = Field(
         None,
-        description="Distributions whose plugins may be used, beside the engine's own; "
-        "all, when left out.",
+        description="Distributions whose plugins may be used, in addition to the engine's own; all "
+        "by default.",
         examples=[["acme-search"]],
     )
     deny: _Names = Field((), description="Distributions whose plugins may not be used.")
     strict: bool = Field(
         False,
-        description="Do not start a server while a plugin has failed, a name is taken twice, or "
-        "the configuration names what is not there.",
+        description="Refuse to start a server if a plugin fails, a name is taken twice, or the "
+        "configuration names something that does not exist.",
     )
     trusted: _Names = Field(
         (),
-        description="Distributions whose algorithms run in the server's own process, not in one of "
-        'their own; "*" for all.',
+        description="Distributions whose algorithms run in the server process instead of separate "
+        'ones; "*" for all.',
     )
     patience_seconds: float = Field(
         30.0,
         gt=0,
-        description="How long an algorithm in a process of its own may go without a sign of life.",
+        description="Longest time that an algorithm in a separate process may show no sign of "
+        "life.",
     )
 
 
 class _Server(Plain):
-    """What `sketchmatch serve` listens on and lets requests ask for."""
+    """Addresses, access and limits of `sketchmatch serve`."""
 
     address: Annotated[str, AfterValidator(_listening)] = Field(
         "127.0.0.1:50051",
         description="Host and port to listen on, or unix:PATH; port 0 picks a free one.",
     )
-    grace_seconds: float = Field(
-        5.0, ge=0, description="Time for running matches when the server is stopped."
-    )
+    grace_seconds: float = Field(5.0, ge=0, description="Time for running matches at shutdown.")
     max_request_mib: int = Field(64, ge=1, le=500, description="Largest request, in MiB.")
     max_matches: int | None = Field(
         None,
         ge=1,
         le=1000,
-        description="Requests at the same time; when left out, 4 for each processor.",
+        description="Requests at the same time; 4 per processor by default.",
         examples=[8],
     )
     workers: int | None = Field(
         None,
         ge=0,
         le=1000,
-        description="Processes that wait for requests at least, more start while more matches run; "
-        "0 to answer in the server's own process, slower and with less memory; when left out, one "
-        "for each processor.",
+        description="Minimum of worker processes, more start while more matches run; 0 to answer "
+        "in the server's own process, slower but with less memory; one per processor by default.",
         examples=[2],
     )
     max_waiting: int = Field(
         500,
         ge=0,
         le=100_000,
-        description="Requests that wait for their turn.",
+        description="Requests waiting for their turn.",
     )
     max_waiting_mib: int = Field(
         256,
         ge=1,
         le=1_000_000,
-        description="Most that requests which wait may have together, in MiB.",
+        description="Total size of waiting requests, in MiB.",
     )
     max_wait_seconds: float = Field(
         10.0, ge=0, description="How long a request may wait for its turn."
     )
     max_time_budget_seconds: float = Field(
-        3600.0, ge=0.001, description="Longest match; one that asks for more is cut to it."
+        3600.0, ge=0.001, description="Longest match; a request for more is cut to it."
     )
     default_time_budget_seconds: float = Field(
-        300.0, ge=0.001, description="Longest match where the request does not say."
+        300.0, ge=0.001, description="Longest match if the request does not say."
     )
     max_matches_per_caller: int | None = Field(
         None,
         ge=1,
         le=1000,
-        description="Requests of one caller at the same time, more wait; all places, when left "
-        "out.",
+        description="Requests of one caller at the same time, further ones wait; no separate limit "
+        "by default.",
         examples=[4],
     )
     max_requests_per_minute: int | None = Field(
         None,
         ge=1,
         le=1_000_000,
-        description="Requests that one caller may begin in a minute; no limit, when left out.",
+        description="Requests that one caller may start per minute; no limit by default.",
         examples=[600],
     )
     max_stored_mib_per_caller: int | None = Field(
         None,
         ge=1,
         le=1_000_000,
-        description="MiB of the scenes that one caller keeps, with their sources; no limit beside "
-        "that of the store, when left out.",
+        description="Size of the scenes that one caller stores, with their sources, in MiB; by "
+        "default limited only by the store.",
         examples=[100],
     )
     max_comparisons: int | None = Field(
         None,
         ge=1,
         le=10**15,
-        description="Pairs of sketched objects × pairs of mapped objects × directions of one "
-        "match; no limit beside memory, when left out.",
+        description="Comparisons of one match: pairs of sketched objects × pairs of mapped objects "
+        "× directions; by default limited only by memory.",
         examples=[1_000_000_000],
     )
     max_candidates: int | None = Field(
         None,
         ge=1,
         le=10**15,
-        description="Maps that a search may weigh by its parameters, such as population × "
-        "generations or particles × iterations; no limit, when left out.",
+        description="Object maps that a search may evaluate by its parameters, such as population "
+        "× generations or particles × iterations; no limit by default.",
         examples=[100_000_000],
     )
     tls_certificate: str | None = Field(
         None,
-        description="PEM file of the server's certificate, with those between it and the "
-        "authority's; no encryption, when left out.",
+        description="PEM file of the server's certificate and its intermediate certificates; no "
+        "encryption by default.",
         examples=["server.pem"],
     )
     tls_key: str | None = Field(
@@ -235,37 +233,37 @@ class _Server(Plain):
     )
     tls_client_ca: str | None = Field(
         None,
-        description="PEM file of the authorities of which each client must show a certificate; "
-        "clients show none, when left out.",
+        description="PEM file of certificate authorities: each client must show a certificate of "
+        "one of them; clients need none by default.",
         examples=["clients-ca.pem"],
     )
     tokens: str | None = Field(
         None,
-        description="File of the tokens of which each call must show one, as `sketchmatch tokens "
-        "add` writes it; calls need none, when left out.",
+        description="Token file written by `sketchmatch tokens add`: each call must carry one of "
+        "its tokens; calls need none by default.",
         examples=["tokens"],
     )
     store: str | None = Field(
         None,
-        description="Folder of the server's own for what it keeps: one in the user's folder for "
-        "application state, when left out.",
+        description="Folder for what the server keeps, not shared with other servers; by default "
+        "in the user's folder for application state.",
         examples=["/var/lib/sketchmatch"],
     )
-    keep: bool = Field(True, description="Keep things on disk, beyond the life of the server.")
+    keep: bool = Field(True, description="Keep things on disk after the server stops.")
     keep_matches_days: float = Field(
-        30.0, gt=0, le=36_500, description="How long a match is kept after its end."
+        30.0, gt=0, le=36_500, description="Time to keep a match after its end."
     )
     keep_matches_mib: int = Field(
         KEPT_MIB,
         ge=1,
         le=1_000_000,
-        description="Most that kept matches may take, in MiB; the oldest go first.",
+        description="Size limit of all kept matches, in MiB; the oldest are deleted first.",
     )
     keep_scenes_mib: int = Field(
         KEPT_MIB,
         ge=1,
         le=1_000_000,
-        description="Most that kept scenes may take, in MiB; what does not fit is refused.",
+        description="Size limit of all stored scenes, in MiB; what does not fit is refused.",
     )
     max_sketches: int = Field(
         1000, ge=0, le=1_000_000, description="Sketches in progress at the same time."
@@ -276,47 +274,47 @@ class _Server(Plain):
     sketch_idle_seconds: float = Field(
         1800.0,
         gt=0,
-        description="How long a sketch in progress is kept that nobody draws or watches.",
+        description="Time to keep a sketch in progress that nobody draws or watches.",
     )
     metrics_address: Annotated[str | None, AfterValidator(_watched)] = Field(
         None,
         description="Host and port for Prometheus' /metrics and the probes /livez and /readyz over "
-        "HTTP; none, when left out.",
+        "HTTP; none by default.",
         examples=["127.0.0.1:9464"],
     )
     traces_endpoint: str | None = Field(
         None,
         pattern=r"^https?://[^/\s]+$",
-        description="URL of an OpenTelemetry collector that takes OTLP over gRPC; no traces, when "
-        "left out.",
+        description="URL of an OpenTelemetry collector that takes OTLP over gRPC; no traces by "
+        "default.",
         examples=["http://127.0.0.1:4317"],
     )
     web_address: Annotated[str | None, AfterValidator(_watched)] = Field(
         None,
         description="Host and port for browsers: the sketch pad, and the services over Connect, "
-        "gRPC-Web and JSON; none, when left out.",
+        "gRPC-Web and JSON; none by default.",
         examples=["127.0.0.1:8080"],
     )
     web_origins: _Names = Field(
         (),
-        description="Origins of pages from elsewhere that may call at the address for browsers.",
+        description="Origins of other pages that may call the address for browsers.",
         examples=[["https://pad.example.org"]],
     )
     web_robots: Annotated[_Names, AfterValidator(_bridges)] = Field(
         (),
-        description="ROS bridges (rosbridge) that the sketch pad may send routes to; it reaches "
-        "nobody else.",
+        description="ROS bridges (rosbridge) to which the sketch pad may send routes; it connects "
+        "to nothing else.",
         examples=[["ws://robot.local:9090"]],
     )
     insecure: bool = Field(
         False,
-        description="Listen where other machines reach the server though strangers may call then, "
-        "or read along.",
+        description="Allow an address that other machines reach, although anyone may then call or "
+        "read along.",
     )
 
 
 class _Limits(Plain):
-    """How large one sketch or one map may be, in a file or in a request."""
+    """Largest sketch or map, in a file or in a request."""
 
     max_bytes: int = Field(
         SourceLimits.max_bytes, ge=1, description="Bytes of a file, or of a picture in a request."
