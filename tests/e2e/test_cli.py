@@ -417,9 +417,9 @@ def test_plugins_show_is_what_the_catalogue_says_of_one(command_line, where):
     assert ["reads", *sources] in lines
     assert next(line for line in lines if line[:2] == ["parameter", "door_width"]) == [
         *("parameter", "door_width", "number | null", "null", "> 0, ≤ 10000", "m"),
-        "Passages up to this wide are doorways; when left out half the width of a robot's map's "
-        "typical room, but at most 2.1 m, and in a drawing half the width of the wider of what "
-        "they join. What is in metres here is in a drawing's own unit for drawings.",
+        "Widest passage that is a doorway; by default half the width of a robot's map's typical "
+        "room, but at most 2.1 m, and in a drawing half the width of the wider part that it joins. "
+        "For drawings, metres here mean the drawing's own unit.",
     ]
 
 

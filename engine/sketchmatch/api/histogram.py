@@ -23,9 +23,8 @@ class HistogramParams(_algorithm.Params):
         ge=4,
         le=3600,
         multiple_of=2,
-        description="Number of directions over the full turn; direction k is 2πk/n from +x. When "
-        "left out, as many as the narrow relations of the scene with fewer objects need, 180 to "
-        "720.",
+        description="Number of directions over the full turn; direction k is 2πk/n from +x. By "
+        "default as many as the narrow relations of the scene with fewer objects need, 180 to 720.",
     )
 
 

@@ -8,7 +8,7 @@ __all__ = ["Angles"]
 
 
 class Angles(PowerForce):
-    """Histogram of the angles of all pairs of points, exactly and not by counting pixels.
+    """Exact histogram of the angles of all pairs of points, without counting pixels.
 
     In polar coordinates about a point b of B the point a of A lies at b + ρ(cos θ, sin θ), and
     da = ρ dρ dθ. The density of the angle θ over all pairs of points is therefore the histogram of

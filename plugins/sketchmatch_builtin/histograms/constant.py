@@ -10,7 +10,7 @@ __all__ = ["ConstantForce"]
 class ConstantForce(PowerForce):
     """Exact histogram of constant forces [1]_, r = 0, of polygons with holes, overlap allowed.
 
-    It is what scenes are described by in [2]_.
+    The thesis [2]_ describes scenes by it.
 
     References
     ----------

@@ -10,7 +10,7 @@ __all__ = ["GravitationalForce"]
 class GravitationalForce(PowerForce):
     """Exact histogram of gravitational forces, r = 2, of polygons that do not touch.
 
-    It tells more of the parts of two objects that are near each other than of the others.
+    Parts of two objects that are near each other count more than the others.
 
     References
     ----------

@@ -22,11 +22,11 @@ __all__ = ["HybridForce"]
 class HybridForce(ForceHistogram):
     """Exact histogram of hybrid forces (F02) of polygons: constant up to a distance, 1/d² beyond.
 
-    The distance Y is ``near`` times the diameter of the smaller object, or ``overlap`` times that
-    of what the two have in common, if that is more; the diameter of a shape is that of the disc
-    of equal area. This Y is that of the program which L. Wendling and P. Matsakis published with
-    [1]_, where the two are p0 and p1. Objects that are further apart than Y have the gravitational
-    histogram; others may touch and overlap, as the force never exceeds 1/Y².
+    The distance Y is the larger of ``near`` times the diameter of the smaller object and
+    ``overlap`` times that of what the two have in common; the diameter of a shape is that of the
+    disc of equal area. It is the Y of the program that L. Wendling and P. Matsakis published with
+    [1]_, where the two parameters are p0 and p1. Objects further apart than Y have the
+    gravitational histogram; others may touch and overlap, since the force never exceeds 1/Y².
 
     References
     ----------
@@ -69,7 +69,7 @@ class HybridForce(ForceHistogram):
             3.0,
             ge=0.0,
             le=1000.0,
-            description="The same in diameters of the overlap, where that is more.",
+            description="The same in diameters of the overlap, if that is more.",
         )
 
     params: Params

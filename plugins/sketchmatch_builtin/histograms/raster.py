@@ -26,8 +26,8 @@ class RasterForce(ForceHistogram):
     """Histogram of the forces d^−r of objects on a grid, exact for their pixels.
 
     The scene is laid on a grid of square pixels, and an object becomes the pixels whose centres it
-    holds. The forces are those between these sets of pixels, not between digital lines, so the
-    pixels alone make it an approximation.
+    contains. Forces act between these sets of pixels, not between digital lines, so the pixels are
+    the only approximation.
 
     References
     ----------
@@ -58,7 +58,7 @@ class RasterForce(ForceHistogram):
             256,
             ge=8,
             le=4096,
-            description="How long the longer side of the scene is on the grid.",
+            description="Length of the scene's longer side on the grid.",
             json_schema_extra={"unit": "px"},
         )
 

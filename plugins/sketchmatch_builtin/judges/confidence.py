@@ -13,11 +13,10 @@ __all__ = ["HighestConfidence"]
 class HighestConfidence(Judge):
     """The map with the highest ζ, less the price of what it leaves out, is the answer.
 
-    How likely it is right follows from ζ of the maps that come close to it, by odds that were
-    learned from simulated sketches: for the weights of the thesis, the default measure of
-    similarity on histograms of constant forces, and maps of objects. For others nothing is said,
-    nor where there are too many objects. It knows nothing of other places: all its probabilities
-    are of maps of this one.
+    Its probability follows from ζ of the maps that come close to it, by odds learned from simulated
+    sketches: for the weights of the thesis, the default similarity measure on histograms of
+    constant forces, and object maps. Otherwise, and for too many objects, there are no
+    probabilities. Other places are not considered: all probabilities assume this one.
 
     References
     ----------

@@ -22,24 +22,23 @@ _NEGLIGIBLE = 1e-6
 
 
 class Posterior(Judge):
-    """Weighs all evidence for each map, and says how likely it is, and whether this is the place.
+    """Weighs all evidence: how likely each map is, and whether this is the place.
 
-    The maps are those met by the search and those that laying the sketch upon the map leads to, as
-    the searcher ``align`` does. A conditional logit [1]_ makes probabilities of what each one is
-    worth: how well its places, sizes and shapes agree in one frame, what outlines are however they
-    are stretched, the ways between objects, their relations and the forces within them, what a page
-    is stretched by, what is left out on either side, and labels where both sides have some; and how
-    certain it is that each mapped object in it is one. What that comes to is a network of two small
-    layers over the lines of a map, in any order [2]_, so that a deviation counts the more, the
-    better the others fit. That the right map is none of them has a share as well.
+    The maps are those met by the search and those found by laying the sketch on the map, as the
+    searcher ``align`` does. A conditional logit [1]_ turns the score of each into a probability.
+    The score covers how well places, sizes and shapes agree in one frame, outlines however they are
+    stretched, the vectors between objects, their relations and the forces within them, how the page
+    is stretched, what is left out on either side, labels if both sides have some, and how certain
+    each mapped object is. It is computed by a network of two small layers over the lines of a map,
+    in any order [2]_, so that a deviation counts the more, the better the others fit. That the
+    right map is none of these has a probability as well.
 
-    Whether the sketch shows this place at all follows from how far the best map exceeds what
-    chance achieves on the same map: decoys, the sketch in the mirror, which nobody draws, and
-    with its things in each other's places. Verifying by a model of chance agreement is what
-    star trackers do [3]_.
+    Whether the sketch shows this place at all follows from how far the best map exceeds what chance
+    achieves on the same map, with decoys: the sketch mirrored, which nobody draws, and with its
+    objects in each other's places. Star trackers verify by such a model of chance agreement [3]_.
 
-    All of it was learned from simulated sketches, on the default relations. Others do not count:
-    then it judges by places, sizes and shapes alone.
+    All of it was learned from simulated sketches, on the default relations. With others it judges
+    by places, sizes and shapes alone.
 
     References
     ----------
@@ -63,7 +62,7 @@ class Posterior(Judge):
     """
 
     name = "posterior"
-    summary = "The default: the likeliest map by all evidence, and whether this is the place."
+    summary = "The default: the most likely map by all evidence, and whether this is the place."
     default = True
 
     @property

@@ -149,9 +149,10 @@ class GrowthParams(Params):
 
     rotation: Literal["circular", "folded"] = Field(
         "circular",
-        description="What R̂ is. circular: R/180°, compared modulo 2, so that all turns of a sketch "
-        "are alike. folded: as the thesis prints it, R/180° up to 180° and back to 0 beyond; a "
-        "sketch turned by 90° is lost then, because a correspondence and its dual are one point.",
+        description="Definition of R̂. circular: R/180°, compared modulo 2, so that all rotations "
+        "of a sketch are alike. folded: as printed in the thesis, R/180° up to 180° and back to 0 "
+        "beyond; a sketch rotated by 90° is lost then, because a correspondence and its dual are "
+        "one point.",
     )
 
     @property

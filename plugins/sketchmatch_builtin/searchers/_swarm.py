@@ -46,7 +46,7 @@ class SwarmParams(GrowthParams):
         30,
         ge=1,
         le=10_000_000,
-        description="Iterations without a better best after which it has converged.",
+        description="Iterations without an improvement after which the search has converged.",
     )
 
     @property

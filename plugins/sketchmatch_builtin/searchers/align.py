@@ -29,22 +29,22 @@ _OFFERED = 10
 
 
 class Align(Searcher):
-    """Matches the objects themselves in one frame, and may leave some of either side out.
+    """Matches the objects themselves in one frame; some of either side may stay unmatched.
 
-    Every two sketched objects laid on every two mapped ones make a pose, a turn, a scale and a
-    shift, unless the sizes and shapes of the four speak against it. Each pose is weighed by how
-    well all sketched objects then lie on mapped ones that are as large and as long; how much
-    larger or smaller than they are the sketch shows things between their places is found with it.
-    The weights are robust, those of Student's t [2]_, so that one object far off rules out
-    nothing. Under the best poses a linear assignment gives each object its partner, or none, and
-    the pose is fitted again to these, a few times. What single changes make of the best of these
-    maps is offered as well.
+    Laying two sketched objects on two mapped ones gives a pose: a rotation, a scale and a
+    translation. All such poses are tried, unless the sizes and shapes of the four objects
+    contradict it. A pose is scored by how well all sketched objects then lie on mapped ones of the
+    same size and length; how much larger or smaller than the distances between them the sketch
+    shows objects is estimated with it. The weights are robust, those of Student's t [2]_, so that
+    one object far off rules out nothing. Under the best poses, a linear assignment gives each
+    object its partner, or none, and the pose is fitted again to these, a few times. The maps that
+    single changes make of the best of these are offered as well.
 
-    Relations without scenes, which a match never has, are searched as ``auto`` does.
+    Relations without scenes, which never occur in a match, are searched as ``auto`` does.
 
-    It compares no relations: ζ decides only which of these maps, completed where they leave
-    objects out, is the best histogram map. A judge that looks at the maps themselves makes the
-    most of it. Matching the objects themselves is future work in the thesis [1]_.
+    Relations are not compared: ζ only decides which of these maps, completed if they leave objects
+    out, is the best histogram map. A judge that looks at the maps themselves makes the most of
+    them. Matching the objects themselves is future work in the thesis [1]_.
 
     References
     ----------
@@ -66,7 +66,9 @@ class Align(Searcher):
     """
 
     name = "align"
-    summary = "The default: lays the sketch upon the map, and may leave out things of either side."
+    summary = (
+        "The default: lays the sketch on the map, and may leave objects of either side unmatched."
+    )
     default = True
 
     class Params(Params):
@@ -76,10 +78,10 @@ class Align(Searcher):
             60,
             ge=1,
             le=10_000,
-            description="Different maps of the best poses that are refined.",
+            description="How many different maps of the best poses are refined.",
         )
         maps: int = Field(
-            20, ge=1, le=10_000, description="The best maps, which a judge is told of."
+            20, ge=1, le=10_000, description="How many of the best maps are passed to the judge."
         )
 
     params: Params

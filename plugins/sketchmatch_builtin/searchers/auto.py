@@ -22,13 +22,12 @@ _MANY = 64.0
 
 
 class Auto(Searcher):
-    """Picks the search by the number of object maps and by the time there is.
+    """Chooses the search by the number of object maps and the time available.
 
-    Where maps are few, as with up to 11 objects, ``exact`` proves the best in milliseconds. Up to
-    about 20 objects, or 10 in a map of 50, ``direct`` looks for the best map and ``exact`` then
-    tries to prove that there is none better, or finds it: for as long as the time budget lasts,
-    or for ``proof_nodes`` where there is none. Beyond, ``direct`` is all. The result's note says
-    what was done.
+    If maps are few, as with up to 11 objects, ``exact`` proves the best one in milliseconds. Up to
+    about 20 objects, or 10 in a map of 50, ``direct`` searches for the best map, and ``exact`` then
+    tries to prove that none is better, or finds it: until the time budget ends or, without one, for
+    ``proof_nodes``. Beyond that, only ``direct`` runs. A note of the result states what was done.
 
     Examples
     --------
@@ -46,7 +45,7 @@ class Auto(Searcher):
     """
 
     name = "auto"
-    summary = "Exact where a proof comes fast, else direct, with a proof if it can."
+    summary = "Exact if a proof is fast, otherwise direct, with a proof if there is time."
 
     class Params(Params):
         """Parameters of the choice."""
@@ -55,8 +54,8 @@ class Auto(Searcher):
             40_000,
             ge=0,
             le=1_000_000_000,
-            description="Nodes of the search trees after which a proof is given up where there is "
-            "no time budget: 1 to 2 s. 0 leaves proofs out, but where maps are few.",
+            description="Nodes of the search trees after which a proof is abandoned if there is no "
+            "time budget: 1 to 2 s. 0 omits proofs, except where maps are few.",
         )
 
     params: Params

@@ -34,17 +34,17 @@ _ENTRIES = 1_000_000
 
 
 class Direct(Searcher):
-    """Matches the objects themselves: evolution of object maps, each one a local optimum.
+    """Matches the objects themselves by evolution of object maps, each a local optimum.
 
     Matching objects instead of histograms is the thesis's closing idea [1]_, evolution with local
     search a memetic algorithm [2]_.
 
-    The first maps are made for global rotations all around and any dilation: each object takes a
-    partner that lies in the same direction of all others, as far away, and is as similar, on
-    average. Then the better of the population cross with each other, or with a new map for their
-    own rotation and dilation. Every map climbs to a local optimum under two moves, exchange of
-    the partners of two objects and move of one object to an unused partner, before it competes.
-    All moves of a map are weighed at once, each in constant time [3]_, and ζ is exact.
+    The first maps are made for global rotations over the full turn and any dilation: each object
+    takes a partner that, on average over all others, lies in the same direction, as far away, and
+    is as similar. Then the better maps of the population cross with each other, or with a new map
+    for their own rotation and dilation. Before it competes, every map climbs to a local optimum
+    under two moves: exchanging the partners of two objects, and moving one object to an unused
+    partner. All moves of a map are evaluated at once, each in constant time [3]_, and ζ is exact.
 
     The alternatives are the best other maps met, completed by all single moves from them.
 
@@ -83,17 +83,21 @@ class Direct(Searcher):
             None,
             ge=2,
             le=10_000,
-            description="Number of object maps that live at once; when left out, 60, but beyond "
-            "50 template objects fewer in proportion.",
+            description="Number of object maps in the population; by default 60, proportionally "
+            "fewer beyond 50 template objects.",
         )
         tournament: int = Field(
-            4, ge=1, le=1000, description="Random maps of which the best becomes a parent."
+            4,
+            ge=1,
+            le=1000,
+            description="Number of random maps of which the best becomes a parent.",
         )
         renewal_rate: float = Field(
             0.5,
             ge=0,
             le=1,
-            description="Probability that a parent crosses with a new map, not with another.",
+            description="Probability that a parent crosses with a new map instead of another "
+            "parent.",
         )
         exchange_rate: float = Field(
             0.3,
@@ -111,9 +115,9 @@ class Direct(Searcher):
             None,
             ge=1,
             le=1_000_000_000,
-            description="Maps without a better best after which it has converged; when left out, "
-            "200, and 40 more for each argument object that a map leaves over, up to 30 of these; "
-            "beyond 30 template objects fewer.",
+            description="Maps without an improvement after which the search has converged; by "
+            "default 200, and 40 more for each argument object that a map leaves over, up to 30 of "
+            "these; fewer beyond 30 template objects.",
         )
 
     params: Params

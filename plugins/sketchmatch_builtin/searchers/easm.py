@@ -83,14 +83,14 @@ class Easm(Searcher):
         consistency: Literal["object", "pairwise"] = Field(
             "object",
             description="What makes an FMAP legal: 'object', it follows from one object map; "
-            "'pairwise', it is one-to-one and holds no histogram beside its dual.",
+            "'pairwise', it is one-to-one and contains no histogram together with its dual.",
         )
         population: int | None = Field(
             None,
             ge=2,
             le=100_000,
-            description="Number of FMAPs that live at once; when left out, twice the square of "
-            "the number of objects in the larger scene, at least 100 and at most 600.",
+            description="Number of FMAPs in the population; by default twice the square of the "
+            "number of objects in the larger scene, at least 100 and at most 600.",
         )
         crossover_rate: float = Field(
             0.7, ge=0, le=1, description="Pc, probability that two parents cross over."
@@ -111,7 +111,7 @@ class Easm(Searcher):
             400,
             ge=1,
             le=10_000_000,
-            description="Generations without a better best after which it has converged.",
+            description="Generations without an improvement after which the search has converged.",
         )
 
     params: Params

@@ -71,12 +71,11 @@ _MOST_LAYERS = 512
 class Exact(Searcher):
     """Finds the object map with the highest ζ and proves that there is none better.
 
-    A few maps that climb as those of ``direct`` do are the start. Then cells of rotation and
-    dilation are bounded [1]_ [2]_ and halved; those that may hold something better than the best
-    map so far are searched depth first, under bounds by dual ascent [3]_ over linear assignments
-    [4]_. The upper bound is true at every moment, and in the end is ζ itself: nothing is better by
-    more than 1e-9. The alternatives are the best other maps met on the way, and not proved to be
-    the next best.
+    The search starts from a few maps that climb as those of ``direct`` do. Cells of rotation and
+    dilation are then bounded [1]_ [2]_ and halved; those that may contain a better map than the
+    best so far are searched depth first, under bounds by dual ascent [3]_ over linear assignments
+    [4]_. The upper bound holds at every moment and finally equals ζ: no map is better by more than
+    1e-9. The alternatives are the best other maps met on the way, not proved to be the next best.
 
     References
     ----------
@@ -117,28 +116,29 @@ class Exact(Searcher):
             None,
             ge=1,
             le=100_000,
-            description="Maps that climb before the proof begins; when left out, half as many as "
-            "the smaller scene has objects.",
+            description="Maps that climb before the proof begins; by default half the number of "
+            "objects in the smaller scene.",
         )
         cell_angle: float = Field(
             24.0,
             ge=2.0,
             le=360.0,
-            description="Width that cells of rotation are halved down to; up to four times as "
-            "wide where there are few maps.",
+            description="Width to which cells of rotation are halved; up to four times as wide if "
+            "there are few maps.",
             json_schema_extra={"unit": "°"},
         )
         cell_dilation: float = Field(
             0.22,
             ge=0.01,
             le=100.0,
-            description="Width in units of L̂ that cells of dilation are halved down to; up to "
-            "four times as wide where there are few maps.",
+            description="Width in units of L̂ to which cells of dilation are halved; up to four "
+            "times as wide if there are few maps.",
         )
         node_limit: int | None = Field(
             None,
             ge=1,
-            description="Cells and nodes of the search trees to stop at; no limit by default.",
+            description="Cells and nodes of the search trees at which to stop; no limit by "
+            "default.",
         )
 
     params: Params

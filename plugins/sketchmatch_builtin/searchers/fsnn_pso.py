@@ -26,17 +26,16 @@ __all__ = ["FsnnPso"]
 
 
 class FsnnPso(Searcher):
-    """Lets a particle swarm choose where FMAPs begin that grow by fuzzy closeness.
+    """Grows FMAPs by fuzzy closeness from seed points that a particle swarm chooses.
 
-    The histogram correspondence nearest to the seed point in (σ̂, R̂, L̂) comes first. Then, again
-    and again, the one comes in whose closeness to those already in the FMAP, weighted by their own
-    confidence, is highest on average. An FMAP is one-to-one and holds no histogram beside its
-    dual, but need not lead to a consistent object map. The scale of a sketch plays no part, as in
-    ``nn``.
+    The first entry is the histogram correspondence nearest to the seed point in (σ̂, R̂, L̂). Each
+    next one has the highest mean closeness to those already in the FMAP, weighted by their own
+    confidence. An FMAP is one-to-one and contains no histogram together with its dual, but need not
+    lead to a consistent object map. The scale of a sketch has no effect, as in ``nn``.
 
-    An FMAP depends on its first entry alone: C(0) is a factor of all that follows. So no more
-    FMAPs exist than Q·Q' (1,568 for 8 objects on 8), however large the swarm; ``first = "every"``
-    grows each of them once, which takes less time than a swarm that evaluates as many.
+    An FMAP depends only on its first entry: C(0) is a factor of all that follows. So there are at
+    most Q·Q' FMAPs (1,568 for 8 objects on 8), however large the swarm; ``first = "every"`` grows
+    each of them once, which takes less time than a swarm that evaluates as many.
 
     The mean and the variance of distances, which closeness depends on, are exact up to about
     13 × 13 objects and estimated from 2²⁰ random pairs beyond. The search begins with a random
@@ -74,7 +73,7 @@ class FsnnPso(Searcher):
         first: Literal["swarm", "every"] = Field(
             "swarm",
             description="Which entries FMAPs grow from: those that the swarm finds, or every one, "
-            "whatever the swarm's parameters say.",
+            "regardless of the swarm's parameters.",
         )
         k: float = Field(
             1.0,

@@ -25,12 +25,12 @@ __all__ = ["Nn"]
 class Nn(Searcher):
     """Grows one FMAP from each of several random seed points and keeps the best [1]_.
 
-    Histogram correspondences enter the FMAP in the order of their Euclidean distance from the
-    seed point in (σ̂, R̂, L̂), unless they conflict with one that is in it: it is one-to-one and
-    holds no histogram beside its dual, but need not lead to a consistent object map. A random
-    FMAP is what the search begins with.
+    Histogram correspondences enter the FMAP in the order of their Euclidean distance from the seed
+    point in (σ̂, R̂, L̂), unless they conflict with one that is in it. It is one-to-one and
+    contains no histogram together with its dual, but need not lead to a consistent object map. The
+    search begins with a random FMAP.
 
-    L̂ of seed points counts from the mean of all L̂, which changes no distance between
+    L̂ of seed points is relative to the mean of all L̂, which changes no distance between
     correspondences: the thesis draws it from ±0.5, as if sketch and map had one scale. The thesis
     leaves the number of seed points open.
 

@@ -21,10 +21,10 @@ __all__ = ["NnPso"]
 
 
 class NnPso(Searcher):
-    """Lets a particle swarm choose the seed points from which ``nn`` grows FMAPs.
+    """Grows FMAPs as ``nn`` does, from seed points that a particle swarm chooses.
 
-    The swarm has a star neighbourhood and ζ as its fitness. A random FMAP is what the search
-    begins with. The scale of a sketch plays no part, as in ``nn``.
+    The swarm has a star neighbourhood and ζ as its fitness. The search begins with a random FMAP.
+    The scale of a sketch has no effect, as in ``nn``.
 
     References
     ----------

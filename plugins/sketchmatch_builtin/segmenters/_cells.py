@@ -55,16 +55,16 @@ class FreeSpaceParams(Params):
         ge=1,
         le=100,
         description=(
-            "Known cells whose occupancy is below this are free; when left out 25, and for a "
-            "map of map_server the thresholds in its file, in whose place this counts."
+            "Known cells with an occupancy below this are free; by default 25, or the thresholds "
+            "in the file of a map of map_server, which this overrides."
         ),
         json_schema_extra={"unit": "%"},
     )
     keep_unknown: bool = Field(
         True,
         description=(
-            "The grey 205, with which map_server saves what nobody saw, stays unknown where "
-            "thresholds would call it free; false lets them decide."
+            "The grey 205, with which map_server saves unknown cells, stays unknown even if "
+            "thresholds make it free; false applies the thresholds."
         ),
     )
 

@@ -29,18 +29,18 @@ _FRAMED = (
 class ImageSegmenter(Segmenter):
     """Takes shapes as objects, filled or outlined, scanned or photographed, dark or light.
 
-    Whether ink is darker than paper, or lighter, as chalk on a board, is told from what lies along
-    the picture's border and, where both do, from what is rare nearby. The light on the paper is
-    found [1]_ and divided out, and ink parted from paper halfway between them [2]_; each shape is
-    then traced around its outside [3]_, so that an outline counts as what it encloses, and nothing
-    within an object is looked at. Gaps in outlines are closed, lines that enclose nothing are left
-    out, and so are ruled lines and a table around the sheet. Outlines that touch or overlap are
-    parted where that gives the fewest convex shapes. One shape around most of the drawing is a
-    frame and left out. Coordinates are pixels from the lower left corner. Objects come in reading
-    order: by their highest point from the top down, then from the left.
+    Whether ink is darker or lighter than the paper, as chalk on a board is, is decided by what lies
+    along the picture's border and, if both do, by what is rare nearby. The illumination of the
+    paper is estimated [1]_ and divided out, and ink is separated from paper halfway between them
+    [2]_. Each shape is traced around its outside [3]_, so an outline counts as what it encloses,
+    and what lies within an object is ignored. Gaps in outlines are closed; lines that enclose
+    nothing, ruled lines and a table around the sheet are left out. Outlines that touch or overlap
+    are separated where that gives the fewest convex shapes. One shape around most of the drawing is
+    a frame and is left out. Coordinates are pixels from the lower left corner. Objects come in
+    reading order: by their highest point from the top down, then from the left.
 
-    Small shapes close to each other in a row are writing if some are open, or if there are several
-    such rows.
+    Small shapes close to each other in a row are taken as writing if some are open, or if there are
+    several such rows.
 
     References
     ----------
@@ -78,7 +78,7 @@ class ImageSegmenter(Segmenter):
             ge=0.0,
             le=50.0,
             description=(
-                "Standard deviation of the Gaussian that evens out noise before the threshold; "
+                "Standard deviation of the Gaussian blur that reduces noise before the threshold; "
                 "0 for none."
             ),
             json_schema_extra={"unit": "px"},
@@ -88,21 +88,22 @@ class ImageSegmenter(Segmenter):
             ge=0.0,
             le=1.0,
             description=(
-                "Shapes smaller than a square with this side are left out, as a share of the "
-                "picture's larger side."
+                "Shapes smaller than a square with this side, as a share of the picture's larger "
+                "side, are left out."
             ),
         )
         simplify: float = Field(
             0.01,
             ge=0.0,
             le=0.2,
-            description="How far a simplified outline may leave the shape, as a share of its size.",
+            description="Largest deviation of a simplified outline from the shape, as a share of "
+            "its size.",
         )
         ink: Literal["auto", "dark", "light"] = Field(
             "auto",
             description=(
-                "Whether what is drawn is darker or lighter than what it is drawn on, as chalk on "
-                "a blackboard is; 'auto' tells it from the picture."
+                "Whether the drawing is darker or lighter than its background, as chalk on a "
+                "blackboard is; 'auto' decides by the picture."
             ),
         )
         faint: float = Field(
@@ -110,16 +111,16 @@ class ImageSegmenter(Segmenter):
             ge=0.0,
             le=1.0,
             description=(
-                "Lines that absorb less than this share of what the darkest absorb are left out, "
-                "as smudges, erased lines and what shows through the paper are."
+                "Lines that absorb less light than this share of what the darkest absorb are left "
+                "out, such as smudges, erased lines and what shows through the paper."
             ),
         )
         frame: Literal["auto", "keep"] = Field(
             "auto",
             description=(
-                "What to do with one shape around at least two others, with walls around things "
-                "far smaller, and with a table around the sheet: 'auto' leaves it out, 'keep' "
-                "takes it as the one object it is."
+                "How to treat one shape around at least two others, walls around far smaller "
+                "things, and a table around the sheet: 'auto' leaves it out, 'keep' takes it as "
+                "one object."
             ),
         )
         max_gap: float = Field(
@@ -127,15 +128,15 @@ class ImageSegmenter(Segmenter):
             ge=0.0,
             le=0.5,
             description=(
-                "Widest gap in an outline that is closed, as a share of the outline's size; "
-                "0 for none."
+                "Widest gap in an outline that is closed, as a share of the outline's size; 0 "
+                "closes none."
             ),
         )
         colours: Literal["merge", "separate"] = Field(
             "merge",
             description=(
-                "Filled areas of different colours or shades that touch: 'merge' takes them as "
-                "one object, 'separate' each as its own."
+                "How to treat touching areas filled in different colours or shades: 'merge' makes "
+                "them one object, 'separate' makes each its own."
             ),
         )
 

@@ -53,29 +53,29 @@ _USUAL_ATTACHED = 2.0
 
 
 class OccupancyGridSegmenter(Segmenter):
-    """Takes as objects what stands in free regions, at their walls, and on legs.
+    """Takes as objects what stands in free regions, at their walls and on legs.
 
     A region is free cells joined by their sides; a hole is what it encloses, joined by sides or
-    corners. A gap one cell wide goes on across corners, so that what stands a cell off a wall is
-    a hole however both lie on the cells. That fills an object's unseen interior, whatever its
-    grey, and leaves out the walls and all that lies behind them. Regions that are small beside the
-    largest are no rooms but what was seen of an object's inside; a hole with a room in it is a
-    building and no object. Outlines run exactly along the cells' borders and are then
-    simplified [1]_.
+    corners. A gap one cell wide continues across corners, so that what stands a cell off a wall is
+    a hole however both lie on the cells. Taking holes fills an object's unseen interior, whatever
+    its grey, and leaves out the walls and all that lies behind them. Regions that are small
+    compared with the largest are not rooms but what was seen of an object's inside; a hole with a
+    room in it is a building, not an object. Outlines run exactly along the cells' borders and are
+    then simplified [1]_.
 
-    What touches a wall, or was not seen from behind, is no hole but a pocket of the region's
-    outline: one that hangs on the wall by a neck, or leans against it as a box does. Of a table a
-    scan shows legs: four at the corners of a rectangle, two bars that face each other, or a crowd
-    of small things are one if so many would not stand so by chance [2]_.
+    What touches a wall, or was not seen from behind, is not a hole but a pocket of the region's
+    outline: one that hangs on the wall by a neck, or leans against it as a box does. Of a table, a
+    scan shows only legs: four at the corners of a rectangle, two bars that face each other, or a
+    crowd of small things are one object if so many are unlikely to stand like that by chance [2]_.
 
-    The certainty of an object says how likely it is one thing. What the laser met all around, and
-    no thin and ragged thing, is certain; four legs are .9, feet and crowds .6; what hangs on a wall
-    is .8, what juts far out of it .7, and what leans against it .4, as the wall's own bumps do; an
-    outline that the laser did not meet is .3. Edges of shadows, specks where what was seen ends,
-    and thin specks that the laser hardly met are left out.
+    The certainty of an object is how likely it is one thing: 1 if the laser met it all around and
+    it is not thin and ragged; 0.9 for four legs, 0.6 for feet and crowds; 0.8 for what hangs on a
+    wall, 0.7 for what juts far out of it, and 0.4 for what leans against it, as the wall's own
+    bumps do; 0.3 for an outline that the laser did not meet. Edges of shadows, specks where the
+    seen area ends, and thin specks that the laser hardly met are left out.
 
-    Objects come in reading order: by their highest point from the top down, then from the left.
-    What the map's file names, other than rooms, gives its name to the object that stands there.
+    Objects come in reading order: by their highest point from the top down, then from the left. A
+    name in the map's file, other than a room's, is given to the object at its place.
 
     References
     ----------
@@ -122,8 +122,8 @@ class OccupancyGridSegmenter(Segmenter):
             ge=0.0,
             le=1.0,
             description=(
-                "Gaps up to this wide are closed, in an object's outline and between objects, "
-                "which then are one; 0 closes none."
+                "Widest gap that is closed, in an outline or between objects, which then become "
+                "one; 0 closes none."
             ),
             json_schema_extra={"unit": "m"},
         )
@@ -132,9 +132,9 @@ class OccupancyGridSegmenter(Segmenter):
             ge=0.0,
             le=100.0,
             description=(
-                "Small things that are at most this far apart become one with the outline around "
-                "all; 0 merges none. When left out, what stands as the legs of tables and chairs "
-                "do, and not by chance, is one."
+                "Small things at most this far apart become one object with the outline around "
+                "all; 0 merges none. By default those are merged that stand like legs of tables "
+                "and chairs, and not by chance."
             ),
             json_schema_extra={"unit": "m"},
         )
@@ -143,7 +143,7 @@ class OccupancyGridSegmenter(Segmenter):
             ge=0.0,
             le=100.0,
             description=(
-                "Small things, of which furniture is merged, are those no larger than a square "
+                "Small things, which may be merged into furniture, are no larger than a square "
                 "with this side."
             ),
             json_schema_extra={"unit": "m"},
@@ -153,8 +153,8 @@ class OccupancyGridSegmenter(Segmenter):
             ge=0.0,
             le=100.0,
             description=(
-                "Objects that touch a wall, or whose back was not seen, count if they are no "
-                "wider than this where they meet it; 0 leaves all out."
+                "Objects that touch a wall, or whose back was not seen, count if their contact is "
+                "no wider than this; 0 leaves all out."
             ),
             json_schema_extra={"unit": "m"},
         )
@@ -163,8 +163,8 @@ class OccupancyGridSegmenter(Segmenter):
             ge=0.0,
             le=10.0,
             description=(
-                "What touches a wall and is no thicker than this is a partition or a bump of "
-                "the wall and no object; it matters with attached alone."
+                "What touches a wall and is no thicker than this is a partition or a bump of the "
+                "wall, not an object; used only with attached."
             ),
             json_schema_extra={"unit": "m"},
         )
@@ -173,8 +173,8 @@ class OccupancyGridSegmenter(Segmenter):
             ge=0.01,
             le=1.0,
             description=(
-                "Objects of which it is less certain that they are one thing are left out; the "
-                "default leaves out edges of shadows and specks at them, 0.5 all that is in doubt."
+                "Objects with a lower certainty are left out; the default leaves out edges of "
+                "shadows and specks at them, 0.5 all that is in doubt."
             ),
         )
         region_share: float = Field(
@@ -182,8 +182,8 @@ class OccupancyGridSegmenter(Segmenter):
             ge=0.001,
             le=1.0,
             description=(
-                "Free regions count, as rooms behind closed doors, from this share of the "
-                "largest's area; 1 takes the largest alone."
+                "Smallest free region that counts, as rooms behind closed doors do, as a share of "
+                "the largest one's area; 1 takes only the largest."
             ),
         )
         tolerance: float | None = Field(
@@ -191,8 +191,8 @@ class OccupancyGridSegmenter(Segmenter):
             ge=0.0,
             le=10.0,
             description=(
-                "How far a simplified outline may leave the cells' borders, but never more than "
-                "12 % of the object's size; three quarters of a cell when left out."
+                "Largest deviation of a simplified outline from the cells' borders, never more "
+                "than 12 % of the object's size; three quarters of a cell by default."
             ),
             json_schema_extra={"unit": "m"},
         )
@@ -201,8 +201,8 @@ class OccupancyGridSegmenter(Segmenter):
             ge=0.0,
             le=100.0,
             description=(
-                "What the map's file names is the object in which its place lies, or else the "
-                "nearest up to this far away."
+                "A name in the map's file is given to the object at its place, or else to the "
+                "nearest within this distance."
             ),
             json_schema_extra={"unit": "m"},
         )

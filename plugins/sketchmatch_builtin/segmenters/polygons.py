@@ -12,9 +12,8 @@ __all__ = ["PolygonSegmenter"]
 class PolygonSegmenter(Segmenter):
     """Takes every polygon as one object, as it is.
 
-    Nothing is repaired: a polygon that crosses itself or has no area is refused, because which
-    shape was meant is not for a program to guess. The model is that of the OGC's simple
-    features.
+    Nothing is repaired: a polygon that crosses itself or has no area is refused, because a program
+    cannot know which shape was meant. The model is that of the OGC's simple features.
 
     References
     ----------

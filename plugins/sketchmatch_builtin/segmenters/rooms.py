@@ -84,38 +84,37 @@ _SMALLEST_SHARE, _SMALL = 0.01, 0.2
 
 
 class RoomSegmenter(Segmenter):
-    """Takes as objects the rooms: free space, cut where it is narrow.
+    """Takes rooms as objects: free space, cut where it is narrow.
 
-    Where a disc as wide as a door does not fit, free space is cut [1]_; what is left is a room or
-    part of one, and what was cut away goes to the nearest, of several to the largest. How wide that
-    is the map itself says: three times the mean distance of free cells to the nearest wall, which
-    is half the width of a square room. Parts that are joined by a passage nearly as wide as the
-    wider of them are one room, so that a corridor stays whole; so are corridors and the place where
-    they meet or bend, where a larger disc fits than into any of them. A convex part that hangs at
-    the rest of its room by one opening, wider than a doorway but narrower than itself, is a room of
-    its own; not where ``door_width`` is given, nor at a corridor that fills less than a fifth of
-    its hull. Rays of a laser through glass and the insides of cupboards' outlines are no rooms.
-    Things that stand free in a room and are no longer than ``furniture`` neither cut it nor are
-    holes in it; longer ones are holes. Unknown and occupied cells otherwise belong to no room, and
-    two rooms are always at least a cell apart. A turned map has the same rooms, turned. A map of
-    more than four million cells is looked at in cells twice as large, or larger, as long as a
-    doorway is 20 of these wide.
+    Free space is cut where a disc as wide as a door does not fit [1]_. What is left is a room or
+    part of one; what was cut away goes to the nearest part, of several to the largest. The map
+    itself gives that width: three times the mean distance of free cells to the nearest wall, which
+    is half the width of a square room. Parts joined by a passage nearly as wide as the wider of
+    them are one room, so that a corridor stays whole; so are corridors and the place where they
+    meet or bend, if a larger disc fits there than into any of them. A convex part joined to the
+    rest of its room by one opening, wider than a doorway but narrower than itself, is a room of its
+    own, unless ``door_width`` is given or it lies at a corridor that fills less than a fifth of its
+    hull. A laser's rays through glass and the insides of cupboards' outlines are not rooms. Things
+    that stand free in a room and are no longer than ``furniture`` neither cut it nor are holes in
+    it; longer ones are holes. All other unknown and occupied cells belong to no room, and two rooms
+    are always at least a cell apart. A rotated map has the same rooms, rotated. A map of more than
+    four million cells is processed in cells twice as large, or larger, as long as a doorway is 20
+    of these wide.
 
-    In a drawing walls are strokes, the borders of polygons and open lines, or one of two shades of
+    In a drawing, walls are strokes, the borders of polygons and open lines, or one of two shades of
     a picture, in which either the walls or the free space may be dark; what joins the picture's
-    border is outside. No metres are known there, and so all is measured by the drawing itself: free
-    space is cut where it becomes less than half as wide [2]_, at doors as where a corridor opens
-    into a hall. A door that is drawn, a leaf and the arc that it turns through, is closed: it is
-    no wall, and a room ends there. Small closed strokes are furniture if they stand free in a room,
-    or at its walls while rooms open into each other; parallel lines evenly apart are ruled paper,
-    and a straight line apart with ticks at both ends is a dimension. A match may take another cut
-    of it, where it becomes less than 0.4 or 0.6 times as wide. A text of the drawing, and else a
-    label that one line alone has, name the room around them; of several texts the largest does, and
-    measures are none. Where polygons come with texts, as from DXF, their labels are of layers and
-    blocks.
+    border is outside. Metres are unknown there, so everything is measured relative to the drawing:
+    free space is cut where it becomes less than half as wide [2]_, at doors as well as where a
+    corridor opens into a hall. A drawn door, a leaf with its swing arc, is closed: it is not a
+    wall, and a room ends there. Small closed strokes are furniture if they stand free in a room, or
+    at its walls while rooms open into each other; evenly spaced parallel lines are ruled paper, and
+    a separate straight line with ticks at both ends is a dimension. A match may use another cut,
+    where free space becomes less than 0.4 or 0.6 times as wide. A room is named by the largest text
+    in it that is not a measure, or else by a label that only one line has. If polygons come with
+    texts, as from DXF, their labels are those of layers and blocks.
 
-    Rooms come in reading order: by their highest point from the top down, then from the left.
-    One that the map's file names, with the type ``room`` and a place in it, has that name.
+    Rooms come in reading order: by their highest point from the top down, then from the left. An
+    entry of the map's file with the type ``room`` names the room in which its place lies.
 
     Notes
     -----
@@ -176,10 +175,9 @@ class RoomSegmenter(Segmenter):
             gt=0.0,
             le=1e4,
             description=(
-                "Passages up to this wide are doorways; when left out half the width of a robot's "
-                "map's typical room, but at most 2.1 m, and in a drawing half the width of the "
-                "wider of what they join. What is in metres here is in a drawing's own unit for "
-                "drawings."
+                "Widest passage that is a doorway; by default half the width of a robot's map's "
+                "typical room, but at most 2.1 m, and in a drawing half the width of the wider "
+                "part that it joins. For drawings, metres here mean the drawing's own unit."
             ),
             json_schema_extra={"unit": "m"},
         )
@@ -188,8 +186,8 @@ class RoomSegmenter(Segmenter):
             ge=0.0,
             le=1e6,
             description=(
-                "Rooms smaller than this are left out; when left out 2 m², and in a drawing a "
-                "hundredth of all rooms, or where these are many a fifth of the mean room."
+                "Rooms smaller than this are left out; by default 2 m², and in a drawing a "
+                "hundredth of all rooms or, if these are many, a fifth of the mean room."
             ),
             json_schema_extra={"unit": "m²"},
         )
@@ -198,9 +196,9 @@ class RoomSegmenter(Segmenter):
             ge=0.0,
             le=1e4,
             description=(
-                "Things that stand free and are at most this long are furniture and belong to "
-                "the room around them; longer ones are walls that may part rooms. When left out "
-                "2 m, and in a drawing as long as a doorway is wide."
+                "Longest free-standing thing that is furniture and belongs to the room around it; "
+                "longer ones are walls, which may separate rooms. By default 2 m, and in a drawing "
+                "the width of a doorway."
             ),
             json_schema_extra={"unit": "m"},
         )
@@ -209,8 +207,8 @@ class RoomSegmenter(Segmenter):
             ge=0.0,
             le=10.0,
             description=(
-                "How far a simplified outline may leave the cells' borders; three quarters of a "
-                "cell when left out."
+                "Largest deviation of a simplified outline from the cells' borders; three quarters "
+                "of a cell by default."
             ),
             json_schema_extra={"unit": "m"},
         )

@@ -69,19 +69,19 @@ class StrokeSegmenter(Segmenter):
 
     Hands overshoot and undershoot the point where an outline closes, the *failure of
     co-termination* of [1]_. A stroke that crosses itself near its ends is closed at the crossing
-    and its tails are cut; else its ends are joined, if the gap is small. The object is
-    everything that the stroke encloses, so that an outline drawn over twice counts once.
+    and its tails are cut; otherwise its ends are joined if the gap is small. The object is
+    everything that the stroke encloses, so an outline drawn twice counts once.
 
-    Strokes that stay open are joined end to end to chains that close: those with the smallest
-    gaps and the shortest tails first, which is the perceptual organisation by proximity and good
-    continuation of [2]_. What is left is a stroke drawn over an outline again, a mark inside an
-    object, a flick, or the route. Small strokes close to each other in a row are writing if some
-    are open, or if there are several such rows.
+    Strokes that stay open are joined end to end into closed chains, those with the smallest gaps
+    and the shortest tails first: the perceptual organisation by proximity and good continuation of
+    [2]_. What remains is a stroke drawn over an outline again, a mark inside an object, a flick, or
+    the route. Small strokes close to each other in a row are taken as writing if some are open, or
+    if there are several such rows.
 
-    An outline without a label is called by the text in it, where the drawing has texts.
+    An outline without a label is named by the text in it, if the drawing has texts.
 
-    Sizes of a stroke are the larger side of its bounding box; spans, of chains and of the sketch,
-    are the largest distance between two points.
+    The size of a stroke is the larger side of its bounding box; the span of a chain or of the
+    sketch is the largest distance between two points.
 
     References
     ----------
@@ -106,7 +106,7 @@ class StrokeSegmenter(Segmenter):
     """
 
     name = "strokes"
-    summary = "Objects drawn with one pen stroke or several; gaps and tails are mended."
+    summary = "Objects drawn with one pen stroke or several; gaps and tails are repaired."
     default = True
     sources = (StrokeSet,)
 
@@ -118,8 +118,8 @@ class StrokeSegmenter(Segmenter):
             ge=0.0,
             le=1.0,
             description=(
-                "Largest gap in an outline that is closed, as a share of its size; strokes that "
-                "are open wider are left out."
+                "Largest gap in an outline that is closed, as a share of its size; strokes with a "
+                "wider gap are left out."
             ),
         )
         simplify: float = Field(
@@ -127,7 +127,7 @@ class StrokeSegmenter(Segmenter):
             ge=0.0,
             le=0.2,
             description=(
-                "How far a simplified outline may leave the stroke, as a share of its size."
+                "Largest deviation of a simplified outline from the stroke, as a share of its size."
             ),
         )
         min_size: float = Field(
@@ -135,16 +135,16 @@ class StrokeSegmenter(Segmenter):
             ge=0.0,
             le=1.0,
             description=(
-                "Size of the smallest object, as a share of the typical one's; what is smaller "
-                "is a dot or a flick and left out. Inside another object it is three times this. "
-                "Outlines that are around others, as walls and pages are, are not typical."
+                "Smallest size of an object, as a share of the typical one; smaller ones are dots "
+                "or flicks and are left out. Inside another object the limit is three times this. "
+                "Outlines around others, such as walls and pages, do not count as typical."
             ),
         )
         route: Literal["auto", "never"] = Field(
             "auto",
             description=(
-                "auto: a stroke labelled route or path, or else the last open one across half of "
-                "the sketch, is the sketched route. never: there is none."
+                "auto: the sketched route is a stroke labelled route or path, otherwise the last "
+                "open one across half of the sketch. never: there is none."
             ),
         )
 

@@ -9,10 +9,10 @@ __all__ = ["CircularPeak"]
 
 
 class CircularPeak(CrossCorrelation):
-    """Largest normalised cross-correlation over all rotations, whole bins and between.
+    """Largest normalised cross-correlation over all rotations, by whole bins and between.
 
-    R is where it lies, so histograms without a clear main direction are aligned well, too. Where
-    two rotations fit equally, as for symmetric histograms, R is the smaller.
+    R is the rotation of this maximum, so histograms without a clear main direction are aligned
+    well, too. If two rotations fit equally, as for symmetric histograms, R is the smaller one.
 
     References
     ----------

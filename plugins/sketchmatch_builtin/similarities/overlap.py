@@ -12,7 +12,7 @@ __all__ = ["Overlap"]
 
 
 class Overlap(Similarity):
-    """Mean of min/max over the directions in which there is something.
+    """Mean of min/max over the directions that are not empty.
 
     Every direction counts alike, however weak the force. Wang counts elements that are in neither
     fuzzy set as equal; here they are left out, because most directions of most histograms are
