@@ -240,18 +240,18 @@ class Profile(google.protobuf.message.Message):
     summary: builtins.str
     """One line for lists."""
     is_default: builtins.bool
-    """Whether the server takes it where a request names none."""
+    """Whether the server uses it for requests that name none."""
     allow_unmatched: builtins.bool
     """Whether objects may stay without partner on both sides, whatever searcher and judge do by
     themselves.
     """
     @property
     def pipeline(self) -> sketchmatch_proto.v1.pipeline_pb2.Pipeline:
-        """What it chooses: the stages that it leaves out are the server's defaults."""
+        """What it chooses; stages that it leaves out are the server's defaults."""
 
     @property
     def weights(self) -> sketchmatch_proto.v1.match_pb2.ConfidenceWeights:
-        """What the parts of ζ count for. Absent: the first three the same."""
+        """Weights of the parts of ζ. Absent: equal ones for the first three."""
 
     def __init__(
         self,
@@ -297,8 +297,8 @@ class Algorithm(google.protobuf.message.Message):
     distribution_version: builtins.str
     """Version of that distribution."""
     is_default: builtins.bool
-    """Whether the server takes it where a request names no algorithm for the stage; a segmenter,
-    where it can read the source.
+    """Whether the server uses it for requests that name no algorithm for the stage; a segmenter, if it
+    can read the source.
     """
     source: builtins.str
     """The publications it is from, in one line; empty if there are none."""
@@ -392,7 +392,7 @@ class GetServerInfoResponse(google.protobuf.message.Message):
     plugin_api_version: builtins.int
     """Version of the plugin API."""
     keeps_scenes: builtins.bool
-    """Whether it keeps scenes, for `PutScene` and what else `SceneService` does with them."""
+    """Whether it stores scenes, for `PutScene` and the related methods of `SceneService`."""
     @property
     def limits(self) -> global___ServerLimits:
         """What requests must keep to."""
@@ -449,11 +449,11 @@ class ServerLimits(google.protobuf.message.Message):
     max_comparisons: builtins.int
     """Most comparisons of relations: pairs of sketched objects × pairs of mapped objects × directions."""
     max_candidates: builtins.int
-    """Most maps that a search may weigh by its parameters, such as population × generations; searchers
-    whose parameters do not say how many are held by their time alone.
+    """Most object maps that a search may evaluate by its parameters, such as population × generations;
+    searchers whose parameters do not determine this are limited only by time.
     """
     max_waiting_bytes: builtins.int
-    """Most bytes that requests which wait may have together; more are RESOURCE_EXHAUSTED."""
+    """Most bytes of all waiting requests together; more are RESOURCE_EXHAUSTED."""
     @property
     def max_time_budget(self) -> google.protobuf.duration_pb2.Duration:
         """Longest time budget; a longer one is cut to it."""
@@ -464,7 +464,7 @@ class ServerLimits(google.protobuf.message.Message):
 
     @property
     def default_time_budget(self) -> google.protobuf.duration_pb2.Duration:
-        """The time budget of a match that does not say one."""
+        """The time budget of a match that states none."""
 
     def __init__(
         self,

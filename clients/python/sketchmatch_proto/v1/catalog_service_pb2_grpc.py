@@ -6,7 +6,7 @@ from sketchmatch_proto.v1 import catalog_service_pb2 as sketchmatch_dot_v1_dot_c
 
 
 class CatalogServiceStub(object):
-    """Says what a server can do.
+    """Describes what a server can do.
     """
 
     def __init__(self, channel):
@@ -28,7 +28,7 @@ class CatalogServiceStub(object):
 
 
 class CatalogServiceServicer(object):
-    """Says what a server can do.
+    """Describes what a server can do.
     """
 
     def ListAlgorithms(self, request, context):
@@ -80,7 +80,7 @@ def add_CatalogServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class CatalogService(object):
-    """Says what a server can do.
+    """Describes what a server can do.
     """
 
     @staticmethod

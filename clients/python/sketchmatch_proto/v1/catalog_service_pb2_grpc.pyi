@@ -18,7 +18,7 @@ class _ServicerContext(grpc.ServicerContext, grpc.aio.ServicerContext):  # type:
     ...
 
 class CatalogServiceStub:
-    """Says what a server can do."""
+    """Describes what a server can do."""
 
     def __init__(self, channel: typing.Union[grpc.Channel, grpc.aio.Channel]) -> None: ...
     ListAlgorithms: grpc.UnaryUnaryMultiCallable[
@@ -50,7 +50,7 @@ class CatalogServiceStub:
     """
 
 class CatalogServiceAsyncStub:
-    """Says what a server can do."""
+    """Describes what a server can do."""
 
     ListAlgorithms: grpc.aio.UnaryUnaryMultiCallable[
         sketchmatch_proto.v1.catalog_service_pb2.ListAlgorithmsRequest,
@@ -81,7 +81,7 @@ class CatalogServiceAsyncStub:
     """
 
 class CatalogServiceServicer(metaclass=abc.ABCMeta):
-    """Says what a server can do."""
+    """Describes what a server can do."""
 
     @abc.abstractmethod
     def ListAlgorithms(

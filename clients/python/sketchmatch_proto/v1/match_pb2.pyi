@@ -40,8 +40,8 @@ class _PhaseEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._EnumType
     PHASE_SEARCH: _Phase.ValueType  # 4
     """Searching for the best map."""
     PHASE_COMPILE: _Phase.ValueType  # 5
-    """Before all others, and rarely: loading what the algorithms have compiled, or compiling it, which
-    takes up to a minute once after an installation. It does not count for the time budget.
+    """Loading the compiled code of the algorithms, or compiling it, which takes up to a minute once after
+    an installation. It precedes all others, is rare, and does not count towards the time budget.
     """
 
 class Phase(_Phase, metaclass=_PhaseEnumTypeWrapper):
@@ -58,8 +58,8 @@ PHASE_RELATE: Phase.ValueType  # 3
 PHASE_SEARCH: Phase.ValueType  # 4
 """Searching for the best map."""
 PHASE_COMPILE: Phase.ValueType  # 5
-"""Before all others, and rarely: loading what the algorithms have compiled, or compiling it, which
-takes up to a minute once after an installation. It does not count for the time budget.
+"""Loading the compiled code of the algorithms, or compiling it, which takes up to a minute once after
+an installation. It precedes all others, is rare, and does not count towards the time budget.
 """
 global___Phase = Phase
 
@@ -72,12 +72,12 @@ class _OutcomeEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._EnumTy
     OUTCOME_UNSPECIFIED: _Outcome.ValueType  # 0
     """Never sent."""
     OUTCOME_CONVERGED: _Outcome.ValueType  # 1
-    """The searcher found nothing better for as long as its parameters ask, or it proved that another
-    map than the judge takes has the highest ζ.
+    """The searcher found nothing better for as long as its parameters require, or it proved that a map
+    other than the judge's has the highest ζ.
     """
     OUTCOME_OPTIMAL: _Outcome.ValueType  # 2
-    """The searcher proved that no map has a higher ζ; where objects may stay unmatched, no map of the
-    same objects of the smaller scene.
+    """The searcher proved that no map has a higher ζ; if objects may stay unmatched, no map of the same
+    objects of the smaller scene.
     """
     OUTCOME_TIME_BUDGET: _Outcome.ValueType  # 3
     """The time budget ended; the result is the best map until then."""
@@ -92,12 +92,12 @@ class Outcome(_Outcome, metaclass=_OutcomeEnumTypeWrapper):
 OUTCOME_UNSPECIFIED: Outcome.ValueType  # 0
 """Never sent."""
 OUTCOME_CONVERGED: Outcome.ValueType  # 1
-"""The searcher found nothing better for as long as its parameters ask, or it proved that another
-map than the judge takes has the highest ζ.
+"""The searcher found nothing better for as long as its parameters require, or it proved that a map
+other than the judge's has the highest ζ.
 """
 OUTCOME_OPTIMAL: Outcome.ValueType  # 2
-"""The searcher proved that no map has a higher ζ; where objects may stay unmatched, no map of the
-same objects of the smaller scene.
+"""The searcher proved that no map has a higher ζ; if objects may stay unmatched, no map of the same
+objects of the smaller scene.
 """
 OUTCOME_TIME_BUDGET: Outcome.ValueType  # 3
 """The time budget ended; the result is the best map until then."""
@@ -109,11 +109,11 @@ global___Outcome = Outcome
 
 @typing.final
 class ConfidenceWeights(google.protobuf.message.Message):
-    """What each part of ζ counts for: ζ = (w₁ζσ + w₂ζR + w₃ζL + w₄ζS + w₅ζM) / (w₁ + w₂ + w₃ + w₄ + w₅).
+    """The weight of each part of ζ: ζ = (w₁ζσ + w₂ζR + w₃ζL + w₄ζS + w₅ζM) / (w₁ + w₂ + w₃ + w₄ + w₅).
 
-    Weights are at least 0, and w₁ to w₅ not all 0. Of the first three, which weigh how objects lie to each
-    other, one that is left out is 1; of the last two, which weigh the objects themselves, 0. Only
-    searchers that map objects can take these: all but nn, nn-pso, fsnn-pso and a pairwise easm.
+    Weights are at least 0, and w₁ to w₅ not all 0. Absent, the first three, which weigh how objects lie
+    relative to each other, are 1, and the last two, which weigh the objects themselves, are 0. Only
+    searchers that map objects accept the last two: all but nn, nn-pso, fsnn-pso and a pairwise easm.
     """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
@@ -135,9 +135,9 @@ class ConfidenceWeights(google.protobuf.message.Message):
     size: builtins.float
     """w₅, for ζM: how well the objects' sizes agree with the dilations of their relations."""
     distance: builtins.float
-    """β, no weight but an exponent, from 0 to 4; 0 when left out. In ζR the rotation of a pair of
-    objects counts for d^β, d being their distance in the scene with fewer objects: far ones turn
-    less about each other when one of them is drawn out of place. Any searcher can take it.
+    """β, an exponent and not a weight, from 0 to 4; 0 if absent. In ζR the rotation of a pair of objects
+    counts d^β, d being their distance in the scene with fewer objects: if an object is drawn out of
+    place, distant ones turn less about it. Any searcher accepts it.
     """
     def __init__(
         self,
@@ -168,8 +168,8 @@ global___ConfidenceWeights = ConfidenceWeights
 
 @typing.final
 class MatchAccepted(google.protobuf.message.Message):
-    """The request is well formed and runs. With these values, sent again, the same server gives the
-    same result, unless a time budget ended the search.
+    """The request is valid and runs. Sent again with these values, it gives the same result on the same
+    server, unless a time budget ended the search.
     """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
@@ -190,8 +190,8 @@ class MatchAccepted(google.protobuf.message.Message):
     a partner.
     """
     allow_unmatched: builtins.bool
-    """Whether objects may stay without partner on both sides. Absent: an older server, which means by
-    `unmatched_price` that they may.
+    """Whether objects may stay without partner on both sides. Absent: an older server, where they may if
+    `unmatched_price` is set.
     """
     @property
     def pipeline(self) -> sketchmatch_proto.v1.pipeline_pb2.Pipeline:
@@ -227,9 +227,9 @@ global___MatchAccepted = MatchAccepted
 
 @typing.final
 class MatchScenes(google.protobuf.message.Message):
-    """What the segmenters found. All indices in later messages point into these scenes. Where a segmenter
-    can cut a source otherwise, as `rooms` cuts a drawing coarser or finer, it is the cut that fits the
-    other side best, and need not be the one that `SceneService.Segment` returns.
+    """What the segmenters found. All indices in later messages refer to these scenes. If a segmenter can
+    cut a source in several ways, as `rooms` cuts a drawing coarser or finer, this is the cut that fits
+    the other side best, not necessarily the one that `SceneService.Segment` returns.
     """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
@@ -259,8 +259,8 @@ class MatchScenes(google.protobuf.message.Message):
 
     @property
     def sketch_route(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[sketchmatch_proto.v1.source_pb2.Point]:
-        """The way that the person drew through the sketch, from its beginning to its end, in the
-        coordinates of `sketch`; empty if there is none. It is no object and never influences a match.
+        """The route drawn in the sketch, from its start to its end, in the coordinates of `sketch`; empty if
+        there is none. It is not an object and never influences a match.
         """
 
     def __init__(
@@ -294,7 +294,7 @@ class MatchProgress(google.protobuf.message.Message):
     phase: global___Phase.ValueType
     """What is being done."""
     fraction: builtins.float
-    """How much of the phase is done, from 0 to 1. Absent where nobody knows, as in most searches."""
+    """How much of the phase is done, from 0 to 1. Absent if unknown, as in most searches."""
     iteration: builtins.int
     """Iterations of the search so far; what an iteration is depends on the searcher."""
     evaluations: builtins.int
@@ -370,35 +370,31 @@ class MatchResult(google.protobuf.message.Message):
     omap_confidence: builtins.float
     """Ω, the mean confidence of the object map, within [0, 1]."""
     upper_bound: builtins.float
-    """A ζ that no map exceeds; where objects may stay unmatched, no map of the same objects of the
-    smaller scene. Absent where the searcher proves nothing of maps of these objects.
+    """A ζ that no map exceeds; if objects may stay unmatched, no map of the same objects of the smaller
+    scene. Absent if the searcher proves nothing about maps of these objects.
     """
     rotation_radians: builtins.float
-    """Radians counter-clockwise by which the sketch as a whole is turned to lie like the map, within
-    (−π, π].
-    """
+    """Rotation of the sketch as a whole onto the map, in radians counter-clockwise, within (−π, π]."""
     scale: builtins.float
-    """Factor by which the sketch as a whole grows to the size of the map: units of the map for a
-    unit of the sketch.
-    """
+    """Scale factor of the sketch as a whole to the map: units of the map per unit of the sketch."""
     search_note: builtins.str
-    """One sentence on what the searcher did, where it has something to say."""
+    """One sentence on what the searcher did; empty if it reports nothing."""
     probability: builtins.float
-    """How likely the object map is right as a whole, within [0, 1]: that the sketch shows this place,
-    and that every sketched object is what the map says, those without a partner too. It exceeds
-    neither `place_probability` nor the probability of any line, and is at least 1 minus all that the
-    lines, those without a partner too, lack to 1: so each of many lines can be likely, and the map
-    not. Absent where the judge knows no probabilities of such a match.
+    """Probability that the object map is right as a whole, within [0, 1]: that the sketch shows this
+    place, and that every sketched object is what the map says, including those without a partner. It
+    exceeds neither `place_probability` nor the probability of any line, and is at least 1 minus the
+    sum of what all lines, and objects without a partner, lack to 1: so many likely lines can form an
+    unlikely map. Absent if the judge gives no probabilities for such a match.
     """
     place_probability: builtins.float
-    """How likely the sketch shows the place of the map at all, within [0, 1]: below one half it is
-    probably another place, and the object map means little. Absent where the judge does not know:
-    then all probabilities take for granted that it is this one.
+    """Probability that the sketch shows the place of the map at all, within [0, 1]: below 0.5 it is
+    probably another place, and the object map means little. Absent if the judge does not know: then
+    all probabilities assume this place.
     """
     provisional: builtins.bool
-    """Whether it is a quick answer about a sketch in progress, found near the maps of the revision before,
-    with `place_probability` as it was then; what `MatchService.Match` would return follows once nothing
-    is drawn for a moment. Never in a result of `Match` itself.
+    """Whether this is a quick answer about a sketch in progress, found near the maps of the previous
+    revision and with its `place_probability`; the answer that `MatchService.Match` would return
+    follows once nothing is drawn for a moment. Never set in a result of `Match` itself.
     """
     @property
     def object_matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectMatch]:
@@ -432,28 +428,27 @@ class MatchResult(google.protobuf.message.Message):
 
     @property
     def alternatives(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___AlternativeMap]:
-        """The next best object maps that were found, in the order in which the judge ranks them. Where one
-        of them is about as likely as the best, `ambiguity` says so.
+        """The next best object maps found, in the order of the judge. If one of them is about as likely as
+        the best, there is an `ambiguity`.
         """
 
     @property
     def ambiguity(self) -> global___Ambiguity:
-        """Where several maps are about equally likely, which, and what to ask. Absent where one is
-        clearly the best, where it is probably not this place, and where nothing is known of
-        probabilities.
+        """If several maps are about equally likely: which, and what to ask. Absent if one is clearly the
+        best, if it is probably not this place, and without probabilities.
         """
 
     @property
     def unmatched_sketch_probabilities(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.float]:
-        """How likely each of `unmatched_sketch_objects` has no partner on this map, in their order; it has
-        none where the sketch shows another place, either. Empty where nothing is known of probabilities.
+        """Probability that each of `unmatched_sketch_objects` has no partner on this map, in their order,
+        either by itself or because the sketch shows another place. Empty without probabilities.
         """
 
     @property
     def object_groups(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectGroup]:
-        """Where several objects of one side are, together, one of the other, as regions of a floor that a
-        person draws as one: which. At most one line of `object_matches` joins two of them; the others are
-        among the unmatched, as all that is said beside takes objects one by one.
+        """Groups of objects that are, together, one object of the other side, such as regions of a floor that
+        a person draws as one. At most one line of `object_matches` joins two of a group; the others are
+        among the unmatched, since all other fields take objects one by one.
         """
 
     def __init__(
@@ -502,8 +497,8 @@ class ObjectGroup(google.protobuf.message.Message):
     MAP_OBJECTS_FIELD_NUMBER: builtins.int
     PROBABILITY_FIELD_NUMBER: builtins.int
     probability: builtins.float
-    """How likely the sketch shows this place and these belong together, all of them taken for one
-    object, within [0, 1]. Absent where nothing is known of probabilities.
+    """Probability that the sketch shows this place and these belong together, all of them taken as one
+    object, within [0, 1]. Absent without probabilities.
     """
     @property
     def sketch_objects(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.int]:
@@ -528,9 +523,9 @@ global___ObjectGroup = ObjectGroup
 
 @typing.final
 class Ambiguity(google.protobuf.message.Message):
-    """Several object maps that the sketch does not tell apart, as in a symmetric room: each is at least
-    half as likely as the best, and says something else of who is who. One that only leaves lines of
-    another out is not counted.
+    """Several object maps that the sketch does not distinguish, as in a symmetric room: each is at least
+    half as likely as the best, and contradicts the others. A map that only leaves out lines of another
+    is not counted.
     """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
@@ -539,17 +534,17 @@ class Ambiguity(google.protobuf.message.Message):
     ALTERNATIVES_FIELD_NUMBER: builtins.int
     DECIDING_SKETCH_OBJECTS_FIELD_NUMBER: builtins.int
     maps: builtins.int
-    """How many they are, the best among them; 2 or more."""
+    """Number of these maps, including the best; 2 or more."""
     @property
     def alternatives(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.int]:
-        """Which of `MatchResult.alternatives` are among them, by index from 0; fewer than `maps` minus 1
-        where fewer alternatives were asked for.
+        """Which of `MatchResult.alternatives` are among them, by index from 0; fewer than `maps` minus 1 if
+        fewer alternatives were requested.
         """
 
     @property
     def deciding_sketch_objects(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.int]:
-        """The sketched objects whose partners differ between them, the one first whose partner would tell
-        most about which map is right: ask for it, and send the answer as a `Pin`. Never empty.
+        """The sketched objects whose partners differ between them, the most informative one first: ask for
+        its partner, and send the answer as a `Pin`. Never empty.
         """
 
     def __init__(
@@ -576,7 +571,7 @@ class AlternativeMap(google.protobuf.message.Message):
     omap_confidence: builtins.float
     """Ω, the mean confidence of the object map."""
     probability: builtins.float
-    """How likely it is the right one, as `MatchResult.probability`. Absent where that is."""
+    """Probability that it is the right one, as `MatchResult.probability`. Absent if that is absent."""
     @property
     def object_matches(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectMatch]:
         """The object map, in the order of the sketch; without margins and relations."""
@@ -629,14 +624,15 @@ class ObjectMatch(google.protobuf.message.Message):
     Absent during the search, and where there are too many objects to try.
     """
     probability: builtins.float
-    """How likely the sketch shows this place and this is its partner, within [0, 1]: of all maps that
-    say so together. Absent during the search, in alternatives, and where `MatchResult.probability`
-    is.
+    """Probability that the sketch shows this place and this is the object's partner, within [0, 1],
+    summed over all maps that say so. Absent during the search, in alternatives, and if
+    `MatchResult.probability` is absent.
     """
     @property
     def relation(self) -> global___ObjectRelation:
-        """How the sketched object lies, in the sketch, to the nearest other matched one: what a robot
-        interface says beside a label, or instead of one. Absent during the search and in alternatives.
+        """How the sketched object lies, in the sketch, relative to the nearest other matched one, for a
+        robot's interface to say beside or instead of a label. Absent during the search and in
+        alternatives.
         """
 
     def __init__(
@@ -662,7 +658,7 @@ global___ObjectMatch = ObjectMatch
 
 @typing.final
 class ObjectRelation(google.protobuf.message.Message):
-    """How a sketched object lies to another, in words and as the person drew it: the map may be turned."""
+    """How a sketched object lies relative to another, in words and as drawn: the map may be rotated."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 

@@ -40,7 +40,7 @@ class _PriorityEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._EnumT
     """Before all others: a person waits for it."""
 
 class Priority(_Priority, metaclass=_PriorityEnumTypeWrapper):
-    """Which of a caller's requests are begun first; those of different callers take turns all the same."""
+    """Which of a caller's requests start first; different callers take turns regardless."""
 
 PRIORITY_UNSPECIFIED: Priority.ValueType  # 0
 """As `PRIORITY_NORMAL`."""
@@ -73,8 +73,8 @@ class _MatchStateEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._Enu
     MATCH_STATE_CANCELLED: _MatchState.ValueType  # 6
     """It was cancelled by `CancelMatch`."""
     MATCH_STATE_INTERRUPTED: _MatchState.ValueType  # 7
-    """It ended before its time, through no fault of its own: the server stopped or was lost, had no room,
-    or nobody read it. The same request, with the same `request_id`, does it again.
+    """It ended early for an external reason: the server stopped or was lost, had no room, or nobody read
+    it. The same request, with the same `request_id`, runs it again.
     """
 
 class MatchState(_MatchState, metaclass=_MatchStateEnumTypeWrapper):
@@ -95,8 +95,8 @@ MATCH_STATE_FAILED: MatchState.ValueType  # 5
 MATCH_STATE_CANCELLED: MatchState.ValueType  # 6
 """It was cancelled by `CancelMatch`."""
 MATCH_STATE_INTERRUPTED: MatchState.ValueType  # 7
-"""It ended before its time, through no fault of its own: the server stopped or was lost, had no room,
-or nobody read it. The same request, with the same `request_id`, does it again.
+"""It ended early for an external reason: the server stopped or was lost, had no room, or nobody read
+it. The same request, with the same `request_id`, runs it again.
 """
 global___MatchState = MatchState
 
@@ -123,30 +123,27 @@ class MatchRequest(google.protobuf.message.Message):
     seed: builtins.int
     """Seed of everything random: the same request with the same seed gives the same result. Absent: 0."""
     alternatives: builtins.int
-    """How many of the next best object maps the result shall hold, at most 100 and no more than there
-    are. Absent: 3, or as many as there are.
-    """
+    """Number of next best object maps in the result, at most 100, and no more than there are. Absent: 3."""
     allow_unmatched: builtins.bool
-    """Whether an object may stay without partner on both sides where that is likelier: a sketch can
-    show what the map lacks, while it lacks something itself. At least 3 objects of the smaller
-    scene find a partner. Only searchers that map objects can do it. Absent: as the profile says, or
-    else where the searcher or the judge finds such maps by itself. Where they may not, the smaller
-    scene is matched completely.
+    """Whether objects may stay without partner on both sides where that is more likely: a sketch can show
+    what the map lacks, and itself lack something. At least 3 objects of the smaller scene are matched.
+    Only searchers that map objects support it. Absent: as the profile says, or else if the searcher or
+    the judge finds such maps by itself. If they may not, the smaller scene is matched completely.
     """
     unmatched_price: builtins.float
-    """What a map loses that leaves all objects of the smaller scene out, in units of ζ, and in
-    proportion where it leaves out some: more makes it rarer. Above 0, at most 1000, and only where
-    objects may stay unmatched. Absent: the judge's own.
+    """Price of a map that leaves out all objects of the smaller scene, in units of ζ, and in proportion
+    if it leaves out some: a higher one makes this rarer. Above 0, at most 1000, and only if objects
+    may stay unmatched. Absent: the judge's own.
     """
     request_id: builtins.str
     """A name that the caller gives the request, at most 128 bytes, such as a UUID: requests of the same
-    caller with the same name are the same match, done once, however many ask. Another request under
-    the same name is INVALID_ARGUMENT. Absent: each request is a match of its own.
+    caller with the same name are one match, which runs once. Another request under the same name is
+    INVALID_ARGUMENT. Absent: each request is a separate match.
     """
     keep_running: builtins.bool
-    """Whether the match goes on when nobody reads it. Without, it stops once its last reader has gone."""
+    """Whether the match continues when nobody reads it. Otherwise it stops once its last reader has gone."""
     priority: global___Priority.ValueType
-    """Which of the caller's own requests come first while they wait."""
+    """Which of the caller's own waiting requests start first."""
     @property
     def sketch(self) -> sketchmatch_proto.v1.source_pb2.Source:
         """What the person drew. Required. It may have fewer or more objects than the map."""
@@ -161,13 +158,13 @@ class MatchRequest(google.protobuf.message.Message):
 
     @property
     def time_budget(self) -> google.protobuf.duration_pb2.Duration:
-        """How long the match may take, more than 0, beside `PHASE_COMPILE`. The best map until then is the
-        result, with `OUTCOME_TIME_BUDGET`. Absent: the server's default.
+        """Time limit of the match, more than 0, without `PHASE_COMPILE`. The result is the best map until
+        then, with `OUTCOME_TIME_BUDGET`. Absent: the server's default.
         """
 
     @property
     def weights(self) -> sketchmatch_proto.v1.match_pb2.ConfidenceWeights:
-        """What the parts of ζ count for. Absent: as the profile says, or else the first three the same."""
+        """Weights of the parts of ζ. Absent: those of the profile, or else equal ones for the first three."""
 
     @property
     def pins(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Pin]:
@@ -177,8 +174,8 @@ class MatchRequest(google.protobuf.message.Message):
 
     @property
     def synonyms(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Synonyms]:
-        """Labels that mean the same, beside those that are equal but for case and plural. Labels are
-        evidence where both scenes have some, and never force a line.
+        """Labels that mean the same, besides those that differ only in case or plural. Labels are evidence if
+        both scenes have some, and never force a line.
         """
 
     def __init__(
@@ -222,14 +219,14 @@ class Pin(google.protobuf.message.Message):
     MAP_OBJECT_FIELD_NUMBER: builtins.int
     EXCLUDED_FIELD_NUMBER: builtins.int
     excluded: builtins.bool
-    """Whether it is known that it is NOT this one: any other may be its partner, or none."""
+    """Whether it is known NOT to be this one: any other may be its partner, or none."""
     @property
     def sketch_object(self) -> global___ObjectReference:
         """The sketched object. Required."""
 
     @property
     def map_object(self) -> global___ObjectReference:
-        """The mapped object that it is. Absent: it is on no map, and finds no partner."""
+        """The mapped object that it is. Absent: it is not on the map, and has no partner."""
 
     def __init__(
         self,
@@ -390,7 +387,7 @@ global___MatchSummary = MatchSummary
 
 @typing.final
 class GetMatchRequest(google.protobuf.message.Message):
-    """Asks how a match is."""
+    """Asks for the state of a match."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -408,7 +405,7 @@ global___GetMatchRequest = GetMatchRequest
 
 @typing.final
 class GetMatchResponse(google.protobuf.message.Message):
-    """How a match is, and what came of it."""
+    """The state of a match, and its events."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -496,7 +493,7 @@ global___CancelMatchRequest = CancelMatchRequest
 
 @typing.final
 class CancelMatchResponse(google.protobuf.message.Message):
-    """How a match is that was asked to stop."""
+    """The state of a match that was asked to stop."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 

@@ -20,10 +20,10 @@ class _ServicerContext(grpc.ServicerContext, grpc.aio.ServicerContext):  # type:
 class MatchServiceStub:
     """Finds out which sketched object is which mapped object.
 
-    A match has a life of its own: it can be asked for, watched and cancelled by its name, `match_id`,
-    by the caller that began it and nobody else. Servers keep matches on disk, unless told not to, for
-    as long as their limits of age and size allow, and beyond a restart; one that keeps nothing
-    remembers the latest in memory. A sketch that is matched while it is drawn is `SketchService`'s.
+    A match outlives its call: the caller that started it, and nobody else, can query, watch and cancel
+    it by its name, `match_id`. Servers keep matches on disk, unless told not to, within their limits of
+    age and size, and across restarts; a server that keeps nothing remembers the latest in memory. To
+    match a sketch while it is drawn, use `SketchService`.
     """
 
     def __init__(self, channel: typing.Union[grpc.Channel, grpc.aio.Channel]) -> None: ...
@@ -33,30 +33,29 @@ class MatchServiceStub:
     ]
     """Matches a sketch with a map and streams the search while it runs.
 
-    A successful stream is: one `accepted`, one `scenes`, any number of `progress` in between and
-    after them, one `result`, end. A slow reader misses old progress, and never one of the
-    others. A reader must skip events that it does not know: later versions may add some.
+    A successful stream is: one `accepted`, one `scenes`, any number of `progress` in between and after
+    them, one `result`, end. A slow reader misses old progress, but no other event. A reader must skip
+    events that it does not know: later versions may add some.
 
     Cancelling the call, or its deadline, stops the search, unless `keep_running` is set or another
-    call reads the same match. To get the best map until a certain moment rather than an error, set
+    call reads the same match. To get the best map at a certain moment instead of an error, set
     `time_budget`, and a deadline well after it.
 
-    Whoever sets `request_id` may send the request again, e.g. after a lost link, and gets the same
-    match from its first event on. Only a match that was interrupted is done again, under its name;
-    it tells `accepted` and `scenes` once more.
+    With a `request_id`, the request can be sent again, e.g. after a lost connection, and gets the same
+    match from its first event on. Only an interrupted match runs again, under its name; it sends
+    `accepted` and `scenes` once more.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct
       the request; the same one fails again.
-    * `NOT_FOUND`: sketch or map is a stored scene, and the caller keeps none of this name here. Put it, or
-      list those there are.
+    * `NOT_FOUND`: sketch or map is a stored scene, and the caller has none of this name here. Put it,
+      or list the existing ones.
     * `FAILED_PRECONDITION`: sketch or map is a stored scene, and the store is damaged or gone, or there is
       none. Send the source itself.
-    * `RESOURCE_EXHAUSTED`: as many matches run and wait as may, or this one waited too long for its
-      turn; send the same request again after the time in `RetryInfo`. Without `RetryInfo` the
-      request is larger than the transport lets through; make it smaller (`GetServerInfo` tells the
-      limit).
+    * `RESOURCE_EXHAUSTED`: no more matches may run or wait, or this one waited too long for its turn;
+      send the same request again after the time in `RetryInfo`. Without `RetryInfo` the request is
+      larger than the transport allows; make it smaller (`GetServerInfo` gives the limit).
     * `DEADLINE_EXCEEDED`: the call's deadline passed, or the time budget ended before there was any
       map to return. Allow more time, or choose a faster searcher.
     * `INTERNAL`: an algorithm broke its contract; the message names it and the distribution it is
@@ -71,7 +70,7 @@ class MatchServiceStub:
         sketchmatch_proto.v1.match_service_pb2.GetMatchRequest,
         sketchmatch_proto.v1.match_service_pb2.GetMatchResponse,
     ]
-    """Tells how a match is, and what came of it.
+    """Returns the state of a match, and its events so far.
 
     Errors (with `ErrorInfo`, see `ErrorReason`):
 
@@ -88,7 +87,7 @@ class MatchServiceStub:
         sketchmatch_proto.v1.match_service_pb2.WatchMatchResponse,
     ]
     """Streams the events of a match after a certain one, as `Match` does, and ends as it does: with its
-    result, or with the error that it ended with. While the match runs, this counts as a reader.
+    result, or with its error. While the match runs, this counts as a reader.
 
     Errors, beside those that `Match` may end with (with `ErrorInfo`, see `ErrorReason`):
 
@@ -106,8 +105,8 @@ class MatchServiceStub:
         sketchmatch_proto.v1.match_service_pb2.CancelMatchRequest,
         sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse,
     ]
-    """Stops a match, and returns at once; its readers are told `CANCELLED`. One that has ended stays as
-    it is, which is no error; but one that was interrupted is cancelled, and so not done again.
+    """Stops a match, and returns at once; its readers get `CANCELLED`. One that has ended stays as it is,
+    without an error; but one that was interrupted is cancelled, and so does not run again.
 
     Errors (with `ErrorInfo`, see `ErrorReason`):
 
@@ -128,7 +127,7 @@ class MatchServiceStub:
     Errors (with `ErrorInfo`, see `ErrorReason`):
 
     * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
-    * `INVALID_ARGUMENT`: `page_token` is none that this method returned.
+    * `INVALID_ARGUMENT`: `page_token` was not returned by this method.
     * `DEADLINE_EXCEEDED`: the call's deadline passed; allow more time.
     * `UNAVAILABLE`: the server is starting, draining or away; send again.
     * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
@@ -137,10 +136,10 @@ class MatchServiceStub:
 class MatchServiceAsyncStub:
     """Finds out which sketched object is which mapped object.
 
-    A match has a life of its own: it can be asked for, watched and cancelled by its name, `match_id`,
-    by the caller that began it and nobody else. Servers keep matches on disk, unless told not to, for
-    as long as their limits of age and size allow, and beyond a restart; one that keeps nothing
-    remembers the latest in memory. A sketch that is matched while it is drawn is `SketchService`'s.
+    A match outlives its call: the caller that started it, and nobody else, can query, watch and cancel
+    it by its name, `match_id`. Servers keep matches on disk, unless told not to, within their limits of
+    age and size, and across restarts; a server that keeps nothing remembers the latest in memory. To
+    match a sketch while it is drawn, use `SketchService`.
     """
 
     Match: grpc.aio.UnaryStreamMultiCallable[
@@ -149,30 +148,29 @@ class MatchServiceAsyncStub:
     ]
     """Matches a sketch with a map and streams the search while it runs.
 
-    A successful stream is: one `accepted`, one `scenes`, any number of `progress` in between and
-    after them, one `result`, end. A slow reader misses old progress, and never one of the
-    others. A reader must skip events that it does not know: later versions may add some.
+    A successful stream is: one `accepted`, one `scenes`, any number of `progress` in between and after
+    them, one `result`, end. A slow reader misses old progress, but no other event. A reader must skip
+    events that it does not know: later versions may add some.
 
     Cancelling the call, or its deadline, stops the search, unless `keep_running` is set or another
-    call reads the same match. To get the best map until a certain moment rather than an error, set
+    call reads the same match. To get the best map at a certain moment instead of an error, set
     `time_budget`, and a deadline well after it.
 
-    Whoever sets `request_id` may send the request again, e.g. after a lost link, and gets the same
-    match from its first event on. Only a match that was interrupted is done again, under its name;
-    it tells `accepted` and `scenes` once more.
+    With a `request_id`, the request can be sent again, e.g. after a lost connection, and gets the same
+    match from its first event on. Only an interrupted match runs again, under its name; it sends
+    `accepted` and `scenes` once more.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct
       the request; the same one fails again.
-    * `NOT_FOUND`: sketch or map is a stored scene, and the caller keeps none of this name here. Put it, or
-      list those there are.
+    * `NOT_FOUND`: sketch or map is a stored scene, and the caller has none of this name here. Put it,
+      or list the existing ones.
     * `FAILED_PRECONDITION`: sketch or map is a stored scene, and the store is damaged or gone, or there is
       none. Send the source itself.
-    * `RESOURCE_EXHAUSTED`: as many matches run and wait as may, or this one waited too long for its
-      turn; send the same request again after the time in `RetryInfo`. Without `RetryInfo` the
-      request is larger than the transport lets through; make it smaller (`GetServerInfo` tells the
-      limit).
+    * `RESOURCE_EXHAUSTED`: no more matches may run or wait, or this one waited too long for its turn;
+      send the same request again after the time in `RetryInfo`. Without `RetryInfo` the request is
+      larger than the transport allows; make it smaller (`GetServerInfo` gives the limit).
     * `DEADLINE_EXCEEDED`: the call's deadline passed, or the time budget ended before there was any
       map to return. Allow more time, or choose a faster searcher.
     * `INTERNAL`: an algorithm broke its contract; the message names it and the distribution it is
@@ -187,7 +185,7 @@ class MatchServiceAsyncStub:
         sketchmatch_proto.v1.match_service_pb2.GetMatchRequest,
         sketchmatch_proto.v1.match_service_pb2.GetMatchResponse,
     ]
-    """Tells how a match is, and what came of it.
+    """Returns the state of a match, and its events so far.
 
     Errors (with `ErrorInfo`, see `ErrorReason`):
 
@@ -204,7 +202,7 @@ class MatchServiceAsyncStub:
         sketchmatch_proto.v1.match_service_pb2.WatchMatchResponse,
     ]
     """Streams the events of a match after a certain one, as `Match` does, and ends as it does: with its
-    result, or with the error that it ended with. While the match runs, this counts as a reader.
+    result, or with its error. While the match runs, this counts as a reader.
 
     Errors, beside those that `Match` may end with (with `ErrorInfo`, see `ErrorReason`):
 
@@ -222,8 +220,8 @@ class MatchServiceAsyncStub:
         sketchmatch_proto.v1.match_service_pb2.CancelMatchRequest,
         sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse,
     ]
-    """Stops a match, and returns at once; its readers are told `CANCELLED`. One that has ended stays as
-    it is, which is no error; but one that was interrupted is cancelled, and so not done again.
+    """Stops a match, and returns at once; its readers get `CANCELLED`. One that has ended stays as it is,
+    without an error; but one that was interrupted is cancelled, and so does not run again.
 
     Errors (with `ErrorInfo`, see `ErrorReason`):
 
@@ -244,7 +242,7 @@ class MatchServiceAsyncStub:
     Errors (with `ErrorInfo`, see `ErrorReason`):
 
     * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
-    * `INVALID_ARGUMENT`: `page_token` is none that this method returned.
+    * `INVALID_ARGUMENT`: `page_token` was not returned by this method.
     * `DEADLINE_EXCEEDED`: the call's deadline passed; allow more time.
     * `UNAVAILABLE`: the server is starting, draining or away; send again.
     * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
@@ -253,10 +251,10 @@ class MatchServiceAsyncStub:
 class MatchServiceServicer(metaclass=abc.ABCMeta):
     """Finds out which sketched object is which mapped object.
 
-    A match has a life of its own: it can be asked for, watched and cancelled by its name, `match_id`,
-    by the caller that began it and nobody else. Servers keep matches on disk, unless told not to, for
-    as long as their limits of age and size allow, and beyond a restart; one that keeps nothing
-    remembers the latest in memory. A sketch that is matched while it is drawn is `SketchService`'s.
+    A match outlives its call: the caller that started it, and nobody else, can query, watch and cancel
+    it by its name, `match_id`. Servers keep matches on disk, unless told not to, within their limits of
+    age and size, and across restarts; a server that keeps nothing remembers the latest in memory. To
+    match a sketch while it is drawn, use `SketchService`.
     """
 
     @abc.abstractmethod
@@ -267,30 +265,29 @@ class MatchServiceServicer(metaclass=abc.ABCMeta):
     ) -> typing.Union[collections.abc.Iterator[sketchmatch_proto.v1.match_service_pb2.MatchResponse], collections.abc.AsyncIterator[sketchmatch_proto.v1.match_service_pb2.MatchResponse]]:
         """Matches a sketch with a map and streams the search while it runs.
 
-        A successful stream is: one `accepted`, one `scenes`, any number of `progress` in between and
-        after them, one `result`, end. A slow reader misses old progress, and never one of the
-        others. A reader must skip events that it does not know: later versions may add some.
+        A successful stream is: one `accepted`, one `scenes`, any number of `progress` in between and after
+        them, one `result`, end. A slow reader misses old progress, but no other event. A reader must skip
+        events that it does not know: later versions may add some.
 
         Cancelling the call, or its deadline, stops the search, unless `keep_running` is set or another
-        call reads the same match. To get the best map until a certain moment rather than an error, set
+        call reads the same match. To get the best map at a certain moment instead of an error, set
         `time_budget`, and a deadline well after it.
 
-        Whoever sets `request_id` may send the request again, e.g. after a lost link, and gets the same
-        match from its first event on. Only a match that was interrupted is done again, under its name;
-        it tells `accepted` and `scenes` once more.
+        With a `request_id`, the request can be sent again, e.g. after a lost connection, and gets the same
+        match from its first event on. Only an interrupted match runs again, under its name; it sends
+        `accepted` and `scenes` once more.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
         * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct
           the request; the same one fails again.
-        * `NOT_FOUND`: sketch or map is a stored scene, and the caller keeps none of this name here. Put it, or
-          list those there are.
+        * `NOT_FOUND`: sketch or map is a stored scene, and the caller has none of this name here. Put it,
+          or list the existing ones.
         * `FAILED_PRECONDITION`: sketch or map is a stored scene, and the store is damaged or gone, or there is
           none. Send the source itself.
-        * `RESOURCE_EXHAUSTED`: as many matches run and wait as may, or this one waited too long for its
-          turn; send the same request again after the time in `RetryInfo`. Without `RetryInfo` the
-          request is larger than the transport lets through; make it smaller (`GetServerInfo` tells the
-          limit).
+        * `RESOURCE_EXHAUSTED`: no more matches may run or wait, or this one waited too long for its turn;
+          send the same request again after the time in `RetryInfo`. Without `RetryInfo` the request is
+          larger than the transport allows; make it smaller (`GetServerInfo` gives the limit).
         * `DEADLINE_EXCEEDED`: the call's deadline passed, or the time budget ended before there was any
           map to return. Allow more time, or choose a faster searcher.
         * `INTERNAL`: an algorithm broke its contract; the message names it and the distribution it is
@@ -307,7 +304,7 @@ class MatchServiceServicer(metaclass=abc.ABCMeta):
         request: sketchmatch_proto.v1.match_service_pb2.GetMatchRequest,
         context: _ServicerContext,
     ) -> typing.Union[sketchmatch_proto.v1.match_service_pb2.GetMatchResponse, collections.abc.Awaitable[sketchmatch_proto.v1.match_service_pb2.GetMatchResponse]]:
-        """Tells how a match is, and what came of it.
+        """Returns the state of a match, and its events so far.
 
         Errors (with `ErrorInfo`, see `ErrorReason`):
 
@@ -326,7 +323,7 @@ class MatchServiceServicer(metaclass=abc.ABCMeta):
         context: _ServicerContext,
     ) -> typing.Union[collections.abc.Iterator[sketchmatch_proto.v1.match_service_pb2.WatchMatchResponse], collections.abc.AsyncIterator[sketchmatch_proto.v1.match_service_pb2.WatchMatchResponse]]:
         """Streams the events of a match after a certain one, as `Match` does, and ends as it does: with its
-        result, or with the error that it ended with. While the match runs, this counts as a reader.
+        result, or with its error. While the match runs, this counts as a reader.
 
         Errors, beside those that `Match` may end with (with `ErrorInfo`, see `ErrorReason`):
 
@@ -346,8 +343,8 @@ class MatchServiceServicer(metaclass=abc.ABCMeta):
         request: sketchmatch_proto.v1.match_service_pb2.CancelMatchRequest,
         context: _ServicerContext,
     ) -> typing.Union[sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse, collections.abc.Awaitable[sketchmatch_proto.v1.match_service_pb2.CancelMatchResponse]]:
-        """Stops a match, and returns at once; its readers are told `CANCELLED`. One that has ended stays as
-        it is, which is no error; but one that was interrupted is cancelled, and so not done again.
+        """Stops a match, and returns at once; its readers get `CANCELLED`. One that has ended stays as it is,
+        without an error; but one that was interrupted is cancelled, and so does not run again.
 
         Errors (with `ErrorInfo`, see `ErrorReason`):
 
@@ -370,7 +367,7 @@ class MatchServiceServicer(metaclass=abc.ABCMeta):
         Errors (with `ErrorInfo`, see `ErrorReason`):
 
         * `FAILED_PRECONDITION`: what the server keeps on disk cannot be read.
-        * `INVALID_ARGUMENT`: `page_token` is none that this method returned.
+        * `INVALID_ARGUMENT`: `page_token` was not returned by this method.
         * `DEADLINE_EXCEEDED`: the call's deadline passed; allow more time.
         * `UNAVAILABLE`: the server is starting, draining or away; send again.
         * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.

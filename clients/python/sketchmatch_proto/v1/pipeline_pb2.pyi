@@ -13,12 +13,12 @@ DESCRIPTOR: google.protobuf.descriptor.FileDescriptor
 
 @typing.final
 class Pipeline(google.protobuf.message.Message):
-    """Which algorithm does each stage of a match, and with which parameters.
+    """Which algorithm runs each stage of a match, and with which parameters.
 
     Every stage may be left out: the profile then decides, or else the server's configuration, and
-    `MatchAccepted` tells what was decided. A stage that names another algorithm than these drops their
-    parameters for it, one with parameters alone is laid over them.
-    `CatalogService.ListAlgorithms` lists what there is to choose from.
+    `MatchAccepted` reports the choice. A stage that names another algorithm drops the parameters set
+    there for it; a stage with parameters alone overrides single ones. `CatalogService.ListAlgorithms`
+    lists the available algorithms.
     """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor

@@ -27,18 +27,16 @@ class SegmentRequest(google.protobuf.message.Message):
     PROFILE_FIELD_NUMBER: builtins.int
     INCLUDE_MAP_FIELD_NUMBER: builtins.int
     profile: builtins.str
-    """Name of the profile that decides what is left out; see `Pipeline.profile`. Its sketch segmenter
-    holds for strokes and images, its map segmenter for polygons and grids, each where it reads them.
+    """Name of the profile that decides what is absent here; see `Pipeline.profile`. Its sketch segmenter
+    applies to strokes and images, its map segmenter to polygons and grids, if it reads them.
     """
     include_map: builtins.bool
-    """Whether the occupancy grid is wanted, too: to show the walls of a map that came in a bag, or to
+    """Whether to return the occupancy grid as well: to show the walls of a map that came in a bag, or to
     save it. It may be large.
     """
     @property
     def source(self) -> sketchmatch_proto.v1.source_pb2.Source:
-        """The sketch or map. Required. A stored scene is none: its objects are found already, and `GetScene`
-        returns them.
-        """
+        """The sketch or map. Required. Not a stored scene, whose objects `GetScene` returns."""
 
     @property
     def segmenter(self) -> sketchmatch_proto.v1.pipeline_pb2.AlgorithmSelection:
@@ -83,21 +81,21 @@ class SegmentResponse(google.protobuf.message.Message):
 
     @property
     def route(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[sketchmatch_proto.v1.source_pb2.Point]:
-        """The way that the person drew through the scene, from its beginning to its end, in the
-        coordinates of `scene`; empty if there is none. It is not among the objects.
+        """The route drawn in the scene, from its start to its end, in the coordinates of `scene`; empty if
+        there is none. It is not among the objects.
         """
 
     @property
     def passages(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Passage]:
-        """Which objects open into each other, as rooms do: people may take two such for one, which a match
-        then says. Empty where objects are things.
+        """Which objects open into each other, as rooms do: people may draw two of these as one, which a match
+        then reports. Empty if objects are things.
         """
 
     @property
     def map(self) -> sketchmatch_proto.v1.source_pb2.MapServerMap:
-        """The occupancy grid of the source, where it is wanted and there is one, as a map of map_server; one
-        that the source is itself comes back as it is. Of other sources it is in mode `scale`, in a PNG whose
-        unknown cells are transparent, and has the same objects as the source.
+        """The occupancy grid of the source, if requested and there is one, as a map of map_server. A source
+        that is such a map is returned unchanged. Other grids are in mode `scale`, in a PNG whose unknown
+        cells are transparent, and have the same objects as the source.
         """
 
     def __init__(
@@ -150,8 +148,8 @@ class PutSceneRequest(google.protobuf.message.Message):
     profile: builtins.str
     """As in `SegmentRequest`."""
     title: builtins.str
-    """What you call it, for people who choose among scenes: up to 200 characters. It is yours alone, and
-    no part of the scene's name. Empty: a scene that you have put already keeps its title.
+    """A title for people who choose among scenes, up to 200 characters. Only the caller sees it, and it
+    is not part of the scene's name. Empty: a scene that the caller has put already keeps its title.
     """
     @property
     def source(self) -> sketchmatch_proto.v1.source_pb2.Source:
@@ -215,7 +213,7 @@ class StoredScene(google.protobuf.message.Message):
     name: builtins.str
     """The hash of what it is, in hexadecimal: 64 digits. `Source.stored_scene` takes it."""
     title: builtins.str
-    """What you call it; empty if nothing."""
+    """The caller's title for it; empty if none."""
     @property
     def scene(self) -> sketchmatch_proto.v1.scene_pb2.Scene:
         """The objects."""
@@ -263,7 +261,7 @@ class GetSceneRequest(google.protobuf.message.Message):
     name: builtins.str
     """Its name. Required."""
     include_source: builtins.bool
-    """Whether the source is wanted, too; it may be large."""
+    """Whether to return the source as well; it may be large."""
     def __init__(
         self,
         *,
@@ -288,7 +286,7 @@ class GetSceneResponse(google.protobuf.message.Message):
 
     @property
     def source(self) -> sketchmatch_proto.v1.source_pb2.Source:
-        """What it was found in, where it is wanted."""
+        """What it was found in, if requested."""
 
     def __init__(
         self,
@@ -363,7 +361,7 @@ class SceneSummary(google.protobuf.message.Message):
     object_count: builtins.int
     """How many objects it has."""
     title: builtins.str
-    """What you call it; empty if nothing."""
+    """The caller's title for it; empty if none."""
     @property
     def labels(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.str]:
         """The labels of those that have one, in the order of the objects."""
@@ -398,8 +396,8 @@ class UpdateSceneRequest(google.protobuf.message.Message):
     name: builtins.str
     """Name of the scene. Required."""
     title: builtins.str
-    """What you call it from now on, as in `PutSceneRequest`; an empty one takes the title away. Absent: the
-    scene in the answer is called as the one that `name` names.
+    """The new title, as in `PutSceneRequest`; an empty one removes the title. Absent: the scene in the
+    answer has the title of the one that `name` names.
     """
     @property
     def labels(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___ObjectLabel]:
@@ -429,7 +427,7 @@ class ObjectLabel(google.protobuf.message.Message):
     object: builtins.int
     """Index of the object, from 0."""
     label: builtins.str
-    """Its label; an empty one takes the label away."""
+    """Its label; an empty one removes the label."""
     def __init__(
         self,
         *,
@@ -463,7 +461,7 @@ global___UpdateSceneResponse = UpdateSceneResponse
 
 @typing.final
 class DeleteSceneRequest(google.protobuf.message.Message):
-    """Which scene to forget."""
+    """Which scene to delete."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -481,7 +479,7 @@ global___DeleteSceneRequest = DeleteSceneRequest
 
 @typing.final
 class DeleteSceneResponse(google.protobuf.message.Message):
-    """Nothing is left to say of it."""
+    """Empty."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 

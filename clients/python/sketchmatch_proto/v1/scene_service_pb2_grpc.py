@@ -6,13 +6,13 @@ from sketchmatch_proto.v1 import scene_service_pb2 as sketchmatch_dot_v1_dot_sce
 
 
 class SceneServiceStub(object):
-    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+    """Finds objects in sketches and maps, without matching them, and stores scenes for later matches.
 
-    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
-    with the value of every parameter and the version, and of the names that were given to its objects.
-    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
-    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
-    names are all the same one.
+    A stored scene is named by the hash of its content: its source, the segmenter that found its objects,
+    with version and all parameters, and the labels given to its objects. So a name always stands for the
+    same scene, for every caller, and putting it again changes nothing. A caller, known by the name of
+    its token or certificate, sees only the scenes that it has put; all callers without a name count as
+    one.
     """
 
     def __init__(self, channel):
@@ -54,13 +54,13 @@ class SceneServiceStub(object):
 
 
 class SceneServiceServicer(object):
-    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+    """Finds objects in sketches and maps, without matching them, and stores scenes for later matches.
 
-    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
-    with the value of every parameter and the version, and of the names that were given to its objects.
-    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
-    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
-    names are all the same one.
+    A stored scene is named by the hash of its content: its source, the segmenter that found its objects,
+    with version and all parameters, and the labels given to its objects. So a name always stands for the
+    same scene, for every caller, and putting it again changes nothing. A caller, known by the name of
+    its token or certificate, sees only the scenes that it has put; all callers without a name count as
+    one.
     """
 
     def Segment(self, request, context):
@@ -83,9 +83,9 @@ class SceneServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def PutScene(self, request, context):
-        """Finds the objects of a source, as `Segment` does, and keeps them, the source and how they lie to
-        each other, so that matches with it do the sketch's part alone. What is kept already is found by
-        its name, and not segmented again.
+        """Finds the objects of a source, as `Segment` does, and stores them with the source and their
+        relations, so that matches with it only process the sketch. A scene that is already stored is found
+        by its name and not segmented again.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -113,8 +113,8 @@ class SceneServiceServicer(object):
 
         * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
         request; the same one fails again.
-        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-        there are.
+        * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+        existing ones.
         * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
         is not needed, or tell its operator; requests with sources in them are answered all the same.
         * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
@@ -143,20 +143,19 @@ class SceneServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def UpdateScene(self, request, context):
-        """Gives a scene another title, and its objects other labels. Labels are part of what a match sees,
-        and so of the scene's name: the scene with the new labels has ANOTHER name, which the answer has. A
-        title alone leaves the name as it is. The scene under the
-        old name stays as it is until it is deleted.
+        """Changes a scene's title and its objects' labels. Labels are part of what a match sees, and so of
+        the scene's name: the scene with the new labels has ANOTHER name, given in the answer. A title
+        alone keeps the name. The scene under the old name stays as it is until it is deleted.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
         * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
         request; the same one fails again.
-        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-        there are.
+        * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+        existing ones.
         * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
         is not needed, or tell its operator; requests with sources in them are answered all the same.
-        * `RESOURCE_EXHAUSTED`: the caller would keep more than it may. Delete what is not needed.
+        * `RESOURCE_EXHAUSTED`: the caller would exceed its storage limit. Delete what is not needed.
         * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
         * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
         * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
@@ -166,14 +165,14 @@ class SceneServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def DeleteScene(self, request, context):
-        """Forgets a scene; it stays for others who have put it.
+        """Deletes a scene; it stays for other callers who have put it.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
         * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
         request; the same one fails again.
-        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-        there are.
+        * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+        existing ones.
         * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
         is not needed, or tell its operator; requests with sources in them are answered all the same.
         * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
@@ -225,13 +224,13 @@ def add_SceneServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class SceneService(object):
-    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+    """Finds objects in sketches and maps, without matching them, and stores scenes for later matches.
 
-    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
-    with the value of every parameter and the version, and of the names that were given to its objects.
-    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
-    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
-    names are all the same one.
+    A stored scene is named by the hash of its content: its source, the segmenter that found its objects,
+    with version and all parameters, and the labels given to its objects. So a name always stands for the
+    same scene, for every caller, and putting it again changes nothing. A caller, known by the name of
+    its token or certificate, sees only the scenes that it has put; all callers without a name count as
+    one.
     """
 
     @staticmethod

@@ -18,13 +18,13 @@ class _ServicerContext(grpc.ServicerContext, grpc.aio.ServicerContext):  # type:
     ...
 
 class SceneServiceStub:
-    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+    """Finds objects in sketches and maps, without matching them, and stores scenes for later matches.
 
-    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
-    with the value of every parameter and the version, and of the names that were given to its objects.
-    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
-    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
-    names are all the same one.
+    A stored scene is named by the hash of its content: its source, the segmenter that found its objects,
+    with version and all parameters, and the labels given to its objects. So a name always stands for the
+    same scene, for every caller, and putting it again changes nothing. A caller, known by the name of
+    its token or certificate, sees only the scenes that it has put; all callers without a name count as
+    one.
     """
 
     def __init__(self, channel: typing.Union[grpc.Channel, grpc.aio.Channel]) -> None: ...
@@ -51,9 +51,9 @@ class SceneServiceStub:
         sketchmatch_proto.v1.scene_service_pb2.PutSceneRequest,
         sketchmatch_proto.v1.scene_service_pb2.PutSceneResponse,
     ]
-    """Finds the objects of a source, as `Segment` does, and keeps them, the source and how they lie to
-    each other, so that matches with it do the sketch's part alone. What is kept already is found by
-    its name, and not segmented again.
+    """Finds the objects of a source, as `Segment` does, and stores them with the source and their
+    relations, so that matches with it only process the sketch. A scene that is already stored is found
+    by its name and not segmented again.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -81,8 +81,8 @@ class SceneServiceStub:
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
       request; the same one fails again.
-    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-      there are.
+    * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+      existing ones.
     * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
       is not needed, or tell its operator; requests with sources in them are answered all the same.
     * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
@@ -111,20 +111,19 @@ class SceneServiceStub:
         sketchmatch_proto.v1.scene_service_pb2.UpdateSceneRequest,
         sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse,
     ]
-    """Gives a scene another title, and its objects other labels. Labels are part of what a match sees,
-    and so of the scene's name: the scene with the new labels has ANOTHER name, which the answer has. A
-    title alone leaves the name as it is. The scene under the
-    old name stays as it is until it is deleted.
+    """Changes a scene's title and its objects' labels. Labels are part of what a match sees, and so of
+    the scene's name: the scene with the new labels has ANOTHER name, given in the answer. A title
+    alone keeps the name. The scene under the old name stays as it is until it is deleted.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
       request; the same one fails again.
-    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-      there are.
+    * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+      existing ones.
     * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
       is not needed, or tell its operator; requests with sources in them are answered all the same.
-    * `RESOURCE_EXHAUSTED`: the caller would keep more than it may. Delete what is not needed.
+    * `RESOURCE_EXHAUSTED`: the caller would exceed its storage limit. Delete what is not needed.
     * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
     * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
     * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
@@ -134,14 +133,14 @@ class SceneServiceStub:
         sketchmatch_proto.v1.scene_service_pb2.DeleteSceneRequest,
         sketchmatch_proto.v1.scene_service_pb2.DeleteSceneResponse,
     ]
-    """Forgets a scene; it stays for others who have put it.
+    """Deletes a scene; it stays for other callers who have put it.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
       request; the same one fails again.
-    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-      there are.
+    * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+      existing ones.
     * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
       is not needed, or tell its operator; requests with sources in them are answered all the same.
     * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
@@ -150,13 +149,13 @@ class SceneServiceStub:
     """
 
 class SceneServiceAsyncStub:
-    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+    """Finds objects in sketches and maps, without matching them, and stores scenes for later matches.
 
-    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
-    with the value of every parameter and the version, and of the names that were given to its objects.
-    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
-    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
-    names are all the same one.
+    A stored scene is named by the hash of its content: its source, the segmenter that found its objects,
+    with version and all parameters, and the labels given to its objects. So a name always stands for the
+    same scene, for every caller, and putting it again changes nothing. A caller, known by the name of
+    its token or certificate, sees only the scenes that it has put; all callers without a name count as
+    one.
     """
 
     Segment: grpc.aio.UnaryUnaryMultiCallable[
@@ -182,9 +181,9 @@ class SceneServiceAsyncStub:
         sketchmatch_proto.v1.scene_service_pb2.PutSceneRequest,
         sketchmatch_proto.v1.scene_service_pb2.PutSceneResponse,
     ]
-    """Finds the objects of a source, as `Segment` does, and keeps them, the source and how they lie to
-    each other, so that matches with it do the sketch's part alone. What is kept already is found by
-    its name, and not segmented again.
+    """Finds the objects of a source, as `Segment` does, and stores them with the source and their
+    relations, so that matches with it only process the sketch. A scene that is already stored is found
+    by its name and not segmented again.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -212,8 +211,8 @@ class SceneServiceAsyncStub:
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
       request; the same one fails again.
-    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-      there are.
+    * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+      existing ones.
     * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
       is not needed, or tell its operator; requests with sources in them are answered all the same.
     * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
@@ -242,20 +241,19 @@ class SceneServiceAsyncStub:
         sketchmatch_proto.v1.scene_service_pb2.UpdateSceneRequest,
         sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse,
     ]
-    """Gives a scene another title, and its objects other labels. Labels are part of what a match sees,
-    and so of the scene's name: the scene with the new labels has ANOTHER name, which the answer has. A
-    title alone leaves the name as it is. The scene under the
-    old name stays as it is until it is deleted.
+    """Changes a scene's title and its objects' labels. Labels are part of what a match sees, and so of
+    the scene's name: the scene with the new labels has ANOTHER name, given in the answer. A title
+    alone keeps the name. The scene under the old name stays as it is until it is deleted.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
       request; the same one fails again.
-    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-      there are.
+    * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+      existing ones.
     * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
       is not needed, or tell its operator; requests with sources in them are answered all the same.
-    * `RESOURCE_EXHAUSTED`: the caller would keep more than it may. Delete what is not needed.
+    * `RESOURCE_EXHAUSTED`: the caller would exceed its storage limit. Delete what is not needed.
     * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
     * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
     * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
@@ -265,14 +263,14 @@ class SceneServiceAsyncStub:
         sketchmatch_proto.v1.scene_service_pb2.DeleteSceneRequest,
         sketchmatch_proto.v1.scene_service_pb2.DeleteSceneResponse,
     ]
-    """Forgets a scene; it stays for others who have put it.
+    """Deletes a scene; it stays for other callers who have put it.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
       request; the same one fails again.
-    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-      there are.
+    * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+      existing ones.
     * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
       is not needed, or tell its operator; requests with sources in them are answered all the same.
     * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
@@ -281,13 +279,13 @@ class SceneServiceAsyncStub:
     """
 
 class SceneServiceServicer(metaclass=abc.ABCMeta):
-    """Finds objects in sketches and maps, without matching them, and keeps scenes for later matches.
+    """Finds objects in sketches and maps, without matching them, and stores scenes for later matches.
 
-    A scene is kept under the hash of what it is: of its source, of the segmenter that found its objects,
-    with the value of every parameter and the version, and of the names that were given to its objects.
-    So a name stands for the same scene for ever and for everybody, and putting it again changes nothing.
-    A caller sees the scenes that it has put itself, by name of its token or certificate; callers without
-    names are all the same one.
+    A stored scene is named by the hash of its content: its source, the segmenter that found its objects,
+    with version and all parameters, and the labels given to its objects. So a name always stands for the
+    same scene, for every caller, and putting it again changes nothing. A caller, known by the name of
+    its token or certificate, sees only the scenes that it has put; all callers without a name count as
+    one.
     """
 
     @abc.abstractmethod
@@ -317,9 +315,9 @@ class SceneServiceServicer(metaclass=abc.ABCMeta):
         request: sketchmatch_proto.v1.scene_service_pb2.PutSceneRequest,
         context: _ServicerContext,
     ) -> typing.Union[sketchmatch_proto.v1.scene_service_pb2.PutSceneResponse, collections.abc.Awaitable[sketchmatch_proto.v1.scene_service_pb2.PutSceneResponse]]:
-        """Finds the objects of a source, as `Segment` does, and keeps them, the source and how they lie to
-        each other, so that matches with it do the sketch's part alone. What is kept already is found by
-        its name, and not segmented again.
+        """Finds the objects of a source, as `Segment` does, and stores them with the source and their
+        relations, so that matches with it only process the sketch. A scene that is already stored is found
+        by its name and not segmented again.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -349,8 +347,8 @@ class SceneServiceServicer(metaclass=abc.ABCMeta):
 
         * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
           request; the same one fails again.
-        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-          there are.
+        * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+          existing ones.
         * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
           is not needed, or tell its operator; requests with sources in them are answered all the same.
         * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
@@ -383,20 +381,19 @@ class SceneServiceServicer(metaclass=abc.ABCMeta):
         request: sketchmatch_proto.v1.scene_service_pb2.UpdateSceneRequest,
         context: _ServicerContext,
     ) -> typing.Union[sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse, collections.abc.Awaitable[sketchmatch_proto.v1.scene_service_pb2.UpdateSceneResponse]]:
-        """Gives a scene another title, and its objects other labels. Labels are part of what a match sees,
-        and so of the scene's name: the scene with the new labels has ANOTHER name, which the answer has. A
-        title alone leaves the name as it is. The scene under the
-        old name stays as it is until it is deleted.
+        """Changes a scene's title and its objects' labels. Labels are part of what a match sees, and so of
+        the scene's name: the scene with the new labels has ANOTHER name, given in the answer. A title
+        alone keeps the name. The scene under the old name stays as it is until it is deleted.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
         * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
           request; the same one fails again.
-        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-          there are.
+        * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+          existing ones.
         * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
           is not needed, or tell its operator; requests with sources in them are answered all the same.
-        * `RESOURCE_EXHAUSTED`: the caller would keep more than it may. Delete what is not needed.
+        * `RESOURCE_EXHAUSTED`: the caller would exceed its storage limit. Delete what is not needed.
         * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.
         * `UNAVAILABLE`: the server is starting, draining or away. Wait for health SERVING, send again.
         * `UNAUTHENTICATED`: this server wants credentials that the call does not carry.
@@ -408,14 +405,14 @@ class SceneServiceServicer(metaclass=abc.ABCMeta):
         request: sketchmatch_proto.v1.scene_service_pb2.DeleteSceneRequest,
         context: _ServicerContext,
     ) -> typing.Union[sketchmatch_proto.v1.scene_service_pb2.DeleteSceneResponse, collections.abc.Awaitable[sketchmatch_proto.v1.scene_service_pb2.DeleteSceneResponse]]:
-        """Forgets a scene; it stays for others who have put it.
+        """Deletes a scene; it stays for other callers who have put it.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
         * `INVALID_ARGUMENT`: a field is missing or cannot be used; `BadRequest` has its path. Correct the
           request; the same one fails again.
-        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-          there are.
+        * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+          existing ones.
         * `FAILED_PRECONDITION`: the server keeps no scenes, or its store is full, damaged or gone. Delete what
           is not needed, or tell its operator; requests with sources in them are answered all the same.
         * `DEADLINE_EXCEEDED`: the call's deadline passed. Allow more time.

@@ -19,7 +19,7 @@ DESCRIPTOR: google.protobuf.descriptor.FileDescriptor
 
 @typing.final
 class CreateSketchRequest(google.protobuf.message.Message):
-    """A sketch to begin."""
+    """A sketch to start."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -31,9 +31,9 @@ class CreateSketchRequest(google.protobuf.message.Message):
     """
     @property
     def match(self) -> sketchmatch_proto.v1.match_service_pb2.MatchRequest:
-        """How to match the sketch, at each revision: the map, required, and all else that a match takes but
-        the sketch, which must not be set. Pins of objects hold for the objects of the whole sketch, by
-        label or index, so for a sketch in progress labels are what to pin by.
+        """How to match each revision: the map, which is required, and any other option of a match; the sketch
+        must not be set. Pins refer to the objects of the whole sketch, by label or index, so pin by label
+        while the sketch is in progress.
         """
 
     def __init__(
@@ -49,7 +49,7 @@ global___CreateSketchRequest = CreateSketchRequest
 
 @typing.final
 class CreateSketchResponse(google.protobuf.message.Message):
-    """The sketch that was begun."""
+    """The sketch that was started."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -74,8 +74,8 @@ global___CreateSketchResponse = CreateSketchResponse
 
 @typing.final
 class UpdateSketchRequest(google.protobuf.message.Message):
-    """What is drawn, changed or erased. First a revision is restored, then strokes are erased, then set.
-    It may have up to 1 MiB: a drawing that is larger is set by several updates.
+    """What is drawn, changed or erased. First a revision is restored, then strokes are erased, then set. At
+    most 1 MiB: send a larger drawing in several updates.
     """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
@@ -88,8 +88,8 @@ class UpdateSketchRequest(google.protobuf.message.Message):
     sketch_id: builtins.str
     """The sketch. Required."""
     restore_revision: builtins.int
-    """Returns to the strokes and pins of this revision: undo, and redo, too. The numbers go on. The last
-    256 are kept, or fewer where what was drawn in them takes more than some 100 000 points together.
+    """Returns to the strokes and pins of this revision, for undo and redo. Revision numbers continue. The
+    last 256 are kept, or fewer if their strokes have more than about 100 000 points together.
     """
     @property
     def set_strokes(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___SketchStroke]:
@@ -101,7 +101,7 @@ class UpdateSketchRequest(google.protobuf.message.Message):
 
     @property
     def pins(self) -> global___PinSet:
-        """What the caller knows of single objects from now on, in place of what it knew before."""
+        """What the caller knows of single objects from now on; it replaces what was known before."""
 
     def __init__(
         self,
@@ -152,7 +152,7 @@ class PinSet(google.protobuf.message.Message):
     PINS_FIELD_NUMBER: builtins.int
     @property
     def pins(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[sketchmatch_proto.v1.match_service_pb2.Pin]:
-        """The pins; none is to know nothing."""
+        """The pins; none means that nothing is known."""
 
     def __init__(
         self,
@@ -165,7 +165,7 @@ global___PinSet = PinSet
 
 @typing.final
 class UpdateSketchResponse(google.protobuf.message.Message):
-    """What became of an update."""
+    """The result of an update."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -231,7 +231,7 @@ class WatchSketchResponse(google.protobuf.message.Message):
 
     @property
     def result(self) -> global___SketchResult:
-        """What came of the revision."""
+        """The result of the revision."""
 
     @property
     def problem(self) -> global___SketchProblem:
@@ -323,14 +323,14 @@ class SketchResult(google.protobuf.message.Message):
     QUESTION_FIELD_NUMBER: builtins.int
     @property
     def result(self) -> sketchmatch_proto.v1.match_pb2.MatchResult:
-        """The same as `MatchService.Match` returns for the strokes of this revision, but for its name and
-        what it cost; or, before that and sooner, one that says it is `provisional`.
+        """The same as `MatchService.Match` returns for the strokes of this revision, except its name and
+        cost; or, sooner, one that is `provisional`.
         """
 
     @property
     def question(self) -> global___SketchQuestion:
-        """The one question whose answer would tell most about which map is right; absent where there is
-        nothing worth asking. A pin is how to answer it.
+        """The most informative question about which map is right; absent if none is worth asking. Answer it
+        with a pin.
         """
 
     def __init__(
@@ -346,7 +346,7 @@ global___SketchResult = SketchResult
 
 @typing.final
 class SketchQuestion(google.protobuf.message.Message):
-    """A question to the person who draws: which of these is it?"""
+    """A question to the person who draws: which of these is this object?"""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -356,7 +356,7 @@ class SketchQuestion(google.protobuf.message.Message):
     """The sketched object that is asked about."""
     @property
     def options(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___QuestionOption]:
-        """What it may be, the likeliest first."""
+        """What it may be, the most likely first."""
 
     def __init__(
         self,
@@ -440,7 +440,7 @@ global___DeleteSketchRequest = DeleteSketchRequest
 
 @typing.final
 class DeleteSketchResponse(google.protobuf.message.Message):
-    """Nothing is left to say of it."""
+    """Empty."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 

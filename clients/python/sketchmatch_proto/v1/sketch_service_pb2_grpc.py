@@ -8,10 +8,10 @@ from sketchmatch_proto.v1 import sketch_service_pb2 as sketchmatch_dot_v1_dot_sk
 class SketchServiceStub(object):
     """Matches a sketch with a map while it is drawn.
 
-    The server keeps the sketch. Updates are calls with one request and one response, and what comes of
-    them is watched in a stream, so that browsers can do both. A sketch lives until it is deleted, or for
-    `idle_timeout` without an update or a watcher; it does not outlive the server.
-    A sketch is its creator's: to others, by name of token or certificate, it does not exist.
+    The server keeps the sketch. Updates are calls with one request and one response, and a stream
+    reports their results, so that browsers can do both. A sketch lives until it is deleted, or for
+    `idle_timeout` without an update or a watcher; it does not outlive the server. It belongs to its
+    creator: to others, by name of token or certificate, it does not exist.
     """
 
     def __init__(self, channel):
@@ -45,22 +45,22 @@ class SketchServiceStub(object):
 class SketchServiceServicer(object):
     """Matches a sketch with a map while it is drawn.
 
-    The server keeps the sketch. Updates are calls with one request and one response, and what comes of
-    them is watched in a stream, so that browsers can do both. A sketch lives until it is deleted, or for
-    `idle_timeout` without an update or a watcher; it does not outlive the server.
-    A sketch is its creator's: to others, by name of token or certificate, it does not exist.
+    The server keeps the sketch. Updates are calls with one request and one response, and a stream
+    reports their results, so that browsers can do both. A sketch lives until it is deleted, or for
+    `idle_timeout` without an update or a watcher; it does not outlive the server. It belongs to its
+    creator: to others, by name of token or certificate, it does not exist.
     """
 
     def CreateSketch(self, request, context):
-        """Begins an empty sketch of a map. The map is segmented and described here, once; one that is stored
-        already is so at once.
+        """Starts an empty sketch of a map. The map is segmented and described once, here; for a stored scene
+        this is already done.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
         * `INVALID_ARGUMENT`: a field is missing or cannot be used, or nothing usable is in the source;
         `BadRequest` has the path. Correct the request; the same one fails again.
-        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-        there are.
+        * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+        existing ones.
         * `FAILED_PRECONDITION`: the map is a stored scene, and the store is damaged or gone. Send the map
         itself.
         * `RESOURCE_EXHAUSTED`: the server is busy, or keeps as many sketches as it may; delete one, or send
@@ -76,8 +76,8 @@ class SketchServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def UpdateSketch(self, request, context):
-        """Adds, changes and erases strokes, all of them or, with an error, none. The answer does not wait for
-        a match.
+        """Adds, changes and erases strokes, all of them or, on an error, none. The answer does not wait for a
+        match.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -93,10 +93,10 @@ class SketchServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def WatchSketch(self, request, context):
-        """Tells what comes of the sketch: first the map, then, for the latest revision there is whenever the
-        server gets to it, the objects found, the search while it takes long, and its result. Revisions that
-        came in between are skipped, and so is what a slow reader missed. A reader must skip events that it
-        does not know. The stream ends with the sketch, with NOT_FOUND.
+        """Streams the results of a sketch: first the map; then, each time for the latest revision, the
+        objects found, the progress of a long search, and its result. Revisions in between are skipped, and
+        so is what a slow reader missed. A reader must skip events that it does not know. When the sketch
+        ends, the stream ends with NOT_FOUND.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -160,10 +160,10 @@ def add_SketchServiceServicer_to_server(servicer, server):
 class SketchService(object):
     """Matches a sketch with a map while it is drawn.
 
-    The server keeps the sketch. Updates are calls with one request and one response, and what comes of
-    them is watched in a stream, so that browsers can do both. A sketch lives until it is deleted, or for
-    `idle_timeout` without an update or a watcher; it does not outlive the server.
-    A sketch is its creator's: to others, by name of token or certificate, it does not exist.
+    The server keeps the sketch. Updates are calls with one request and one response, and a stream
+    reports their results, so that browsers can do both. A sketch lives until it is deleted, or for
+    `idle_timeout` without an update or a watcher; it does not outlive the server. It belongs to its
+    creator: to others, by name of token or certificate, it does not exist.
     """
 
     @staticmethod

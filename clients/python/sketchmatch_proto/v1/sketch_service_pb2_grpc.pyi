@@ -20,10 +20,10 @@ class _ServicerContext(grpc.ServicerContext, grpc.aio.ServicerContext):  # type:
 class SketchServiceStub:
     """Matches a sketch with a map while it is drawn.
 
-    The server keeps the sketch. Updates are calls with one request and one response, and what comes of
-    them is watched in a stream, so that browsers can do both. A sketch lives until it is deleted, or for
-    `idle_timeout` without an update or a watcher; it does not outlive the server.
-    A sketch is its creator's: to others, by name of token or certificate, it does not exist.
+    The server keeps the sketch. Updates are calls with one request and one response, and a stream
+    reports their results, so that browsers can do both. A sketch lives until it is deleted, or for
+    `idle_timeout` without an update or a watcher; it does not outlive the server. It belongs to its
+    creator: to others, by name of token or certificate, it does not exist.
     """
 
     def __init__(self, channel: typing.Union[grpc.Channel, grpc.aio.Channel]) -> None: ...
@@ -31,15 +31,15 @@ class SketchServiceStub:
         sketchmatch_proto.v1.sketch_service_pb2.CreateSketchRequest,
         sketchmatch_proto.v1.sketch_service_pb2.CreateSketchResponse,
     ]
-    """Begins an empty sketch of a map. The map is segmented and described here, once; one that is stored
-    already is so at once.
+    """Starts an empty sketch of a map. The map is segmented and described once, here; for a stored scene
+    this is already done.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used, or nothing usable is in the source;
       `BadRequest` has the path. Correct the request; the same one fails again.
-    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-      there are.
+    * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+      existing ones.
     * `FAILED_PRECONDITION`: the map is a stored scene, and the store is damaged or gone. Send the map
       itself.
     * `RESOURCE_EXHAUSTED`: the server is busy, or keeps as many sketches as it may; delete one, or send
@@ -55,8 +55,8 @@ class SketchServiceStub:
         sketchmatch_proto.v1.sketch_service_pb2.UpdateSketchRequest,
         sketchmatch_proto.v1.sketch_service_pb2.UpdateSketchResponse,
     ]
-    """Adds, changes and erases strokes, all of them or, with an error, none. The answer does not wait for
-    a match.
+    """Adds, changes and erases strokes, all of them or, on an error, none. The answer does not wait for a
+    match.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -72,10 +72,10 @@ class SketchServiceStub:
         sketchmatch_proto.v1.sketch_service_pb2.WatchSketchRequest,
         sketchmatch_proto.v1.sketch_service_pb2.WatchSketchResponse,
     ]
-    """Tells what comes of the sketch: first the map, then, for the latest revision there is whenever the
-    server gets to it, the objects found, the search while it takes long, and its result. Revisions that
-    came in between are skipped, and so is what a slow reader missed. A reader must skip events that it
-    does not know. The stream ends with the sketch, with NOT_FOUND.
+    """Streams the results of a sketch: first the map; then, each time for the latest revision, the
+    objects found, the progress of a long search, and its result. Revisions in between are skipped, and
+    so is what a slow reader missed. A reader must skip events that it does not know. When the sketch
+    ends, the stream ends with NOT_FOUND.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -106,25 +106,25 @@ class SketchServiceStub:
 class SketchServiceAsyncStub:
     """Matches a sketch with a map while it is drawn.
 
-    The server keeps the sketch. Updates are calls with one request and one response, and what comes of
-    them is watched in a stream, so that browsers can do both. A sketch lives until it is deleted, or for
-    `idle_timeout` without an update or a watcher; it does not outlive the server.
-    A sketch is its creator's: to others, by name of token or certificate, it does not exist.
+    The server keeps the sketch. Updates are calls with one request and one response, and a stream
+    reports their results, so that browsers can do both. A sketch lives until it is deleted, or for
+    `idle_timeout` without an update or a watcher; it does not outlive the server. It belongs to its
+    creator: to others, by name of token or certificate, it does not exist.
     """
 
     CreateSketch: grpc.aio.UnaryUnaryMultiCallable[
         sketchmatch_proto.v1.sketch_service_pb2.CreateSketchRequest,
         sketchmatch_proto.v1.sketch_service_pb2.CreateSketchResponse,
     ]
-    """Begins an empty sketch of a map. The map is segmented and described here, once; one that is stored
-    already is so at once.
+    """Starts an empty sketch of a map. The map is segmented and described once, here; for a stored scene
+    this is already done.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
     * `INVALID_ARGUMENT`: a field is missing or cannot be used, or nothing usable is in the source;
       `BadRequest` has the path. Correct the request; the same one fails again.
-    * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-      there are.
+    * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+      existing ones.
     * `FAILED_PRECONDITION`: the map is a stored scene, and the store is damaged or gone. Send the map
       itself.
     * `RESOURCE_EXHAUSTED`: the server is busy, or keeps as many sketches as it may; delete one, or send
@@ -140,8 +140,8 @@ class SketchServiceAsyncStub:
         sketchmatch_proto.v1.sketch_service_pb2.UpdateSketchRequest,
         sketchmatch_proto.v1.sketch_service_pb2.UpdateSketchResponse,
     ]
-    """Adds, changes and erases strokes, all of them or, with an error, none. The answer does not wait for
-    a match.
+    """Adds, changes and erases strokes, all of them or, on an error, none. The answer does not wait for a
+    match.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -157,10 +157,10 @@ class SketchServiceAsyncStub:
         sketchmatch_proto.v1.sketch_service_pb2.WatchSketchRequest,
         sketchmatch_proto.v1.sketch_service_pb2.WatchSketchResponse,
     ]
-    """Tells what comes of the sketch: first the map, then, for the latest revision there is whenever the
-    server gets to it, the objects found, the search while it takes long, and its result. Revisions that
-    came in between are skipped, and so is what a slow reader missed. A reader must skip events that it
-    does not know. The stream ends with the sketch, with NOT_FOUND.
+    """Streams the results of a sketch: first the map; then, each time for the latest revision, the
+    objects found, the progress of a long search, and its result. Revisions in between are skipped, and
+    so is what a slow reader missed. A reader must skip events that it does not know. When the sketch
+    ends, the stream ends with NOT_FOUND.
 
     Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -191,10 +191,10 @@ class SketchServiceAsyncStub:
 class SketchServiceServicer(metaclass=abc.ABCMeta):
     """Matches a sketch with a map while it is drawn.
 
-    The server keeps the sketch. Updates are calls with one request and one response, and what comes of
-    them is watched in a stream, so that browsers can do both. A sketch lives until it is deleted, or for
-    `idle_timeout` without an update or a watcher; it does not outlive the server.
-    A sketch is its creator's: to others, by name of token or certificate, it does not exist.
+    The server keeps the sketch. Updates are calls with one request and one response, and a stream
+    reports their results, so that browsers can do both. A sketch lives until it is deleted, or for
+    `idle_timeout` without an update or a watcher; it does not outlive the server. It belongs to its
+    creator: to others, by name of token or certificate, it does not exist.
     """
 
     @abc.abstractmethod
@@ -203,15 +203,15 @@ class SketchServiceServicer(metaclass=abc.ABCMeta):
         request: sketchmatch_proto.v1.sketch_service_pb2.CreateSketchRequest,
         context: _ServicerContext,
     ) -> typing.Union[sketchmatch_proto.v1.sketch_service_pb2.CreateSketchResponse, collections.abc.Awaitable[sketchmatch_proto.v1.sketch_service_pb2.CreateSketchResponse]]:
-        """Begins an empty sketch of a map. The map is segmented and described here, once; one that is stored
-        already is so at once.
+        """Starts an empty sketch of a map. The map is segmented and described once, here; for a stored scene
+        this is already done.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
         * `INVALID_ARGUMENT`: a field is missing or cannot be used, or nothing usable is in the source;
           `BadRequest` has the path. Correct the request; the same one fails again.
-        * `NOT_FOUND`: the caller keeps no scene of this name here; the message names it. Put it, or list those
-          there are.
+        * `NOT_FOUND`: the caller has no scene of this name here; the message names it. Put it, or list the
+          existing ones.
         * `FAILED_PRECONDITION`: the map is a stored scene, and the store is damaged or gone. Send the map
           itself.
         * `RESOURCE_EXHAUSTED`: the server is busy, or keeps as many sketches as it may; delete one, or send
@@ -229,8 +229,8 @@ class SketchServiceServicer(metaclass=abc.ABCMeta):
         request: sketchmatch_proto.v1.sketch_service_pb2.UpdateSketchRequest,
         context: _ServicerContext,
     ) -> typing.Union[sketchmatch_proto.v1.sketch_service_pb2.UpdateSketchResponse, collections.abc.Awaitable[sketchmatch_proto.v1.sketch_service_pb2.UpdateSketchResponse]]:
-        """Adds, changes and erases strokes, all of them or, with an error, none. The answer does not wait for
-        a match.
+        """Adds, changes and erases strokes, all of them or, on an error, none. The answer does not wait for a
+        match.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 
@@ -248,10 +248,10 @@ class SketchServiceServicer(metaclass=abc.ABCMeta):
         request: sketchmatch_proto.v1.sketch_service_pb2.WatchSketchRequest,
         context: _ServicerContext,
     ) -> typing.Union[collections.abc.Iterator[sketchmatch_proto.v1.sketch_service_pb2.WatchSketchResponse], collections.abc.AsyncIterator[sketchmatch_proto.v1.sketch_service_pb2.WatchSketchResponse]]:
-        """Tells what comes of the sketch: first the map, then, for the latest revision there is whenever the
-        server gets to it, the objects found, the search while it takes long, and its result. Revisions that
-        came in between are skipped, and so is what a slow reader missed. A reader must skip events that it
-        does not know. The stream ends with the sketch, with NOT_FOUND.
+        """Streams the results of a sketch: first the map; then, each time for the latest revision, the
+        objects found, the progress of a long search, and its result. Revisions in between are skipped, and
+        so is what a slow reader missed. A reader must skip events that it does not know. When the sketch
+        ends, the stream ends with NOT_FOUND.
 
         Errors (those that the request causes carry `ErrorInfo`, see `ErrorReason`):
 

@@ -66,10 +66,9 @@ class Source(google.protobuf.message.Message):
     FILE_FIELD_NUMBER: builtins.int
     STORED_SCENE_FIELD_NUMBER: builtins.int
     stored_scene: builtins.str
-    """Name of a scene that this server keeps, as `SceneService.PutScene` returned it: its objects
-    are those that were found when it was put. None of this name, or one that only others have
-    put, is NOT_FOUND. It needs no segmenter, and a request that names one for it is
-    INVALID_ARGUMENT with WRONG_ALGORITHM.
+    """Name of a scene stored on this server, as `SceneService.PutScene` returned it; its objects are
+    those found when it was put. A name that does not exist, or that only others have put, is
+    NOT_FOUND. It needs no segmenter; naming one for it is INVALID_ARGUMENT with WRONG_ALGORITHM.
     """
     @property
     def stroke_set(self) -> global___StrokeSet:
@@ -371,13 +370,13 @@ class MapServerMap(google.protobuf.message.Message):
     image: builtins.bytes
     """Bytes of the picture that `image` in the .yaml names: PGM, PNG, BMP or JPEG."""
     objects: builtins.str
-    """Text of the file beside the map that says what its objects are (GeoJSON as `sketchmatch segment
-    --out` saves it). They stand for the map where no segmenter is chosen. If none of its features
-    says that it is of a map with this content, it is ignored, with a warning.
+    """Text of the file with the map's objects (GeoJSON as `sketchmatch segment --out` saves it). They
+    replace those found in the map, unless a segmenter is chosen. If none of its features states that
+    it is of a map with this content, it is ignored, with a warning.
     """
     own_objects: builtins.bool
-    """Whether `objects` are of this map though none of its features says so, as where somebody has put
-    them right just now.
+    """Whether `objects` are of this map even if none of its features states it, e.g. if somebody has just
+    corrected them.
     """
     def __init__(
         self,

@@ -38,7 +38,7 @@ class _TransferDirectionEnumTypeWrapper(google.protobuf.internal.enum_type_wrapp
     """From the map to the sketch."""
 
 class TransferDirection(_TransferDirection, metaclass=_TransferDirectionEnumTypeWrapper):
-    """From where to where features are carried."""
+    """Direction of a transfer."""
 
 TRANSFER_DIRECTION_UNSPECIFIED: TransferDirection.ValueType  # 0
 """The same as `TRANSFER_DIRECTION_SKETCH_TO_MAP`."""
@@ -63,7 +63,7 @@ class _ChangeReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._E
     CHANGE_REASON_MOVED_END: _ChangeReason.ValueType  # 3
     """A route ends elsewhere: there is an obstacle where it ended."""
     CHANGE_REASON_OTHER_SIDE: _ChangeReason.ValueType  # 4
-    """A route passes an object on another side than it was drawn: there is no way on that side."""
+    """A route passes an object on another side than drawn: the drawn side is impassable."""
     CHANGE_REASON_UNREACHABLE: _ChangeReason.ValueType  # 5
     """A route, or the rest of it, cannot be reached, and was left out."""
     CHANGE_REASON_BLOCKED: _ChangeReason.ValueType  # 6
@@ -72,7 +72,7 @@ class _ChangeReasonEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._E
     """A point or a zone lies beyond the grid; it was not moved."""
 
 class ChangeReason(_ChangeReason, metaclass=_ChangeReasonEnumTypeWrapper):
-    """Why something was changed, or could not be had."""
+    """Why something was changed, or is impossible."""
 
 CHANGE_REASON_UNSPECIFIED: ChangeReason.ValueType  # 0
 """Never sent."""
@@ -83,7 +83,7 @@ CHANGE_REASON_MOVED_START: ChangeReason.ValueType  # 2
 CHANGE_REASON_MOVED_END: ChangeReason.ValueType  # 3
 """A route ends elsewhere: there is an obstacle where it ended."""
 CHANGE_REASON_OTHER_SIDE: ChangeReason.ValueType  # 4
-"""A route passes an object on another side than it was drawn: there is no way on that side."""
+"""A route passes an object on another side than drawn: the drawn side is impassable."""
 CHANGE_REASON_UNREACHABLE: ChangeReason.ValueType  # 5
 """A route, or the rest of it, cannot be reached, and was left out."""
 CHANGE_REASON_BLOCKED: ChangeReason.ValueType  # 6
@@ -101,19 +101,19 @@ class _WarpKindEnumTypeWrapper(google.protobuf.internal.enum_type_wrapper._EnumT
     WARP_KIND_UNSPECIFIED: _WarpKind.ValueType  # 0
     """Never sent."""
     WARP_KIND_SIMILARITY: _WarpKind.ValueType  # 1
-    """Nothing, as through two to four objects."""
+    """Nothing else, as through two to four objects."""
     WARP_KIND_AFFINE: _WarpKind.ValueType  # 2
     """Stretch and shear it."""
     WARP_KIND_SPLINE: _WarpKind.ValueType  # 3
     """Bend it, as a thin-plate spline does."""
 
 class WarpKind(_WarpKind, metaclass=_WarpKindEnumTypeWrapper):
-    """What a warp may do beside turning, scaling and shifting the whole."""
+    """What a warp may do besides rotating, scaling and translating the whole."""
 
 WARP_KIND_UNSPECIFIED: WarpKind.ValueType  # 0
 """Never sent."""
 WARP_KIND_SIMILARITY: WarpKind.ValueType  # 1
-"""Nothing, as through two to four objects."""
+"""Nothing else, as through two to four objects."""
 WARP_KIND_AFFINE: WarpKind.ValueType  # 2
 """Stretch and shear it."""
 WARP_KIND_SPLINE: WarpKind.ValueType  # 3
@@ -122,8 +122,8 @@ global___WarpKind = WarpKind
 
 @typing.final
 class TransferRequest(google.protobuf.message.Message):
-    """Two scenes, what is to be carried from one to the other, and how. The fields up to `synonyms` mean
-    what those of the same names do in a `MatchRequest`.
+    """Two scenes, what to transfer from one to the other, and how. The fields up to `synonyms` mean the
+    same as in a `MatchRequest`.
     """
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
@@ -149,20 +149,20 @@ class TransferRequest(google.protobuf.message.Message):
     allow_unmatched: builtins.bool
     """Whether an object may stay without partner on both sides."""
     unmatched_price: builtins.float
-    """What a map loses that leaves all objects out."""
+    """Price of a map that leaves out all objects."""
     direction: global___TransferDirection.ValueType
-    """From which side to which. Absent: from sketch to map."""
+    """Direction of the transfer. Absent: from sketch to map."""
     y_axis: sketchmatch_proto.v1.source_pb2.YAxis.ValueType
     """Which way y grows in `features`. In the response it always grows upwards."""
     radius: builtins.float
-    """How far routes are kept away from obstacles: half the width of the robot, in metres, or the
-    units of a side that is no grid. On a grid obstacles are the squares of the cells that are occupied
-    or unknown and all beyond the grid, half a cell is kept at least, and absent means 0; elsewhere they
-    are the objects, to within the cells on which these are drawn for that, and absent means that
-    routes are not kept out of them.
+    """Distance of routes from obstacles: half the width of the robot, in metres, or in the units of a
+    side without a grid. On a grid, obstacles are the squares of occupied or unknown cells and
+    everything beyond the grid; at least half a cell is kept, and absent means 0. Elsewhere, obstacles
+    are the objects, to within the cells onto which they are rasterised; absent means that routes do
+    not avoid them.
     """
     allow_unknown: builtins.bool
-    """Whether cells that nobody has seen are no obstacles."""
+    """Whether routes may cross unknown cells."""
     @property
     def sketch(self) -> sketchmatch_proto.v1.source_pb2.Source:
         """The sketch, or the old map. Required."""
@@ -183,7 +183,7 @@ class TransferRequest(google.protobuf.message.Message):
 
     @property
     def weights(self) -> sketchmatch_proto.v1.match_pb2.ConfidenceWeights:
-        """What the parts of ζ count for."""
+        """Weights of the parts of ζ."""
 
     @property
     def pins(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[sketchmatch_proto.v1.match_service_pb2.Pin]:
@@ -195,14 +195,14 @@ class TransferRequest(google.protobuf.message.Message):
 
     @property
     def object_map(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Partners]:
-        """Which object is which, where that is known: then nothing is matched, and `seed` to `synonyms`
-        are not used. Two pairs or more; an object is in one of them at most.
+        """The object map, if it is known: then nothing is matched, and `seed` to `synonyms` are not used. Two
+        pairs or more; each object is in one of them at most.
         """
 
     @property
     def features(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Feature]:
-        """What is carried, in the coordinates of the side that it is from: of a scene, as in `MatchScenes`,
-        but for the way of y. Together with the route that the segmenter finds in a sketch, one at least.
+        """The features to transfer, in the coordinates of their scene, as in `MatchScenes`, except the
+        direction of y. With the route that the segmenter finds in a sketch, at least one.
         """
 
     def __init__(
@@ -278,7 +278,7 @@ class Feature(google.protobuf.message.Message):
 
     @property
     def route(self) -> global___Route:
-        """A way that is driven in this order."""
+        """A route, driven in this order."""
 
     @property
     def zone(self) -> global___Zone:
@@ -300,7 +300,7 @@ global___Feature = Feature
 
 @typing.final
 class Route(google.protobuf.message.Message):
-    """A way."""
+    """A route."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -346,7 +346,7 @@ global___Zone = Zone
 
 @typing.final
 class FeatureChange(google.protobuf.message.Message):
-    """What was changed about a feature, or could not be had."""
+    """What was changed about a feature, or is impossible."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -355,9 +355,9 @@ class FeatureChange(google.protobuf.message.Message):
     LAST_POINT_FIELD_NUMBER: builtins.int
     SENTENCE_FIELD_NUMBER: builtins.int
     reason: global___ChangeReason.ValueType
-    """Of which kind it is."""
+    """The reason."""
     first_point: builtins.int
-    """The first of the carried points that it is about, by index from 0."""
+    """The first of the transferred points that it is about, by index from 0."""
     last_point: builtins.int
     """The last of them."""
     sentence: builtins.str
@@ -376,7 +376,7 @@ global___FeatureChange = FeatureChange
 
 @typing.final
 class CarriedPoints(google.protobuf.message.Message):
-    """What is to be known of one line of points of a carried feature, beside where they are."""
+    """Details of one line of points of a transferred feature."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -384,11 +384,11 @@ class CarriedPoints(google.protobuf.message.Message):
     SOURCES_FIELD_NUMBER: builtins.int
     @property
     def deviations(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.float]:
-        """The standard deviation of each point, along each axis, in units of the side it was carried to."""
+        """The standard deviation of each point, along each axis, in units of the target side."""
 
     @property
     def sources(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.float]:
-        """Which given point each is, by index from 0, or with a fraction between which two it lies."""
+        """Which given point each is, by index from 0; a fraction lies between two of them."""
 
     def __init__(
         self,
@@ -402,7 +402,7 @@ global___CarriedPoints = CarriedPoints
 
 @typing.final
 class CarriedFeature(google.protobuf.message.Message):
-    """A feature where it was carried to."""
+    """A feature after the transfer."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -411,11 +411,11 @@ class CarriedFeature(google.protobuf.message.Message):
     CHANGES_FIELD_NUMBER: builtins.int
     DRAWN_FIELD_NUMBER: builtins.int
     drawn: builtins.bool
-    """Whether the request did not name it: it is the route that the segmenter found in the sketch."""
+    """Whether it is not in the request, but the route that the segmenter found in the sketch."""
     @property
     def feature(self) -> global___Feature:
-        """What it is there, y upwards. A route may have more points than the one that was given, or fewer;
-        where nothing of it can be reached there is a name alone.
+        """The feature there, y upwards. A route may have more or fewer points than the given one; if nothing
+        of it can be reached, there is only a name.
         """
 
     @property
@@ -441,7 +441,7 @@ global___CarriedFeature = CarriedFeature
 
 @typing.final
 class Warp(google.protobuf.message.Message):
-    """The warp that carried the features."""
+    """The warp that transferred the features."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -453,15 +453,17 @@ class Warp(google.protobuf.message.Message):
     kind: global___WarpKind.ValueType
     """What it may do."""
     rotation_radians: builtins.float
-    """Radians counter-clockwise by which it turns the whole, within (−π, π]."""
+    """Rotation of the whole, in radians counter-clockwise, within (−π, π]."""
     scale: builtins.float
-    """Factor by which it enlarges the whole."""
+    """Scale factor of the whole."""
     residual: builtins.float
-    """Root mean square of what the objects miss by, along x and y, in units of the target."""
+    """Root mean square distance of the objects from their partners, along x and y, in units of the
+    target.
+    """
     @property
     def weights(self) -> google.protobuf.internal.containers.RepeatedScalarFieldContainer[builtins.float]:
-        """What each pair of `TransferResponse.object_map` counts for, from 0 to 1: little where it
-        contradicts the others, as a thing that was moved does.
+        """Weight of each pair of `TransferResponse.object_map`, from 0 to 1: low if it contradicts the
+        others, as an object that was moved does.
         """
 
     def __init__(
@@ -479,7 +481,7 @@ global___Warp = Warp
 
 @typing.final
 class TransferResponse(google.protobuf.message.Message):
-    """The features where they were carried to."""
+    """The transferred features."""
 
     DESCRIPTOR: google.protobuf.descriptor.Descriptor
 
@@ -494,11 +496,11 @@ class TransferResponse(google.protobuf.message.Message):
 
     @property
     def warp(self) -> global___Warp:
-        """How they were carried."""
+        """How they were transferred."""
 
     @property
     def object_map(self) -> google.protobuf.internal.containers.RepeatedCompositeFieldContainer[global___Partners]:
-        """Which object is which, as it was given or matched."""
+        """The object map, as given or matched."""
 
     @property
     def scenes(self) -> sketchmatch_proto.v1.match_pb2.MatchScenes:

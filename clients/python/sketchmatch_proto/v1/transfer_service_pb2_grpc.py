@@ -6,8 +6,8 @@ from sketchmatch_proto.v1 import transfer_service_pb2 as sketchmatch_dot_v1_dot_
 
 
 class TransferServiceStub(object):
-    """Carries points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
-    to a new one, through the objects that both have.
+    """Transfers points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
+    to a new one, by the objects that both have.
     """
 
     def __init__(self, channel):
@@ -24,16 +24,16 @@ class TransferServiceStub(object):
 
 
 class TransferServiceServicer(object):
-    """Carries points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
-    to a new one, through the objects that both have.
+    """Transfers points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
+    to a new one, by the objects that both have.
     """
 
     def Transfer(self, request, context):
-        """Carries features from one scene to the other.
+        """Transfers features from one scene to the other.
 
-        Which object is which is said by `object_map`, or else found by a match, as `MatchService` does.
-        A warp that goes through the matched objects carries the features: it is nearly exact at the
-        objects, straight far from them, and never folds the plane.
+        The object map is given by `object_map`, or else found by a match, as by `MatchService`. A warp
+        through the matched objects transfers the features: it is nearly exact at the objects, straight far
+        from them, and never folds the plane.
 
         Cancelling the call, or its deadline, stops the work.
 
@@ -42,8 +42,8 @@ class TransferServiceServicer(object):
         * `INVALID_ARGUMENT`: a field is missing or cannot be used, or the matched objects are mirrored or
         lie such that every warp folds; `BadRequest` has the path. Correct the request; the same one
         fails again.
-        * `NOT_FOUND`: a side is a stored scene, and the caller keeps none of this name here. Put it, or
-        list those there are.
+        * `NOT_FOUND`: a side is a stored scene, and the caller has none of this name here. Put it, or list
+        the existing ones.
         * `FAILED_PRECONDITION`: a side is a stored scene, and the store is damaged or gone, or there is none.
         Send the source itself.
         * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
@@ -75,8 +75,8 @@ def add_TransferServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class TransferService(object):
-    """Carries points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
-    to a new one, through the objects that both have.
+    """Transfers points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
+    to a new one, by the objects that both have.
     """
 
     @staticmethod

@@ -18,8 +18,8 @@ class _ServicerContext(grpc.ServicerContext, grpc.aio.ServicerContext):  # type:
     ...
 
 class TransferServiceStub:
-    """Carries points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
-    to a new one, through the objects that both have.
+    """Transfers points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
+    to a new one, by the objects that both have.
     """
 
     def __init__(self, channel: typing.Union[grpc.Channel, grpc.aio.Channel]) -> None: ...
@@ -27,11 +27,11 @@ class TransferServiceStub:
         sketchmatch_proto.v1.transfer_service_pb2.TransferRequest,
         sketchmatch_proto.v1.transfer_service_pb2.TransferResponse,
     ]
-    """Carries features from one scene to the other.
+    """Transfers features from one scene to the other.
 
-    Which object is which is said by `object_map`, or else found by a match, as `MatchService` does.
-    A warp that goes through the matched objects carries the features: it is nearly exact at the
-    objects, straight far from them, and never folds the plane.
+    The object map is given by `object_map`, or else found by a match, as by `MatchService`. A warp
+    through the matched objects transfers the features: it is nearly exact at the objects, straight far
+    from them, and never folds the plane.
 
     Cancelling the call, or its deadline, stops the work.
 
@@ -40,8 +40,8 @@ class TransferServiceStub:
     * `INVALID_ARGUMENT`: a field is missing or cannot be used, or the matched objects are mirrored or
       lie such that every warp folds; `BadRequest` has the path. Correct the request; the same one
       fails again.
-    * `NOT_FOUND`: a side is a stored scene, and the caller keeps none of this name here. Put it, or
-      list those there are.
+    * `NOT_FOUND`: a side is a stored scene, and the caller has none of this name here. Put it, or list
+      the existing ones.
     * `FAILED_PRECONDITION`: a side is a stored scene, and the store is damaged or gone, or there is none.
       Send the source itself.
     * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
@@ -55,19 +55,19 @@ class TransferServiceStub:
     """
 
 class TransferServiceAsyncStub:
-    """Carries points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
-    to a new one, through the objects that both have.
+    """Transfers points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
+    to a new one, by the objects that both have.
     """
 
     Transfer: grpc.aio.UnaryUnaryMultiCallable[
         sketchmatch_proto.v1.transfer_service_pb2.TransferRequest,
         sketchmatch_proto.v1.transfer_service_pb2.TransferResponse,
     ]
-    """Carries features from one scene to the other.
+    """Transfers features from one scene to the other.
 
-    Which object is which is said by `object_map`, or else found by a match, as `MatchService` does.
-    A warp that goes through the matched objects carries the features: it is nearly exact at the
-    objects, straight far from them, and never folds the plane.
+    The object map is given by `object_map`, or else found by a match, as by `MatchService`. A warp
+    through the matched objects transfers the features: it is nearly exact at the objects, straight far
+    from them, and never folds the plane.
 
     Cancelling the call, or its deadline, stops the work.
 
@@ -76,8 +76,8 @@ class TransferServiceAsyncStub:
     * `INVALID_ARGUMENT`: a field is missing or cannot be used, or the matched objects are mirrored or
       lie such that every warp folds; `BadRequest` has the path. Correct the request; the same one
       fails again.
-    * `NOT_FOUND`: a side is a stored scene, and the caller keeps none of this name here. Put it, or
-      list those there are.
+    * `NOT_FOUND`: a side is a stored scene, and the caller has none of this name here. Put it, or list
+      the existing ones.
     * `FAILED_PRECONDITION`: a side is a stored scene, and the store is damaged or gone, or there is none.
       Send the source itself.
     * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
@@ -91,8 +91,8 @@ class TransferServiceAsyncStub:
     """
 
 class TransferServiceServicer(metaclass=abc.ABCMeta):
-    """Carries points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
-    to a new one, through the objects that both have.
+    """Transfers points, routes and zones from a sketch to a map, from a map to a sketch, or from an old map
+    to a new one, by the objects that both have.
     """
 
     @abc.abstractmethod
@@ -101,11 +101,11 @@ class TransferServiceServicer(metaclass=abc.ABCMeta):
         request: sketchmatch_proto.v1.transfer_service_pb2.TransferRequest,
         context: _ServicerContext,
     ) -> typing.Union[sketchmatch_proto.v1.transfer_service_pb2.TransferResponse, collections.abc.Awaitable[sketchmatch_proto.v1.transfer_service_pb2.TransferResponse]]:
-        """Carries features from one scene to the other.
+        """Transfers features from one scene to the other.
 
-        Which object is which is said by `object_map`, or else found by a match, as `MatchService` does.
-        A warp that goes through the matched objects carries the features: it is nearly exact at the
-        objects, straight far from them, and never folds the plane.
+        The object map is given by `object_map`, or else found by a match, as by `MatchService`. A warp
+        through the matched objects transfers the features: it is nearly exact at the objects, straight far
+        from them, and never folds the plane.
 
         Cancelling the call, or its deadline, stops the work.
 
@@ -114,8 +114,8 @@ class TransferServiceServicer(metaclass=abc.ABCMeta):
         * `INVALID_ARGUMENT`: a field is missing or cannot be used, or the matched objects are mirrored or
           lie such that every warp folds; `BadRequest` has the path. Correct the request; the same one
           fails again.
-        * `NOT_FOUND`: a side is a stored scene, and the caller keeps none of this name here. Put it, or
-          list those there are.
+        * `NOT_FOUND`: a side is a stored scene, and the caller has none of this name here. Put it, or list
+          the existing ones.
         * `FAILED_PRECONDITION`: a side is a stored scene, and the store is damaged or gone, or there is none.
           Send the source itself.
         * `RESOURCE_EXHAUSTED`: the server is busy; send the same request again after the time in
