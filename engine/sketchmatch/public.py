@@ -82,54 +82,50 @@ def match(
     Parameters
     ----------
     sketch, map
-        Scenes, sources, or paths of files that hold them: SVG or stroke JSON sketches, GeoJSON
-        polygons, ROS map YAML, images, and whatever plugins read; ``"plan.dxf#walls"`` names a
-        part of a file.
+        Scenes, sources, or paths of files: SVG or stroke JSON sketches, GeoJSON polygons, ROS map
+        YAML, images, and whatever plugins read; ``"plan.dxf#walls"`` selects a part of a file.
     profile
-        A pipeline to start from, e.g. ``"proof"``; what is said beside it wins.
+        A named pipeline to start from, e.g. ``"proof"``; other arguments override it.
     sketch_segmenter, map_segmenter
-        Names of the algorithms that find the objects, e.g. ``map_segmenter="rooms"``; a scene needs
-        none. Left out, the profile decides, or else the configuration, or else the form of the
-        source.
+        Names of the algorithms that find the objects, e.g. ``map_segmenter="rooms"``; not used for
+        scenes. By default those of the profile, the configuration, or the kind of source.
     histogram, similarity, searcher, judge
-        Names of the algorithms. Left out, the profile decides, or else the configuration, or else
-        they are ``"constant"``, ``"cross-correlation"``, ``"align"`` and ``"posterior"``.
+        Names of the algorithms. By default those of the profile, the configuration, or
+        ``"constant"``, ``"cross-correlation"``, ``"align"`` and ``"posterior"``.
     params
-        Parameters by stage, the six above, e.g. ``{"searcher": {"population": 400}}``; without a
-        name they are those of the algorithm that is used anyway.
+        Parameters by stage, the six above, e.g. ``{"searcher": {"population": 400}}``; they need no
+        name beside them if the stage keeps its algorithm.
     seed
         The same arguments with the same seed give the same result.
     time_budget
-        Seconds after which the best answer so far is given, or None for no limit.
+        Seconds after which the search stops with the best answer so far; None for no limit.
     weights
-        Of ζσ, ζR and ζL in ζ; with two numbers more, of ζS and ζM, which compare each object with
-        its partner in shape and in size; with a sixth, an exponent β by which the rotation of two
-        objects that are d apart counts in ζR for d^β. Left out, as the profile says, or else
-        1, 1, 1.
+        Weights of ζσ, ζR and ζL in ζ; two more are those of ζS and ζM, which compare each object
+        with its partner in shape and in size; a sixth is an exponent β: in ζR, the rotation of two
+        objects at distance d counts d^β. By default those of the profile, or else 1, 1, 1.
     allow_unmatched
-        Whether an object may stay without partner on both sides, where that is likelier. Left out,
+        Whether objects may stay without partner on both sides where that is more likely. By default
         as the profile says, or else as searcher and judge do by themselves: ``"align"`` and
         ``"posterior"`` leave objects out, others match the smaller scene completely.
     unmatched_price
-        What a map loses that leaves all objects of the smaller scene out, in units of ζ, and in
-        proportion where it leaves out some. Left out, the judge's own.
+        Price of a map that leaves out all objects of the smaller scene, in units of ζ; in
+        proportion if it leaves out some. By default the judge's own.
     alternatives
-        How many of the next best object maps the result shall hold; None for 3, or as many as
-        there are.
+        Number of next best object maps in the result; None for 3. There may be fewer.
     pins
-        What is known of single objects: a dict from sketched objects to the mapped ones that they
-        are, or None for one that is on no map, e.g. ``{"desk": 3, 0: "sofa", 5: None}``; objects
-        by index, from 0, or by a label that no other of the scene has. Or a list of
-        :class:`~sketchmatch.Pin`, which can also say that one is *not* another. The answer obeys.
+        What is known of single objects: a dict from sketched objects to their partners, or to None
+        for one that is not on the map, e.g. ``{"desk": 3, 0: "sofa", 5: None}``. Objects are given
+        by index, from 0, or by a label that is unique in the scene. Or a list of
+        :class:`~sketchmatch.Pin`, which can also state that one is *not* another. The answer obeys.
     synonyms
-        Labels that mean the same, beside those that are equal but for case, plural and numbers
-        that count: ``[("couch", "sofa")]``. Labels are evidence where both scenes have some, for
-        algorithms that weigh them, and force nothing.
+        Labels that mean the same, besides those that differ only in case, plural or a counting
+        number: ``[("couch", "sofa")]``. Labels are evidence if both scenes have some, for
+        algorithms that use them, and never force a line.
     on_progress
         Called with the state of the match, at most 20 times a second.
     config
-        A configuration file. Without it none is read, wherever one may lie; environment variables
-        and the built-in profiles count in any case.
+        A configuration file. By default no file is read, not even one in the usual places;
+        environment variables and the built-in profiles always apply.
 
     Returns
     -------
@@ -139,9 +135,9 @@ def match(
     Raises
     ------
     InvalidInputError
-        If something cannot be used; the sentence says what, where and what would help.
+        If something cannot be used; the message states what, where and what would help.
     AnswerUnavailableError
-        If the time budget ends before there is any answer.
+        If the time budget ends before there is an answer.
 
     Examples
     --------
@@ -204,26 +200,26 @@ def transfer(
     on_progress: Callable[[Progress], None] | None = None,
     config: str | Path | None = None,
 ) -> TransferResult:
-    """Carry points, routes and zones from a sketch to a map, or back, through the matched objects.
+    """Transfer points, routes and zones from a sketch to a map, or back, by the matched objects.
 
     Parameters
     ----------
     sketch, map
         As for :func:`match`.
     features
-        What is carried, in the coordinates of the scene that it is from, y upwards: metres around
-        ``PolygonSet.geographic_origin`` where its file has longitudes and latitudes. A route that
-        is drawn in the sketch is carried without being asked.
+        The features to transfer, in the coordinates of their scene, y upwards; if its file has
+        longitudes and latitudes, in metres around ``PolygonSet.geographic_origin``. A route that is
+        drawn in the sketch is always transferred.
     object_map
-        Which sketched object is which mapped one, where that is known, e.g.
-        ``match(…).object_map``: then nothing is matched.
+        Which sketched object is which mapped one, if known, e.g. ``match(…).object_map``: then
+        nothing is matched.
     direction
         ``"sketch-to-map"`` or ``"map-to-sketch"``.
     radius
-        How far routes are kept away from obstacles: half the width of the robot. On a grid 0 when
-        left out; elsewhere routes are not kept out of objects then.
+        Distance of routes from obstacles: half the width of the robot. By default 0 on a grid;
+        elsewhere routes then do not avoid objects.
     allow_unknown
-        Whether cells that nobody has seen are no obstacles.
+        Whether routes may cross unknown cells.
     profile, sketch_segmenter, map_segmenter, params, seed, time_budget, pins, synonyms
         As for :func:`match`.
     on_progress
@@ -234,8 +230,8 @@ def transfer(
     Returns
     -------
     TransferResult
-        ``carried`` has each feature where it was carried to, the standard deviation of each of its
-        points, and what was changed about it and why.
+        ``carried`` has each transferred feature, the standard deviation of each of its points, and
+        what was changed and why.
 
     Raises
     ------
@@ -286,18 +282,18 @@ def carry(
     segmenter: str | None = None,
     **options: Any,
 ) -> TransferResult:
-    """Carry points, routes and zones of an old map to a new one of the same place.
+    """Transfer points, routes and zones from an old map to a new one of the same place.
 
     Parameters
     ----------
     features
-        What is carried, in the coordinates of the old map.
+        The features to transfer, in the coordinates of the old map.
     old, new
-        The maps, as :func:`match` takes them. The new one may begin elsewhere, be turned, and show
-        some things where they were not.
+        The maps, as :func:`match` takes them. The new one may have another origin, be rotated, and
+        show some objects elsewhere.
     segmenter
-        Finds the objects on both maps. Left out, two grids are compared by their objects and by
-        their rooms, and what tells more is taken.
+        Algorithm that finds the objects on both maps. By default two grids are compared by objects
+        and by rooms, and the more informative result is returned.
     **options
         As for :func:`transfer`.
 
@@ -348,8 +344,8 @@ def read_scene(
     path
         A sketch or a map, as :func:`match` takes them.
     segmenter
-        Name of the algorithm that finds the objects, e.g. ``"rooms"``. Left out, the profile
-        decides, or else the configuration, or else the form of the source.
+        Name of the algorithm that finds the objects, e.g. ``"rooms"``. By default that of the
+        profile, the configuration, or the kind of source.
     params
         Its parameters, e.g. ``{"min_size": 0.3}``.
     profile, config
@@ -358,8 +354,8 @@ def read_scene(
     Raises
     ------
     InvalidInputError
-        If the file cannot be read or holds fewer than two objects, or the segmenter or a parameter
-        is of no use for it.
+        If the file cannot be read or has fewer than two objects, or the segmenter or a parameter
+        cannot be used for it.
     """
     engine = _engine(config)
     with engine.limited():
@@ -391,13 +387,13 @@ def compare(
     Returns
     -------
     Comparison
-        Scenes, histograms and the table of σ, R and L; ``most_similar`` reads it from sketch to
+        Scenes, histograms and the table of σ, R and L; ``most_similar`` lists it from sketch to
         map.
 
     Raises
     ------
     InvalidInputError
-        If something cannot be used; the sentence says what, where and what would help.
+        If something cannot be used; the message states what, where and what would help.
 
     Examples
     --------

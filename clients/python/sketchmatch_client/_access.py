@@ -20,23 +20,23 @@ Pem = str | os.PathLike[str] | bytes
 
 
 class AccessOptions(TypedDict, total=False):
-    """How to get in, as :class:`Client` takes it; what is left out, the environment may say.
+    """Access options of :class:`Client`; environment variables replace those not given.
 
     Attributes
     ----------
     token
-        Shown with every call: it says who calls.
+        Sent with every call: it identifies the caller.
     token_file
-        A file that holds the token, instead.
+        A file with the token, instead.
     tls
-        Whether to encrypt; left out, certificates decide. True alone trusts the authorities that
-        gRPC trusts.
+        Whether to encrypt; by default if there are certificates. True alone trusts the authorities
+        that gRPC trusts.
     root_certificates
-        The authorities to trust instead of these.
+        Certificate authorities to trust instead of these.
     certificate, key
-        To be shown to the server: they say who calls.
+        Client certificate and its private key: they identify the caller.
     server_name
-        The name that the server's certificate is for, where it is not the one in the address.
+        The name in the server's certificate, if it is not in the address.
     """
 
     token: str | None

@@ -97,7 +97,7 @@ class AsyncClient:
     Raises
     ------
     SketchmatchError
-        From every call: :mod:`sketchmatch_client.errors` has one class for each thing to do.
+        From every call: :mod:`sketchmatch_client.errors` has one class for each way to react.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class AsyncClient:
         await self.close()
 
     async def close(self) -> None:
-        """Close the connection; calls that are under way end."""
+        """Close the connection; calls in progress end."""
         await self._channel.close()
 
     async def match(
@@ -155,8 +155,8 @@ class AsyncClient:
     ) -> AsyncGenerator[MatchResponse, None]:
         """Match a sketch with a map, event by event; see :meth:`Client.events`.
 
-        Closing the generator cancels the match. Python does not close it at the moment a loop
-        over it is left; ``contextlib.aclosing`` does.
+        Closing the generator cancels the match. Leaving a loop over it does not close it at once;
+        ``contextlib.aclosing`` does.
         """
         request = match_request(sketch, map, **options)
         return self._events(Course(request), self._limit(timeout))
@@ -164,22 +164,22 @@ class AsyncClient:
     def watch(
         self, match_id: str, after: int = 0, *, timeout: float | None = None
     ) -> AsyncGenerator[MatchResponse, None]:
-        """Read a match of one's own that was begun before; see :meth:`Client.watch`."""
+        """Read one of the caller's earlier matches; see :meth:`Client.watch`."""
         return self._events(watched(match_id, after), self._limit(timeout))
 
     async def get_match(self, match_id: str, *, timeout: float | None = None) -> GetMatchResponse:
-        """Return how a match of one's own is; see :meth:`Client.get_match`."""
+        """Return the state of one of the caller's matches; see :meth:`Client.get_match`."""
         request = GetMatchRequest(match_id=match_id)
         return await self._asked(self._matching.GetMatch, request, timeout)
 
     async def cancel_match(self, match_id: str, *, timeout: float | None = None) -> MatchSummary:
-        """Stop a match of one's own, and return how it is; see :meth:`Client.cancel_match`."""
+        """Stop one of the caller's matches; see :meth:`Client.cancel_match`."""
         request = CancelMatchRequest(match_id=match_id)
         answer = await self._asked(self._matching.CancelMatch, request, timeout)
         return answer.match
 
     async def matches(self, *, timeout: float | None = None) -> AsyncGenerator[MatchSummary, None]:
-        """Yield all matches of one's own, the latest first; see :meth:`Client.matches`."""
+        """Yield all of the caller's matches, the latest first; see :meth:`Client.matches`."""
         request = ListMatchesRequest()
         while True:
             page = await self._asked(self._matching.ListMatches, request, timeout)
@@ -213,19 +213,19 @@ class AsyncClient:
         title: str = "",
         timeout: float | None = None,
     ) -> PutSceneResponse:
-        """Have the server keep a scene; see :meth:`Client.put_scene`."""
+        """Store a scene on the server; see :meth:`Client.put_scene`."""
         request = _scenes.put_request(source, segmenter, params, profile, title)
         return await self._asked(self._keeping.PutScene, request, timeout)
 
     async def get_scene(
         self, name: str, *, include_source: bool = False, timeout: float | None = None
     ) -> GetSceneResponse:
-        """Return a scene that you have put, with its source where that is wanted."""
+        """Return a scene that the caller has put, with its source if requested."""
         request = _scenes.get_request(name, include_source)
         return await self._asked(self._keeping.GetScene, request, timeout)
 
     async def list_scenes(self, *, timeout: float | None = None) -> list[SceneSummary]:
-        """Return what there is to say of all scenes that you have put, the latest first."""
+        """Return summaries of all scenes that the caller has put, the latest first."""
         found, request = list[SceneSummary](), ListScenesRequest()
         while True:
             page = await self._asked(self._keeping.ListScenes, request, timeout)
@@ -242,12 +242,12 @@ class AsyncClient:
         title: str | None = None,
         timeout: float | None = None,
     ) -> StoredScene:
-        """Give objects of a kept scene other labels; see :meth:`Client.update_scene`."""
+        """Change labels or title of a stored scene; see :meth:`Client.update_scene`."""
         request = _scenes.update_request(name, labels, title)
         return (await self._asked(self._keeping.UpdateScene, request, timeout)).stored_scene
 
     async def delete_scene(self, name: str, *, timeout: float | None = None) -> None:
-        """Forget a scene; it stays for others who have put it."""
+        """Delete a scene; it stays for other callers who have put it."""
         deletion = Counted(self._keeping.DeleteScene)
         try:
             await self._asked(deletion, _scenes.delete_request(name), timeout)
@@ -264,7 +264,7 @@ class AsyncClient:
         timeout: float | None = None,
         **options: Unpack[MatchOptions],
     ) -> AsyncSketch:
-        """Begin a sketch that is matched while it is drawn; see :meth:`Client.sketch`."""
+        """Start a sketch that is matched while it is drawn; see :meth:`Client.sketch`."""
         request = create_request(map, y_axis, **options)
         made = await self._asked(self._drawing.CreateSketch, request, timeout)
         return AsyncSketch(self, made.sketch_id)
@@ -278,7 +278,7 @@ class AsyncClient:
         timeout: float | None = None,
         **options: Unpack[TransferOptions],
     ) -> TransferResponse:
-        """Carry points, routes and zones; see :meth:`Client.transfer`."""
+        """Transfer points, routes and zones; see :meth:`Client.transfer`."""
         request = transfer_request(sketch, map, features, **options)
         stub = cast("TransferServiceAsyncStub", TransferServiceStub(self._channel))
         return await self._asked(stub.Transfer, request, timeout)

@@ -30,12 +30,12 @@ __all__ = ["Match", "MatchCollector", "Progress", "ProgressCallback", "tell_prog
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """How far a match is: the contract's message, but None where it has no value yet.
+    """State of a running match: the contract's message, but None for values that are not known yet.
 
     Attributes
     ----------
     message
-        The message, which an equal one is equal to.
+        The message; a Progress equals it and equal ones.
     """
 
     message: MatchProgress
@@ -47,7 +47,7 @@ class Progress:
 
     @property
     def fraction(self) -> float | None:
-        """How much of the phase is done, from 0 to 1; None where nobody knows."""
+        """How much of the phase is done, from 0 to 1; None if unknown."""
         return self._known("fraction")
 
     @property
@@ -142,18 +142,18 @@ class Match:
 
     @property
     def probability(self) -> float | None:
-        """How likely the object map is right as a whole, on this place; None where unknown."""
+        """How likely the object map is right as a whole, on this place; None if unknown."""
         return self.result.probability if self.result.HasField("probability") else None
 
     @property
     def place_probability(self) -> float | None:
-        """How likely the sketch shows the map's place at all; None where unknown."""
+        """How likely the sketch shows the map's place at all; None if unknown."""
         known = self.result.HasField("place_probability")
         return self.result.place_probability if known else None
 
     @property
     def ambiguity(self) -> Ambiguity | None:
-        """Which maps are about as likely, and what to ask; None where one is clearly the best."""
+        """Which maps are about as likely, and what to ask; None if one is clearly the best."""
         return self.result.ambiguity if self.result.HasField("ambiguity") else None
 
     @property
@@ -170,23 +170,23 @@ class Match:
         return f"<{type(self).__name__}: {match_headline(self.result, self.scenes.sketch)}>"
 
     def __str__(self) -> str:
-        """Return which object is which, for a terminal; objects count from 0."""
+        """Return which object is which, for a terminal; objects are numbered from 0."""
         return match_table(self.result, self.scenes.sketch, self.scenes.map)
 
     def rows(self) -> list[MatchRow]:
         """Return a plain dict for each sketched object, in their order, as data frames take them.
 
-        Its keys are those of :class:`MatchRow`: indices and labels of the object and of its
-        partner, where the partner is, and what is known of both. What is unknown is None.
+        Its keys are those of :class:`MatchRow`: indices and labels of the object and its partner,
+        the partner's place, and what is known of both. What is unknown is None.
         """
         return self._view().rows()
 
     def to_geojson(self) -> dict[str, Any]:
         """Return a GeoJSON FeatureCollection in the map's frame, in metres.
 
-        A feature for each row of :meth:`rows`, which are its properties, with the polygon of the
-        partner, or no geometry where there is none; then one for each mapped object without
-        partner. The property ``label`` is the mapped object's label, or else the sketched one's.
+        One feature for each row of :meth:`rows`, with the row as its properties and the polygon of
+        the partner, or no geometry without one; then one for each mapped object without partner.
+        The property ``label`` is the mapped object's label, or else the sketched one's.
         """
         return self._view().geojson()
 

@@ -59,7 +59,7 @@ _STAGES = tuple(
 
 
 class MatchOptions(TypedDict, total=False):
-    """How to match; whatever is left out is the server's to decide.
+    """Options of a match; the server decides those that are not given.
 
     Attributes
     ----------
@@ -69,41 +69,40 @@ class MatchOptions(TypedDict, total=False):
         Parameters by stage, e.g. ``{"searcher": {"population": 200}}``. The stages are the
         names of the six options above.
     seed
-        Seed of everything random, from 0 to 2**64 − 1. Left out: 0.
+        Random seed, from 0 to 2**64 − 1; 0 by default.
     time_budget
         Seconds, or a timedelta, after which the best match so far is the result.
     weights
-        Weights of similarity, rotation and dilation in ζ, with two numbers more of the objects'
-        own shape and size, and with a sixth the exponent β by which the rotation of two objects
-        that are d apart counts for d^β. Left out: as the profile says, or else 1, 1, 1, 0, 0, 0.
+        Weights of similarity, rotation and dilation in ζ; two more are those of the objects' own
+        shape and size; a sixth is the exponent β: the rotation of two objects at distance d counts
+        d^β. By default those of the profile, or else 1, 1, 1, 0, 0, 0.
     allow_unmatched
-        Whether an object may stay without partner on both sides where that is likelier. Left out:
+        Whether objects may stay without partner on both sides where that is more likely. By default
         as the profile says, or else as searcher and judge do by themselves.
     unmatched_price
-        What a match loses that leaves all objects of the smaller scene out, in units of ζ, and in
-        proportion where it leaves out some. Left out: the judge's own.
+        Price of a match that leaves out all objects of the smaller scene, in units of ζ; in
+        proportion if it leaves out some. By default the judge's own.
     alternatives
-        How many of the next best object maps the result shall hold. Left out: 3, or as many as
-        there are.
+        Number of next best object maps in the result; 3 by default. There may be fewer.
     pins
         What is known of single objects, which the answer obeys: a dict from sketched objects to
-        the mapped ones that they are, or None for one that is on no map, e.g. ``{"desk": 3, 0:
-        "sofa", 5: None}``; objects by index, from 0, or by a label that no other of the scene has.
-        Or :class:`Pin` values, which can also say that one is *not* another.
+        their partners, or to None for one that is not on the map, e.g. ``{"desk": 3, 0: "sofa", 5:
+        None}``. Objects are given by index, from 0, or by a label that is unique in the scene. Or
+        :class:`Pin` values, which can also state that one is *not* another.
     synonyms
-        Labels that mean the same, beside those that are equal but for case, plural and numbers
-        that count: ``[("couch", "sofa")]``. Labels are evidence, and force nothing.
+        Labels that mean the same, besides those that differ only in case, plural or a counting
+        number: ``[("couch", "sofa")]``. Labels are evidence, and never force a line.
     profile
-        Name of one of the server's pipelines, e.g. ``"proof"``, to start from; what
-        the options above say wins. Left out: the server's default one.
+        Name of one of the server's pipelines, e.g. ``"proof"``, to start from; the options above
+        override it. By default the server's default one.
     request_id
         A name for the request, at most 128 bytes: sent again under the same name it is the same
-        match, done once. Left out: the client makes one for each call.
+        match, which runs once. By default the client makes one for each call.
     keep_running
-        Whether the match goes on when nobody reads it; :meth:`Client.watch` reads it again.
+        Whether the match continues when nobody reads it; :meth:`Client.watch` reads it again.
     priority
-        ``"low"``, ``"normal"`` or ``"high"``: which of one's own requests come first while they
-        wait. Left out: normal.
+        ``"low"``, ``"normal"`` or ``"high"``: which of the caller's own waiting requests start
+        first; normal by default.
     """
 
     sketch_segmenter: str | None

@@ -76,7 +76,7 @@ class Sketch:
         erase
             Names of the strokes to erase.
         restore
-            A former revision to return to: undo, and redo.
+            A former revision to return to, for undo and redo.
         labels
             Names for people, by the names of strokes that are set.
         pins
@@ -87,13 +87,13 @@ class Sketch:
         Returns
         -------
         UpdateSketchResponse
-            The number of the revision that this made, and how many strokes it has.
+            The number of the new revision, and how many strokes it has.
         """
         request = update_request(self.id, strokes or {}, erase, restore, labels or {}, pins)
         return self._client._asked(self._client._drawing.UpdateSketch, request, timeout, retries=0)
 
     def watch(self, *, timeout: float | None = None) -> Generator[WatchSketchResponse, None, None]:
-        """Yield what comes of the sketch until it ends: the latest of each kind of event.
+        """Yield the results of the sketch until it ends: the latest of each kind of event.
 
         Closing the generator ends it.
         """
@@ -110,7 +110,7 @@ class Sketch:
                 call.cancel()
 
     def delete(self, *, timeout: float | None = None) -> None:
-        """End the sketch; one that has ended is no error."""
+        """End the sketch; no error if it has ended."""
         try:
             self._client._asked(
                 self._client._drawing.DeleteSketch, DeleteSketchRequest(sketch_id=self.id), timeout
@@ -151,7 +151,7 @@ class AsyncSketch:
     async def watch(
         self, *, timeout: float | None = None
     ) -> AsyncGenerator[WatchSketchResponse, None]:
-        """Yield what comes of the sketch until it ends; see :meth:`Sketch.watch`."""
+        """Yield the results of the sketch until it ends; see :meth:`Sketch.watch`."""
         client = self._client
         async with async_translated_errors(client._address):
             call = client._drawing.WatchSketch(
@@ -166,7 +166,7 @@ class AsyncSketch:
                 call.cancel()
 
     async def delete(self, *, timeout: float | None = None) -> None:
-        """End the sketch; one that has ended is no error."""
+        """End the sketch; no error if it has ended."""
         request = DeleteSketchRequest(sketch_id=self.id)
         try:
             await self._client._asked(self._client._drawing.DeleteSketch, request, timeout)

@@ -77,35 +77,34 @@ _CANCELLING = 10.0
 class Client:
     """A connection to a sketchmatch server; close it, or use it in a ``with`` statement.
 
-    It connects with the first call, and again by itself when the link was lost. It may be
-    used from several threads.
+    It connects with the first call, and reconnects by itself when the connection is lost. Threads
+    may share it.
 
     Parameters
     ----------
     address
-        Host and port of the server, e.g. ``"localhost:50051"``, or another address as gRPC
-        names them, e.g. ``"unix:/run/sketchmatch.sock"``. Proxies that the environment names
-        are not asked for what is on this machine.
+        Host and port of the server, e.g. ``"localhost:50051"``, or another gRPC address, e.g.
+        ``"unix:/run/sketchmatch.sock"``. Proxies from the environment are not used for this
+        machine.
     credentials
-        Credentials of gRPC's own making, in place of what ``access`` says of encryption.
+        gRPC credentials; they replace the encryption that ``access`` configures.
     timeout
-        Seconds that a call may take where the call itself does not say. None or infinity: no
-        limit.
+        Time limit of calls that set none, in seconds. None or infinity: no limit.
     retries
-        How often a request is sent again where the server is not available or has no room, after a
-        pause that the server asks for or that grows from 0.1 s. The timeout is for all attempts
-        together. A match that has begun goes on where the link was lost, with attempts for a
-        minute; where the server lost it too, it is done again. With 0 none of that is done.
+        How often a request is sent again if the server is unavailable or busy, after a pause that
+        the server asks for or that grows from 0.1 s. The timeout covers all attempts together. A
+        match in progress is resumed after a lost connection, with attempts for a minute; if the
+        server lost it too, it runs again. 0 disables all of this.
     options
-        Channel options of gRPC, beside or instead of this package's own.
+        gRPC channel options, added to this package's own or replacing them.
     **access
-        How to get in, by encryption, certificates and a token: :class:`AccessOptions`. What is
-        left out, the environment may say: ``SKETCHMATCH_TOKEN`` is ``token``, and so on.
+        Encryption, certificates and a token: :class:`AccessOptions`. Environment variables replace
+        absent ones: ``SKETCHMATCH_TOKEN`` is ``token``, and so on.
 
     Raises
     ------
     SketchmatchError
-        From every call: :mod:`sketchmatch_client.errors` has one class for each thing to do.
+        From every call: :mod:`sketchmatch_client.errors` has one class for each way to react.
     """
 
     def __init__(
@@ -137,7 +136,7 @@ class Client:
         self.close()
 
     def close(self) -> None:
-        """Close the connection; calls that are under way end."""
+        """Close the connection; calls in progress end."""
         self._channel.close()
 
     def match(
@@ -156,11 +155,11 @@ class Client:
         sketch, map
             From :mod:`sketchmatch_client.sources`.
         on_progress
-            Called with each :class:`Progress`, at most 20 a second. What it raises ends the
-            match.
+            Called with each :class:`Progress`, at most 20 times a second. An exception from it ends
+            the match.
         timeout
-            Seconds after which the call fails; infinity for none. To have the best match until
-            then, give a ``time_budget`` instead.
+            Seconds after which the call fails; infinity for none. To get the best match until then
+            instead, give a ``time_budget``.
         **options
             Profile, algorithms, parameters, seed, time budget …: :class:`MatchOptions`.
 
@@ -179,7 +178,7 @@ class Client:
         timeout: float | None = None,
         **options: Unpack[MatchOptions],
     ) -> MatchCall:
-        """Match a sketch with a map, event by event, or with a hand on it.
+        """Match a sketch with a map, event by event, with control over the match.
 
         Parameters
         ----------
@@ -198,7 +197,7 @@ class Client:
         return self._reading(Course(request), self._limit(timeout))
 
     def watch(self, match_id: str, after: int = 0, *, timeout: float | None = None) -> MatchCall:
-        """Read a match of one's own that was begun before, event by event.
+        """Read one of the caller's earlier matches, event by event.
 
         Parameters
         ----------
@@ -212,8 +211,8 @@ class Client:
         Returns
         -------
         MatchCall
-            As :meth:`events` does; closing it does not stop a match that is to keep running or that
-            others read, and its ``cancel()`` does.
+            As :meth:`events` does. Closing it does not stop a match that is to keep running or that
+            others read; its ``cancel()`` does.
 
         Raises
         ------
@@ -223,7 +222,7 @@ class Client:
         return self._reading(watched(match_id, after), self._limit(timeout))
 
     def get_match(self, match_id: str, *, timeout: float | None = None) -> GetMatchResponse:
-        """Return how a match of one's own is, with its events so far.
+        """Return the state of one of the caller's matches, with its events so far.
 
         Raises
         ------
@@ -235,10 +234,10 @@ class Client:
         return self._asked(stub.GetMatch, request, timeout)
 
     def cancel_match(self, match_id: str, *, timeout: float | None = None) -> MatchSummary:
-        """Stop a match of one's own, and return how it is.
+        """Stop one of the caller's matches, and return its state.
 
-        One that has ended stays as it is, but one that was interrupted is cancelled, and so not
-        done again.
+        One that has ended stays as it is, but one that was interrupted is cancelled, and so does
+        not run again.
 
         Raises
         ------
@@ -250,12 +249,12 @@ class Client:
         return self._asked(stub.CancelMatch, request, timeout).match
 
     def matches(self, *, timeout: float | None = None) -> Iterator[MatchSummary]:
-        """Yield all matches of one's own that the server knows, the latest first.
+        """Yield all of the caller's matches that the server knows, the latest first.
 
         Parameters
         ----------
         timeout
-            Seconds after which each call for some of them fails.
+            Seconds after which each call for a page of them fails.
         """
         stub, request = MatchServiceStub(self._channel), ListMatchesRequest()
         while True:
@@ -282,13 +281,13 @@ class Client:
         source
             From :mod:`sketchmatch_client.sources`.
         segmenter
-            Name of the algorithm; the server's choice when left out.
+            Name of the algorithm; by default the server's choice.
         params
             Its parameters.
         profile
-            The server's pipeline that decides what is left out.
+            The server's pipeline that supplies what is not given here.
         include_map
-            Whether the occupancy grid is wanted, too, such as that of a bag, as map_server saves
+            Whether to return the occupancy grid as well, such as that of a bag, as map_server saves
             maps.
         timeout
             Seconds after which the call fails.
@@ -296,7 +295,7 @@ class Client:
         Returns
         -------
         SegmentResponse
-            The scene, warnings, the segmenter as it ran, and the map where it is wanted.
+            The scene, warnings, the segmenter as it ran, and the map if requested.
         """
         request = segment_request(source, segmenter, params, profile, include_map)
         return self._asked(self._keeping.Segment, request, timeout)
@@ -311,21 +310,21 @@ class Client:
         title: str = "",
         timeout: float | None = None,
     ) -> PutSceneResponse:
-        """Find the objects of a source, and have the server keep them for later matches.
+        """Find the objects of a source, and store them on the server for later matches.
 
-        ``sources.stored_scene`` makes the name in the answer a sketch or map.
+        ``sources.stored_scene`` makes a sketch or map of the name in the answer.
 
         Parameters
         ----------
         source, segmenter, params, profile, timeout
             As for :meth:`segment`.
         title
-            What you call it, for people who choose among scenes; it is no part of the name.
+            A title for people who choose among scenes; not part of the name.
 
         Returns
         -------
         PutSceneResponse
-            The scene, under the hash of what it is, and whether you had not put it before.
+            The scene, named by the hash of its content, and whether it is new to the caller.
         """
         request = _scenes.put_request(source, segmenter, params, profile, title)
         return self._asked(self._keeping.PutScene, request, timeout)
@@ -333,12 +332,12 @@ class Client:
     def get_scene(
         self, name: str, *, include_source: bool = False, timeout: float | None = None
     ) -> GetSceneResponse:
-        """Return a scene that you have put, with its source where that is wanted."""
+        """Return a scene that the caller has put, with its source if requested."""
         request = _scenes.get_request(name, include_source)
         return self._asked(self._keeping.GetScene, request, timeout)
 
     def list_scenes(self, *, timeout: float | None = None) -> list[SceneSummary]:
-        """Return what there is to say of all scenes that you have put, the latest first."""
+        """Return summaries of all scenes that the caller has put, the latest first."""
         found, request = list[SceneSummary](), ListScenesRequest()
         while True:
             page = self._asked(self._keeping.ListScenes, request, timeout)
@@ -355,16 +354,16 @@ class Client:
         title: str | None = None,
         timeout: float | None = None,
     ) -> StoredScene:
-        """Give objects of a kept scene other labels, or the scene another title.
+        """Change labels of a stored scene's objects, or its title.
 
         Parameters
         ----------
         name
             Of the scene, which stays as it is.
         labels
-            By index, from 0; an empty one takes the label away.
+            By index, from 0; an empty one removes the label.
         title
-            What you call it from now on; None: as before.
+            The new title; None keeps the present one.
         timeout
             Seconds after which the call fails.
 
@@ -377,7 +376,7 @@ class Client:
         return self._asked(self._keeping.UpdateScene, request, timeout).stored_scene
 
     def delete_scene(self, name: str, *, timeout: float | None = None) -> None:
-        """Forget a scene; it stays for others who have put it."""
+        """Delete a scene; it stays for other callers who have put it."""
         deletion = Counted(self._keeping.DeleteScene)
         try:
             self._asked(deletion, _scenes.delete_request(name), timeout)
@@ -394,12 +393,12 @@ class Client:
         timeout: float | None = None,
         **options: Unpack[MatchOptions],
     ) -> Sketch:
-        """Begin a sketch that is matched while it is drawn.
+        """Start a sketch that is matched while it is drawn.
 
         Parameters
         ----------
         map
-            From :mod:`sketchmatch_client.sources`; a stored scene is there at once.
+            From :mod:`sketchmatch_client.sources`; a stored scene is ready at once.
         y_axis
             Which way y grows in the strokes to come: ``"down"`` on screens.
         timeout
@@ -410,7 +409,7 @@ class Client:
         Returns
         -------
         Sketch
-            Empty; ``update`` draws, ``watch`` tells what comes of it.
+            Empty; ``update`` draws, ``watch`` streams the results.
         """
         request = create_request(map, y_axis, **options)
         made = self._asked(self._drawing.CreateSketch, request, timeout)
@@ -425,26 +424,27 @@ class Client:
         timeout: float | None = None,
         **options: Unpack[TransferOptions],
     ) -> TransferResponse:
-        """Carry points, routes and zones from a sketch to a map, back, or to a new map.
+        """Transfer points, routes and zones from a sketch to a map, back, or to a new map.
 
         Parameters
         ----------
         sketch, map
             From :mod:`sketchmatch_client.sources`; of two maps the old one is the sketch.
         features
-            From :mod:`sketchmatch_client.features`. A route that is drawn in a sketch is carried
-            without being asked.
+            From :mod:`sketchmatch_client.features`. A route that is drawn in a sketch is always
+            transferred.
         timeout
             Seconds after which the call fails.
         **options
-            The object map where it is known, direction, radius …, and all that a match takes but
+            The object map if known, direction, radius …, and all options of a match except
             ``alternatives``, ``request_id``, ``keep_running`` and ``priority``:
             :class:`TransferOptions`.
 
         Returns
         -------
         TransferResponse
-            The carried features, each point with its standard deviation, and why what was changed.
+            The transferred features, each point with its standard deviation, and what was changed
+            and why.
         """
         request = transfer_request(sketch, map, features, **options)
         stub = TransferServiceStub(self._channel)
@@ -466,9 +466,9 @@ class Client:
         Parameters
         ----------
         name
-            The part: a service, as in ``"sketchmatch.v1.MatchService"``, or an algorithm, as in
-            ``"searcher/easm"``, which is warm once its kernels are compiled. The whole server when
-            left out, which is warm once the default algorithms are.
+            The part: a service, e.g. ``"sketchmatch.v1.MatchService"``, or an algorithm, e.g.
+            ``"searcher/easm"``, which is warm once its kernels are compiled. By default the whole
+            server, which is warm once the default algorithms are.
         timeout
             Seconds after which the call fails.
 
@@ -477,7 +477,7 @@ class Client:
         InvalidRequestError
             If the server has no such part.
         ServerUnavailableError
-            If nobody answers.
+            If there is no answer.
         """
         check: grpc.UnaryUnaryMultiCallable[bytes, bytes] = self._channel.unary_unary(CHECK_HEALTH)
         with translated_errors(self._address):
@@ -495,8 +495,8 @@ class Client:
         Parameters
         ----------
         timeout
-            Seconds to wait at most; infinity for no limit. A server's first ever start compiles
-            its kernels.
+            Longest wait in seconds; infinity for no limit. A server's very first start compiles its
+            kernels.
 
         Raises
         ------

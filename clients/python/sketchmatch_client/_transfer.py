@@ -26,22 +26,22 @@ _Y_AXES = {"up": source_pb2.Y_AXIS_UP, "down": source_pb2.Y_AXIS_DOWN}
 
 
 class TransferOptions(MatchOptions, total=False):
-    """How to carry features; what is left out is as the contract says.
+    """Options of a transfer; the contract has their defaults.
 
     Attributes
     ----------
     object_map
-        Which sketched object is which mapped one, by index from 0, where that is known, e.g.
+        Which sketched object is which mapped one, by index from 0, if known, e.g.
         ``match.object_map``: then nothing is matched.
     direction
         ``"sketch-to-map"``, also from an old map to a new one, or ``"map-to-sketch"``.
     y_axis
         Which way y grows in the features; in the answer it grows upwards.
     radius
-        How far routes are kept away from obstacles: half the width of the robot. Left out: 0 on a
-        grid; elsewhere routes are not kept out of objects then.
+        Distance of routes from obstacles: half the width of the robot. By default 0 on a grid;
+        elsewhere routes then do not avoid objects.
     allow_unknown
-        Whether cells that nobody has seen are no obstacles.
+        Whether routes may cross unknown cells.
     """
 
     object_map: Mapping[int, int] | None
@@ -57,7 +57,7 @@ def transfer_request(
     features: Iterable[Feature] = (),
     **options: Unpack[TransferOptions],
 ) -> TransferRequest:
-    """Return the request to carry features; see :class:`TransferOptions`.
+    """Return the request for a transfer; see :class:`TransferOptions`.
 
     Examples
     --------

@@ -77,7 +77,7 @@ class _RetryableError(SketchmatchError):
     reason
         Why it does not now.
     retry_after
-        Seconds after which to send the same request again, or None where the server did not say.
+        Seconds after which to send the same request again, or None if the server gave none.
     """
 
     def __init__(self, message: str, reason: str = "", retry_after: float | None = None) -> None:
@@ -88,7 +88,7 @@ class _RetryableError(SketchmatchError):
 class ServerUnavailableError(_RetryableError):
     """No server answers, it is starting or stopping, or it lost the process that answered.
 
-    Wait until it serves, and ``retry_after`` seconds if it said so, and send again.
+    Wait until it serves, and for ``retry_after`` seconds if given, then send again.
     """
 
 
@@ -97,14 +97,14 @@ class ServerBusyError(_RetryableError):
 
 
 class DeadlineExceededError(SketchmatchError):
-    """The time ended before there was an answer; allow more of it."""
+    """The time limit passed before there was an answer; allow more time."""
 
 
 class NotAuthenticatedError(SketchmatchError):
     """The server does not know the token, or the client does not trust the server's certificate.
 
-    A server that wants a certificate of the client, or another one, ends the link without a word:
-    that is a :class:`ServerUnavailableError`.
+    A server that requires a client certificate, or another one, ends the connection without a
+    reason: that is a :class:`ServerUnavailableError`.
     """
 
 
@@ -117,7 +117,7 @@ class StoreError(SketchmatchError):
 
 
 class NotSupportedError(SketchmatchError):
-    """The server does not know the method; it is older than this client, or another server."""
+    """The server does not know the method: it is older than this client, or a different server."""
 
 
 class CallCancelledError(SketchmatchError):
@@ -125,7 +125,7 @@ class CallCancelledError(SketchmatchError):
 
 
 class ServerFailedError(SketchmatchError):
-    """The server could not do what it should; the message says which part of it failed."""
+    """The server failed; the message states which part of it."""
 
 
 @contextmanager

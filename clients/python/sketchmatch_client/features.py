@@ -19,7 +19,7 @@ def point(x: float, y: float, name: str = "") -> Feature:
     Parameters
     ----------
     x, y
-        Where it is, in the coordinates of the scene that it is from.
+        Coordinates in the scene of the feature.
     name
         For people.
 
@@ -34,7 +34,7 @@ def point(x: float, y: float, name: str = "") -> Feature:
 def route(
     points: Iterable[Sequence[float]], name: str = "", speeds: Iterable[float] | None = None
 ) -> Feature:
-    """Return a way that is driven in the order of its points.
+    """Return a route, driven in the order of its points.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def route(
     name
         For people.
     speeds
-        How fast it is driven from each of its points on, in metres a second; as many as points.
+        Speed from each of its points on, in metres per second; as many as points.
 
     Raises
     ------

@@ -103,7 +103,7 @@ def polygons(
     y_axis
         Which way y grows; see :func:`strokes`.
     certainties
-        How sure it is, above 0 and up to 1, that each polygon is one thing; None where it is.
+        How certain it is, above 0 and up to 1, that each polygon is one thing; None for 1.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def polygons(
 
 
 def stored_scene(name: str) -> source_pb2.Source:
-    """Return a scene that the server keeps, by its name.
+    """Return a scene that is stored on the server, by its name.
 
     Raises
     ------
@@ -210,11 +210,11 @@ def map_server_map(path: str | os.PathLike[str]) -> source_pb2.Source:
     Parameters
     ----------
     path
-        The .yaml file. The picture that its ``image`` names is read as well; where that is a path
-        of another machine, one of that name beside the file is taken, with a warning. Or the
-        picture, which a .yaml beside it names, or the folder that holds one map. A file beside it
-        that says what its objects are, as ``sketchmatch segment --out`` saves it, is read as well,
-        with a warning.
+        The .yaml file. The picture that its ``image`` names is read as well; if that is a path of
+        another machine, the picture of that name beside the file is used, with a warning. Or the
+        picture, if a .yaml beside it names it, or the folder with one map. A file with the map's
+        objects beside it, as saved by ``sketchmatch segment --out``, is read as well, with a
+        warning.
 
     Raises
     ------
@@ -268,10 +268,10 @@ def file(
     Parameters
     ----------
     file
-        The file, such as a ROS bag, or its bytes. :meth:`Client.algorithms` lists under
-        ``readers`` what else there is.
+        The file, such as a ROS bag, or its bytes. :meth:`Client.algorithms` lists other kinds under
+        ``readers``.
     name
-        Its name, of which the ending tells what it is; for bytes, or in place of the file's own.
+        Its name, whose ending gives the kind; for bytes, or instead of the file's own.
     part
         Which part of it to read, such as layers of a drawing, one picture of many or the topic
         of a bag.

@@ -81,14 +81,14 @@ class Comparison(Tabular):
     def most_similar(
         self, sketch_pairs: Pairs = (), map_pairs: Pairs = (), limit: int | None = None
     ) -> tuple[Correspondence, ...]:
-        """Return how pairs of sketched objects compare with pairs of mapped ones, σ first.
+        """Compare pairs of sketched objects with pairs of mapped ones, the highest σ first.
 
         Parameters
         ----------
         sketch_pairs, map_pairs
-            Ordered pairs of indices, from 0; all pairs (a, b), a < b, where there are none.
+            Ordered pairs of indices, from 0; by default all pairs (a, b), a < b.
         limit
-            How many at most; all where it is None.
+            Largest number; None for all.
         """
         table = self.table
         values = [table.similarity, table.rotation, table.dilation]

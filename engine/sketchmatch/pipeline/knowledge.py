@@ -38,11 +38,11 @@ class Pin:
     Attributes
     ----------
     sketch
-        The sketched object: its index, from 0, or its label, which no other one has.
+        The sketched object: its index, from 0, or its label, if it is unique.
     map
-        The mapped object, in the same way; None if it is on no map and finds no partner.
+        The mapped object, in the same way; None if the sketched one is not on the map.
     excluded
-        Whether it is known that it is *not* this one: any other may be its partner, or none.
+        Whether it is known *not* to be this one: any other may be its partner, or none.
     """
 
     sketch: int | str

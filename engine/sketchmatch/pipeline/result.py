@@ -27,7 +27,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class ObjectRelation:
-    """How an object lies to another one of the same scene, in words.
+    """How an object lies relative to another one of the same scene, in words.
 
     Attributes
     ----------
@@ -55,13 +55,13 @@ class ObjectMatch:
     confidence
         How much of the evidence speaks for it, within [0, 1].
     margin
-        By how much ζ falls if the sketched object takes its best other partner, in one exchange
-        or in one of the alternatives; about 0 where it is ambiguous, None where unknown.
+        By how much ζ falls if the sketched object takes its best other partner, in one exchange or
+        in one of the alternatives; about 0 if it is ambiguous, None if unknown.
     relation
-        How the sketched object lies, in the sketch, to the nearest other matched one; None in
-        progress and alternatives.
+        How the sketched object lies, in the sketch, relative to the nearest other matched one; None
+        in progress and alternatives.
     probability
-        How likely the sketch shows this place and this is its partner; None where unknown, see
+        Probability that the sketch shows this place and this is its partner; None if unknown, see
         :class:`MatchResult`.
     """
 
@@ -86,7 +86,7 @@ class AlternativeMap:
     omap_confidence
         Ω, the mean of the lines' confidences.
     probability
-        How likely it is the right one, as :attr:`MatchResult.probability`; None where unknown.
+        Probability that it is the right one, as :attr:`MatchResult.probability`; None if unknown.
     """
 
     matches: tuple[ObjectMatch, ...]
@@ -107,18 +107,17 @@ class AlternativeMap:
 
 @dataclass(frozen=True)
 class Ambiguity:
-    """Several object maps that the sketch does not tell apart, as in a symmetric room.
+    """Several object maps that the sketch does not distinguish, as in a symmetric room.
 
     Attributes
     ----------
     maps
-        How many of them are about equally likely, the best among them; 2 or more.
+        Number of maps that are about equally likely, including the best; 2 or more.
     alternatives
         Which of :attr:`MatchResult.alternatives` are among them, by index from 0; fewer than
-        ``maps`` − 1 where fewer alternatives were asked for.
+        ``maps`` − 1 if fewer alternatives were requested.
     deciding_sketch_objects
-        The sketched objects whose partners differ between them, the one first of which it would
-        help most to know what it is.
+        The sketched objects whose partners differ between them, the most informative one first.
     """
 
     maps: int
@@ -135,8 +134,8 @@ class ObjectGroup:
     sketch_objects, map_objects
         Indices from 0, in order; at most one line of :attr:`MatchResult.matches` joins two of them.
     probability
-        How likely the sketch shows this place and these belong together, all of them taken for one
-        object; None where unknown.
+        Probability that the sketch shows this place and these belong together, all of them taken as
+        one object; None if unknown.
     """
 
     sketch_objects: tuple[int, ...]
@@ -169,7 +168,7 @@ class Correspondence:
 
 @dataclass(frozen=True)
 class Statistics:
-    """What a match took.
+    """What a match cost.
 
     Attributes
     ----------
@@ -195,12 +194,12 @@ class Statistics:
 class MatchResult(Tabular):
     """The result of a match.
 
-    All probabilities are of plain events, so they fit each other. That the map is right means that
-    the sketch shows this place and that every sketched object is what the map says, those without
-    partner too. It is never likelier than the place, nor than any of its lines, and it is at least
-    as likely as 1 less what all of these lack to certainty. Each line adds up all maps that have
-    it: so every line can be likely where the map is not, as twenty lines of 0.95 may each fail in
-    another map. That an object has no partner holds where the sketch shows another place, too.
+    All probabilities are consistent. That the map is right means that the sketch shows this place
+    and that every sketched object is what the map says, including those without partner. This is
+    never more likely than the place or any of its lines, and at least as likely as 1 minus the sum
+    of what all lines, and objects without partner, lack to 1. A line sums over all maps that
+    contain it, so many likely lines can form an unlikely map: twenty lines of 0.95 may each fail in
+    another map. That an object has no partner includes that the sketch shows another place.
 
     Attributes
     ----------
@@ -219,11 +218,11 @@ class MatchResult(Tabular):
     outcome
         Why the search ended.
     upper_bound
-        A ζ that no legal FMAP exceeds, or None where the searcher proves nothing. Where objects
-        may stay unmatched, it and an outcome OPTIMAL speak of maps of the objects of the smaller
-        scene that are matched; that no other objects should be is not proved. An outcome is
-        OPTIMAL only where the judge answers the map with the highest ζ, and there is no bound
-        where it answers a map of other objects than the search proved one for.
+        A ζ that no legal FMAP exceeds, or None if the searcher proves nothing. If objects may stay
+        unmatched, it and the outcome OPTIMAL refer to maps of the matched objects of the smaller
+        scene; whether other objects should be matched is not proved. The outcome is OPTIMAL only if
+        the judge's answer is the map with the highest ζ, and there is no bound if its answer has
+        other objects than the map for which the search proved one.
     seed
         With it, the same request gives the same result.
     match_id
@@ -233,32 +232,31 @@ class MatchResult(Tabular):
     sketch, map
         The scenes that were matched.
     warnings
-        What segmentation left out or decided, each naming its side.
+        Notes of the segmentation: what it left out or decided, each naming its side.
     alternatives
-        The next best object maps that were found, in the order in which the judge ranks them.
+        The next best object maps that were found, in the order of the judge.
     search_note
-        What the searcher says of what it did, or empty.
+        The searcher's note on what it did, or empty.
     sketch_route
-        Shape (k, 2), the way drawn through the sketch, in its coordinates, or None.
+        Shape (k, 2), the route drawn in the sketch, in its coordinates, or None.
     probability
-        How likely the object map is right as a whole, on this place, as learned from simulated
-        sketches. None where the judge knows no probabilities of such a match.
+        Probability that the object map is right as a whole, on this place, as learned from
+        simulated sketches. None if the judge gives no probabilities for such a match.
     place_probability
-        How likely the sketch shows the place of the map at all: below one half it is probably
-        another one, and the object map means little. None where the judge does not know.
+        Probability that the sketch shows the place of the map at all: below 0.5 it is probably
+        another one, and the object map means little. None if the judge does not know.
     ambiguity
-        Where several maps are about equally likely, which, and what to ask. None where one is
-        clearly the best, where this is probably not the place, and where nothing is known of
-        probabilities.
+        If several maps are about equally likely: which, and what to ask. None if one is clearly the
+        best, if this is probably not the place, and without probabilities.
     unmatched_sketch_probabilities
-        How likely each of ``unmatched_sketch_objects`` has no partner on this map; empty where
+        Probability that each of ``unmatched_sketch_objects`` has no partner on this map; empty if
         unknown.
     provisional
-        Whether it was looked for near former maps alone, to be quick.
+        Whether it is a quick answer, searched only near former maps.
     groups
-        Where several objects of one side are one of the other, as regions that people draw as one:
-        which. What of them has no line of its own is among the unmatched; all that is said beside
-        takes objects one by one.
+        Groups of objects that are, together, one of the other side, such as regions that people
+        draw as one. Those without a line of their own are among the unmatched, since all other
+        fields take objects one by one.
     """
 
     matches: tuple[ObjectMatch, ...]
@@ -311,17 +309,16 @@ class MatchResult(Tabular):
         """Return a plain dict for each sketched object, in their order, as data frames take them.
 
         Its keys are those of :class:`sketchmatch_views.MatchRow`: indices and labels of the object
-        and of its partner, where the partner is, and what is known of both. What is unknown is
-        None.
+        and its partner, the partner's place, and what is known of both. What is unknown is None.
         """
         return self._view().rows()
 
     def to_geojson(self) -> dict[str, Any]:
         """Return a GeoJSON FeatureCollection in the map's frame, in its units.
 
-        A feature for each row of :meth:`rows`, which are its properties, with the polygon of the
-        partner, or no geometry where there is none; then one for each mapped object without
-        partner. The property ``label`` is the mapped object's label, or else the sketched one's.
+        One feature for each row of :meth:`rows`, with the row as its properties and the polygon of
+        the partner, or no geometry without one; then one for each mapped object without partner.
+        The property ``label`` is the mapped object's label, or else the sketched one's.
         ``sketchmatch`` reads such a file as a map.
         """
         return self._view().geojson()

@@ -40,12 +40,12 @@ class Feature:
         Which of them it is.
     rings
         One line of one point; or one line of two or more, the route in its order; or the outline of
-        a zone and its holes, each of three or more. Each of shape (k, 2), y up. Where an outline
-        crosses itself near its ends, as hands close one, its tails are cut.
+        a zone and its holes, each of three or more. Each of shape (k, 2), y up. If an outline
+        crosses itself near its ends, as hand-drawn ones do, its tails are cut.
     name
         For people.
     speeds
-        Shape (k,), how fast a route is driven from each of its points on, or None.
+        Shape (k,), the speed of a route from each of its points on, or None.
     numbers
         For each ring, shape (k,): which given point each of its points is, or comes after; with a
         fraction where tails were cut.
@@ -137,14 +137,14 @@ class ChangeReason(StrEnum):
 
 @dataclass(frozen=True)
 class Change:
-    """What was changed about a feature, or could not be had.
+    """What was changed about a feature, or is impossible.
 
     Attributes
     ----------
     reason
-        Of which kind it is.
+        The kind of change.
     first, last
-        From which to which of the carried points.
+        The first and the last of the transferred points that it is about.
     sentence
         For people.
     """
@@ -157,20 +157,20 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """A feature where it was carried to.
+    """A feature after the transfer.
 
     Attributes
     ----------
     kind, name
         Of what was given.
     feature
-        What it is there. A route may have more points than the one that was given, or fewer where
-        a part of it cannot be reached; None where nothing of it can.
+        The feature there. A route may have more points than the given one, or fewer if a part of it
+        cannot be reached; None if nothing of it can.
     deviations
         For each ring, shape (k,): standard deviations of its points, along each axis.
     sources
-        For each ring, shape (k,): which given point each carried one is, or comes after; as numbers
-        with a fraction for points in between.
+        For each ring, shape (k,): the given point of each transferred one, or the one before it; a
+        fraction for points in between.
     changes
         What was changed, in the order of the points.
     """

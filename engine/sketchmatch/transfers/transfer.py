@@ -36,7 +36,7 @@ _UNLIKELY = 0.5
 
 
 class Direction(StrEnum):
-    """From where to where features are carried."""
+    """Direction of a transfer."""
 
     SKETCH_TO_MAP = "sketch-to-map"
     MAP_TO_SKETCH = "map-to-sketch"
@@ -44,24 +44,23 @@ class Direction(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class TransferRequest:
-    """What to carry, and how.
+    """What to transfer, and how.
 
     Attributes
     ----------
     match
         Sketch and map, and how they are matched; of two maps the old one is the sketch.
     features
-        What is carried; beside it goes the route that the segmenter finds in a sketch.
+        The features to transfer; the route that the segmenter finds in a sketch is added.
     object_map
-        Pairs (sketch index, map index) of objects that are the same, where that is known: then
-        nothing is matched.
+        Pairs (sketch index, map index) of the same objects, if known: then nothing is matched.
     direction
-        From where to where.
+        Direction of the transfer.
     radius
-        How far routes are kept away from obstacles. On a grid None means 0, elsewhere that routes
-        are not kept out of objects.
+        Distance of routes from obstacles. None means 0 on a grid; elsewhere routes then do not
+        avoid objects.
     allow_unknown
-        Whether cells that nobody has seen are no obstacles.
+        Whether routes may cross unknown cells.
     sources
         What sketch and map were found in, where they are segmented already.
 
@@ -96,23 +95,23 @@ class TransferRequest:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TransferResult(Tabular):
-    """What became of a transfer.
+    """The result of a transfer.
 
     Attributes
     ----------
     carried
-        The features where they were carried to: the route of the sketch, if it has one, then those
-        that were given, in their order.
+        The transferred features: the route of the sketch, if it has one, then the given ones, in
+        their order.
     drawn
         How many of them were found in the sketch: one or none.
     warp
-        How they were carried.
+        How they were transferred.
     object_map
         Pairs (sketch index, map index) of objects that are the same.
     sketch, map
         What was found on both sides.
     match
-        The match, or None where the object map was given.
+        The match, or None if the object map was given.
     """
 
     carried: tuple[Carried, ...]
@@ -125,7 +124,7 @@ class TransferResult(Tabular):
 
     @property
     def features(self) -> tuple[Feature, ...]:
-        """The features where they were carried to, without those of which nothing is left."""
+        """The transferred features, without those of which nothing is left."""
         return tuple(each.feature for each in self.carried if each.feature is not None)
 
     @property
