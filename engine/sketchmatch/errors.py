@@ -110,8 +110,8 @@ class InvalidInputError(SketchmatchError, ValueError):
     field
         Path of the field at fault, e.g. ``"sketch.stroke_set.strokes[3]"``; empty for the whole.
     problem
-        What is wrong with it and what would help, without a final full stop and without the
-        field's name: it is read after the path.
+        What is wrong with it and the remedy, without a final full stop and without the field's
+        name: it is read after the path.
 
     Examples
     --------

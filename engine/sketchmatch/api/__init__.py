@@ -1,4 +1,4 @@
-"""All that a plugin may import from the engine, beside ``sketchmatch.model``.
+"""All that a plugin may import from the engine, in addition to ``sketchmatch.model``.
 
 A distribution offers its algorithms, and readers of files, through one entry point in the group
 ``sketchmatch``, naming a module with any of six hooks, each marked with :data:`hookimpl` and

@@ -41,13 +41,13 @@ class Algorithm:
     Attributes
     ----------
     name
-        What a request, a config file or a command line selects the algorithm by.
+        The name by which a request, a configuration file or a command line selects the algorithm.
     summary
         One line for lists.
     default
-        Whether it is used where nobody chooses an algorithm of its kind, or, for a segmenter, one
-        for the sources that it reads. Only a class of the engine's own distribution is that says
-        so itself: it is not inherited.
+        Whether it is the default of its kind, or, for a segmenter, of the sources that it reads.
+        Only counts for a class of the engine's own distribution that sets it itself: it is not
+        inherited.
     """
 
     name: ClassVar[str]
@@ -59,12 +59,12 @@ class Algorithm:
 
     @classmethod
     def warm_up(cls) -> None:
-        """Compile what the first use would otherwise wait for; nothing, unless overridden."""
+        """Compile what the first use would otherwise wait for; nothing unless overridden."""
 
     def __init__(self, params: Any = None) -> None:
         self.params = self.Params() if params is None else params
 
     @property
     def identity(self) -> str:
-        """What it is and how it is set, the same for two that do the same."""
+        """Identifies the algorithm and its parameters: equal for two that do the same."""
         return f"{self.name} {self.params.model_dump_json()}"

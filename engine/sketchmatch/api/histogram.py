@@ -44,8 +44,8 @@ class Histogram(_algorithm.Algorithm, ABC):
     def directions(self) -> int:
         """n, how many directions there are over the full turn.
 
-        The host fills in what the parameters leave out before it describes a scene, so that they
-        hold a number too; used alone it is 180.
+        The host fills in what the parameters leave open before it describes a scene, so that they
+        hold a number too; without a host it is 180.
         """
         return self.params.directions or _DIRECTIONS
 
@@ -53,7 +53,7 @@ class Histogram(_algorithm.Algorithm, ABC):
     def of_pairs(self) -> bool:
         """Whether a pair's histogram follows from its two objects and the scene's ``middle``.
 
-        Then the host may keep it while other objects of the scene change.
+        If so, the host may keep it while other objects of the scene change.
         """
         return False
 

@@ -55,34 +55,34 @@ class JudgeProblem:
     weights
         Of the parts of ζ.
     candidates
-        The maps met, at least one. First the best that was found, then the others, what is worth
-        most first: ζ less the price of the template objects that a map leaves out.
+        The maps met, at least one: the best one found, then the others, the most valuable first: by
+        ζ less the price of the template objects that a map leaves out.
     swapped
         Whether the template is the map, and the argument the sketch.
     price
-        Of leaving all template objects out, in units of ζ; infinite where none may be left out.
+        Price of leaving out all template objects, in units of ζ; infinite if none may be left out.
     alternatives
-        How many maps beside the best are wanted, be it to see them or to know what competes.
+        How many maps besides the best are wanted, to show them or to know what competes.
     allowed
-        Shape (N, N'): which pairings the caller does not rule out; None where none is ruled out.
+        Shape (N, N'): the pairings that the caller does not rule out; None if none is ruled out.
     pinned
-        int64, shape (N,): the argument object that a template object is known to be, −1 where
-        nothing is known; None where of none. In ``allowed`` all that contradicts is ruled out.
+        int64, shape (N,): the argument object that a template object is known to be, −1 if unknown;
+        None if unknown for all. ``allowed`` rules out all that contradicts it.
     names
-        int64, shape (N, N'): 1 where both objects have a label and these mean the same, −1 where
-        they do not, 0 where one has none; None where a side has no labels at all.
+        int64, shape (N, N'): 1 if both objects have labels that mean the same, −1 if these differ,
+        0 if one has none; None if a side has no labels at all.
     exchanges
-        Shape (k, N'): ζ after each exchange in the first candidate, of its k matched objects;
-        None where there are too many.
+        Shape (k, N'): ζ after each exchange of one of the k matched objects in the first candidate;
+        None if there are too many.
     omissions
-        Shape (k,): ζ of the first candidate without each of them; None where there are too many.
+        Shape (k,): ζ of the first candidate without each of them; None if there are too many.
     usual
         Whether relations are those of the default similarity on histograms of constant forces,
-        found by a searcher of object maps; what was learned of ζ holds for no others.
+        found by a searcher of object maps; what was learned about ζ holds only for these.
     elsewhere
-        How likely the sketch shows another place, as it was judged a moment ago, before something
-        was drawn or erased. Where it is given, a judge may take it for granted, to be quick, and
-        go by the candidates alone; the host asks again without it.
+        How likely the sketch shows another place, as judged a moment ago, before something was
+        drawn or erased. A judge may then assume it and use only the candidates, to be quick; the
+        host asks again without it.
     """
 
     template: Scene
@@ -109,9 +109,9 @@ class JudgedMap:
     Attributes
     ----------
     partners
-        As in :class:`Candidate`: that of one, or another.
+        As in :class:`Candidate`: the map of one, or another.
     probability
-        How likely it is right as a whole, and the place is the one sketched; None where unknown.
+        Probability that it is right as a whole and the place is the sketched one; None if unknown.
     """
 
     partners: IntArray
@@ -128,15 +128,14 @@ class Judgement:
     Attributes
     ----------
     maps
-        All different, the answer first and then the next best ones; all that are about as likely,
-        however few the caller wants to see. One at most is right: their probabilities are 1
-        together, or less.
+        All different, the answer first, then the next best ones, with all that are about as likely
+        even if the caller wants fewer. At most one is right: their probabilities sum to at most 1.
     lines
-        Shape (N, N' + 1): how likely each template object's partner is each argument object, and,
-        last, none of them, as where the sketch shows another place: 1 together, or less. None
-        where unknown. No map is likelier than one of its lines.
+        Shape (N, N' + 1): probability of each argument object as the partner of each template
+        object and, last, of no partner, which includes that the sketch shows another place; rows
+        sum to at most 1. None if unknown. No map is more likely than one of its lines.
     elsewhere
-        How likely the sketch does not show this place at all; None where unknown.
+        How likely the sketch does not show this place at all; None if unknown.
     """
 
     maps: tuple[JudgedMap, ...]
@@ -155,13 +154,13 @@ class Judge(Algorithm, ABC):
     def partial(self) -> bool:
         """Whether it finds maps that leave objects out by itself.
 
-        Then objects may stay without partner on both sides unless a request says otherwise, and no
-        searcher is asked again for parts of the template.
+        If so, objects may stay without partner on both sides unless a request says otherwise, and
+        no searcher is asked again for parts of the template.
         """
         return False
 
     def price(self, weights: ConfidenceWeights) -> float:  # noqa: ARG002
-        """Return what a map loses that leaves all template objects out, in units of ζ.
+        """Return the price of a map that leaves out all template objects, in units of ζ.
 
         Parameters
         ----------

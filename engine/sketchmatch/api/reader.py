@@ -11,8 +11,8 @@ __all__ = ["Reader"]
 class Reader(ABC):
     """Reads files of one kind, such as annotations of a tool.
 
-    Whatever names a file reaches it: the command line, paths in Python and, as
-    ``Source.file``, requests. Helpers for JSON and XML are in :mod:`sketchmatch.api.documents`.
+    Files reach it from the command line, from paths in Python and from requests, as
+    ``Source.file``. Helpers for JSON and XML are in :mod:`sketchmatch.api.documents`.
 
     Attributes
     ----------
@@ -21,11 +21,11 @@ class Reader(ABC):
     summary
         One line for lists.
     suffixes
-        What the names of its files end in, in small letters, such as ``".excalidraw"``. Of several
-        readers the one with the longest suffix reads a file; ``.json`` alone is nobody's.
+        Endings of its files' names, in small letters, such as ``".excalidraw"``. If several readers
+        match, the longest ending decides; ``.json`` alone is not allowed.
     keys
-        Keys that a JSON document of this kind has at its top level, whatever its name. Of several
-        readers the one with the most keys reads it; none for what is no JSON.
+        Top-level keys of a JSON document of this kind, whatever its name. If several readers match,
+        the one with the most keys reads it; empty for other formats.
     source
         The type of what it returns: one of the source types in :mod:`sketchmatch.model`, or a
         subclass of one with more in it. What is of a subclass goes to the segmenter that names
@@ -74,6 +74,6 @@ class Reader(ABC):
         Raises
         ------
         InvalidInputError
-            With a path within the file, if it cannot be used or has no such part. Whatever else is
-            raised is put down to the reader.
+            With a path within the file, if it cannot be used or has no such part. Any other
+            exception counts as a fault of the reader.
         """

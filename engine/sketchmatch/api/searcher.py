@@ -41,37 +41,37 @@ class MatchProblem:
     Attributes
     ----------
     table
-        Similarity, rotation and dilation of every histogram correspondence, and what they count
-        for. The template has at most as many objects as the argument.
+        Similarity, rotation and dilation of every histogram correspondence, and their weights. The
+        template has at most as many objects as the argument.
     weights
-        Weights of the three parts of ζ: of ζσ, or the mean of the evidence in its place where the
-        table holds any, ζR and ζL. Where the caller rules pairings out, the evidence says so, and
-        weighs more: this ζ has the order of the true one, which the host reports.
+        Weights of the three parts of ζ: ζσ (replaced by the mean evidence if the table holds any),
+        ζR and ζL. If the caller rules out pairings, the evidence contains that and weighs more:
+        this ζ then orders maps as the true one, which the host reports.
     alternatives
-        How many object maps beside the best are wanted.
+        How many object maps besides the best are wanted.
     time_budget
         Seconds left for the search, or None for no limit; the host stops the search by then.
     scenes
-        Returns the template and the argument themselves, for a searcher that looks beyond their
-        relations; None where there are none.
+        Returns the template and the argument themselves, for a searcher that uses more than their
+        relations; None if there are none.
     swapped
         Whether the template is the map, and the argument the sketch.
     partial
         Whether template objects may stay without partner.
     allowed
-        Shape (N, N'): which pairings the caller does not rule out; None where none is ruled out.
-        A searcher may leave it alone: ζ of maps with others is below that of all without.
+        Shape (N, N'): the pairings that the caller does not rule out; None if none is ruled out. A
+        searcher may ignore it: ζ of maps with other pairings is below that of all others.
     pinned
-        int64, shape (N,): the argument object that a template object is known to be, −1 where
-        nothing is known; None where of none. In ``allowed`` all that contradicts is ruled out.
+        int64, shape (N,): the argument object that a template object is known to be, −1 if unknown;
+        None if unknown for all. ``allowed`` rules out all that contradicts it.
     names
-        int64, shape (N, N'): 1 where both objects have a label and these mean the same, −1 where
-        they do not, 0 where one has none; None where a side has no labels at all.
+        int64, shape (N, N'): 1 if both objects have labels that mean the same, −1 if these differ,
+        0 if one has none; None if a side has no labels at all.
     start
         Object maps that were right a moment ago, before something was drawn or erased, the best
         first; each int64, shape (N,), −1 for an object without partner. A searcher that is ``warm``
-        looks near these alone, to be quick; the host asks again without them. Any other never
-        gets them.
+        searches only near these, to be quick; the host asks again without them. Other searchers
+        never get them.
     """
 
     table: RelationTable
@@ -102,16 +102,16 @@ class SearchProgress:
     evaluations
         FMAPs evaluated.
     upper_bound
-        A ζ that no FMAP of an object map exceeds, or None where the searcher proves nothing.
+        A ζ that no FMAP of an object map exceeds, or None if the searcher proves nothing.
     alternatives
-        Good legal FMAPs beside the best, in any order; the host picks the best of them that lead
+        Good legal FMAPs besides the best, in any order; the host picks the best of them that lead
         to other object maps. Only those of the last progress count.
     note
-        One sentence on what the searcher did, where there is something to say.
+        One sentence on what the searcher did; empty if it reports nothing.
     maps
-        Object maps for the judge beside these, in any order, from a searcher that is ``partial``:
-        each int64, shape (N,), with −1 for a template object that has no partner. Only those of
-        the last progress count.
+        Further object maps for the judge, in any order, from a searcher that is ``partial``: each
+        int64, shape (N,), with −1 for a template object without partner. Only those of the last
+        progress count.
     """
 
     fmap: Fmap
@@ -137,7 +137,7 @@ class Searcher(Algorithm, ABC):
     def object_consistent(self) -> bool:
         """Whether each FMAP that it yields follows from one object map.
 
-        Where it is False, ``object_consistent = False`` in the class or a property that looks at
+        If it is False, by ``object_consistent = False`` in the class or a property that depends on
         the parameters, the host refuses requests that weigh shapes and sizes of objects.
         """
         return True
@@ -146,22 +146,22 @@ class Searcher(Algorithm, ABC):
     def partial(self) -> bool:
         """Whether it finds maps that leave objects out by itself, where a problem lets it.
 
-        It tells them in ``SearchProgress.maps``, and is asked once, for all of the template; any
-        other searcher is asked again for parts of it.
+        It reports them in ``SearchProgress.maps``, and is asked once, for all of the template;
+        other searchers are asked again for parts of it.
         """
         return False
 
     @property
     def warm(self) -> bool:
-        """Whether it is quick where a problem has maps to start with: ``MatchProblem.start``."""
+        """Whether it is quick if a problem has maps to start with: ``MatchProblem.start``."""
         return False
 
     @property
     def most_maps(self) -> int | None:
-        """How many maps it makes at most by its parameters, whatever the scenes.
+        """Largest number of maps that its parameters allow, whatever the scenes.
 
-        It grows, breeds or improves each of them, and has no more iterations than that. A server
-        may refuse what is beyond its limit. None, as here, is where no parameter says it.
+        It grows, breeds or improves each of them, and has at most as many iterations. A server may
+        refuse what exceeds its limit. None, the default, means that no parameter determines it.
         """
         return None
 
@@ -171,9 +171,9 @@ class Searcher(Algorithm, ABC):
     ) -> Generator[SearchProgress, None, Outcome]:
         """Search, yielding the state at least every 50 ms.
 
-        The host stops a search by closing the generator; a searcher needs to know nothing of
-        deadlines, cancellation or streams. The same generator state gives the same run, so
-        nothing that is drawn may depend on the clock.
+        The host stops a search by closing the generator; a searcher needs no code for deadlines,
+        cancellation or streams. The same generator state gives the same run, so nothing random may
+        depend on the clock.
 
         Parameters
         ----------

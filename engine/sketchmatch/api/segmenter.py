@@ -22,13 +22,13 @@ class Segmentation:
     scene
         The objects.
     warnings
-        What it left out or decided on its own, each one sentence for the person who drew it.
+        What it left out or decided, each one sentence for the person who drew it.
     route
-        Shape (k, 2), the way that a person drew through the scene, in its coordinates and from
-        its beginning to its end, or None. It is no object and never influences a match.
+        Shape (k, 2), the route that a person drew through the scene, in its coordinates, from start
+        to end, or None. It is not an object and never influences a match.
     passages
-        Pairs of objects, by index, that open into each other, as rooms do: people may take two such
-        for one. Empty where objects are things.
+        Pairs of objects, by index, that open into each other, as rooms do: people may draw two of
+        these as one. Empty if objects are things.
     """
 
     scene: Scene
@@ -61,10 +61,10 @@ class Segmenter(Algorithm, ABC):
     def cuts(self, source: Any) -> Iterator[Segmentation]:
         """Yield what :meth:`segment` returns, then what else the objects may be.
 
-        Where one object ends and the next begins is not always plain, as in free space, which may
-        be cut coarser, or finer. A match takes the cut of either side that fits the other best, and
-        the first where nothing speaks for another; it asks for another one only while there is time
-        for it, and for twelve at most. There is no other by default.
+        Where one object ends and the next begins may be unclear, as in free space, which can be cut
+        coarser or finer. A match takes the cut of either side that fits the other side best, or the
+        first if none fits better; it asks for further cuts only while there is time, and for twelve
+        at most. By default there is only one.
 
         Raises
         ------

@@ -29,7 +29,7 @@ class Similarity(Algorithm, ABC):
     Attributes
     ----------
     alignment
-        How the host shall find the rotation.
+        How the host finds the rotation.
 
     Examples
     --------
@@ -58,8 +58,8 @@ class Similarity(Algorithm, ABC):
             Shape (k, directions), template histograms, dilated and rotated; no row is
             all zero.
         argument
-            Shape (k, directions), argument histograms; no row is all zero. Both are in units
-            of their mean, so that the size of a scene plays no part.
+            Shape (k, directions), argument histograms; no row is all zero. Both are in units of
+            their mean, so that the size of a scene has no effect.
 
         Returns
         -------

@@ -51,13 +51,13 @@ class ConfidenceWeights(NamedTuple):
     Attributes
     ----------
     similarity, rotation, dilation
-        Of ζσ, ζR and ζL, which see relations of objects alone; the thesis's ζ.
+        Weights of ζσ, ζR and ζL, which compare only relations of objects; the thesis's ζ.
     shape, size
-        Of ζS and ζM, which compare each object with its partner.
+        Weights of ζS and ζM, which compare each object with its partner.
     distance
-        β, no weight but an exponent: the rotation of a pair of template objects that are d apart
-        counts in ζR for d^β, so ζR = |Σ d^β e^{iR}| / Σ d^β. With 0 all pairs count alike, as in
-        the thesis.
+        β, an exponent and not a weight: the rotation of a pair of template objects at distance d
+        counts d^β in ζR, so ζR = |Σ d^β e^{iR}| / Σ d^β. With 0 all pairs count alike, as in the
+        thesis.
     """
 
     similarity: float = 1.0

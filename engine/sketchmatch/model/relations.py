@@ -168,11 +168,11 @@ class RelationTable:
     template_objects, argument_objects
         N ≤ N'.
     evidence
-        Shape (Q, Q'), within [0, 1]: what speaks for every correspondence, duals included, where
-        that is more than σ; None where it is σ.
+        Shape (Q, Q'), within [0, 1]: the evidence of every correspondence, duals included, if it is
+        more than σ; None if it is σ.
     rotation_weights
-        Shape (Q,), above 0, 1 on average: what R of each template pair counts for in ζR. Numbers
-        of any scale may be given, one for each pair, or one for all; left out, all count alike.
+        Shape (Q,), above 0, 1 on average: the weight of R of each template pair in ζR. Given in any
+        scale, one for each pair or one for all; by default all are equal.
     """
 
     similarity: FloatArray

@@ -54,11 +54,11 @@ class SceneObject:
         The outer ring, counter-clockwise, then the holes, clockwise; each a read-only array of
         shape (k, 2), k ≥ 3, in metres or sketch units, without a repeated last point.
     label
-        A name for people, in one line: :func:`~sketchmatch.model.labels.cleaned_label` makes it
-        so. Where both scenes have some, a match weighs labels as it does all else.
+        A name for people, in one line, as :func:`~sketchmatch.model.labels.cleaned_label` returns
+        it. Labels are evidence if both scenes have some.
     certainty
-        How sure it is that this is one thing, and no part of a wall, shadow or speckle: above 0
-        and at most 1. What is in doubt, below :data:`DOUBTFUL`, is drawn hollow.
+        How certain it is that this is one thing, and not part of a wall, shadow or speckle: above 0
+        and at most 1. Objects in doubt, below :data:`DOUBTFUL`, are drawn hollow.
     """
 
     rings: tuple[FloatArray, ...]
@@ -296,7 +296,7 @@ class Scene:
     def identity(self) -> str:
         """A hash of outlines and certainties, in hexadecimal: the same for those described alike.
 
-        Labels, on which histograms do not depend, are no part of it.
+        Labels are not part of it, since histograms do not depend on them.
 
         Examples
         --------

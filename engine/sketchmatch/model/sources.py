@@ -72,7 +72,7 @@ class Stroke:
 
 @dataclass(frozen=True)
 class Landmark:
-    """A thing that whoever made a map gave a name and a place.
+    """A thing to which the author of a map gave a name and a place.
 
     Attributes
     ----------
@@ -81,9 +81,9 @@ class Landmark:
     point
         (x, y) in the map's frame, in metres.
     kind
-        What sort of thing it is, such as ``"door"`` or ``"room"``; empty if nobody said.
+        What kind of thing it is, such as ``"door"`` or ``"room"``; empty if unknown.
     size
-        How high its letters are written, in the map's or the drawing's unit; 0 if nobody wrote.
+        Height of its letters, in the map's or the drawing's unit; 0 if it is not written text.
     """
 
     name: str
@@ -101,8 +101,7 @@ class StrokeSet:
     strokes
         The strokes.
     notes
-        What whoever read the file left out or had to decide, each one sentence for people: the
-        engine puts them before the segmenter's warnings.
+        What the reader of the file left out or decided, as in :class:`StrokeSet`.
     landmarks
         Names that are written in the sketch, of kind ``"room"``, in sketch units.
     """
@@ -138,14 +137,14 @@ class PolygonSet:
     polygons
         The polygons.
     notes
-        What whoever read the file left out or had to decide, as in :class:`StrokeSet`.
+        What the reader of the file left out or decided, as in :class:`StrokeSet`.
     lines
-        What encloses nothing, each of shape (k, 2), y up: walls, to who looks for rooms.
+        Open lines, each of shape (k, 2), y up: walls, for finding rooms.
     landmarks
         Names that are written in the drawing, of kind ``"room"``.
     geographic_origin
-        Longitude and latitude, in degrees, of the place that is (0, 0), where the file has such
-        and they became metres east and north of it; None elsewhere.
+        Longitude and latitude, in degrees, of (0, 0), if the file has such coordinates, which
+        became metres east and north of it; otherwise None.
     """
 
     polygons: tuple[LabelledPolygon, ...]
@@ -160,7 +159,7 @@ class PolygonSet:
 
 @dataclass(frozen=True, eq=False)
 class GridPicture:
-    """The picture from which thresholds made a grid, for those who want other thresholds.
+    """The picture from which thresholds made a grid, so that other thresholds can be applied.
 
     Attributes
     ----------
@@ -181,7 +180,7 @@ class GridPicture:
         object.__setattr__(self, "shades", frozen(np.asarray(self.shades, dtype=np.uint8)))
 
     def free(self, threshold: float | None = None) -> NDArray[np.bool_]:
-        """Return which cells a threshold alone calls free; without one, the map's own does."""
+        """Return which cells a threshold calls free; by default that of the map."""
         share = self.free_thresh if threshold is None else threshold
         return (np.arange(256) / 255.0 < share)[self.shades]
 
@@ -200,14 +199,14 @@ class OccupancyGrid:
         Pose (x, y, yaw) of the lower left corner of cell (0, 0) in the map's frame, in metres
         and radians counter-clockwise.
     notes
-        What whoever read the map's file had to decide, as in :class:`StrokeSet`.
+        What the reader of the map's file decided, as in :class:`StrokeSet`.
     picture
-        What the cells were read from, where thresholds decided; else None.
+        The picture from which thresholds made the cells; otherwise None.
     landmarks
         What the map's file names.
     objects
-        What people say its objects are, in the map's frame and metres; they stand for the map
-        where nobody chooses a segmenter. None where nobody said so.
+        The objects as corrected by people, in the map's frame and metres; they replace those found
+        in the map, unless a segmenter is chosen. None if there are none.
     """
 
     cells: NDArray[np.int8]
@@ -246,7 +245,7 @@ class Image:
         uint8, row 0 the highest; 0 is black. Shape (rows, columns) if grey, (rows, columns, 3)
         if in colour: red, green, blue.
     notes
-        What whoever read the file left out or had to decide, as in :class:`StrokeSet`.
+        What the reader of the file left out or decided, as in :class:`StrokeSet`.
     """
 
     pixels: NDArray[np.uint8]

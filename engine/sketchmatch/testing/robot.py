@@ -21,7 +21,7 @@ __all__ = ["Survey", "survey"]
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """What came of a drive.
+    """The result of a drive.
 
     Attributes
     ----------

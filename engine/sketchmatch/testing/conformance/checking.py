@@ -48,10 +48,10 @@ def check_plugin(
     expected_failures: Reasons = _NONE,
     time_limit: float | None = TIME_LIMIT,
 ) -> None:
-    """Put a class to every contract of its kind.
+    """Check a class against every contract of its kind.
 
-    It is used with its default parameters, on small inputs made for the purpose: some seconds a
-    class.
+    It is used with its default parameters, on small inputs made for the purpose; this takes some
+    seconds per class.
 
     Parameters
     ----------
@@ -65,8 +65,8 @@ def check_plugin(
     Raises
     ------
     ContractViolationError
-        At the first contract that it breaks, whose check does not end in time, or that it keeps
-        though it was expected to fail.
+        At the first contract that it breaks, or whose check exceeds its time limit, or that it
+        keeps although it was expected to fail.
     ValueError
         If an expected failure names no check.
     TypeError

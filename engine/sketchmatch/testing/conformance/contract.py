@@ -56,7 +56,7 @@ class ContractViolationError(AssertionError):
     seen
         What the algorithm did.
     overdue
-        Whether the check had to be ended by its time limit.
+        Whether the check was stopped by its time limit.
     """
 
     def __init__(self, check: PluginCheck, seen: str, *, overdue: bool = False) -> None:
@@ -68,7 +68,7 @@ class ContractViolationError(AssertionError):
 
 
 class CheckState(StrEnum):
-    """What came of a check."""
+    """The result of a check."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -77,7 +77,7 @@ class CheckState(StrEnum):
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What came of one check of a class.
+    """The result of one check of a class.
 
     Attributes
     ----------
@@ -86,11 +86,11 @@ class CheckResult:
     state
         Whether the contract is kept.
     seen
-        What the algorithm did, where it failed, or why there was nothing to check; else empty.
+        What the algorithm did if it failed, or why there was nothing to check; otherwise empty.
     seconds
         How long it took.
     overdue
-        Whether it had to be ended by its time limit.
+        Whether it was stopped by its time limit.
     """
 
     name: str
@@ -110,14 +110,14 @@ class PluginCheck:
     algorithm
         The class.
     name
-        What an expected failure names it by, in kebab-case.
+        The name for expected failures, in kebab-case.
     demand
         What is expected, in one sentence.
     contract
         What finds out.
     time_limit
-        Seconds after which the check is ended, and has failed. None for no limit; the check runs
-        in the thread that calls it then, as a debugger likes it.
+        Seconds after which the check is stopped and has failed. None for no limit; the check then
+        runs in the calling thread, which suits a debugger.
     """
 
     algorithm: type[Any]
@@ -130,7 +130,7 @@ class PluginCheck:
     def of(
         cls, contract: Contract, algorithm: type[Any], time_limit: float | None = TIME_LIMIT
     ) -> PluginCheck:
-        """Put a contract to a class."""
+        """Return the check of a class against a contract."""
         name = contract.__name__.replace("_", "-")
         demand = " ".join((inspect.getdoc(contract) or "").split())
         return cls(algorithm, name, demand, contract, time_limit)

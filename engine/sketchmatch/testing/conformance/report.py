@@ -17,7 +17,7 @@ __all__ = ["SearchReport", "search_report"]
 
 @dataclass(frozen=True)
 class SearchReport:
-    """How a searcher does on small problems, each with another seed.
+    """How well a searcher performs on small problems, each with another seed.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class SearchReport:
 
 
 def search_report(algorithm: type[Any], problems: int = 10) -> SearchReport:
-    """Search some small problems and say how well that went.
+    """Search some small problems, and report the results.
 
     Parameters
     ----------
