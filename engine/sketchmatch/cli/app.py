@@ -45,6 +45,7 @@ app = typer.Typer(
     name="sketchmatch",
     help="Match a hand-drawn sketch of a place with a robot's map of it, object by object.",
     invoke_without_command=True,
+    rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

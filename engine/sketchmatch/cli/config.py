@@ -14,7 +14,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 
 __all__ = ["app"]
 
-app = typer.Typer(help="Show, check and write the configuration.")
+app = typer.Typer(help="Show, check and write the configuration.", rich_markup_mode="markdown")
 
 
 @app.callback()

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
-app = typer.Typer(help="List, show, watch and cancel your matches on a server.")
+app = typer.Typer(
+    help="List, show, watch and cancel your matches on a server.", rich_markup_mode="markdown"
+)
 
 _Name = Annotated[
     str, typer.Argument(metavar="MATCH", help="Name of the match, as `matches list` shows it.")

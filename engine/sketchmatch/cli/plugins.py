@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
-app = typer.Typer(help="List and describe algorithms, create and check plugins.")
+app = typer.Typer(
+    help="List and describe algorithms, create and check plugins.", rich_markup_mode="markdown"
+)
 app.command("new")(new.new)
 
 _Kind = Annotated[

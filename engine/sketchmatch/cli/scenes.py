@@ -14,7 +14,7 @@ from sketchmatch.errors import InvalidInputError, Reason, quoted
 
 __all__ = ["app"]
 
-app = typer.Typer(help="Store scenes on a server for later matches.")
+app = typer.Typer(help="Store scenes on a server for later matches.", rich_markup_mode="markdown")
 
 _Server = Annotated[
     str, typer.Option(metavar="HOST:PORT", help="Server that stores them.", show_default=True)

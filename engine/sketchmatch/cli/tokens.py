@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
-app = typer.Typer(help="Create, list and remove the tokens that admit callers to a server.")
+app = typer.Typer(
+    help="Create, list and remove the tokens that admit callers to a server.",
+    rich_markup_mode="markdown",
+)
 
 _Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the caller, e.g. robot-7.")]
 _File = Annotated[
