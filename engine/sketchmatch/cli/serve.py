@@ -236,9 +236,9 @@ def serve(
 
     Options override the configuration. SIGHUP rereads the configuration except addresses, web
     origins, grace, workers, the endpoint of traces and the paths of certificate and token files,
-    whose content is reread whenever it changes. Requests in progress keep the settings they began with. Health is NOT_SERVING until the
-    kernels are compiled or loaded. A server that hangs exits with code 70 after 30 s: have its
-    supervisor restart it.
+    whose content is reread whenever it changes. Requests in progress keep the settings they began
+    with. Health is NOT_SERVING until the kernels are compiled or loaded. A server that hangs exits
+    with code 70 after 30 s: have its supervisor restart it.
     """
     import asyncio
 
