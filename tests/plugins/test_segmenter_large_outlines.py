@@ -76,6 +76,7 @@ def hangs(ring, a, b):
         yield pocket.is_valid and not pocket.buffer(-neck).is_empty
 
 
+@pytest.mark.slow
 @given(SEEDS)
 @settings(max_examples=60)
 def test_bounds_and_pieces_change_no_object(seed):
@@ -162,6 +163,7 @@ def raw_outlines_of(seed):
     return parts.outlines(range(1, len(parts.boxes)))
 
 
+@pytest.mark.slow
 @given(SEEDS)
 @settings(max_examples=100)
 def test_no_larger_disc_fits_into_an_outline_than_is_said(seed):

@@ -130,6 +130,7 @@ def test_names_written_in_a_picture_are_no_walls():
     assert sorted(areas(Image(pixels), 40)) == pytest.approx(AREAS, rel=0.12)
 
 
+@pytest.mark.slow
 def test_a_label_that_one_line_has_names_the_room_around_its_middle():
     table = [(1.5, 6.5), (2.2, 6.5), (2.2, 7.2), (1.5, 6.5)]
     lines = [table, *WALLS]
@@ -448,6 +449,7 @@ def test_a_leaf_that_is_drawn_as_it_closes_is_where_the_room_ends():
     assert leaf == pytest.approx(np.array([[0.92, 4.3], [1.88, 4.3]]))
 
 
+@pytest.mark.slow
 def test_a_turned_hall_whose_widest_discs_fit_apart_from_each_other_is_one_room():
     # Their middles lie on a line, of which at 31 degrees few cells are as far from both sides.
     c, s = np.cos(np.radians(31.0)), np.sin(np.radians(31.0))
@@ -522,12 +524,14 @@ def test_lines_within_furniture_are_of_it():
     assert sorted(found) == pytest.approx(HALL_AREAS, rel=0.1)
 
 
+@pytest.mark.slow
 def test_closed_lines_side_by_side_are_rooms_however_small():
     boxes = [box(0, 0, 9, 4), box(0, 4, 4, 3), box(4, 4, 1.5, 1.5), box(4, 5.5, 1.5, 1.5)]
     found = areas(strokes([*boxes, box(5.5, 4, 3.5, 3)]))
     assert sorted(found) == pytest.approx([2.25, 2.25, 10.5, 12, 36], rel=0.06)
 
 
+@pytest.mark.slow
 def test_named_outlines_apart_in_a_place_without_a_name_are_rooms():
     tents = [box(3.0 * k + 1, 1, 2, 2) for k in range(4)]
     field = [box(0, 0, 13.5, 9), [(0, 4.5), (6, 4.5)], [(7.5, 4.5), (13.5, 4.5)]]
@@ -559,6 +563,7 @@ def test_walls_are_no_paper_if_they_are_few_or_at_other_distances():
     assert paper([grid[0]] * 20) == frozenset()
 
 
+@pytest.mark.slow
 def test_lines_that_say_how_long_a_wall_is_bound_nothing():
     below = [[(0, -1), (9, -1)], [(-0.1, -1.1), (0.1, -0.9)], [(8.9, -1.1), (9.1, -0.9)]]
     beside = [[(-1, 0), (-1, 7)], *(box(-1.1, y, 0.2, 0.2) for y in (0.02, 6.8))]
@@ -584,6 +589,7 @@ def test_a_wall_is_no_dimension():
     assert not dimensions([np.array(line, dtype=float) for line in [round_, *ends]])
 
 
+@pytest.mark.slow
 def test_small_holes_of_walls_are_rooms_though_larger_ones_open_into_each_other():
     small = [box(1.5 * x, 1.5 * y, 1.49, 1.49) for x in range(6) for y in range(4)]
     walls = [[(x, y), (x, y + 2.1)] for x in (3, 6) for y in (6, 8.9)]

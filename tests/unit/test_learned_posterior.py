@@ -327,6 +327,7 @@ def test_labels_that_were_put_on_a_sketch_are_mostly_right():
     assert alike / (alike + unlike) == pytest.approx(0.9 + 0.1 / 6.0, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_sketch_is_known_by_its_maps_and_which_of_them_is_right():
     rights = others = 0
     for number in range(12):

@@ -116,6 +116,7 @@ def test_what_all_objects_are_bent_by_is_bent():
     assert warp(inside) == pytest.approx(expected, abs=0.05)
 
 
+@pytest.mark.slow
 @given(seeds, st.integers(5, 16))
 def test_objects_that_agree_come_nearly_to_their_partners(seed, count):
     rng = np.random.default_rng(seed)
