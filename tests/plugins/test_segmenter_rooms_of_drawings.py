@@ -1,6 +1,7 @@
 """The segmenter of rooms on drawn floor plans: strokes, polygons and pictures."""
 
 import itertools
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -570,6 +571,25 @@ def test_lines_that_say_how_long_a_wall_is_bound_nothing():
     lines = [np.array(line, dtype=float) for line in [*below, *beside, *HALL]]
     assert dimensions(lines) == frozenset(range(6))
     found = areas(strokes([*lines, *doors("apart")]))
+    assert sorted(found) == pytest.approx(HALL_AREAS, rel=0.1)
+
+
+def dashed(lines):
+    return StrokeSet(tuple(replace(stroke, dashed=True) for stroke in strokes(lines).strokes))
+
+
+def test_dashed_lines_are_no_walls_but_where_all_are():
+    rooms = [box(0, 0, 4, 6), box(4, 0, 5, 6)]
+    across, rug = [(-1, 3), (10, 3)], box(5, 0.5, 3, 2)
+    drawing = StrokeSet((*strokes(rooms).strokes, *dashed([across, rug]).strokes))
+    assert areas(drawing) == pytest.approx([24.0, 30.0], rel=0.05)
+    assert areas(dashed(rooms)) == pytest.approx([24.0, 30.0], rel=0.05)
+
+
+def test_doors_whose_arcs_are_dashed_close_rooms():
+    swings = strokes(doors("apart")).strokes
+    drawn = [replace(each, dashed=len(each.points) > 2) for each in swings]
+    found = areas(StrokeSet((*strokes(HALL).strokes, *drawn)))
     assert sorted(found) == pytest.approx(HALL_AREAS, rel=0.1)
 
 

@@ -701,6 +701,40 @@ def test_a_long_value_is_looked_at_once(body):
         assert boxes(body + DESK)[-1] == near([PLACE])[0]
 
 
+DASHED = '<path class="d" d="M0 0H100" fill="none" stroke="red" {}/>'
+
+
+@pytest.mark.parametrize(
+    ("style", "attributes", "dashed"),
+    [
+        ("", "", False),
+        ("", 'stroke-dasharray="6 4"', True),
+        ("", 'stroke-dasharray="6,4,1"', True),
+        ("", 'stroke-dasharray="6"', True),
+        (".d{stroke-dasharray:6px 4px}", "", True),
+        (".d{stroke-dasharray:none}", 'stroke-dasharray="6"', False),
+        ("", 'stroke-dasharray="6 -4"', False),  # no legal value
+        ("", 'stroke-dasharray="none"', False),
+        ("", 'stroke-dasharray="6 0"', False),  # no gaps
+        ("", 'stroke-dasharray="0"', False),
+        ("", 'stroke-dasharray="100"', False),  # all of it is one dash
+        ("", 'stroke-dasharray="60" transform="scale(0.5 2)"', False),
+        ("", 'stroke-dasharray="60" transform="scale(3)"', True),
+    ],
+)
+def test_a_line_with_gaps_is_dashed(style, attributes, dashed):
+    found = decoded(f"<style>{style}</style>{KEPT}{DASHED.format(attributes)}")
+    assert [stroke.dashed for stroke in found.strokes] == [False, dashed]
+
+
+def test_a_filling_within_a_dashed_line_has_no_gaps():
+    body = (
+        '<g stroke="red" stroke-dasharray="2"><line x2="99"/><path d="M0 9H99"/>'
+        '<rect width="99" height="70" fill="blue"/><path d="M0 0H99V70" fill="none"/></g>'
+    )
+    assert [each.dashed for each in decoded(body).strokes] == [True, True, False, True]
+
+
 MARKER = '<marker id="tip"><path d="M0 0L4 2L0 4"/></marker>'
 LINE = '<path class="d" d="M100 100H300" stroke="red" fill="none" {}/>'
 

@@ -56,6 +56,8 @@ class Shape:
         How a person finds it in the file.
     box
         Around its control points.
+    dashed
+        Whether nothing of it is seen but a line with gaps.
     """
 
     subpaths: list[Subpath]
@@ -66,6 +68,7 @@ class Shape:
     pen: bool
     place: str
     box: Box
+    dashed: bool = False
 
     @property
     def filled(self) -> bool:

@@ -8,6 +8,7 @@ outside the document is ever opened, so ``@import`` has no effect.
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -35,7 +36,7 @@ _PAINTS = {"fill", "stroke"}
 _INHERITED = {
     *_PAINTS,
     *{"visibility", "color", "fill-rule", "fill-opacity", "stroke-opacity", "stroke-width"},
-    *{"marker-start", "marker-end", "font-size"},
+    *{"stroke-dasharray", "marker-start", "marker-end", "font-size"},
 }
 _TRANSFORMS = {"transform", "translate", "rotate", "scale", "transform-origin", "transform-box"}
 _GEOMETRY = {"x", "y", "width", "height", "cx", "cy", "r", "rx", "ry", "d"}
@@ -84,6 +85,8 @@ class Look:
         Paint as it is written, and what ``currentColor`` stands for.
     fill_opacity, stroke_opacity, stroke_width
         As shares and in user units.
+    stroke_dasharray
+        How long its longest dash is, in user units; infinite where its line has no gaps.
     fill_rule
         Whether it is ``evenodd``.
     marker_start, marker_end
@@ -109,6 +112,7 @@ class Look:
     fill_opacity: float = 1.0
     stroke_opacity: float = 1.0
     stroke_width: float = 1.0
+    stroke_dasharray: float = math.inf
     fill_rule: bool = False
     marker_start: str = ""
     marker_end: str = ""
@@ -426,6 +430,19 @@ def _length(text: str) -> float:
     return length(text, 100.0)
 
 
+def _longest_dash(text: str) -> float:
+    """Return how long the longest dash is: infinite if there are no gaps."""
+    if text.lower() == "none":
+        return math.inf
+    lengths = [_length(each) for each in re.split(r"[\s,]+", text.strip())]
+    if min(lengths) < 0.0:
+        raise ValueError(text)
+    # An odd number of them is gone through twice, so that each is a dash and a gap.
+    even = len(lengths) % 2 == 0
+    dashes, gaps = (lengths[::2], lengths[1::2]) if even else (lengths, lengths)
+    return max(dashes) if any(gaps) else math.inf
+
+
 def _target(text: str) -> str:
     match = _URL.match(text)
     return match[1].strip().removeprefix("#") if match else ""
@@ -436,6 +453,7 @@ _VALUES: dict[str, Any] = {
     **dict.fromkeys(_SHARES, _share),
     "color": _paint_text,
     **dict.fromkeys(("stroke-width", "font-size"), _length),
+    "stroke-dasharray": _longest_dash,
     "visibility": lambda text: _VISIBLE[text.lower()],
     "fill-rule": lambda text: _RULES[text.lower()],
     "marker-start": _target,

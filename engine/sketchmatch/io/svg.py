@@ -123,7 +123,7 @@ def decode_svg(data: bytes) -> StrokeSet:
     )
     return StrokeSet(
         tuple(
-            Stroke(points * (1.0, -1.0), None, shape.label)
+            Stroke(points * (1.0, -1.0), None, shape.label, shape.dashed)
             for shape in shapes
             for points in lines_of(shape, tolerance)
         ),
@@ -274,8 +274,7 @@ class _Drawing:
             point = own.point_in_matrix_space((x, y))
         except (ValueError, IndexError, TypeError):
             return
-        scale = math.sqrt(abs(own.a * own.d - own.b * own.c))
-        size = scale * max(shown.font_size for _, shown in placed)
+        size = _scale(own) * max(shown.font_size for _, shown in placed)
         if look.visible and name and all(map(math.isfinite, (point.x, point.y, size))):
             yield Landmark(name, (float(point.x), -float(point.y)), "room", size)
 
@@ -304,6 +303,10 @@ class _Drawing:
         subpaths = subpaths_of(element, look, context.frame, context.matrix, field, line)
         # Whoever gives both the same colour has fattened the ink.
         pen = tag_of(element) in ("path", "polygon") and fill is not None and stroke in (None, fill)
+        box = box_of(subpaths)
+        flat = all(len(each) == 1 and len(each[0]) == 2 for each in subpaths)
+        # A line that is no longer than a dash may have no gap.
+        dash = look.stroke_dasharray * _scale(context.matrix)
         return Shape(
             subpaths,
             label_of(element) or context.label,
@@ -312,7 +315,8 @@ class _Drawing:
             look.fill_rule,
             pen,
             self._place(element),
-            box_of(subpaths),
+            box,
+            (fill is None or flat) and dash < max(box[2] - box[0], box[3] - box[1]),
         )
 
     def _children(
@@ -496,6 +500,11 @@ class _Drawing:
     def _invalid(self, element: ElementTree.Element, problem: str) -> InvalidInputError:
         where = f"({named_element(element)} on line {self._lines[element]} of the file)"
         return invalid("", f"{where} {problem}")
+
+
+def _scale(matrix: Any) -> float:
+    """Return how many times as long lines become, in the mean of all directions."""
+    return math.sqrt(abs(matrix.a * matrix.d - matrix.b * matrix.c))
 
 
 def _sides(frame: Frame | None) -> tuple[float, float] | tuple[None, None]:

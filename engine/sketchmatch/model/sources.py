@@ -45,11 +45,14 @@ class Stroke:
         Shape (k,), seconds from any origin, or None where the pad gave none.
     label
         A name for people.
+    dashed
+        Whether it is drawn with gaps, as what is no wall of a floor plan.
     """
 
     points: FloatArray
     times: FloatArray | None = None
     label: str = ""
+    dashed: bool = False
 
     def __post_init__(self) -> None:
         points = frozen_floats(self.points)

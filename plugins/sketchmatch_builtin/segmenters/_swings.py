@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sketchmatch.model import FloatArray
 from sketchmatch_builtin.segmenters._lines import is_closed, is_straight
 
-__all__ = ["doors_apart"]
+__all__ = ["doors_apart", "is_swing"]
 
 # Of the whole drawing's span: how far on both sides of a point the direction of a line is measured,
 # and the smallest and the largest leaf.
@@ -102,6 +102,11 @@ def doors_apart(lines: Sequence[FloatArray]) -> tuple[list[FloatArray], list[Flo
         _closed(arc, pieces.ends[arc.piece], [bool(each) for each in leaves], walls)
         for arc, leaves in swings
     ]
+
+
+def is_swing(line: FloatArray) -> bool:
+    """Whether a line, shape (k, 2), is an arc as a door may turn through."""
+    return len(line) > 2 and bool(np.ptp(line, axis=0).any()) and _arc(0, line) is not None
 
 
 def _turns(line: FloatArray, aside: float) -> tuple[FloatArray, FloatArray]:

@@ -55,6 +55,7 @@ from sketchmatch_builtin.segmenters._plan_things import (
     within,
 )
 from sketchmatch_builtin.segmenters._plans import Plan, drawn, lines_of
+from sketchmatch_builtin.segmenters._swings import is_swing
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 
 __all__ = ["RoomSegmenter"]
@@ -268,15 +269,23 @@ class RoomSegmenter(Segmenter):
     def _plan(self, source: StrokeSet | PolygonSet | Image) -> Plan:
         """Return the free cells of a drawing, furniture among them."""
         width = self.params.door_width
-        left_out = self._things(source) if isinstance(source, StrokeSet) else frozenset()
+        if not isinstance(source, StrokeSet):
+            return self._emptied(drawn(source, width))
+        left_out = self._things(source)
+        dashed = {k for k in left_out if source.strokes[k].dashed}
+        if dashed and width is None:
+            # A rug or a beam tells how wide doors are, as all that is drawn in rooms does.
+            full = drawn(source, None, left_out=left_out - dashed)
+            width = full.door * full.cell
         return self._emptied(drawn(source, width, left_out=left_out))
 
     def _things(self, source: StrokeSet) -> frozenset[int]:
         """Return the lines of a drawing that are things in its rooms, its paper, or say lengths."""
         lines, names = lines_of(source), source.landmarks
+        aside = self._dashed(source)
         if len(lines) > _MOST_LINES:
-            return frozenset()
-        aside = paper(lines) | dimensions(lines)
+            return aside
+        aside |= paper(lines) | dimensions(lines)
         free, touching = things_in(lines, names)
         if not (free or touching):
             return aside
@@ -293,6 +302,18 @@ class RoomSegmenter(Segmenter):
         # of a line that bounds a wall more rooms are found without it.
         if touching and 2 * len(opening) > count:
             found |= {*touching} if count <= self._rooms_without(source, found)[1].max() else set()
+        return found
+
+    def _dashed(self, source: StrokeSet) -> frozenset[int]:
+        """Return the dashed lines that are no doors, unless it is they that bound rooms."""
+        found = frozenset(
+            k
+            for k, stroke in enumerate(source.strokes)
+            if stroke.dashed and not is_swing(stroke.points)
+        )
+        solid = any(len(each.points) for k, each in enumerate(source.strokes) if k not in found)
+        if not (found and solid) or self._rooms_without(source, found)[1].max() < _FEWEST:
+            return frozenset()
         return found
 
     def _rooms_without(self, source: StrokeSet, left_out: Container[int]) -> tuple[Plan, Labels]:
