@@ -175,6 +175,10 @@ def test_texts_of_an_svg_plan_name_its_rooms(tmp_path):
         ("Bad, 5.6 m²", "Bad"),
         ("Балкон 4 м²", "Балкон"),
         ("Kitchen (12 m2)", "Kitchen"),
+        ("21.5°C", ""),
+        ("70 °F", ""),
+        ("45%", ""),
+        ("Hall 21 °C", "Hall"),
         ("101", "101"),
         ("Bath 2", "Bath 2"),
         ("1 car", "1 car"),
@@ -185,6 +189,15 @@ def test_texts_of_an_svg_plan_name_its_rooms(tmp_path):
 def test_measures_are_no_names(written, name):
     found = names_of_rooms([Landmark(written, (1.0, 2.0), "room", 3.0)])
     assert found == ([Landmark(name, (1.0, 2.0), "room", 3.0)] if name else [])
+
+
+def test_the_letters_of_a_compass_are_no_names():
+    def names(*written):
+        return [item.name for item in names_of_rooms([Landmark(each, (0, 0)) for each in written])]
+
+    assert names("N", "hall", "S") == ["hall"]
+    assert names("M", "N", "hall") == ["M", "N", "hall"]
+    assert names("W", "E") == ["W", "E"]
 
 
 def test_what_is_written_largest_names_a_room(tmp_path):

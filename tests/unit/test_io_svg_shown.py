@@ -767,6 +767,49 @@ def test_of_lengths_the_first_is_named_and_outlines_are_none():
     assert note.startswith("<line> on line 1 of the file and 1 more are marked")
 
 
+@pytest.mark.parametrize(
+    ("above", "below", "names"),
+    [
+        ('x="9" y="20"', 'x="9" y="39"', ["master bath"]),
+        ('x="9" y="20" id="a"', 'x="9" y="39" id="b"', ["master bath"]),
+        ('x="9" y="20"', 'x="9" y="50"', ["master", "bath"]),  # too far below
+        ('x="9" y="20"', 'x="19" y="39"', ["master", "bath"]),  # aside
+        ('x="9" y="39"', 'x="9" y="20"', ["master", "bath"]),  # above
+        ('x="9" y="20"', 'x="9" y="39" class="small"', ["master", "bath"]),
+        ('x="9" y="20"', 'x="9" y="20"', ["master", "bath"]),
+    ],
+)
+def test_texts_right_below_each_other_are_one_name(above, below, names):
+    found = decoded(f"{KEPT}<text {above}>master</text><text {below}>bath</text>")
+    assert [item.name for item in found.landmarks] == names
+    assert found.landmarks[0].point == (9.0, -float(above.split('"')[3]))
+
+
+@pytest.mark.parametrize(
+    ("lines", "names"),
+    [
+        (("room", "of", "steam"), ["room of steam"]),
+        (("master", "12 m²"), ["master", "12 m²"]),
+        (("room 1", "bath"), ["room 1", "bath"]),
+    ],
+)
+def test_names_go_on_for_more_lines_up_to_a_number(lines, names):
+    texts = [f'<text x="9" y="{20 * k}">{line}</text>' for k, line in enumerate(lines)]
+    found = decoded(KEPT + "".join(texts))
+    assert [item.name for item in found.landmarks] == names
+    between = decoded(KEPT.join(texts))
+    assert [item.name for item in between.landmarks] == [*lines]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "joined"),
+    [("music", "/ office", True), ("kitchen &amp;", "dining", True), ("music", "office", False)],
+)
+def test_signs_join_lines_of_another_manner(first, second, joined):
+    texts = f'<text y="20">{first}</text><text y="50" font-size="12">{second}</text>'
+    assert len(decoded(KEPT + texts).landmarks) == (1 if joined else 2)
+
+
 def test_what_is_written_is_read_where_it_is_seen():
     texts = "".join(
         f'<text x="{k}" y="5" style="{style}">room {k}</text>'

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from xml.etree import ElementTree
 
 from sketchmatch.io._svg_tree import tag_of
+from sketchmatch.model import Landmark
 
-__all__ = ["groups_label", "label_of", "written_in"]
+__all__ = ["goes_on", "groups_label", "label_of", "written_in"]
 
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 _NAMES = ("aria-label", f"{_INKSCAPE}label", "{http://www.serif.com/}id", "data-name")
@@ -26,6 +27,11 @@ _LAYER = re.compile(
 _COPY = re.compile(r"(?<=.)_\d+_$")
 # How Illustrator and CorelDRAW write what an ``id`` may not contain.
 _ESCAPED = re.compile(r"_x([0-9A-F]{2,5})_", re.IGNORECASE)
+
+# Of the height of letters: how far apart the lines of a name are at most, and those of one that
+# ends or begins with a sign that joins words, and how far aside the next line begins.
+_SPACED, _SPACED_JOINED, _ASIDE = 1.6, 2.2, 0.1
+_JOINED = re.compile(r"[/&+,-]\n|\n[/&+]")
 
 
 def label_of(element: ElementTree.Element) -> str:
@@ -63,6 +69,31 @@ def written_in(text: ElementTree.Element) -> str:
         said += f" {part}" if line != last else part
         last = line
     return _spaced(said)
+
+
+def goes_on(
+    above: ElementTree.Element, first: Landmark, text: ElementTree.Element, second: Landmark
+) -> bool:
+    """Whether a text is the next line of a name whose line above is a text, too.
+
+    It is written in the same manner right below, or joined by a sign such as ``&``. Texts with
+    numbers, as measures have them, stand alone.
+    """
+    both = f"{first.name}\n{second.name}"
+    joined = _JOINED.search(both) is not None
+    size = max(first.size, second.size)
+    down = first.point[1] - second.point[1]
+    return (
+        0.0 < down <= (_SPACED_JOINED if joined else _SPACED) * size
+        and abs(first.point[0] - second.point[0]) <= _ASIDE * size
+        and not re.search(r"\d", both)
+        and (joined or _manner(above) == _manner(text))
+    )
+
+
+def _manner(text: ElementTree.Element) -> dict[str, str]:
+    """Return all that a text's attributes say but which and where it is."""
+    return {name: said for name, said in text.items() if name not in ("id", "x", "y")}
 
 
 def _lines_of(part: ElementTree.Element, line: object) -> Iterator[tuple[object, str]]:

@@ -51,7 +51,7 @@ from sketchmatch.io._svg_curves import (
     subpaths_of,
 )
 from sketchmatch.io._svg_frame import NUMBER, Frame, css_transform, fitted, length, view_box
-from sketchmatch.io._svg_names import groups_label, label_of, written_in
+from sketchmatch.io._svg_names import goes_on, groups_label, label_of, written_in
 from sketchmatch.io._svg_shapes import (
     Box,
     Shape,
@@ -207,6 +207,8 @@ class _Drawing:
         self.background = self._styles.background(root)
         self.page: Box | None = None
         self.names: list[Landmark] = []
+        # The last text, if nothing was drawn since, and its own line of the last name.
+        self._above: tuple[ElementTree.Element, Landmark] | None = None
         self.dimensions: list[str] = []
 
     def shapes(self) -> Iterator[Shape]:
@@ -219,7 +221,7 @@ class _Drawing:
             if not look.displayed or not _for_us(element):
                 continue
             if tag_of(element) == "text":
-                self.names.extend(self._written(element, look, outer))
+                self._name(element, look, outer)
                 continue
             inner = replace(
                 outer, look=look, size=(None, None), matrix=self._placed(element, look, outer)
@@ -227,6 +229,7 @@ class _Drawing:
             if look.clip_path:
                 inner = replace(inner, clip=_both(inner.clip, self._clip(look.clip_path, inner)))
             if tag_of(element) in SHAPES:
+                self._above = None
                 fill, stroke = self._styles.filled(look), self._styles.stroked(look)
                 if inner.frame is None and stroke is None and fill and _is_whole(element):
                     self.background = fill
@@ -248,6 +251,16 @@ class _Drawing:
             children, inner = self._children(element, inner)
             self._visit(len(children))
             stack.extend((child, inner) for child in reversed(children))
+
+    def _name(self, text: ElementTree.Element, look: Look, context: _Context) -> None:
+        """Add what a text says to the names, or to the last of them."""
+        for line in self._written(text, look, context):
+            name = line
+            if self._above and goes_on(*self._above, text, line):
+                last = self.names.pop()
+                name = replace(last, name=f"{last.name} {line.name}")
+            self.names.append(name)
+            self._above = text, line
 
     def _written(
         self, text: ElementTree.Element, look: Look, context: _Context

@@ -22,12 +22,17 @@ _LONGEST_NAME = 40
 # Letters are larger that are so many times as high.
 _LARGER, _LEAST = 1.1, 1e-100
 # What a measure is made of: numbers, and what says that these are no number of a room.
-_UNITS = r"(?:[cm]?[mм][²2]?|qm|sqm|sq\.?\s?(?:m|ft|feet)\.?|кв\.?\s?м\.?|ft[²2]?|feet|in|㎡)"
+_UNITS = (
+    r"(?:[cm]?[mм][²2]?|qm|sqm|sq\.?\s?(?:m|ft|feet)\.?|кв\.?\s?м\.?|ft[²2]?|feet|in|㎡"
+    r"|°\s?[CF]?|[℃℉%]|kwh?|lx|lux|ppm)"
+)
 _SIGNS = r"(?:['\"′″’”]|[x×✕*]|by)"
 _UNIT = re.compile(rf"{_UNITS}|{_SIGNS}|\d[.,]\d", re.IGNORECASE)
 _MEASURE = re.compile(
     rf"(?:\d+(?:[.,/⁄]\d+)*|{_UNITS}|{_SIGNS}|[½¼¾]|ca\.?|[\s~≈=±+:;,.()/-])+", re.IGNORECASE
 )
+# What a compass says: it has no other letters.
+_COMPASS = frozenset("NESWO")
 # An area behind a name.
 _AREA = re.compile(rf"[\s,;:(/·|–-]+(?:ca\.?\s*)?\d+(?:[.,]\d+)?\s?{_UNITS}\)?$", re.IGNORECASE)
 
@@ -75,9 +80,15 @@ def labels_of(
 
 
 def names_of_rooms(written: Iterable[Landmark]) -> list[Landmark]:
-    """Return what is written in a plan without measures, such as ``12 m²`` or ``3.5 x 4``."""
+    """Return what is written in a plan without measures, such as ``3.5 x 4``, and a compass's N."""
+    written = [*written]
+    letters = {item.name for item in written if len(item.name) == 1 and item.name.isalpha()}
+    # Who calls rooms by letters has other ones, too.
+    compass = letters if "N" in letters and letters <= _COMPASS else frozenset[str]()
     found = []
     for item in written:
+        if item.name in compass:
+            continue
         measured = _MEASURE.fullmatch(item.name) and _UNIT.search(item.name)
         name = _AREA.sub("", item.name).strip()
         if name and not (measured and re.search(r"\d", item.name)):
