@@ -587,6 +587,28 @@ def test_lines_that_say_how_long_a_wall_is_bound_nothing():
     assert sorted(found) == pytest.approx(HALL_AREAS, rel=0.1)
 
 
+def test_a_grid_that_is_thinner_than_what_is_drawn_on_it_is_paper():
+    across = [np.array([(0.0, y), (9.0, y)]) for y in (0.0, 2.0, 4.0, 6.0)]
+    down = [np.array([(x, -1.0), (x, 8.0)]) for x in (1.0, 3.0, 5.0)]
+    walls = [np.array(box(0, 0, 9, 7), dtype=float)]
+    lines = [*walls, *across, *down, *across]
+    grid = {*range(1, len(lines))}
+    assert paper(lines, [1.0, *[0.1] * len(grid)]) == grid
+    assert not paper(lines, [1.0, *[0.5] * len(grid)])
+    assert not paper(lines, [0.0] * len(lines))  # nobody said how wide
+    assert not paper([*walls, *across], [1.0, *[0.1] * 4])
+    uneven = [line + np.array([0.0, 0.1 * k * k]) for k, line in enumerate(across)]
+    assert not paper([*walls, *uneven, *down], [1.0, *[0.1] * 7])
+    beside = [line + np.array([0.0, 20.0]) for line in across]
+    assert not paper([*walls, *beside, *down], [1.0, *[0.1] * 7])
+
+
+def test_ruled_lines_that_are_drawn_twice_are_paper():
+    lines = [np.array([(0.0, y), (9.0, y)]) for y in range(8)]
+    assert paper([*lines, *lines]) == {*range(16)}
+    assert not paper([*lines[:4]] * 4)
+
+
 def dashed(lines):
     return StrokeSet(tuple(replace(stroke, dashed=True) for stroke in strokes(lines).strokes))
 

@@ -727,6 +727,14 @@ def test_a_line_with_gaps_is_dashed(style, attributes, dashed):
     assert [stroke.dashed for stroke in found.strokes] == [False, dashed]
 
 
+def test_strokes_are_as_wide_as_their_lines():
+    body = (
+        '<g stroke="red"><path d="M0 0H99"/><g transform="scale(3)" stroke-width="2">'
+        '<path d="M0 9H99"/></g></g><rect width="9" height="7" stroke-width="3"/>'
+    )
+    assert [each.width for each in decoded(body).strokes] == pytest.approx([1.0, 6.0, 0.0])
+
+
 def test_a_filling_within_a_dashed_line_has_no_gaps():
     body = (
         '<g stroke="red" stroke-dasharray="2"><line x2="99"/><path d="M0 9H99"/>'

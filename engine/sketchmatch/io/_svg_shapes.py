@@ -58,6 +58,8 @@ class Shape:
         Around its control points.
     dashed
         Whether nothing of it is seen but a line with gaps.
+    width
+        Of its line, in the drawing's units; 0 where it has none.
     """
 
     subpaths: list[Subpath]
@@ -69,6 +71,7 @@ class Shape:
     place: str
     box: Box
     dashed: bool = False
+    width: float = 0.0
 
     @property
     def filled(self) -> bool:

@@ -123,7 +123,7 @@ def decode_svg(data: bytes) -> StrokeSet:
     )
     return StrokeSet(
         tuple(
-            Stroke(points * (1.0, -1.0), None, shape.label, shape.dashed)
+            Stroke(points * (1.0, -1.0), None, shape.label, shape.dashed, shape.width)
             for shape in shapes
             for points in lines_of(shape, tolerance)
         ),
@@ -319,7 +319,8 @@ class _Drawing:
         box = box_of(subpaths)
         flat = all(len(each) == 1 and len(each[0]) == 2 for each in subpaths)
         # A line that is no longer than a dash may have no gap.
-        dash = look.stroke_dasharray * _scale(context.matrix)
+        scale = _scale(context.matrix)
+        dash = look.stroke_dasharray * scale
         return Shape(
             subpaths,
             label_of(element) or context.label,
@@ -330,6 +331,7 @@ class _Drawing:
             self._place(element),
             box,
             (fill is None or flat) and dash < max(box[2] - box[0], box[3] - box[1]),
+            look.stroke_width * scale if stroke is not None else 0.0,
         )
 
     def _children(

@@ -47,12 +47,15 @@ class Stroke:
         A name for people.
     dashed
         Whether it is drawn with gaps, as what is no wall of a floor plan.
+    width
+        How wide its line is drawn, in sketch units; 0 where nobody said.
     """
 
     points: FloatArray
     times: FloatArray | None = None
     label: str = ""
     dashed: bool = False
+    width: float = 0.0
 
     def __post_init__(self) -> None:
         points = frozen_floats(self.points)

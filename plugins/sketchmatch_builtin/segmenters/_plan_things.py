@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -33,6 +34,11 @@ _NEAR = 0.003
 # So many parallel lines are of paper: as long as the longest, at like distances, in radians of one
 # direction; of the longest, and of the usual distance.
 _RULED, _AS_LONG, _PARALLEL, _LIKE = 8, 0.98, 0.005, 0.03
+# So many are of a grid, whose lines are at most so wide, of the widest of all; of the pairs of its
+# lines in different directions those that cross.
+_GRID, _THIN, _CROSSING = 3, 0.2, 0.5
+# Of its length: what is nearer to a line than this is that line.
+_TWICE = 1e-6
 # Of the distances between them: those that are so many times the usual one.
 _EVEN = 0.9
 # Lines of a dimension: it and what ends it.
@@ -58,32 +64,60 @@ class Things(NamedTuple):
     touching: list[int]
 
 
-def paper(lines: Sequence[FloatArray]) -> frozenset[int]:
-    """Return which lines, each of shape (k, 2), are of ruled paper: parallel, and evenly apart."""
+def paper(lines: Sequence[FloatArray], widths: Sequence[float] = ()) -> frozenset[int]:
+    """Return which lines, each of shape (k, 2), are of ruled paper: parallel, and evenly apart.
+
+    They are many; or, in two directions, at least a few that cross most of the others and are much
+    thinner than what is drawn on them.
+
+    Parameters
+    ----------
+    lines
+        The lines of a plan.
+    widths
+        How wide each is drawn; left out, that is not known.
+    """
     which = [k for k, line in enumerate(lines) if len(line) == 2 and (line[0] != line[1]).any()]
-    if len(which) < _RULED:
-        return frozenset()
+    found = {k for rules in _ruled(lines, which, _RULED) for k in rules}
+    thin = _THIN * max(widths, default=0.0)
+    if thin > 0.0:
+        thinner = [k for k in which if 0.0 < widths[k] <= thin]
+        families = _ruled(lines, thinner, _GRID)
+        drawn = [np.array([shapely.LineString(lines[k]) for k in each]) for each in families]
+        for a, b in itertools.combinations(range(len(families)), 2):
+            if shapely.intersects(drawn[a][:, None], drawn[b]).mean() >= _CROSSING:
+                found.update(families[a], families[b])
+    return frozenset(found)
+
+
+def _ruled(lines: Sequence[FloatArray], which: Sequence[int], fewest: int) -> list[list[int]]:
+    """Return which of some straight lines are ruled together, each of at least so many places."""
+    if len(which) < fewest:
+        return []
     ends = np.array([lines[k] for k in which])
     steps = ends[:, 1] - ends[:, 0]
     lengths = np.hypot(*steps.T)
     # A line is the same from either end.
     direction = np.arctan2(steps[:, 1], steps[:, 0]) % math.pi
-    found: set[int] = set()
+    found: list[list[int]] = []
+    seen = np.zeros(len(which), dtype=bool)
     for k in np.argsort(-lengths).tolist():
         turned = np.abs((direction - direction[k] + math.pi / 2.0) % math.pi - math.pi / 2.0)
         same = (turned <= _PARALLEL) & (lengths >= _AS_LONG * lengths[k])
         same &= lengths <= lengths[k] / _AS_LONG
-        if which[k] in found or same.sum() < _RULED:
+        if seen[k] or same.sum() < fewest:
             continue
         across = np.array([-steps[k, 1], steps[k, 0]]) / lengths[k]
         gaps = np.diff(np.sort(ends[same].mean(axis=1) @ across))
-        usual = float(np.median(gaps))
-        if not usual:
+        # What is drawn twice is one line.
+        gaps = gaps[gaps > _TWICE * lengths[k]]
+        if len(gaps) < fewest - 1:
             continue
-        off = np.abs(gaps / usual - np.round(gaps / usual))
-        if (off <= _LIKE).mean() >= _EVEN:
-            found.update(which[j] for j in np.flatnonzero(same))
-    return frozenset(found)
+        apart = gaps / np.median(gaps)
+        if (np.abs(apart - np.round(apart)) <= _LIKE).mean() >= _EVEN:
+            seen |= same
+            found.append([which[j] for j in np.flatnonzero(same).tolist()])
+    return found
 
 
 def dimensions(lines: Sequence[FloatArray]) -> frozenset[int]:

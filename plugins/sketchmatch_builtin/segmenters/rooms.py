@@ -285,7 +285,7 @@ class RoomSegmenter(Segmenter):
         aside = self._dashed(source)
         if len(lines) > _MOST_LINES:
             return aside
-        aside |= paper(lines) | dimensions(lines)
+        aside |= paper(lines, [stroke.width for stroke in source.strokes]) | dimensions(lines)
         free, touching = things_in(lines, names)
         if not (free or touching):
             return aside
