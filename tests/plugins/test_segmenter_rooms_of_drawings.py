@@ -20,7 +20,7 @@ from sketchmatch.model import (
     StrokeSet,
 )
 from sketchmatch_builtin.segmenters._landmarks import names_of_rooms
-from sketchmatch_builtin.segmenters._plan_things import dimensions, paper
+from sketchmatch_builtin.segmenters._plan_things import dimensions, paper, seen
 from sketchmatch_builtin.segmenters._swings import doors_apart
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
@@ -607,6 +607,39 @@ def test_ruled_lines_that_are_drawn_twice_are_paper():
     lines = [np.array([(0.0, y), (9.0, y)]) for y in range(8)]
     assert paper([*lines, *lines]) == {*range(16)}
     assert not paper([*lines[:4]] * 4)
+
+
+def filled(lines):
+    return tuple(replace(stroke, opaque=True) for stroke in strokes(lines).strokes)
+
+
+def test_what_a_later_room_hides_is_no_wall():
+    hall, bath, closet = box(0, 0, 9, 8), box(3, 2, 6, 3), box(4, 2, 3, 1)
+    drawn = filled([hall, box(-4, 3, 7, 3), bath, closet])
+    lines = [shapely.LineString(line) for line in seen(drawn)]
+    (cut,) = (line for line in lines if line.length > 30)
+    # The side that lies along the border of the bath is seen.
+    assert cut.distance(shapely.Point(0, 4.5)) == pytest.approx(1.5, abs=0.05)
+    assert cut.distance(shapely.Point(9, 4)) == 0.0
+    assert [line.is_ring for line in lines] == [False, True, True, True]
+
+
+def test_nothing_is_hidden_by_what_is_seen_through_or_came_before():
+    lines = [box(0, 0, 9, 8), box(-4, 3, 7, 3)]
+    for drawn in (strokes(lines).strokes, (*filled(lines[:1]), *strokes(lines[1:]).strokes)):
+        found = seen(drawn)
+        assert [line.tolist() for line in found] == [[[*p] for p in line] for line in lines]
+
+
+def test_fillings_without_an_area_hide_nothing():
+    lines = [box(0, 0, 9, 8), [(1, 1), (8, 1), (1, 1)], [(2, 2)], [(1, 3), (8, 3), (4, 3), (1, 3)]]
+    assert [line.tolist() for line in seen(filled(lines))] == [[[*p] for p in e] for e in lines]
+    assert len(seen(filled(lines[1:2]))) == 1
+
+
+def test_rooms_that_are_drawn_over_each_other_are_whole():
+    rooms = filled([box(0, 0, 10, 8), box(5, 5, 10, 7)])
+    assert sorted(areas(StrokeSet(rooms))) == pytest.approx([65.0, 70.0], rel=0.05)
 
 
 def dashed(lines):

@@ -701,6 +701,7 @@ def test_a_long_value_is_looked_at_once(body):
         assert boxes(body + DESK)[-1] == near([PLACE])[0]
 
 
+MARKER = '<marker id="tip"><path d="M0 0L4 2L0 4"/></marker>'
 DASHED = '<path class="d" d="M0 0H100" fill="none" stroke="red" {}/>'
 
 
@@ -735,6 +736,27 @@ def test_strokes_are_as_wide_as_their_lines():
     assert [each.width for each in decoded(body).strokes] == pytest.approx([1.0, 6.0, 0.0])
 
 
+@pytest.mark.parametrize(
+    ("attributes", "opaque"),
+    [
+        ('fill="blue"', True),
+        ("", True),
+        ('fill="currentColor" color="#00f"', True),
+        ('fill="none"', False),
+        ('fill="rgb(0 0 255 / .9)"', False),
+        ('fill="currentColor" color="#00f8"', False),
+        ('fill="blue" fill-opacity="0.9"', False),
+        ('fill="blue" opacity="0.9"', False),
+        ('fill="url(#tip)"', False),
+        ('fill="blue" style="stroke:none"', False),
+    ],
+)
+def test_a_filling_that_is_not_seen_through_is_opaque(attributes, opaque):
+    shape = f'<rect x="5" y="5" width="60" height="40" stroke="red" {attributes}/>'
+    found = decoded(f"{MARKER}{KEPT}{shape}<g opacity='.5'>{shape}</g>")
+    assert [each.opaque for each in found.strokes[1:]] == [opaque, False]
+
+
 def test_a_filling_within_a_dashed_line_has_no_gaps():
     body = (
         '<g stroke="red" stroke-dasharray="2"><line x2="99"/><path d="M0 9H99"/>'
@@ -743,7 +765,6 @@ def test_a_filling_within_a_dashed_line_has_no_gaps():
     assert [each.dashed for each in decoded(body).strokes] == [True, True, False, True]
 
 
-MARKER = '<marker id="tip"><path d="M0 0L4 2L0 4"/></marker>'
 LINE = '<path class="d" d="M100 100H300" stroke="red" fill="none" {}/>'
 
 

@@ -60,6 +60,8 @@ class Shape:
         Whether nothing of it is seen but a line with gaps.
     width
         Of its line, in the drawing's units; 0 where it has none.
+    opaque
+        Whether nothing is seen through its filling.
     """
 
     subpaths: list[Subpath]
@@ -72,6 +74,7 @@ class Shape:
     box: Box
     dashed: bool = False
     width: float = 0.0
+    opaque: bool = False
 
     @property
     def filled(self) -> bool:

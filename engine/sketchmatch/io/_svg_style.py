@@ -93,6 +93,8 @@ class Look:
         Identities of what its ends are drawn with, or empty.
     font_size
         In user units.
+    opacity
+        Of all of it, its parents' among them, as a share.
     displayed
         Whether anything of it is shown, that is neither ``display`` nor ``opacity`` hides it.
     clip_path
@@ -117,6 +119,7 @@ class Look:
     marker_start: str = ""
     marker_end: str = ""
     font_size: float = 16.0
+    opacity: float = 1.0
     displayed: bool = True
     clip_path: str = ""
     overflow: bool = False
@@ -217,10 +220,12 @@ class Styles:
         if changes.get("color", "").lower() == "currentcolor":
             del changes["color"]
         own = {name: text for name, text in values.items() if text.lower() not in _WIDE}
+        opacity = _share(own.get("opacity"))
         return replace(
             _inherited(parent),
             **changes,
-            displayed=own.get("display", "").lower() != "none" and _share(own.get("opacity")) > 0.0,
+            opacity=parent.opacity * min(max(opacity, 0.0), 1.0),
+            displayed=own.get("display", "").lower() != "none" and opacity > 0.0,
             clip_path=_target(own.get("clip-path", "")),
             overflow=own.get("overflow", "").lower() in ("visible", "auto"),
             transforms={name: own[name] for name in _TRANSFORMS & own.keys()},
@@ -237,6 +242,13 @@ class Styles:
     def filled(self, look: Look) -> Colour | None:
         """Return the colour of what fills a shape, or None."""
         return self.paint(look.fill, look.fill_opacity, look.color)
+
+    def hides(self, look: Look) -> bool:
+        """Whether nothing is seen through what fills a shape."""
+        text = look.color if look.fill.lower() == "currentcolor" else look.fill
+        parsed = None if _URL.match(text) else _parsed_colour(text)
+        plain = parsed is not None and parsed != "currentcolor" and parsed.alpha >= 1.0
+        return plain and look.fill_opacity >= 1.0 and look.opacity >= 1.0
 
     def stroked(self, look: Look) -> Colour | None:
         """Return the colour of a shape's line, or None."""

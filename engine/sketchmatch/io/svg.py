@@ -123,7 +123,7 @@ def decode_svg(data: bytes) -> StrokeSet:
     )
     return StrokeSet(
         tuple(
-            Stroke(points * (1.0, -1.0), None, shape.label, shape.dashed, shape.width)
+            Stroke(points * (1.0, -1.0), None, shape.label, shape.dashed, shape.width, shape.opaque)
             for shape in shapes
             for points in lines_of(shape, tolerance)
         ),
@@ -332,6 +332,9 @@ class _Drawing:
             box,
             (fill is None or flat) and dash < max(box[2] - box[0], box[3] - box[1]),
             look.stroke_width * scale if stroke is not None else 0.0,
+            # Ink may become another line, and holes are seen through.
+            not (pen or stroke is None or context.clip or len(subpaths) > 1)
+            and self._styles.hides(look),
         )
 
     def _children(

@@ -49,6 +49,8 @@ class Stroke:
         Whether it is drawn with gaps, as what is no wall of a floor plan.
     width
         How wide its line is drawn, in sketch units; 0 where nobody said.
+    opaque
+        Whether it is closed and filled, and hides what was drawn there before.
     """
 
     points: FloatArray
@@ -56,6 +58,7 @@ class Stroke:
     label: str = ""
     dashed: bool = False
     width: float = 0.0
+    opaque: bool = False
 
     def __post_init__(self) -> None:
         points = frozen_floats(self.points)

@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from sketchmatch.model import FloatArray, Landmark
+from sketchmatch.model import FloatArray, Landmark, Stroke
 from sketchmatch_builtin.segmenters._doorways import Labels
 from sketchmatch_builtin.segmenters._lines import is_closed, is_straight
 from sketchmatch_builtin.segmenters._merging import groups
 
-__all__ = ["Things", "dimensions", "paper", "standing", "things_in", "within"]
+__all__ = ["Things", "dimensions", "paper", "seen", "standing", "things_in", "within"]
 
 # Of the area of the hull of all that is drawn: the largest thing.
 _LARGEST = 0.06
@@ -41,6 +41,8 @@ _GRID, _THIN, _CROSSING = 3, 0.2, 0.5
 _TWICE = 1e-6
 # Of the distances between them: those that are so many times the usual one.
 _EVEN = 0.9
+# Of the span of all: what is nearer to the border of a filling is not hidden by it.
+_BORDER = 0.001
 # Lines of a dimension: it and what ends it.
 _FEWEST = 3
 # Of the length of a dimension line: how long what ends it is, and how far from its end that may be.
@@ -147,6 +149,41 @@ def dimensions(lines: Sequence[FloatArray]) -> frozenset[int]:
         if (np.sort(sizes)[:-1] <= _TICK * length).all() and all(map(np.any, at_ends)):
             found += [which[k] for k in members.tolist()]
     return frozenset(found)
+
+
+def seen(strokes: Sequence[Stroke]) -> list[FloatArray]:
+    """Return the lines of strokes but for what later ones hide of large outlines.
+
+    So rooms are drawn over each other. Things, small or open, are whole beneath others, and what
+    lies along the border of a filling is seen.
+    """
+    lines = [stroke.points for stroke in strokes]
+    closed = {
+        k: _outline(line)
+        for k, line in enumerate(lines)
+        if len(line) >= _CORNERS and is_closed(line)
+    }
+    covers = np.array([k for k in closed if strokes[k].opaque], dtype=np.int64)
+    if not len(covers):
+        return lines
+    whole = shapely.MultiPoint(np.concatenate(lines))
+    least = _LARGEST * whole.convex_hull.area
+    inward = _BORDER * float(np.ptp(shapely.get_coordinates(whole), axis=0).max())
+    hiding = shapely.buffer(np.array([closed[k] for k in covers], dtype=object), -inward)
+    tree = shapely.STRtree(hiding)
+    found: list[FloatArray] = []
+    for k, line in enumerate(lines):
+        above = np.zeros(0, dtype=np.int64)
+        if k in closed and float(shapely.area(closed[k])) > least:
+            above = tree.query(shapely.LineString(line), "intersects")
+        above = above[covers[above] > k]
+        if not len(above):
+            found.append(line)
+            continue
+        left = shapely.LineString(line) - shapely.union_all(hiding[above])
+        parts = shapely.get_parts(shapely.line_merge(left))
+        found += [shapely.get_coordinates(part) for part in parts if part.length]
+    return found
 
 
 def things_in(lines: Sequence[FloatArray], names: Sequence[Landmark]) -> Things:

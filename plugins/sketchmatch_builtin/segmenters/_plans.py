@@ -14,6 +14,7 @@ from sketchmatch.api import InvalidInputError, Reason
 from sketchmatch.model import FloatArray, Image, PolygonSet, StrokeSet
 from sketchmatch_builtin.segmenters._cells import Mask
 from sketchmatch_builtin.segmenters._doorways import divided, doorway
+from sketchmatch_builtin.segmenters._plan_things import seen
 from sketchmatch_builtin.segmenters._swings import doors_apart
 
 __all__ = ["Plan", "drawn", "lines_of"]
@@ -70,7 +71,7 @@ def drawn(
     door_width
         Widest doorway in the drawing's unit, or None to find it from the drawing.
     left_out
-        Which lines are no walls.
+        Which strokes are no walls.
     side
         Cells along the longer side of what lines are drawn into.
     """
@@ -78,7 +79,9 @@ def drawn(
         walls, cell, corner = _of_picture(source)
         closed = np.zeros_like(walls)
     else:
-        given = [line for k, line in enumerate(lines_of(source)) if k not in left_out]
+        given = lines_of(source)
+        if isinstance(source, StrokeSet):
+            given = seen([each for k, each in enumerate(source.strokes) if k not in left_out])
         lines, leaves = doors_apart(given)
         (walls, closed), cell, corner = _of_lines((lines, leaves), side)
     door = None if door_width is None else door_width / cell
