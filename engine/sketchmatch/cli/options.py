@@ -30,6 +30,7 @@ __all__ = [
     "Histogram",
     "Json",
     "JsonDocument",
+    "MapFile",
     "MapSegmenter",
     "Overlay",
     "Pins",
@@ -37,6 +38,7 @@ __all__ = [
     "Search",
     "Server",
     "Settings",
+    "SketchFile",
     "SketchSegmenter",
     "Synonyms",
     "Timeout",
@@ -68,6 +70,16 @@ def to_path(text: str) -> Path:
     return Path(text)
 
 
+SketchFile = Annotated[
+    Path,
+    typer.Argument(
+        metavar="SKETCH", help="Sketch, in any format that `match` reads.", parser=to_path
+    ),
+]
+MapFile = Annotated[
+    Path,
+    typer.Argument(metavar="MAP", help="Map, in any format that `match` reads.", parser=to_path),
+]
 Address = Annotated[
     str,
     typer.Argument(metavar="ADDRESS", help="Address of the server: HOST:PORT or unix:PATH."),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -25,20 +24,8 @@ __all__ = ["relate"]
 
 @answering
 def relate(
-    sketch: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SKETCH",
-            help="Sketch, in any format that `match` reads.",
-            parser=options.to_path,
-        ),
-    ],
-    map_: Annotated[
-        Path,
-        typer.Argument(
-            metavar="MAP", help="Map, in any format that `match` reads.", parser=options.to_path
-        ),
-    ],
+    sketch: options.SketchFile,
+    map_: options.MapFile,
     sketch_pair: Annotated[
         list[str] | None,
         typer.Option(

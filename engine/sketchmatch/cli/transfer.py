@@ -66,20 +66,8 @@ _AllowUnknown = Annotated[
 @answering
 @options.asking
 def transfer(
-    sketch: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SKETCH",
-            help="Sketch, in any format that `match` reads.",
-            parser=options.to_path,
-        ),
-    ],
-    map_: Annotated[
-        Path,
-        typer.Argument(
-            metavar="MAP", help="Map, in any format that `match` reads.", parser=options.to_path
-        ),
-    ],
+    sketch: options.SketchFile,
+    map_: options.MapFile,
     features: Annotated[
         Path | None,
         typer.Argument(
