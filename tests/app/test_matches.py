@@ -114,7 +114,9 @@ class TestOneLife:
         async def run():
             async with serving() as app:
                 await matched(app, named("n1"))
-                with pytest.raises(InvalidInputError, match="name of another request") as no:
+                with pytest.raises(
+                    InvalidInputError, match="already belongs to another request"
+                ) as no:
                     await matched(app, named("n1", seed=1))
                 assert no.value.field == "request_id"
                 await matched(app, named("n1", seed=1), BOB)
@@ -161,7 +163,7 @@ class TestOneLife:
                     await until(Held.began.is_set, "it does not begin")
                     assert match.state is State.RUNNING
                 await state(match, State.INTERRUPTED)
-                with pytest.raises(MatchInterruptedError, match="nobody read"):
+                with pytest.raises(MatchInterruptedError, match="no client was reading"):
                     match.log.check()
                 last = match.log.last
                 Held.go.set()
@@ -352,7 +354,7 @@ class TestKept:
                 record = await app.matches.get("alice", name)
                 assert record.state is State.INTERRUPTED
                 assert record.ended is not None
-                with pytest.raises(MatchInterruptedError, match="lost or stopped"):
+                with pytest.raises(MatchInterruptedError, match="stopped or crashed"):
                     record.log.check()
                 done = await matched(app, named("n1"))
                 assert done.id == name

@@ -101,7 +101,7 @@ def test_a_search_of_too_many_maps_is_refused_by_its_parameters():
     params = {"searcher": {"population": 20, "generations": 30}}
     request = match_request(SCENE, SCENE, searcher="easm", params=params)
     assert asked(request, max_candidates=600)
-    with pytest.raises(InvalidInputError, match="let 'easm' weigh 600 maps") as no:
+    with pytest.raises(InvalidInputError, match="let 'easm' evaluate 600 object maps") as no:
         asked(request, max_candidates=599)
     assert no.value.reason is Reason.LIMIT_EXCEEDED
     assert no.value.field == "pipeline.searcher.parameters"
@@ -122,7 +122,9 @@ def test_all_searchers_whose_parameters_say_how_much_they_weigh_are_held_to_it(
     searcher, parameters
 ):
     request = match_request(SCENE, SCENE, searcher=searcher, params={"searcher": parameters})
-    with pytest.raises(InvalidInputError, match=r"weigh 1[02]0[01] maps, .* limit of 1000"):
+    with pytest.raises(
+        InvalidInputError, match=r"evaluate 1[02]0[01] object maps, .* limit of 1000"
+    ):
         asked(request, max_candidates=1000)
     assert asked(request, max_candidates=1200)
 
@@ -132,7 +134,7 @@ def test_a_sketch_whose_matches_would_weigh_too_much_is_not_begun():
     match.ClearField("sketch")
     request = CreateSketchRequest(match=match)
     assert asked(request, max_candidates=9)
-    with pytest.raises(InvalidInputError, match="let 'nn' weigh 9 maps") as no:
+    with pytest.raises(InvalidInputError, match="let 'nn' evaluate 9 object maps") as no:
         asked(request, max_candidates=8)
     assert no.value.field == "match.pipeline.searcher.parameters"
 

@@ -130,7 +130,9 @@ class TestOwners:
         assert not archive.get(name, "anna").HasField("source")
 
     def test_a_name_of_any_length_is_quoted_and_cut(self, archive):
-        with pytest.raises(NotFoundError, match=r"^name is 'x+…, and you keep no scene") as caught:
+        with pytest.raises(
+            NotFoundError, match=r"^name is 'x+…, but you have stored no scene"
+        ) as caught:
             archive.get("x" * 10_000, "anna")
         assert len(str(caught.value)) < 250
 
@@ -151,7 +153,7 @@ class TestLabels:
         assert back == found().stored_scene
 
     def test_labels_of_what_is_not_there_are_refused_and_change_nothing(self, archive, name):
-        with pytest.raises(InvalidInputError, match="objects 0 to 1") as caught:
+        with pytest.raises(InvalidInputError, match="of an object, from 0 to 1") as caught:
             archive.relabel(name, [(0, "cot"), (2, "desk")], "anna")
         assert caught.value.field == "labels[1].object"
         assert len(archive.list("anna", 0, "").scenes) == 1
@@ -207,7 +209,7 @@ class TestShelf:
 
     def test_anothers_scene_is_not_there_even_where_it_was_decoded(self, shelf, name):
         shelf.segmentation(name, "anna", "map.stored_scene")
-        with pytest.raises(NotFoundError, match=f"^map.stored_scene is {name}, and you"):
+        with pytest.raises(NotFoundError, match=f"^map.stored_scene is {name}, but you"):
             shelf.segmentation(name, "bert", "map.stored_scene")
 
     def test_histograms_come_back_to_the_last_digit(self, archive, shelf, name):
@@ -227,7 +229,7 @@ class TestShelf:
             assert file.execute("SELECT count(*) FROM histograms").fetchone() == (0,)
 
     def test_without_a_store_the_field_is_named(self):
-        with pytest.raises(StoreError, match=r"^map\.stored_scene needs a store, and this server"):
+        with pytest.raises(StoreError, match=r"^map\.stored_scene needs a store, but this server"):
             Shelf(None).segmentation("x", "anna", "map.stored_scene")
 
 
@@ -245,8 +247,8 @@ class TestQuotas:
         for each in large[:2]:
             assert archive.put(each, "anna", most=2 * self.MIB + 20_000)[1]
         said = (
-            r"with this scene you would keep 3 MiB here, and 2\.02 MiB are the limit for each "
-            "caller; delete scenes that you do not need"
+            r"with this scene you would store 3 MiB, and the limit for each "
+            r"caller is 2\.02 MiB; delete scenes that you do not need"
         )
         with pytest.raises(QuotaError, match=said):
             archive.put(large[2], "anna", most=2 * self.MIB + 20_000)

@@ -58,7 +58,7 @@ def test_a_sketch_is_its_creators():
         name = await made(sketches)
         for request in (UpdateSketchRequest, DeleteSketchRequest):
             method = sketches.update if request is UpdateSketchRequest else sketches.delete
-            with pytest.raises(NotFoundError, match=f"sketch_id is '{name}', and you have no"):
+            with pytest.raises(NotFoundError, match=f"sketch_id is '{name}', but you have no"):
                 await method(request(sketch_id=name), BERT)
         with pytest.raises(NotFoundError):
             await anext(sketches.watch(WatchSketchRequest(sketch_id=name), BERT))
@@ -107,10 +107,10 @@ def test_nobody_has_more_sketches_than_one_may_and_all_together_may():
     async def scenario(sketches):
         first = await made(sketches)
         await made(sketches)
-        with pytest.raises(TooBusyError, match="you have 2 sketches in progress, the limit"):
+        with pytest.raises(TooBusyError, match="you have 2 sketches in progress, which is"):
             await made(sketches)
         await made(sketches, BERT)
-        with pytest.raises(TooBusyError, match="the server has 3 sketches in progress, the limit"):
+        with pytest.raises(TooBusyError, match="the server has 3 sketches in progress, which is"):
             await made(sketches, BERT)
         await sketches.delete(DeleteSketchRequest(sketch_id=first), ANNA)
         await made(sketches)
@@ -123,7 +123,7 @@ def test_who_begins_too_many_loses_the_one_that_is_idle_longest(monkeypatch):
         watched, idle, late = await made(sketches), await made(sketches), await made(sketches)
         events = sketches.watch(WatchSketchRequest(sketch_id=watched), ANNA)
         assert await anext(events)
-        with pytest.raises(TooBusyError, match=r"the limit; delete one; .* again in (59|60) s"):
+        with pytest.raises(TooBusyError, match=r"each caller; delete one; .* again in (59|60) s"):
             await made(sketches)
         monkeypatch.setattr("sketchmatch.app.sketches._SPARED", 0.02)
         await asyncio.sleep(0.03)
@@ -162,7 +162,9 @@ def test_too_many_strokes_or_points_are_refused_and_leave_the_sketch_as_it_was()
     async def scenario(sketches):
         name = await made(sketches)
         strokes = [SketchStroke(stroke_id=f"s{k}") for k in range(3)]
-        with pytest.raises(InvalidInputError, match="makes 3 strokes, more than the limit of 2"):
+        with pytest.raises(
+            InvalidInputError, match="makes 3 strokes in all, more than the limit of 2"
+        ):
             await sketches.update(UpdateSketchRequest(sketch_id=name, set_strokes=strokes), ANNA)
         update = UpdateSketchRequest(sketch_id=name, set_strokes=strokes[:2])
         answer = await sketches.update(update, ANNA)
@@ -170,7 +172,7 @@ def test_too_many_strokes_or_points_are_refused_and_leave_the_sketch_as_it_was()
         points = [(0.0, 0.0)] * (LIMITS.max_vertices + 1)
         (stroke,) = sources.strokes([points]).stroke_set.strokes
         update.set_strokes[0].stroke.CopyFrom(stroke)
-        with pytest.raises(InvalidInputError, match="points, more than the limit"):
+        with pytest.raises(InvalidInputError, match="points in all, more than the limit"):
             await sketches.update(update, ANNA)
 
     with_sketches(scenario, strokes=2)

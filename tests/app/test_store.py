@@ -122,7 +122,7 @@ def test_a_damaged_file_is_said_and_another_is_made_once_it_is_moved_away(things
     things.close()
     things.path.write_bytes(b"no database, " * 1000)
     for _ in range(2):
-        with pytest.raises(StoreError, match="is damaged; move it away, and another is made"):
+        with pytest.raises(StoreError, match="is damaged; move it away, and the server makes"):
             names(things)
     things.path.unlink()
     put(things, "table")
@@ -155,7 +155,8 @@ def test_a_file_of_another_version_is_left_as_it_is(reopened, things):
     put(things, "chair")
     things.close()
     other = reopened(version=2)
-    sentence = f"the store's file {other.path} is of another version of sketchmatch; move it away"
+    file, other_version = f"the store's file {other.path}", "another version of sketchmatch"
+    sentence = f"{file} was written by {other_version}; move it away"
     with pytest.raises(StoreError, match=f"^{re.escape(sentence)}$"):
         names(other)
     assert names(reopened()) == ["chair"]

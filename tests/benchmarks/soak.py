@@ -42,7 +42,7 @@ _MOST_AT_ONCE, _OTHER_PROCESSES = 8, 4
 _MORE_THREADS, _MORE_FILES, _FILES_OF_A_PROCESS = 4, 8, 3
 _MORE_MEMORY = 48 * _MIB
 """Of the latest matches up to 32 MiB are in memory, and the allocator keeps some more."""
-_FORESEEN = ("a worker process ended by itself (signal 9)",)
+_FORESEEN = ("a worker process ended unexpectedly (signal 9)",)
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ REFUSALS = {
         )
     ),
     "Status.resource_exhausted": status.refusal(
-        TooBusyError("the server runs 12 requests already, which is its limit")
+        TooBusyError("the server is busy: 12 requests are running, which is its limit")
     ),
     "Status.deadline_exceeded": status.refusal(
         AnswerUnavailableError(
@@ -60,12 +60,14 @@ REFUSALS = {
     ),
     "Status.failed_precondition": status.refusal(
         StoreError(
-            "the store's file /srv/matches.sqlite is full; delete what is not needed, or allow it "
-            "more bytes"
+            "the store's file /srv/matches.sqlite is full; delete what is not needed, or raise "
+            "its size limit"
         )
     ),
     "Status.cancelled": status.refusal(MatchCancelledError("the match was cancelled")),
-    "Status.interrupted": status.refusal(MatchInterruptedError("nobody read the match any more")),
+    "Status.interrupted": status.refusal(
+        MatchInterruptedError("the match was stopped because no client was reading it any more")
+    ),
     "Status.internal": status.refusal(
         PluginError("searcher guessing of acme-tiles 2.1 failed: it ended without any answer")
     ),

@@ -26,7 +26,7 @@ def test_both_sides_of_a_match_may_be_stored_scenes():
 
 def test_what_is_to_be_kept_is_no_stored_scene():
     source = golden("MatchRequest.stored").sketch
-    with pytest.raises(InvalidInputError, match="kept already") as caught:
+    with pytest.raises(InvalidInputError, match="stored already") as caught:
         requests.source(source, "source", True)
     assert caught.value.field == "source.stored_scene"
 

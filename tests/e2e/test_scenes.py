@@ -47,7 +47,7 @@ def test_a_map_is_put_labelled_and_matched_with_by_its_name(scenes):
     ("command", "arguments", "said"),
     [
         ("scenes show", ["ff"], "'ff' begins no name of a scene; `sketchmatch scenes list` shows"),
-        ("scenes delete", ["f" * 64], f"name is {'f' * 64}, and you keep no scene of this name"),
+        ("scenes delete", ["f" * 64], f"name is {'f' * 64}, but you have stored no scene"),
         ("scenes label", ["ff", "desk"], "'desk' is no label of an object; give its number"),
         ("scenes label", ["ff", "0=desk"], "'0=desk' is no label of an object"),
         ("scenes put", ["missing.yaml"], "missing.yaml"),

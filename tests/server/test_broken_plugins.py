@@ -29,7 +29,7 @@ def test_a_broken_plugin_is_named_with_its_distribution_and_the_server_goes_on(
     assert raised.value.reason == "PLUGIN_FAILED"
     assert raised.value.__cause__.code() is grpc.StatusCode.INTERNAL
     assert sentence.startswith(f"{kind} {plugin.name} of acme-plugins 1.2 failed (")
-    assert sentence.endswith("; tell its author or choose another")
+    assert sentence.endswith("; report it to its author, or choose another")
     assert "\n" not in sentence
     assert plugin.name in caplog.text, "the operator's log says so as well"
     assert client.match(scene(4), scene(4)).object_map == {k: k for k in range(4)}

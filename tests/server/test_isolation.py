@@ -203,7 +203,7 @@ def test_threads_that_a_plugin_leaves_end_with_its_process_and_are_told(patient_
     told = [record.message for record in caplog.records if "left threads" in record.message]
     assert told[0] == (
         "histogram threadedhistogram of acme-misbehaving 1.2 left threads running (spinning), so "
-        "the process was ended; tell its author or choose another"
+        "its process was ended; report it to its author, or choose another"
     )
 
 
@@ -268,7 +268,7 @@ def fails(client, plugin) -> None:
     kind = stage.removeprefix("map_")
     assert raised.value.reason == "PLUGIN_FAILED"
     assert str(raised.value).startswith(f"{kind} {plugin.name} of acme-misbehaving 1.2 ")
-    assert str(raised.value).endswith("; tell its author or choose another")
+    assert str(raised.value).endswith("; report it to its author, or choose another")
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ def test_a_request_more_than_the_server_has_room_for_is_told_when_to_come_again(
             lambda: client.match(scene(3), scene(3)),
             lambda: client.segment(scene(3)),
         ):
-            with pytest.raises(ServerBusyError, match="runs 2 requests already") as raised:
+            with pytest.raises(ServerBusyError, match="2 requests are running") as raised:
                 refused()
             assert raised.value.reason == "LIMIT_EXCEEDED"
             assert raised.value.retry_after == 1.0

@@ -77,7 +77,7 @@ def test_however_many_ask_for_a_match_at_once_it_is_searched_once(recorded):
     assert probes.started.qsize() == 1
     assert found[0] == found[1] == found[2] == found[3]
     assert [event.WhichOneof("event") for event in found[0]] == ["accepted", "scenes", "result"]
-    with pytest.raises(InvalidRequestError, match="name of another request") as no:
+    with pytest.raises(InvalidRequestError, match="already belongs to another request") as no:
         recorded.match(scene(8, 0), scene(8, 2), **options)
     assert no.value.field == "request_id"
 

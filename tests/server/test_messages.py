@@ -146,7 +146,7 @@ def test_what_explodes_is_refused_at_the_limit(path, compression):
     assert code is grpc.StatusCode.INVALID_ARGUMENT
     drawn = path == "/sketchmatch.v1.SketchService/UpdateSketch"
     limit = 100_000 if path in ADMITTED else MIB if drawn else 65_536
-    assert sentence.startswith(f"the request has more than {limit} bytes once it is inflated")
+    assert sentence.startswith(f"the request has more than the limit of {limit} bytes when")
     assert reason == "MESSAGE_TOO_LARGE"
 
 
@@ -202,7 +202,7 @@ def test_a_queue_takes_no_more_memory_than_it_may():
         for _ in range(20):
             code, sentence, _ = refused(running.address, path, request)
             assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
-            assert f"those that wait may have {32 * MIB} bytes together" in sentence
+            assert f"would have more than {32 * MIB} bytes together" in sentence
         # What comes and goes beside what waits is little; what was refused must not stay.
         assert memory_of(running.process.pid, "VmHWM") - before < 4 * 32 * MIB
         for call in calls:

@@ -101,7 +101,7 @@ def test_a_fault_of_the_file_has_its_path_in_the_request(client, file):
     ("kind", "words"),
     [
         ("raising", r"reader raising of acme-shelves 1\.2 failed \(ZeroDivisionError: by zero\)"),
-        ("lying", r"failed \(it returned a str, not a PolygonSet\); tell its author"),
+        ("lying", r"failed \(it returned a str, not a PolygonSet\); report it to its author"),
         ("exiting", r"reader exiting of acme-shelves 1\.2 ended its process \(exit code 3\)"),
     ],
 )

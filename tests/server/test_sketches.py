@@ -309,7 +309,9 @@ def test_revisions_of_long_ago_are_forgotten(client):
         for k in range(258):
             sketch.update({"s0": [(0, 0), (k, 1)]})
         sketch.update(restore=3)
-        with pytest.raises(InvalidRequestError, match="no longer kept; give one from 4 to 259"):
+        with pytest.raises(
+            InvalidRequestError, match="no longer kept; give a revision from 4 to 259"
+        ):
             sketch.update(restore=3)
 
 
@@ -319,7 +321,7 @@ def test_the_oldest_revisions_of_a_large_sketch_are_forgotten_sooner(client):
         sketch.update({"small": outline(1)})
         for k in range(6):
             made = sketch.update({"large": ink + k, "more": outline(2)}).revision
-        with pytest.raises(InvalidRequestError, match=r"is 1, .*; give one from [3-6] to 7"):
+        with pytest.raises(InvalidRequestError, match=r"is 1, .*; give a revision from [3-6] to 7"):
             sketch.update(restore=1)
         assert sketch.update(restore=made - 1).stroke_count == 3
         sketch.update(erase=["large"])
@@ -449,7 +451,7 @@ def test_options_of_serve_say_how_many_sketches_there_are_and_how_long_and_how_m
         service = SketchServiceStub(channel)
         request = CreateSketchRequest(match=MatchRequest(map=MAP))
         assert service.CreateSketch(request).idle_timeout.ToMilliseconds() == 7500
-        with pytest.raises(grpc.RpcError, match="you have 1 sketch in progress, the limit"):
+        with pytest.raises(grpc.RpcError, match="you have 1 sketch in progress, which is"):
             service.CreateSketch(request)
         client.put_scene(MAP)
         with pytest.raises(StoreError, match="is full; delete what is not needed"):

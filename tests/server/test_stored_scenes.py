@@ -123,14 +123,14 @@ def test_a_scene_comes_back_with_its_source_until_it_is_deleted(client):
     assert name in [each.name for each in client.list_scenes()]
     client.delete_scene(name)
     assert name not in [each.name for each in client.list_scenes()]
-    with pytest.raises(NotFoundError, match=f"^name is {name}, and you keep no scene"):
+    with pytest.raises(NotFoundError, match=f"^name is {name}, but you have stored no scene"):
         client.get_scene(name)
 
 
 @pytest.mark.parametrize("side", ["sketch", "map"])
 def test_a_scene_that_is_not_there_is_named_with_the_side(client, side):
     sides = {"sketch": SKETCH, "map": MAP, side: sources.stored_scene(MISSING)}
-    with pytest.raises(NotFoundError, match=f"^{side}.stored_scene is {MISSING}, and you"):
+    with pytest.raises(NotFoundError, match=f"^{side}.stored_scene is {MISSING}, but you"):
         client.match(**sides)
 
 
@@ -270,7 +270,7 @@ def test_a_title_is_changed_alone_kept_with_new_labels_and_taken_away(client, na
 
 
 def test_a_title_longer_than_a_line_is_refused(client):
-    with pytest.raises(InvalidRequestError, match=r"title has 201 characters; give up to 200"):
+    with pytest.raises(InvalidRequestError, match=r"title has 201 characters; give at most 200"):
         client.put_scene(MAP, title="x" * 201)
     assert client.put_scene(MAP, title="x" * 200).stored_scene.title == "x" * 200
 
@@ -344,7 +344,9 @@ def test_a_name_before_anything_was_put_is_not_found(tmp_path):
             lambda: client.transfer(SKETCH, stored, object_map={0: 0, 1: 1}),
             lambda: client.get_scene(MISSING),
         ):
-            with pytest.raises(NotFoundError, match="you keep no scene of this name here"):
+            with pytest.raises(
+                NotFoundError, match="you have stored no scene of this name on this server"
+            ):
                 call()
 
 

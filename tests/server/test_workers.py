@@ -223,7 +223,9 @@ def test_what_costs_nothing_is_answered_while_all_places_and_the_queue_are_full(
         with insecure_channel(address) as channel, within(10.0):
             wait_until(lambda: refused(client), "there is always room")
             for _ in range(10):
-                with pytest.raises(ServerBusyError, match="2 requests already and 2 wait") as busy:
+                with pytest.raises(
+                    ServerBusyError, match="2 requests are running and 2 are waiting"
+                ) as busy:
                     client.match(scene(3), scene(3))
                 assert busy.value.retry_after >= 1.0
                 assert client.algorithms().algorithms

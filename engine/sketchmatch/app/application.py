@@ -331,7 +331,8 @@ class Application:
         finally:
             match.readers -= 1
             if not (match.readers or match.wish.keep_running):
-                self._stop(match, MatchInterruptedError("nobody read the match any more"))
+                problem = "the match was stopped because no client was reading it any more"
+                self._stop(match, MatchInterruptedError(problem))
 
     def cancel(self, match: Task | Record) -> Record:
         """Stop a match, whoever reads it, and return how it is."""
@@ -526,19 +527,20 @@ class Application:
         """Return which limit would be passed if so many more waited, of so many bytes."""
         limits = self._setup.limits
         if len(self._waiting) + requests > limits.max_waiting:
-            waiting = f" and {limits.max_waiting} wait" if limits.max_waiting else ""
+            waiting = f" and {limits.max_waiting} are waiting" if limits.max_waiting else ""
             return f"{waiting}, which is its limit"
         if sum(map(_size, self._waiting)) + size > limits.max_waiting_bytes:
             return (
-                f", and those that wait may have {limits.max_waiting_bytes} bytes together, which "
-                "they would pass"
+                f", and the waiting ones would have more than {limits.max_waiting_bytes} bytes "
+                "together, which is its limit"
             )
         return ""
 
     def _busy(self, full: str) -> TooBusyError:
         """Return the error of a request for which there is no room."""
-        there_are = f"the server runs {counted(len(self._running), 'request')} already"
-        return TooBusyError(f"{there_are}{full}", self._retry_seconds())
+        running = len(self._running)
+        there_are = f"{counted(running, 'request')} {'is' if running == 1 else 'are'} running"
+        return TooBusyError(f"the server is busy: {there_are}{full}", self._retry_seconds())
 
     def _dispatch(self) -> None:
         """Begin what waits, as far as there are places."""
@@ -609,7 +611,7 @@ class Application:
                 self.sketches.look()
                 self._look_at_tasks()
             except Exception:  # nobody else would look from then on
-                _log.exception("silence, or too long a wait, was not seen to")
+                _log.exception("the regular check of workers, sketches and waiting requests failed")
 
     def _look_at_tasks(self) -> None:
         size = sum(map(_size, self._waiting))

@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 _Result = TypeVar("_Result")
 _Row = tuple[str, str, str, bytes, int, float, float | None, int, int, bytes | None]
 
-INTERRUPTED = "the server was lost or stopped while it did the match"
+INTERRUPTED = "the server stopped or crashed during the match"
 
 _VERSION = 1
 _SCHEMA = """
@@ -196,7 +196,7 @@ class Archive:
             try:
                 self._write(batch)
             except Exception:  # the thread is to live on
-                _log.exception("matches could not be kept")
+                _log.exception("matches could not be saved")
                 self._failed(len(batch))
             with self._idle:
                 self._writing = False
@@ -216,7 +216,7 @@ class Archive:
         except StoreError as error:
             if records:
                 self._failed(len(records))
-            self._say(f"{error}; until then matches go on and are not kept")
+            self._say(f"{error}; until then, matches continue but are not kept")
             return
         self._know(records)
         if self._fault:
@@ -341,7 +341,7 @@ def _record(row: _Row, events: list[tuple[int, bytes]]) -> Record:
     name, caller, request_id, digest, state, created, ended, outcome, run, packed = row
     error: BaseException | None = None
     if packed is not None:
-        error = failure_of(packed)[0] or RuntimeError("a match failed in a way nobody foresaw")
+        error = failure_of(packed)[0] or RuntimeError("the match failed with an unexpected error")
     elif state == State.INTERRUPTED:
         error = MatchInterruptedError(INTERRUPTED)
     return Record(

@@ -52,8 +52,8 @@ class Costs:
             raise InvalidInputError(
                 Reason.LIMIT_EXCEEDED,
                 "pipeline.searcher.parameters",
-                f"let {searcher.name!r} weigh {candidates} maps, more than this server's limit of "
-                f"{limit}; set them so that it weighs fewer",
+                f"let {searcher.name!r} evaluate {candidates} object maps, more than this server's "
+                f"limit of {limit}; give values with which it evaluates fewer",
             )
 
     def _check_comparisons(self, directions: int, sketch: Scene, map_: Scene) -> None:
@@ -64,7 +64,7 @@ class Costs:
             raise InvalidInputError(
                 Reason.LIMIT_EXCEEDED,
                 "sketch",
-                f"has {len(sketch)} objects and the map {len(map_)}, which makes {comparisons} "
+                f"has {len(sketch)} objects and the map has {len(map_)}, which makes {comparisons} "
                 f"comparisons in {directions} directions, more than this server's limit of "
                 f"{limit}; leave out small objects or ask for fewer directions",
             )

@@ -238,7 +238,9 @@ def _sources_of_stored(
             return None
         kept = setup.shelf.source(side.stored_scene)
         if kept is None:
-            raise StoreError(f"what {name}.stored_scene was found in cannot be read; put it again")
+            raise StoreError(
+                f"the stored source of {name}.stored_scene cannot be read; store the scene again"
+            )
         return requests.source(kept, name, True, setup.engine.registry.readers)
 
     return source(request.sketch, "sketch"), source(request.map, "map")
@@ -257,7 +259,7 @@ def _stopping(clock: Clock) -> Iterator[None]:
         yield
     except AnswerUnavailableError:
         if clock.curtailed:
-            raise ServerStoppingError("the server stopped before any answer") from None
+            raise ServerStoppingError("the server stopped before there was an answer") from None
         raise
 
 
@@ -329,7 +331,7 @@ def _map_of_sketch(
     match.CopyFrom(request.match)
     try:
         if match.HasField("sketch"):
-            problem = "is set, and a sketch begins empty; set strokes by UpdateSketch"
+            problem = "is set, but a sketch begins empty; add its strokes by UpdateSketch"
             raise InvalidInputError(Reason.INVALID_FIELD, "sketch", problem)
         stroke = match.sketch.stroke_set.strokes.add()
         for x in (0.0, 1.0, 2.0):

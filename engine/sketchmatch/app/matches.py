@@ -105,7 +105,7 @@ class Matches:
             If that cannot be told.
         """
         if not name:
-            problem = "is not set; give the name that the event accepted has"
+            problem = "is not set; give the match_id from the event `accepted`"
             raise InvalidInputError(Reason.MISSING_FIELD, "match_id", problem)
         known = self._live.get(name) or self._recent.get(name)
         if known is not None and _caller(known) == caller:
@@ -115,8 +115,8 @@ class Matches:
             found = await asyncio.to_thread(self._archive.find, caller, name)
         if found is None:
             raise NotFoundError(
-                f"the server keeps no match {quoted(name)} of yours; it has another name, was "
-                "another caller's, or is deleted"
+                f"you have no match {quoted(name)} on this server: it has another name, belongs to "
+                "another caller, or was deleted; list your matches"
             )
         return found
 
@@ -147,7 +147,7 @@ class Matches:
             raise InvalidInputError(
                 Reason.INVALID_FIELD,
                 "request_id",
-                f"{quoted(wish.request_id)} is the name of another request; give each its own",
+                f"{quoted(wish.request_id)} already belongs to another request; give each its own",
             )
         return found
 
@@ -162,7 +162,7 @@ class Matches:
             If that cannot be told.
         """
         if size < 0:
-            problem = f"is {size}; give how many matches to return, or 0"
+            problem = f"is {size}; give a number of matches, or 0 for the default of {_LISTED}"
             raise InvalidInputError(Reason.INVALID_FIELD, "page_size", problem)
         size = min(size or _LISTED, _MOST_LISTED)
         before = _unpacked(token) if token else None
@@ -214,5 +214,5 @@ def _unpacked(token: str) -> tuple[float, str]:
         (created,) = _TOKEN.unpack(place[: _TOKEN.size])
         return created, place[_TOKEN.size :].decode()
     except (binascii.Error, struct.error, ValueError):
-        problem = f"is {quoted(token)}; give the next_page_token of the page before"
+        problem = f"is {quoted(token)}; give the next_page_token of the page before, or none"
         raise InvalidInputError(Reason.INVALID_FIELD, "page_token", problem) from None

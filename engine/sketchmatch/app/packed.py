@@ -53,8 +53,8 @@ class Packed:
             raise InvalidInputError(
                 Reason.INVALID_FIELD,
                 "",
-                "the request cannot be decoded; send the message that the contract names, encoded "
-                "by code that protoc generates from it",
+                "the request cannot be decoded; send the message that the contract has for this "
+                "call, encoded by code that was generated from the .proto files",
             ) from None
 
 
@@ -94,7 +94,7 @@ def inflated(data: bytes, limit: int) -> bytes:
         raise InvalidInputError(
             Reason.MESSAGE_TOO_LARGE,
             "",
-            f"the request has more than {limit} bytes once it is inflated, which is the limit; "
+            f"the request has more than the limit of {limit} bytes when decompressed; "
             "send fewer points or a smaller picture",
         )
     return whole if stream.eof and not stream.unused_data else data

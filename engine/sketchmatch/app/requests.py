@@ -225,7 +225,7 @@ def source(
     """
     kind = message.WhichOneof("kind")
     if kind == "stored_scene":
-        problem = "names what is kept already; give the source itself"
+        problem = "names a scene that is stored already; give the source itself"
         raise InvalidInputError(Reason.INVALID_FIELD, f"{field}.stored_scene", problem)
     if not present or kind is None:
         raise InvalidInputError(Reason.MISSING_FIELD, field, f"is not set; give {_KINDS}")
@@ -459,7 +459,7 @@ def _occupancy_grid(message: source_pb2.OccupancyGrid) -> OccupancyGrid:
         raise InvalidInputError(
             Reason.INVALID_GRID,
             "cells",
-            f"has {len(message.cells)} bytes for {rows} × {columns} cells; give one for each cell",
+            f"has {len(message.cells)} bytes for {rows} × {columns} cells; give one byte a cell",
         )
     cells = np.frombuffer(message.cells, dtype=np.int8).reshape(rows, columns)
     origin = message.origin
@@ -498,5 +498,5 @@ def _check_known(field: str, value: int, kind: EnumDescriptor) -> None:
     """Refuse a value that an enumeration of the contract does not have."""
     if value not in kind.values_by_number:
         names = " or ".join(each.name for each in kind.values if each.number)
-        problem = f"is {value}, which this server's contract does not know; give {names}"
+        problem = f"is {value}, which this server does not know; give {names}"
         raise InvalidInputError(Reason.INVALID_FIELD, field, problem)

@@ -397,7 +397,7 @@ def details(record: Record) -> match_service_pb2.GetMatchResponse:
     return response
 
 
-_UNFORESEEN = "the server failed in a way nobody foresaw"
+_UNFORESEEN = "the server failed with an unexpected error"
 
 
 def _is_ours(error: BaseException) -> bool:

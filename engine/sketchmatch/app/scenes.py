@@ -212,7 +212,7 @@ class SceneArchive:
             for k, (place, label) in enumerate(labels):
                 if place >= len(record.scene.objects):
                     last = len(record.scene.objects) - 1
-                    problem = f"is {place}, which is no object; the scene has objects 0 to {last}"
+                    problem = f"is {place}; give the index of an object, from 0 to {last}"
                     raise InvalidInputError(Reason.INVALID_FIELD, f"labels[{k}].object", problem)
                 record.scene.objects[place].label = cleaned_label(label)
             wanted = _labels_of(record)
@@ -233,7 +233,10 @@ class SceneArchive:
             If there is no such part.
         """
         if not 0 <= page_size <= _LONGEST_PAGE:
-            problem = f"is {page_size}; give a number up to {_LONGEST_PAGE}, or 0 for {_PAGE}"
+            problem = (
+                f"is {page_size}; give a number of scenes up to {_LONGEST_PAGE}, "
+                f"or 0 for the default of {_PAGE}"
+            )
             raise InvalidInputError(Reason.INVALID_FIELD, "page_size", problem)
         size, (before, last) = page_size or _PAGE, _place(page_token)
 
@@ -337,8 +340,8 @@ def _own(connection: sqlite3.Connection, name: str, caller: str, most: int | Non
     new = made.rowcount > 0
     if new and most is not None and (kept := _kept_bytes(connection, caller)) > most:
         raise QuotaError(
-            f"with this scene you would keep {kept / _MIB:.3g} MiB here, and {most / _MIB:.3g} MiB "
-            "are the limit for each caller; delete scenes that you do not need"
+            f"with this scene you would store {kept / _MIB:.3g} MiB, and the limit for each caller "
+            f"is {most / _MIB:.3g} MiB; delete scenes that you do not need"
         )
     return new
 
@@ -401,6 +404,6 @@ def _place(page_token: str) -> tuple[int, str]:
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             "page_token",
-            f"is {quoted(page_token)}; give the next_page_token of the response before, or none",
+            f"is {quoted(page_token)}; give the next_page_token of the page before, or none",
         )
     return min(int(time_), 2**63 - 1), name

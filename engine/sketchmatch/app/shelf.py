@@ -99,7 +99,7 @@ def cleaned_title(given: str) -> str:
     """
     title = cleaned_label(given)
     if len(title) > _LONGEST_TITLE:
-        problem = f"has {len(title)} characters; give up to {_LONGEST_TITLE}"
+        problem = f"has {len(title)} characters; give at most {_LONGEST_TITLE}"
         raise InvalidInputError(Reason.INVALID_FIELD, "title", problem)
     return title
 
@@ -122,7 +122,7 @@ def segmentation(record: StoredScene) -> Segmentation:
 def without_store(field: str) -> StoreError:
     """Return what there is to say of a stored scene where none is kept."""
     return StoreError(
-        f"{field} needs a store, and this server keeps nothing; start it with one, or send the "
+        f"{field} needs a store, but this server keeps nothing; start it with a store, or send the "
         "source itself"
     )
 
@@ -283,8 +283,8 @@ def not_kept(name: str, field: str) -> NotFoundError:
     """Return what there is to say where a caller has put no scene of a name."""
     shown = name if _A_NAME.fullmatch(name) else quoted(name)
     return NotFoundError(
-        f"{field} is {shown[:_NAMED]}, and you keep no scene of this name here; put it, or "
-        "list those there are"
+        f"{field} is {shown[:_NAMED]}, but you have stored no scene of this name on this server; "
+        "store it first, or list your scenes"
     )
 
 

@@ -168,8 +168,8 @@ class _Sketch:
             raise InvalidInputError(
                 Reason.INVALID_FIELD,
                 "restore_revision",
-                f"is {revision}, which is {'no longer kept' if forgotten else 'yet to be made'}; "
-                f"give one from {oldest} to {self.revision}",
+                f"is {revision}, which {'is no longer kept' if forgotten else 'does not exist yet'}"
+                f"; give a revision from {oldest} to {self.revision}",
             )
         return self._states[revision]
 
@@ -294,7 +294,8 @@ class Sketches:
                 self._end(
                     name,
                     NotFoundError(
-                        f"nobody drew or watched the sketch for {seconds}; create another"
+                        f"the sketch was deleted because nobody drew or watched it for {seconds}; "
+                        "create another"
                     ),
                 )
 
@@ -315,7 +316,7 @@ class Sketches:
         if len(theirs) >= self._limits.of_one:
             self._drop_one(theirs)
         if len(self._all) >= self._limits.sketches:
-            raise TooBusyError(f"the server has {_in_progress(self._all)}, the limit")
+            raise TooBusyError(f"the server has {_in_progress(self._all)}, which is its limit")
 
     def _drop_one(self, theirs: dict[str, _Sketch]) -> None:
         """End the sketch that nobody drew or watched for longest, if that is long enough.
@@ -325,32 +326,33 @@ class Sketches:
         idle = {name: each.touched for name, each in theirs.items() if not each.watchers}
         if not idle:
             raise TooBusyError(
-                f"you have {_in_progress(theirs)}, the limit, and watch all; delete one"
+                f"you have {_in_progress(theirs)}, which is the limit for each caller, and watch "
+                "all of them; delete one"
             )
         name = min(idle, key=idle.__getitem__)
         seconds = time.monotonic() - idle[name]
         if seconds < _SPARED:
             raise TooBusyError(
-                f"you have {_in_progress(theirs)}, the limit; delete one",
+                f"you have {_in_progress(theirs)}, which is the limit for each caller; delete one",
                 max(1, math.ceil(_SPARED - seconds)),
             )
         self._end(
             name,
             NotFoundError(
-                f"nobody drew or watched the sketch for {seconds:.0f} s, and its creator began "
-                "more than the limit; create another"
+                f"the sketch was deleted because nobody drew or watched it for {seconds:.0f} s and "
+                "its creator began another one at the limit; create another"
             ),
         )
 
     def _sketch(self, name: str, caller: Caller) -> _Sketch:
         """Return a sketch of a caller."""
         if not name:
-            problem = "is not set; give what CreateSketch returned"
+            problem = "is not set; give the sketch_id that CreateSketch returned"
             raise InvalidInputError(Reason.MISSING_FIELD, "sketch_id", problem)
         sketch = self._all.get(name)
         if sketch is None or sketch.caller.known != caller.known:
             raise NotFoundError(
-                f"sketch_id is {quoted(name)}, and you have no sketch of this name, or no more; "
+                f"sketch_id is {quoted(name)}, but you have no sketch of this name, or no longer; "
                 "create one"
             )
         sketch.touched = time.monotonic()
@@ -363,14 +365,14 @@ class Sketches:
                 raise InvalidInputError(
                     Reason.INVALID_FIELD,
                     f"erase_strokes[{k}]",
-                    f"is {quoted(name)}, which is no stroke of the sketch; name one that is",
+                    f"is {quoted(name)}, which is not a stroke of the sketch; name one that is",
                 )
         for k, each in enumerate(request.set_strokes):
             if not 1 <= len(each.stroke_id) <= _LONGEST_NAME:
                 raise InvalidInputError(
                     Reason.INVALID_FIELD,
                     f"set_strokes[{k}].stroke_id",
-                    f"has {len(each.stroke_id)} characters; give a name of 1 to {_LONGEST_NAME}",
+                    f"has {len(each.stroke_id)} characters; give 1 to {_LONGEST_NAME} characters",
                 )
             _check_points(each.stroke, f"set_strokes[{k}].stroke")
             strokes[each.stroke_id] = _apart(each.stroke)
@@ -397,7 +399,7 @@ class Sketches:
                     return
                 except Exception as error:
                     if not isinstance(error, SketchmatchError):
-                        _log.exception("a sketch failed")
+                        _log.exception("a sketch in progress failed")
                     sketch.board.put("outcome", _problem_event(revision, error))
                 sketch.done = revision
             else:
@@ -529,7 +531,8 @@ def _map_event(record: StoredScene) -> WatchSketchResponse:
 
 
 def _problem_event(revision: int, error: Exception) -> WatchSketchResponse:
-    problem = SketchProblem(message="the server failed in a way nobody foresaw; its log has more")
+    unexpected = "the server failed with an unexpected error; its log has the details"
+    problem = SketchProblem(message=unexpected)
     if isinstance(error, SketchmatchError):
         problem = SketchProblem(
             reason=getattr(error, "reason", ""),
@@ -543,7 +546,7 @@ def _too_large(field_: str, count: int, what: str, most: int) -> InvalidInputErr
     return InvalidInputError(
         Reason.LIMIT_EXCEEDED,
         field_,
-        f"makes {count} {what}, more than the limit of {most}; erase some, or draw with fewer",
+        f"makes {count} {what} in all, more than the limit of {most}; erase some, or draw fewer",
     )
 
 

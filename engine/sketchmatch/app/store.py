@@ -158,7 +158,8 @@ class Database(_File):
         (found,) = connection.execute("PRAGMA user_version").fetchone()
         if found not in (0, self._version):
             raise StoreError(
-                f"the store's file {self.path} is of another version of sketchmatch; move it away"
+                f"the store's file {self.path} was written by another version of sketchmatch; "
+                "move it away"
             )
         if not found:
             connection.executescript(
@@ -245,13 +246,13 @@ def _said(path: Path, error: sqlite3.Error) -> StoreError:
     """Return what is wrong with a file, in a sentence."""
     code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
     if code in _FULL and _free_bytes(path) < _LEAST_FREE:
-        fault = "cannot grow: its disk is full; make room there"
+        fault = "cannot grow because its disk is full; free some space"
     elif code in _FULL:
-        fault = "is full; delete what is not needed, or allow it more bytes"
+        fault = "is full; delete what is not needed, or raise its size limit"
     elif code in _DAMAGED:
-        fault = "is damaged; move it away, and another is made"
+        fault = "is damaged; move it away, and the server makes a new one"
     elif code in _TAKEN:
-        fault = "is in use by another process; end that"
+        fault = "is in use by another process; end that process"
     else:
-        fault = f"cannot be used ({error}); see to its folder and disk"
+        fault = f"cannot be used ({error}); check its folder and its disk"
     return StoreError(f"the store's file {path} {fault}")

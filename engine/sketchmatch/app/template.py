@@ -42,7 +42,9 @@ def _load() -> None:
     except _NotCompiledError:
         return
     except Exception:
-        logging.getLogger(__name__).exception("workers will load what they need themselves")
+        logging.getLogger(__name__).exception(
+            "loading ahead for all workers failed; each worker loads what it needs itself"
+        )
 
 
 def _rehearse(registry: Registry) -> None:

@@ -39,9 +39,9 @@ def read_whole(read: Callable[[bytes], Message], data: bytes) -> Message:
     raise InvalidInputError(
         Reason.INVALID_FIELD,
         path,
-        f"{'' if path else f'the {name} '}has a field with the number {number}, which this "
-        "server's contract does not know; leave it out, write it as the .proto files name it, or "
-        "ask a newer server",
+        f"{'' if path else f'the {name} '}has a field with the number {number}, which is not in "
+        "this server's contract; leave it out, write its name as in the .proto files, or use a "
+        "newer server",
     )
 
 

@@ -66,7 +66,7 @@ _COMPILING = 2
 _GIVES_WAY = 10
 _NAMED = 5
 _TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
-_REMEDY = "tell its author or choose another"
+_REMEDY = "report it to its author, or choose another"
 _Key = frozenset[tuple[str, str]]
 """Distributions, with their versions, whose algorithms a worker loads beside the engine's own."""
 _Strangers = tuple[Registered | RegisteredReader, ...]
@@ -300,19 +300,20 @@ class _Worker(asyncio.Protocol):
             If it does not get ready.
         """
         if self._killed:
-            raise self._blame("was not wanted any more")
+            raise self._blame("was no longer needed")
         ours, theirs = socket.socketpair()
         try:
             with theirs:
                 await asyncio.to_thread(self._fork, theirs)
         except (OSError, EOFError) as error:
             ours.close()
-            raise WorkerLostError(f"no worker could be started ({_said(error)})") from error
+            problem = f"a worker process could not be started ({_said(error)})"
+            raise WorkerLostError(problem) from error
         loop = asyncio.get_running_loop()
         self._transport, _ = await loop.create_connection(lambda: self, sock=ours)
         if self._killed:
             self._transport.abort()
-            raise self._blame("was not wanted any more")
+            raise self._blame("was no longer needed")
         self._set_up(setup, backwards)
         self._heard = time.monotonic()
         patience = _STARTING + (setup.isolation.patience if self._strangers else 0.0)
@@ -422,7 +423,7 @@ class _Worker(asyncio.Protocol):
             ending = "before it began"
         verdict = self._verdict or self._blame(f"ended its process ({ending})")
         if not (self._killed or self._strangers):
-            _log.error("a worker process ended by itself (%s)", ending)
+            _log.error("a worker process ended unexpectedly (%s)", ending)
         if self._next is not None and not self._next.done():
             self._next.set_exception(verdict)
         return verdict
@@ -473,7 +474,7 @@ class _Worker(asyncio.Protocol):
             self._step_forward()
         if self._threads:
             _log.warning(
-                "%s left threads running (%s), so the process was ended; %s",
+                "%s left threads running (%s), so its process was ended; %s",
                 _culprits(self._strangers),
                 self._threads,
                 _REMEDY,

@@ -86,8 +86,8 @@ class blaming:  # noqa: N801
         if told is not None:
             raise told from None
         raise PluginError(
-            f"{self._registry.whose(self._algorithm)} failed ({words_of(error)}); tell its author "
-            "or choose another"
+            f"{self._registry.whose(self._algorithm)} failed ({words_of(error)}); report it to its "
+            "author, or choose another"
         ) from error
 
 

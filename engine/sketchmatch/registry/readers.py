@@ -57,7 +57,7 @@ class RegisteredReader:
         return source
 
     def _failure(self, cause: str) -> PluginError:
-        return PluginError(f"{self.origin} failed ({cause}); tell its author")
+        return PluginError(f"{self.origin} failed ({cause}); report it to its author")
 
 
 def reader_by_name(readers: Iterable[RegisteredReader], name: str) -> RegisteredReader | None:

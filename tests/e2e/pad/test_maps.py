@@ -82,7 +82,7 @@ def test_what_is_wrong_with_the_servers_store_is_said_where_its_maps_would_be(vi
     with serving_pad("--store", str(store)) as (_, url):
         page = visit(url)
         page.get_by_test_id("open-places").click()
-        page.get_by_test_id("store-trouble").get_by_text("of another version").wait_for()
+        page.get_by_test_id("store-trouble").get_by_text("by another version").wait_for()
         page.get_by_test_id("place-kitchen").click()
         kitchen_drawn(page)
 
