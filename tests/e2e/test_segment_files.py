@@ -40,7 +40,7 @@ def test_what_was_found_is_saved_to_the_last_digit(command_line, where, tmp_path
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("scene.json", "let its name end in .geojson"), ("no/s.geojson", "there is no folder")],
+    [("scene.json", "give a name that ends in .geojson"), ("no/s.geojson", "there is no folder")],
 )
 def test_other_endings_are_refused_before_the_work_starts(
     command_line, where, tmp_path, name, words
@@ -198,9 +198,9 @@ def test_a_fault_in_a_file_of_another_tool_begins_with_its_path(command_line, wh
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("a.json", "is JSON, an object with 'walls', which nothing here reads; known are strokes"),
-        ("a.dwg", "is of no known kind; give a file that ends in one of .bag "),
-        ("a.json#x", "is JSON, an object with 'walls'"),
+        ("a.json", "is JSON of an unknown kind (an object with 'walls'); known are strokes"),
+        ("a.dwg", "is of an unknown kind; give a file whose name ends in one of .bag "),
+        ("a.json#x", "is JSON of an unknown kind (an object with 'walls'"),
     ],
 )
 def test_of_a_file_that_nobody_reads_it_is_said_what_was_seen(
@@ -220,7 +220,7 @@ def test_what_a_file_leaves_out_is_told(command_line, where, tmp_path):
     file.write_text("\n".join(json.dumps(each) for each in (*polygons, nowhere)))
     done = command_line("segment", file, *where)
     assert done.returncode == 0
-    assert "[2] is without a place: left out." in done.stderr
+    assert "[2] was left out: it has no place." in done.stderr
 
 
 def test_a_map_is_mended_in_the_file_that_was_saved_beside_it(command_line, where, tmp_path):
@@ -235,7 +235,7 @@ def test_a_map_is_mended_in_the_file_that_was_saved_beside_it(command_line, wher
     done = command_line("segment", room, *where)
     rows = [line.split("\t") for line in done.stdout.splitlines()[1:]]
     assert (len(rows), rows[0][1]) == (6, "mended")
-    assert "objects are those of living_room.objects.geojson beside the map" in done.stderr
+    assert "the objects are from living_room.objects.geojson beside the map" in done.stderr
     anew = command_line("segment", room, "--segmenter", "occupancy-grid", *where)
     assert len(anew.stdout.splitlines()) == 9
     document["features"][0]["geometry"]["coordinates"] = [[[0, 0], [1, 1], [1, 0], [0, 1]]]

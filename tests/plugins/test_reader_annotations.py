@@ -121,7 +121,9 @@ def test_a_fault_of_labelme_is_named_with_its_path(given, words):
 
 
 def test_a_kind_without_parts_has_none_to_choose():
-    with pytest.raises(InvalidInputError, match="has no part 'x', nor any other; leave out"):
+    with pytest.raises(
+        InvalidInputError, match="has no parts of which 'x' could be one; leave out"
+    ):
         labelme(part="x")
 
 

@@ -94,10 +94,10 @@ def test_a_topic_is_named_by_the_part_and_of_several_a_warning_tells(client, tmp
     first = client.segment(sources.file(bag))
     assert np.array(corners(chosen.scene)) == pytest.approx(np.array(CORNERS), abs=0.051)
     assert corners(first.scene) != corners(chosen.scene)
-    said = "the map is that of the topic /a/map; there are others: /b/map"
+    said = "the map was read from the topic /a/map; other topics: /b/map"
     assert [said in warning for warning in first.warnings] == [True]
     with pytest.raises(
-        InvalidRequestError, match=r"^source\.file has no maps in /c; choose one of"
+        InvalidRequestError, match=r"^source\.file has no topic /c with maps; choose one of"
     ):
         client.segment(sources.file(bag, part="/c"))
 
@@ -105,14 +105,14 @@ def test_a_topic_is_named_by_the_part_and_of_several_a_warning_tells(client, tmp
 @pytest.mark.parametrize(
     ("name", "data", "sentence"),
     [
-        ("a.bag", b"", r"source\.file is no ROS bag, or a damaged one \(File '.bag' seems to be"),
-        ("a.mcap", b"\x89MCAP0\r\n", r"source\.file is no ROS bag, or a damaged one \("),
+        ("a.bag", b"", r"source\.file is not a ROS bag, or is damaged \(File '.bag' seems to be"),
+        ("a.mcap", b"\x89MCAP0\r\n", r"source\.file is not a ROS bag, or is damaged \("),
         (
             "a.db3",
             b"SQLite format 3",
-            r"source\.file is no ROS bag, or a damaged one \(file is not",
+            r"source\.file is not a ROS bag, or is damaged \(file is not",
         ),
-        ("metadata.yaml", b"rosbag2:", r"source\.file is a map, or a bag, that is more than one"),
+        ("metadata.yaml", b"rosbag2:", r"source\.file is the YAML of a map or a bag"),
     ],
 )
 def test_what_is_no_bag_is_refused_in_one_sentence(client, name, data, sentence):

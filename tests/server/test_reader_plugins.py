@@ -78,13 +78,13 @@ def test_a_server_matches_it_and_another_segmenter_can_be_chosen(client, file):
 def test_a_fault_of_the_file_has_its_path_in_the_request(client, file):
     with pytest.raises(InvalidRequestError, match=r"^source\.file\.shelves is empty; give some"):
         client.segment(sources.file(file.read_bytes(), name="x.json", part="none"))
-    with pytest.raises(InvalidRequestError, match=r"source\.file is of no known kind; give a file"):
-        client.segment(sources.file(b"?", name="x.unknown"))
-    with pytest.raises(InvalidRequestError, match=r"map\.file is of no known kind; give a file"):
-        client.match(sources.file(file), sources.file(b"?", name="x.unknown"))
     with pytest.raises(
-        InvalidRequestError, match=r"source\.file is a map, or a bag, that is more than one file"
+        InvalidRequestError, match=r"source\.file is of an unknown kind; give a file"
     ):
+        client.segment(sources.file(b"?", name="x.unknown"))
+    with pytest.raises(InvalidRequestError, match=r"map\.file is of an unknown kind; give a file"):
+        client.match(sources.file(file), sources.file(b"?", name="x.unknown"))
+    with pytest.raises(InvalidRequestError, match=r"source\.file is the YAML of a map or a bag"):
         client.segment(sources.file(b"image: x.pgm", name="room.yaml"))
     with pytest.raises(InvalidRequestError, match=r"source\.file\.data "):
         client.segment(sources.file(b"P5\n9 9\n255\n" + bytes([254] * 81), name="white.pgm"))

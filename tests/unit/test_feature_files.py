@@ -188,7 +188,9 @@ def test_longitudes_and_latitudes_of_features_are_metres_where_those_of_their_ma
     zone, dock = found.features
     assert zone.points == pytest.approx(ZONE, abs=1e-6)
     assert dock.points == pytest.approx(np.array([[-4.0, 7.5]]), abs=1e-6)
-    assert found.notes == ("The coordinates are longitudes and latitudes: turned into metres.",)
+    assert found.notes == (
+        "The coordinates are longitudes and latitudes, and were turned into metres.",
+    )
 
 
 @pytest.mark.parametrize(

@@ -228,7 +228,7 @@ def test_warnings_are_sentences_that_somebody_can_read():
         segmented(Segmentation(SCENE, "oops"))
     warnings = segmented(Segmentation(SCENE, ("w\ud800\x1b[2J" * 99_999,) * 300_000)).warnings
     assert len(warnings) == 1001
-    assert warnings[-1] == "299000 more are left out."
+    assert warnings[-1] == "299000 more notes are left out."
     assert max(map(len, warnings)) <= 1001
     assert "\x1b" not in warnings[0]
 

@@ -16,9 +16,9 @@ from tests.tools import ROOT
 CASES = ROOT.parent / "shared" / "data" / "cases"
 NAMES = ("desk", "shelf", "bed", "lamp", "table")
 ODD = "left side red [bold]x[/bold]"
-LEFT_OUT = "features[5].geometry is {}, which encloses no area: left out."
-NOWHERE = "features[5]{} is without a place: left out."
-METRES = "The coordinates are longitudes and latitudes: turned into metres."
+LEFT_OUT = "features[5].geometry was left out: {} enclose no area."
+NOWHERE = "features[5]{} was left out: it has no place."
+METRES = "The coordinates are longitudes and latitudes, and were turned into metres."
 READ = {
     # RFC 7946, 3.1.1: a third element is the height; further ones may be ignored.
     "3d": (NAMES, ()),
@@ -26,7 +26,7 @@ READ = {
     # 3.1.6: a linear ring is a closed LineString with four or more positions.
     "closed-line": (
         NAMES,
-        ("features[4].geometry is a closed line: taken as the outline of an object.",),
+        ("features[4].geometry is a closed line, taken as the outline of an object.",),
     ),
     "contains": ((*NAMES, "room"), ()),
     "crlf-bom": (NAMES, ()),
@@ -42,7 +42,7 @@ READ = {
     # 3.2: a feature's id is its commonly used identifier.
     "id-label": (NAMES, ()),
     "label-multiline": (tuple(f"{name} {ODD}" for name in NAMES), ()),
-    "line-too": (NAMES, (LEFT_OUT.format("an open line"),)),
+    "line-too": (NAMES, (LEFT_OUT.format("open lines"),)),
     # 4: coordinates are longitude and latitude, in degrees.
     "lonlat": (NAMES, (METRES,)),
     "multi": ((*NAMES[:3], "pair", "pair"), ()),
@@ -54,7 +54,7 @@ READ = {
     "null-geometry": (NAMES, (NOWHERE.format(""),)),
     "overlap": ((*NAMES, "rug"), ()),
     "plain": (NAMES, ()),
-    "point-too": (NAMES, (LEFT_OUT.format("a point"),)),
+    "point-too": (NAMES, (LEFT_OUT.format("points"),)),
     # RFC 8142: texts after record separators.
     "rs-seq": (NAMES, ()),
     "same-twice": ((*NAMES, "desk"), ()),
@@ -70,7 +70,7 @@ REFUSED = {
     "spike": "polygons[4] crosses itself at (",
     # RFC 7946, 3.1.1: a position is an array of numbers.
     "string-coords": 'coordinates[0][0][0] is "0"; give a finite number',
-    "topojson": "an object with 'type', 'arcs', 'objects' and type 'Topology', which nothing",
+    "topojson": "an object with 'type', 'arcs', 'objects' and type 'Topology')",
     "touch-self": "polygons[4] crosses itself at (3.45, 2.6)",
     # 3.1.6: a linear ring has four or more positions.
     "zero-area": "polygons[5].rings[0] has 2 distinct points; a ring needs at least three",
@@ -92,14 +92,14 @@ WRONG_STROKES = {
     "nan": "strokes[0].points[2][0] is NaN; give a finite number",
     "null": "strokes[0].points[2][0] is missing; give a finite number",
     # Which way y grows is not said, so that either reading could be the mirror image.
-    "list": "is JSON, a list of 5, the first an object with 'points', 'label', which nothing here",
+    "list": "is JSON of an unknown kind (a list of 5, the first an object with 'points', 'label')",
     "null-stroke": 'strokes[5] is missing; give an object with "points"',
     "pressure4": "strokes[0].points[0] is a list of 4; give [x, y] or [x, y, seconds]",
     "trailing-comma": "is not JSON (",
     "utf16": "is not UTF-8 text; save it as UTF-8",
     "xy-objects": "strokes[0].points[0] is an object; give [x, y] or [x, y, seconds]",
     "y-axis-caps": 'y_axis is "Down"; give "up" or "down"',
-    "yAxis": "'yAxis' is no key that is read; write \"y_axis\", or leave it out",
+    "yAxis": "'yAxis' is not a key that is read; write \"y_axis\", or leave it out",
 }
 # What other tests look at, or those of the segmenter of strokes: taps and empty sketches.
 ELSEWHERE = {"dot", "dot5", "empty-stroke", "excalidraw", "gc-collide"}
@@ -173,5 +173,5 @@ def test_where_too_little_is_left_the_refusal_says_what_was_left_out():
         segment(decode_geojson(json.dumps(line)), PolygonSegmenter(), default_registry(), "map")
     assert str(caught.value) == (
         "map.polygons holds no polygon; a match compares relations between objects, so give at "
-        "least two (The whole is an open line, which encloses no area: left out.)"
+        "least two (The geometry was left out: open lines enclose no area.)"
     )

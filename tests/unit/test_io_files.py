@@ -37,7 +37,7 @@ def test_an_unknown_kind_lists_the_known_ones(tmp_path, name):
     (tmp_path / name).write_text("?")
     error = refused(tmp_path / name)
     assert error.reason == Reason.INVALID_FILE
-    assert "is of no known kind; give a file that ends in one of .bag .bmp" in error.problem
+    assert "is of an unknown kind; give a file whose name ends in one of .bag .bmp" in error.problem
 
 
 def test_a_path_that_the_system_refuses_is_named():
@@ -47,7 +47,7 @@ def test_a_path_that_the_system_refuses_is_named():
 @pytest.mark.parametrize("name", ["/dev/zero", "/dev/null"])
 def test_a_device_is_not_read(tmp_path, name):
     (tmp_path / "endless.png").symlink_to(name)
-    assert "is no plain file" in refused(tmp_path / "endless.png").problem
+    assert "is not a regular file" in refused(tmp_path / "endless.png").problem
 
 
 def test_a_path_with_a_null_is_named():
@@ -73,7 +73,7 @@ def test_a_part_follows_the_name_of_a_file_that_is_there(tmp_path):
 def test_a_file_without_parts_has_none_to_choose(tmp_path, name):
     (tmp_path / name).write_text('{"strokes": []}')
     assert (
-        "has no part 'x', nor any other; leave out what follows '#'"
+        "has no parts of which 'x' could be one; leave out '#'"
         in refused(tmp_path / f"{name}#x").problem
     )
 
@@ -81,14 +81,14 @@ def test_a_file_without_parts_has_none_to_choose(tmp_path, name):
 @pytest.mark.parametrize(
     ("text", "seen"),
     [
-        ("{}", "is JSON, an empty object, which nothing here reads; known are strokes as"),
-        ('{"b": 1, "a": 2}', "is JSON, an object with 'b', 'a', which nothing here reads"),
-        ('{"type": "Topology", "arcs": []}', "with 'type', 'arcs' and type 'Topology', which"),
-        ("[]", "is JSON, a list of 0, which"),
-        ("[[1]]", "is JSON, a list of 1, which"),
-        ('[{"x": 1}, 2]', "is JSON, a list of 2, the first an object with 'x', which"),
-        ("3", "is JSON, 3, which"),
-        ('"\\ud800"', "is JSON, '\\ud800', which"),
+        ("{}", "is JSON of an unknown kind (an empty object); known are strokes as"),
+        ('{"b": 1, "a": 2}', "is JSON of an unknown kind (an object with 'b', 'a')"),
+        ('{"type": "Topology", "arcs": []}', "with 'type', 'arcs' and type 'Topology');"),
+        ("[]", "is JSON of an unknown kind (a list of 0);"),
+        ("[[1]]", "is JSON of an unknown kind (a list of 1);"),
+        ('[{"x": 1}, 2]', "of an unknown kind (a list of 2, the first an object with 'x');"),
+        ("3", "is JSON of an unknown kind (3);"),
+        ('"\\ud800"', "is JSON of an unknown kind ('\\ud800');"),
     ],
 )
 def test_of_json_of_no_known_kind_it_is_said_what_was_seen_and_what_is_known(tmp_path, text, seen):
@@ -101,7 +101,7 @@ def test_of_json_of_no_known_kind_it_is_said_what_was_seen_and_what_is_known(tmp
 def test_many_keys_are_not_all_shown(tmp_path):
     (tmp_path / "x.json").write_text(json.dumps({f"key {k}": 0 for k in range(50)}))
     problem = refused(tmp_path / "x.json").problem
-    assert "'key 5' and 44 more, which" in problem
+    assert "'key 5' and 44 more); known are" in problem
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_what_a_plugin_may_read_is_not_read_here(tmp_path, name, text):
         ("none.json", "does not exist"),
         ("none.svg", "does not exist"),
         ("bad.json", "strokes[0].points[1][1] is missing"),
-        ("good.json#x", "has no part 'x', nor any other"),
+        ("good.json#x", "has no parts of which 'x' could be one"),
     ],
 )
 def test_what_is_read_here_is_refused_as_by_the_one_door(tmp_path, name, problem):

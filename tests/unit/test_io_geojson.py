@@ -122,7 +122,7 @@ def test_features_without_a_place_are_left_out_with_a_note():
     nowhere = [None, {"type": "MultiPolygon", "coordinates": []}]
     found = decode_geojson(json.dumps(features(polygon(), *nowhere, polygon())))
     assert len(found.polygons) == 2
-    assert found.notes == ("features[1] and 1 more are without a place: left out.",)
+    assert found.notes == ("features[1] and 1 more were left out: they have no place.",)
 
 
 def test_points_and_open_lines_are_left_out_and_closed_lines_are_outlines():
@@ -139,9 +139,9 @@ def test_points_and_open_lines_are_left_out_and_closed_lines_are_outlines():
     )
     assert [item.rings[0].tolist() for item in found.polygons] == [SQUARE[0], SQUARE[0]]
     assert found.notes == (
-        "features[1].geometry is a point, which encloses no area: left out.",
-        "features[2].geometry and 1 more are an open line, which encloses no area: left out.",
-        "features[3].geometry is a closed line: taken as the outline of an object.",
+        "features[1].geometry was left out: points enclose no area.",
+        "features[2].geometry and 1 more were left out: open lines enclose no area.",
+        "features[3].geometry is a closed line, taken as the outline of an object.",
     )
 
 
@@ -182,7 +182,9 @@ def test_a_fault_in_one_of_several_texts_is_found_in_that_one():
 def test_degrees_become_metres_where_they_are_meant():
     corners = [[11.0, 60.0], [11.0001, 60.0], [11.0001, 60.0001], [11.0, 60.0001]]
     found = decode_geojson(json.dumps(polygon([corners])))
-    assert found.notes == ("The coordinates are longitudes and latitudes: turned into metres.",)
+    assert found.notes == (
+        "The coordinates are longitudes and latitudes, and were turned into metres.",
+    )
     (ring,), middle = found.polygons[0].rings, found.geographic_origin
     assert from_metres(ring, middle) == pytest.approx(np.array(corners), abs=1e-12)
     # 1e-4 degrees of a great circle of 40 030 km; half of it along the parallel of 60°.
@@ -266,7 +268,7 @@ def test_of_a_building_of_several_levels_one_is_chosen():
     assert polygons_of(building(unit(0, level=1), unit(2))).notes == ()
     with pytest.raises(InvalidInputError, match=r"no level '9'; choose one of '0', '1', 'roof'"):
         polygons_of(house, "9")
-    with pytest.raises(InvalidInputError, match="has no part '1', nor any other"):
+    with pytest.raises(InvalidInputError, match="has no parts of which '1' could be one"):
         polygons_of(building(unit(0)), "1")
 
 

@@ -47,8 +47,8 @@ def test_of_several_pages_or_frames_the_first_is_read_and_this_is_said(kind, mod
     assert (several.pixels == alone.pixels).all()
     assert alone.notes == ()
     assert several.notes == (
-        "Of the file's several pages or frames the first alone was read: save another by itself "
-        "to have that one.",
+        "The file has several pages or frames, of which only the first was read: save another "
+        "one as a file of its own to use it.",
     )
 
 

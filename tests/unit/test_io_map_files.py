@@ -93,7 +93,7 @@ def test_a_picture_of_another_machine_is_found_beside_the_yaml_and_said(name):
     note = f"the map's image {ELSEWHERE[name]} does not exist, and m.pgm beside {path.name}"
     grid = read_source(path)
     assert grid.cells.shape == (190, 215)
-    assert grid.notes == (f"{note} was taken",)
+    assert grid.notes == (f"{note} was used",)
 
 
 def test_a_picture_at_its_place_comes_before_one_beside_the_yaml(tmp_path):
@@ -190,7 +190,7 @@ def test_an_image_that_stands_twice_is_noted(tmp_path):
     path = write(tmp_path)
     path.write_text(path.read_text() + "image: other.pgm\n", encoding="utf-8")
     (note,) = read_source(path).notes
-    assert note == "image stands in office.yaml twice, and the first, office.pgm, counts"
+    assert note == "office.yaml has image twice, and the first, office.pgm, was used"
 
 
 def test_the_folder_of_a_map_is_read_as_the_map(tmp_path):

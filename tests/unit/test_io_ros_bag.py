@@ -52,7 +52,7 @@ def test_the_last_map_is_taken_with_its_pose_and_the_resolution_that_was_meant(t
 def test_an_orientation_of_nan_is_none_and_noted(tmp_path, kind):
     found = read_source(write(tmp_path, kind, ("/map", CELLS, math.nan)))
     assert found.origin == (1.0, -2.0, 0.0)
-    assert found.notes == ("the orientation of the map's origin is not finite, read as none",)
+    assert found.notes == ("the orientation of the map's origin is not finite and was read as 0",)
 
 
 @pytest.mark.parametrize("part", "xyzw")
@@ -86,7 +86,7 @@ def test_a_bag_without_a_map_is_refused(tmp_path):
 def test_a_damaged_bag_is_refused_or_read(tmp_path, kind, keep):
     path = file_of(write(tmp_path, kind, ("/map", CELLS, 0.0)))
     path.write_bytes(path.read_bytes()[:keep])
-    assert "damaged one" in refused(path).problem
+    assert "or is damaged" in refused(path).problem
 
 
 def test_a_missing_bag_is_named(tmp_path):
@@ -106,7 +106,7 @@ def test_a_grid_of_wrong_size_is_refused(tmp_path):
         shape = (4, 3)
 
     error = refused(write(tmp_path, MCAP, ("/map", CELLS.view(Flat), 0.0)))
-    assert "has a map of 6 cells for 4 × 3" in error.problem
+    assert "has a map of 4 × 3 cells with data for 6" in error.problem
 
 
 def test_without_the_package_a_sentence_says_what_to_install(tmp_path, monkeypatch):
@@ -118,7 +118,7 @@ def test_without_the_package_a_sentence_says_what_to_install(tmp_path, monkeypat
 def test_of_several_topics_the_first_by_name_is_taken_and_the_others_are_named(tmp_path):
     topics = ("/robot2/map", "/costmap", "/robot1/map")
     found = read_source(write(tmp_path, MCAP, *((topic, CELLS, 0.0) for topic in topics)))
-    said = "the map is that of the topic /costmap; there are others: /robot1/map, /robot2/map"
+    said = "the map was read from the topic /costmap; other topics: /robot1/map, /robot2/map"
     assert found.notes == (said,)
 
 
@@ -137,7 +137,9 @@ def test_a_bag_of_bytes_is_read_as_its_file_is(tmp_path, kind):
     assert (from_bytes.cells == from_path.cells).all()
     assert (from_bytes.resolution, from_bytes.origin) == (from_path.resolution, from_path.origin)
     assert (decoded(path, "/other").cells == 0).all()
-    with pytest.raises(InvalidInputError, match=r"no maps in /none; choose one of: /map, /other$"):
+    with pytest.raises(
+        InvalidInputError, match=r"no topic /none with maps; choose one of: /map, /other$"
+    ):
         decoded(path, "/none")
 
 
@@ -179,7 +181,7 @@ def test_what_is_packed_and_cut_is_refused(tmp_path, packing):
         {"bz2": b"BZh", "lz4": b"\x04\x22\x4d\x18", "zstd": b"\x28\xb5\x2f\xfd"}[packing]
     )
     data[begin + 20 : begin + 40] = bytes(20)
-    with pytest.raises(InvalidInputError, match="damaged one"):
+    with pytest.raises(InvalidInputError, match="or is damaged"):
         decoded(path, data=bytes(data))
 
 
@@ -213,7 +215,7 @@ FOREVER = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELEC
 def test_a_database_of_a_stranger_computes_nothing(tmp_path, statements):
     path = file_of(write(tmp_path, SQLITE, ("/map", CELLS, 0.0)))
     data = database(path, *statements)
-    with pytest.raises(InvalidInputError, match=r"a damaged one|no topic|no message"):
+    with pytest.raises(InvalidInputError, match=r"or is damaged|no topic|no message"):
         decoded(path, data=data)
 
 
@@ -250,7 +252,7 @@ def test_a_database_whose_pages_lead_to_each_other_without_end_is_stopped(tmp_pa
     whole = bytearray(data + leaf + b"".join(leading_to(count + k) for k in (1, 2, 3)))
     whole[512 * (root - 1) : 512 * root] = leading_to(count + 4)
     whole[28:32] = struct.pack(">I", count + 4)
-    with pytest.raises(InvalidInputError, match=r"a damaged one \(interrupted\)"):
+    with pytest.raises(InvalidInputError, match=r"is damaged \(interrupted\)"):
         decoded(path, data=bytes(whole))
 
 
@@ -306,7 +308,7 @@ def test_a_bag_whose_index_leads_to_one_place_again_and_again_ends_soon():
     )
     data = b"#ROSBAG V2.0\n" + head + body + connection + number(len(described)) + described
     assert 13 + len(head) == start
-    with pytest.raises(InvalidInputError, match="leads to the same place again and again"):
+    with pytest.raises(InvalidInputError, match="leads to the same place over and over"):
         decode_file("a.bag", data + info * chunks)
 
 
@@ -336,7 +338,7 @@ def test_a_small_chunk_of_millions_of_records_is_refused_before_it_is_unpacked(
     assert len(data) < 10_000
     tracemalloc.start()
     try:
-        with pytest.raises(InvalidInputError, match="packs more records into its"):
+        with pytest.raises(InvalidInputError, match="has more records in its"):
             decode_file("a.mcap", data)
         assert tracemalloc.get_traced_memory()[1] < 8_000_000
     finally:
@@ -364,7 +366,7 @@ def test_a_chunk_that_is_larger_than_it_says_is_refused_as_soon_as_it_is(tmp_pat
     lying = bytes(data).replace(data[size : size + 8], struct.pack("<Q", 1000))
     tracemalloc.start()
     try:
-        with pytest.raises(InvalidInputError, match="more than the 1000 bytes that it says"):
+        with pytest.raises(InvalidInputError, match="more than the 1000 bytes that it states"):
             decode_file("a.mcap", lying)
         assert tracemalloc.get_traced_memory()[1] < 8_000_000
     finally:
@@ -398,7 +400,7 @@ def test_definitions_of_messages_in_a_bag_are_not_used(tmp_path):
 def test_names_of_topics_are_shown_as_far_as_they_can_be(tmp_path, count):
     topics = [f"/robot{k:02}/map" for k in range(count - 1)] + ["/z\x1b[31m" + "x" * 500]
     path = file_of(write(tmp_path, MCAP, *((topic, CELLS, 0.0) for topic in topics)))
-    with pytest.raises(InvalidInputError, match="no maps in /none") as caught:
+    with pytest.raises(InvalidInputError, match="no topic /none with maps") as caught:
         decoded(path, "/none")
     assert str(caught.value).isprintable()
     assert len(str(caught.value)) < 300

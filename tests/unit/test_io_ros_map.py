@@ -206,7 +206,7 @@ def with_greys(**shares):
             30,
             "30% of the map has the grey 205, .* 0.25",
         ),
-        (with_greys(g205=30, g0=5), {"free_thresh": 0.2}, 30, "unless keep_unknown is false"),
+        (with_greys(g205=30, g0=5), {"free_thresh": 0.2}, 30, "set keep_unknown to false"),
         (with_greys(g205=30), {}, 30, None),
         # Others than 205 are what the thresholds say, and so is one cell in 200.
         (with_greys(g204=30, g206=30), {"free_thresh": 0.25}, 0, None),
@@ -284,9 +284,7 @@ def test_of_a_key_that_stands_twice_the_first_counts_and_is_noted():
     grid = decode_map_server(text, pgm([[0]]))
     assert grid.resolution == 0.05
     assert set(parse(text).repeated) == {"resolution", "author"}
-    assert grid.notes == (
-        "resolution stands in the map's YAML twice, and the first, '0.05', counts",
-    )
+    assert grid.notes == ("the map's YAML has resolution twice, and the first, '0.05', was used",)
 
 
 def test_of_several_documents_the_first_counts():
@@ -342,7 +340,7 @@ def test_a_thousand_landmarks_are_enough_and_one_counts_once():
     listed = ", ".join(f"{{name: n, x: {k % 1002}, y: 0}}" for k in range(1500))
     grid = decode_map_server(yaml_text(all=f"[{listed}]"), pgm([[0]]))
     assert [item.point[0] for item in grid.landmarks] == list(range(1000))
-    assert grid.notes == ("of what the map's YAML names the first 1000 count",)
+    assert grid.notes == ("only the first 1000 named places of the map's YAML count",)
     fewer = decode_map_server(
         yaml_text(all=f"[{listed.split(', {name: n, x: 1000')[0]}]"), pgm([[0]])
     )
@@ -396,8 +394,8 @@ def test_a_wrong_key_is_named_with_the_remedy(case):
         ("a: b: c", "is not YAML (line 1)"),
         ("a: !!python/object:os.system x", "has types written with '!'; give plain values"),
         ("x: \0", "is not YAML"),
-        ("[" * 60_000, "has lists in lists, more than 20 deep"),
-        ("{a: " * 10_000, "has lists in lists, more than 20 deep"),
+        ("[" * 60_000, "has lists nested more than 20 deep"),
+        ("{a: " * 10_000, "has lists nested more than 20 deep"),
     ],
 )
 def test_text_that_is_no_header_is_refused(text, words):

@@ -70,8 +70,8 @@ def test_it_is_geojson_as_the_rfc_has_it():
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("scene.json", "let its name end in .geojson"),
-        ("scene.svg", "let its name end in .geojson"),
+        ("scene.json", "give a name that ends in .geojson"),
+        ("scene.svg", "give a name that ends in .geojson"),
         ("none/scene.geojson", "there is no folder"),
     ],
 )

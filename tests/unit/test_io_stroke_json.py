@@ -73,8 +73,8 @@ WRONG = {
     '{"strokes": [[[0, 0], [1, 1]]]}': ("strokes[0]", 'give an object with "points"'),
     '{"strokes": [{}]}': ("strokes[0].points", "is missing; give a list of [x, y] pairs"),
     '{"strokes": [{"points": [], "label": []}]}': ("strokes[0].label", "a list of 0; give a name"),
-    '{"strokes": [], "yAxis": "down"}': ("'yAxis'", 'is no key that is read; write "y_axis"'),
-    '{"strokes": [], "Y-axis": "up"}': ("'Y-axis'", 'is no key that is read; write "y_axis"'),
+    '{"strokes": [], "yAxis": "down"}': ("'yAxis'", 'is not a key that is read; write "y_axis"'),
+    '{"strokes": [], "Y-axis": "up"}': ("'Y-axis'", 'is not a key that is read; write "y_axis"'),
     '{"strokes": [{"points": [[0, 0, 1], [1, 1, null]]}]}': (
         "strokes[0].points[1][2]",
         "is missing; give a finite number",
@@ -84,7 +84,7 @@ WRONG = {
     '{"strokes": [], "y_axis": "left"}': ("y_axis", 'is "left"; give "up" or "down"'),
     "[]": ("", 'is a list of 0; give an object with "strokes"'),
     '{"strokes": [': ("", "is not JSON (Expecting value in line 1, column 14)"),
-    "[" * 100_000: ("", "is JSON nested too deeply"),
+    "[" * 100_000: ("", "is JSON that is nested too deeply"),
     '{"strokes": ' + "9" * 5000 + "}": ("", "too long a number"),
 }
 

@@ -258,11 +258,11 @@ def test_documents_meant_to_harm_are_refused(document, reason, words):
         ("hello", "is not SVG (syntax error: line 1, column 0); save it as SVG again"),
         ("<svg><path></svg>", "is not SVG (mismatched tag"),
         ("<svg><po:ygon/></svg>", "is not SVG (unbound prefix"),
-        ("<html/>", "is XML but no SVG: it begins with <html>; save it as SVG"),
+        ("<html/>", "is XML but not SVG: it begins with <html>; save it as SVG"),
         ('<?xml version="1.0" encoding="bogus"?><svg/>', "is not SVG"),
         ("<svg><text>desk</text></svg>", "has nothing drawn in it"),
         ('<svg><g transform="matrix(1 0)"/></svg>', "has a transform that cannot be read"),
-        ('<svg><g id="a"/><use href="#a" x="q"/></svg>', "<use> whose x or y is no length"),
+        ('<svg><g id="a"/><use href="#a" x="q"/></svg>', "has an x or y that is not a length"),
     ],
 )
 def test_what_is_no_drawing_is_refused(document, words):

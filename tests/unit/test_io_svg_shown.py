@@ -329,15 +329,15 @@ def test_what_lies_beyond_the_page_is_read():
         ),
         (
             '<use id="u" href="icons.svg#bed"/>',
-            '(<use id="u"> on line 3 of the file) draws what lies in another file',
+            '(<use id="u"> on line 3 of the file) draws something from another file',
         ),
         (
             '<svg id="n" x="wide"/>',
-            '(<svg id="n"> on line 3 of the file) has a place or size that is no length',
+            '(<svg id="n"> on line 3 of the file) has a place or size that is not a length',
         ),
         (
             '<rect id="r" width="5vw" height="3"/>',
-            """(<rect id="r">) has width='5vw', which is no length here, on line 3 of the file; """
+            """(<rect id="r">) has width='5vw', which is not a length, on line 3 of the file; """
             "write it in px",
         ),
         ("<style>g{.a{display:none}}</style>", "has a style sheet that has rules within rules"),
@@ -415,7 +415,7 @@ def test_a_share_of_a_page_that_says_no_size_is_refused_with_the_remedy():
     with pytest.raises(InvalidInputError) as caught:
         decoded('<rect width="50%" height="3"/>', "")
     assert caught.value.problem == (
-        "(<rect>) has width='50%' of a page that says no size, on line 1 of the file; "
+        "(<rect>) has width='50%' of a page without a size, on line 1 of the file; "
         "give <svg> a viewBox"
     )
 
@@ -540,7 +540,8 @@ def test_a_ground_smaller_than_the_page_is_told_of():
     found = decoded(floor + THINGS)
     assert len(found.strokes) == 3
     assert found.notes == (
-        '<rect id="floor"> on line 1 of the file was taken for the paper: all else lies on it.',
+        '<rect id="floor"> on line 1 of the file was taken as the paper and left out: all else '
+        "lies on it.",
     )
     assert len(decoded(THINGS + floor).strokes) == 4, "it lies over the others"
     assert len(decoded(floor + floor.replace("beige", "red") + THINGS).strokes) == 4, (
@@ -782,8 +783,9 @@ def test_a_line_with_arrowheads_at_both_ends_says_a_length(style, attributes, re
     body = f"<style>{style}</style>{MARKER}{KEPT}{LINE.format(attributes)}"
     found = decoded(body)
     assert len(found.strokes) == 1 + read
-    note = "<path> on line 1 of the file is marked as a length is, with arrowheads at both ends"
-    assert found.notes == (() if read else (f"{note}: left out.",))
+    where = "<path> on line 1 of the file"
+    note = f"{where} was left out as a dimension line: it has arrowheads at both ends."
+    assert found.notes == (() if read else (note,))
 
 
 def test_of_lengths_the_first_is_named_and_outlines_are_none():
@@ -793,7 +795,9 @@ def test_of_lengths_the_first_is_named_and_outlines_are_none():
     found = decoded(f"{MARKER}<g {ends}>{DESK}{KEPT}{lines}{unseen}</g>")
     assert len(found.strokes) == 2
     (note,) = found.notes
-    assert note.startswith("<line> on line 1 of the file and 1 more are marked")
+    assert note.startswith(
+        "<line> on line 1 of the file and 1 more were left out as dimension lines"
+    )
 
 
 @pytest.mark.parametrize(

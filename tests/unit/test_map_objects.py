@@ -20,7 +20,7 @@ HEADER = (
     "image: office.pgm\nresolution: 0.1\norigin: [-1, 2, 0]\nnegate: 0\n"
     "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
 )
-SAID = "objects are those of {} beside the map, unless a segmenter is chosen"
+SAID = "the objects are from {} beside the map, unless a segmenter is chosen"
 
 
 def picture(*boxes):
@@ -127,8 +127,8 @@ def test_that_of_another_content_is_said_and_ignored(mended):
     (office.parent / "office.pgm").write_bytes(picture(*BOXES, (30, 50, 4, 4)))
     assert len(read_scene(office)) == 4
     assert notes(office) == (
-        "office.objects.geojson is of another content of the map and was ignored; replace it, and "
-        "what is in it, with `sketchmatch segment office.yaml --segmenter occupancy-grid "
+        "office.objects.geojson was made for an earlier state of the map and was ignored; replace "
+        "it and all that is in it with `sketchmatch segment office.yaml --segmenter occupancy-grid "
         "--out office.objects.geojson`",
     )
 
@@ -136,8 +136,8 @@ def test_that_of_another_content_is_said_and_ignored(mended):
 def test_one_that_says_of_no_map_is_ignored(mended):
     office, _, edit = mended
     edit(lambda features: [each["properties"].pop("map") for each in features])
-    assert "does not say by a property map of which content" in notes(office)[0]
-    content = re.search(r"give a feature map=(sha256:[0-9a-f]{16})", notes(office)[0])[1]
+    assert "does not say for which state of the map" in notes(office)[0]
+    content = re.search(r"add map=(sha256:[0-9a-f]{16})", notes(office)[0])[1]
     edit(lambda features: features[0]["properties"].update(map=content))
     assert notes(office) == (SAID.format("office.objects.geojson"),)
 
@@ -148,7 +148,7 @@ def test_one_that_a_caller_says_is_of_this_map_need_not_say_so_itself(office):
     objects = json.dumps({"type": "FeatureCollection", "features": [crate]})
     ignored = decode_map_server(text, picture, objects)
     assert ignored.objects is None
-    assert "of another content" in ignored.notes[-1]
+    assert "an earlier state" in ignored.notes[-1]
     taken = decode_map_server(text, picture, objects, own_objects=True)
     assert [each.label for each in taken.objects.polygons] == ["crate"]
     assert not any("content" in note for note in taken.notes)
@@ -223,6 +223,6 @@ def test_the_client_sends_it_along_with_a_warning(mended):
     from sketchmatch_client import sources
 
     office, beside, _ = mended
-    with pytest.warns(UserWarning, match=r"objects are those of office\.objects\.geojson"):
+    with pytest.warns(UserWarning, match=r"the objects are from office\.objects\.geojson"):
         packed = sources.map_server_map(office)
     assert packed.map_server_map.objects == beside.read_text(encoding="utf-8")

@@ -439,12 +439,14 @@ def test_an_empty_path_is_not_the_folder_that_we_are_in(tmp_path, monkeypatch):
     for file in (LIVING_ROOM_MAP, LIVING_ROOM_MAP.with_suffix(".pgm")):
         shutil.copy(file, tmp_path)
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(InvalidInputError, match=r"^sketch: path is empty; give that of a file$"):
+    with pytest.raises(
+        InvalidInputError, match=r"^sketch: path is empty; give the path of a file$"
+    ):
         match("", LIVING_ROOM_MAP)
     for call in (read_scene, read_source):
-        with pytest.raises(InvalidInputError, match=r"^path is empty; give that of a file$"):
+        with pytest.raises(InvalidInputError, match=r"^path is empty; give the path of a file$"):
             call("")
-        with pytest.raises(InvalidInputError, match=r"^path is None; give that of a file$"):
+        with pytest.raises(InvalidInputError, match=r"^path is None; give the path of a file$"):
             call(None)
     assert len(read_scene(".")) > 2, "who means the folder says so"
 

@@ -127,7 +127,7 @@ fs::path yaml_in(const fs::path& folder) {
     throw MapFileError("is a folder without a map; give the .yaml that map_server saved");
   }
   if (found.size() > 1) {
-    throw MapFileError("is a folder of several maps; give one of them: " + named(found));
+    throw MapFileError("is a folder with several maps; give one of them: " + named(found));
   }
   return found.front();
 }
@@ -189,8 +189,8 @@ FoundFile find_picture(const fs::path& file, const std::vector<std::string>& ima
       return {there, {}};
     }
     return {there,
-            {"image stands in " + file.filename().string() + " twice, and the first, " +
-             there.filename().string() + ", counts"}};
+            {file.filename().string() + " has image twice, and the first, " +
+             there.filename().string() + ", was used"}};
   }
   for (const auto& image : images) {
     // A name from Windows has backslashes, which are letters elsewhere.
@@ -200,7 +200,7 @@ FoundFile find_picture(const fs::path& file, const std::vector<std::string>& ima
     if (is_file(beside)) {
       return {beside,
               {"the map's image " + images.front() + " does not exist, and " +
-               beside.filename().string() + " beside " + file.filename().string() + " was taken"}};
+               beside.filename().string() + " beside " + file.filename().string() + " was used"}};
     }
   }
   return {there, {}};
@@ -214,7 +214,7 @@ std::optional<FoundObjects> find_objects(const fs::path& file) {
   }
   try {
     return FoundObjects{decoded_yaml(read_bytes(path)),
-                        "objects are those of " + path.filename().string() +
+                        "the objects are from " + path.filename().string() +
                             " beside the map, unless a segmenter is chosen"};
   } catch (const std::exception&) {
     return std::nullopt;

@@ -440,7 +440,7 @@ TEST_F(Golden, EachOtherFormOfSourceIsSent) {
   fs::remove(folder / "room.objects.geojson");
   expect_segment_request(mended, "SegmentRequest.mended_map");
   EXPECT_EQ(mended.notes(),
-            std::vector<std::string>{"objects are those of room.objects.geojson beside the map, "
+            std::vector<std::string>{"the objects are from room.objects.geojson beside the map, "
                                      "unless a segmenter is chosen"});
 }
 

@@ -174,7 +174,7 @@ TEST_F(MapFiles, TheFirstOfTwoPicturesCounts) {
       sources::map_server_map(write("room.yaml", "image: a.pgm\nresolution: 1\nimage: b.pgm\n"));
   EXPECT_EQ(source.message().map_server_map().image(), "first");
   ASSERT_EQ(source.notes().size(), 1U);
-  EXPECT_EQ(source.notes()[0], "image stands in room.yaml twice, and the first, a.pgm, counts");
+  EXPECT_EQ(source.notes()[0], "room.yaml has image twice, and the first, a.pgm, was used");
 }
 
 TEST_F(MapFiles, APictureOrAFolderLeadsToItsYaml) {
@@ -189,7 +189,7 @@ TEST_F(MapFiles, APictureOrAFolderLeadsToItsYaml) {
   EXPECT_NE(sources::map_server_map(picture).message().map_server_map().yaml().find("0.05"),
             std::string::npos);
   EXPECT_EQ(refused(folder),
-            "INVALID_FILE: map_server_map.yaml () is a folder of several maps; give one of them: "
+            "INVALID_FILE: map_server_map.yaml () is a folder with several maps; give one of them: "
             "other.yaml, room.yaml");
 }
 

@@ -164,14 +164,14 @@ def find_picture(file: Path, document: Document) -> tuple[Path, tuple[str, ...]]
     if _is_file(named):
         if len(document.images) == 1:
             return named, ()
-        return named, (f"image stands in {file.name} twice, and the first, {named.name}, counts",)
+        return named, (f"{file.name} has image twice, and the first, {named.name}, was used",)
     for image in document.images:
         # A name from Windows has backslashes, which are letters elsewhere; this knows both.
         beside = file.parent / (PureWindowsPath(image.strip()).name or image)
         if _is_file(beside):
             return beside, (
                 f"the map's image {_shown(document.images[0])} does not exist, and {beside.name} "
-                f"beside {file.name} was taken",
+                f"beside {file.name} was used",
             )
     return named, ()
 
@@ -181,11 +181,12 @@ def _yaml_in(folder: Path) -> Path:
     try:
         found = [file for file in _yamls(folder) if _document_of(file) is not None]
     except OSError as error:
-        raise MapFileError(f"cannot be read ({str(error.strerror).lower()})") from None
+        problem = f"cannot be read ({str(error.strerror).lower()})"
+        raise MapFileError(f"{problem}; check the folder's permissions") from None
     if not found:
         raise MapFileError("is a folder without a map; give the .yaml that map_server saved")
     if len(found) > 1:
-        raise MapFileError(f"is a folder of several maps; give one of them: {_named(found)}")
+        raise MapFileError(f"is a folder with several maps; give one of them: {_named(found)}")
     return found[0]
 
 

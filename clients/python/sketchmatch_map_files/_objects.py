@@ -50,7 +50,7 @@ def find_objects(
     """Return the text of the file with a map's objects, and what there is to say of it.
 
     It is that with the map's name, or else another one beside it, of a map of the same content:
-    map files get other names. None that is of another content is read.
+    map files get other names. Files that were made for an earlier state of the map are not read.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def find_objects(
             # Whoever reads it says what is wrong with it.
             mine = path == own
         if mine:
-            note = f"objects are those of {path.name} beside the map, unless a segmenter is chosen"
+            note = f"the objects are from {path.name} beside the map, unless a segmenter is chosen"
             return text, (note,)
         if path == own:
             stale = (_ignored(own.name, file.name, "" if said else content),)
@@ -83,12 +83,12 @@ def find_objects(
 
 def _ignored(own: str, file: str, content: str) -> str:
     """Return what is said of a file that is not read; the content is one that it fails to name."""
-    why, remedy = "is of another content of the map", ""
+    why, remedy = "was made for an earlier state of the map", ""
     if content:
-        why = "does not say by a property map of which content of the map it is"
-        remedy = f"give a feature map={content}, or "
+        why = "does not say for which state of the map it was made"
+        remedy = f"add map={content} to the properties of a feature, or "
     anew = f"`sketchmatch segment {file} --segmenter occupancy-grid --out {own}`"
-    return f"{own} {why} and was ignored; {remedy}replace it, and what is in it, with {anew}"
+    return f"{own} {why} and was ignored; {remedy}replace it and all that is in it with {anew}"
 
 
 def _candidates(own: Path) -> Iterator[Path]:

@@ -78,7 +78,7 @@ class _Reader:
             return self._alias(str(event.anchor))
         assert isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent)
         if depth > _DEEPEST:
-            raise _refused(f"has lists in lists, more than {_DEEPEST} deep; {_REMEDY}")
+            raise _refused(f"has lists nested more than {_DEEPEST} deep; {_REMEDY}")
         if event.tag not in (None, "!", *_PLAIN_TAGS):
             raise _refused("has types written with '!'; give plain values")
         value = self._content(event, events, depth)
@@ -104,7 +104,7 @@ class _Reader:
         if self._aliases > _MOST_ALIASES:
             raise _refused(f"has more than {_MOST_ALIASES} aliases; write out what they repeat")
         if anchor not in self._anchored:
-            raise _refused(f"repeats '*{anchor[:40]}' before it has it whole; write it out")
+            raise _refused(f"repeats '*{anchor[:40]}' before that is complete; write it out")
         return self._anchored[anchor]
 
     def _list(self, events: Iterator[yaml.Event], depth: int) -> list[Value]:

@@ -68,7 +68,7 @@ def load_json(text: str) -> Any:
         where = f"line {error.lineno}, column {error.colno}"
         problem = f"is not JSON ({error.msg} in {where}); correct it there"
     except (ValueError, RecursionError):
-        problem = "is JSON nested too deeply or with too long a number; save it from the tool again"
+        problem = "is JSON that is nested too deeply or has too long a number; save it again"
     raise InvalidInputError(Reason.INVALID_FILE, "", problem)
 
 
@@ -115,7 +115,9 @@ def load_xml(
         if parameter or value is None or len(value) > _LONGEST_WORD or set("&<%") & set(value):
             defined()
         if references * len(value) > _MOST_REPLACED:
-            raise _refused(f"uses its entities {references} times; save it as plain {kind}")
+            raise _refused(
+                f"uses its entities too often, {references} times; save it as plain {kind}"
+            )
 
     def defined(*_declaration: object) -> NoReturn:
         raise _refused(
@@ -221,7 +223,9 @@ def no_parts(part: str) -> None:
         If one is named.
     """
     if part:
-        raise _refused(f"has no part {quoted(part)}, nor any other; leave out what follows '#'")
+        raise _refused(
+            f"has no parts of which {quoted(part)} could be one; leave out '#' and what follows"
+        )
 
 
 def _counting() -> Callable[[Mapping[str, str], int], None]:

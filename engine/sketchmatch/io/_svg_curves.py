@@ -99,14 +99,14 @@ def subpaths_of(
         ]
         curves = [np.array([p for p in part if p is not None], np.float64) for part in segments]
     except (ValueError, TypeError, IndexError, ArithmeticError, AttributeError):
-        raise _unreadable(element, field, "a geometry that cannot be read", line) from None
+        raise _unreadable(element, field, "a shape that cannot be read", line) from None
     if str(geometry.get("d", "")).strip() and not segments:
         raise _unreadable(element, field, "path data that cannot be read", line)
     subpaths: list[Subpath] = []
     ended = True
     for segment, controls in zip(segments, curves, strict=True):
         if not (np.abs(controls) < _LARGEST).all():
-            raise _unreadable(element, field, "a coordinate that is no usable number", line)
+            raise _unreadable(element, field, "a coordinate that is not a usable number", line)
         if isinstance(segment, svgelements.Move):
             ended = True
             continue
@@ -134,9 +134,9 @@ def _geometry(
             try:
                 value = length(text, _ALONG[name](frame) if frame else None, look.font_size)
             except ValueError:
-                problem, remedy = f"{name}={text[:40]!r}, which is no length here", "write it in px"
+                problem, remedy = f"{name}={text[:40]!r}, which is not a length", "write it in px"
                 if text.rstrip().endswith("%"):
-                    problem = f"{name}={text[:40]!r} of a page that says no size"
+                    problem = f"{name}={text[:40]!r} of a page without a size"
                     remedy = "give <svg> a viewBox"
                 raise _unreadable(element, field, problem, line, remedy) from None
             geometry[name] = max(0.0, value) if name in extent else value

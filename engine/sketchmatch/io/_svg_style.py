@@ -181,7 +181,7 @@ class Styles:
         tests = 0
         for prelude, declared in rules:
             if elements > _FEW and _AROUND.search(tinycss2.serialize(prelude)):
-                raise _costly("selects elements by their siblings, and the drawing is large")
+                raise _costly("selects elements by their siblings in so large a drawing")
             try:
                 compiled = cssselect2.compile_selector_list(prelude, namespaces)
                 parsed = selector_parser.parse(prelude, namespaces)

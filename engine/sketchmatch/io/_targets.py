@@ -31,7 +31,7 @@ def check_target(path: str | Path, field: str, endings: Collection[str], named: 
     path = Path(path)
     if path.suffix.lower() not in endings:
         raise InvalidInputError(
-            Reason.INVALID_FILE, field, f"is {str(path)!r}; let its name end in {named}"
+            Reason.INVALID_FILE, field, f"is {str(path)!r}; give a name that ends in {named}"
         )
     if not path.parent.is_dir():
         raise InvalidInputError(
@@ -57,5 +57,5 @@ def writing(path: str | Path, field: str) -> Iterator[None]:
         raise InvalidInputError(
             Reason.INVALID_FILE,
             field,
-            f"cannot be written to {str(path)!r} ({why}); name a file in a folder of yours",
+            f"cannot be written to {str(path)!r} ({why}); choose a folder in which you may write",
         ) from None

@@ -76,9 +76,9 @@ def read_source(path: str | Path, readers: _Readers | None = None) -> Source:
 def _as_path(given: Any) -> Path:
     """Return what is given as a path; an empty one would be the folder that we are in."""
     if not isinstance(given, str | os.PathLike):
-        raise _invalid("path", f"is {quoted(given)}; give that of a file")
+        raise _invalid("path", f"is {quoted(given)}; give the path of a file")
     if not os.fspath(given):
-        raise _invalid("path", "is empty; give that of a file")
+        raise _invalid("path", "is empty; give the path of a file")
     return Path(given)
 
 
@@ -132,10 +132,12 @@ def kind_of_file(name: str, data: bytes, readers: _Readers | None = None) -> Fil
     if suffix in YAML_SUFFIXES:
         raise _invalid(
             "",
-            "is a map, or a bag, that is more than one file; give its path, or send a map as "
-            "map_server_map and a bag as its .mcap or .db3 alone",
+            "is the YAML of a map or a bag, which has more files than this one; give its path, or "
+            "send a map as map_server_map, and of a bag its .mcap or .db3",
         )
-    raise _invalid("", f"is of no known kind; give a file that ends in one of {_suffixes(readers)}")
+    raise _invalid(
+        "", f"is of an unknown kind; give a file whose name ends in one of {_suffixes(readers)}"
+    )
 
 
 def read_here(path: Path) -> Source | None:
@@ -285,7 +287,7 @@ def _kind_of_document(document: Any, readers: _Readers) -> FileKind:
             ),
         ]
     )
-    raise _invalid("", f"is JSON, {_seen(document)}, which nothing here reads; known are {known}")
+    raise _invalid("", f"is JSON of an unknown kind ({_seen(document)}); known are {known}")
 
 
 def _seen(document: Any) -> str:
@@ -322,7 +324,7 @@ def _read(path: Path, field: str) -> bytes:
     try:
         # Devices and pipes would be endless, or wait for a writer.
         if stat.S_IFMT(path.stat().st_mode) not in (stat.S_IFREG, stat.S_IFDIR):
-            raise _invalid(field, "is no plain file; give one")
+            raise _invalid(field, "is not a regular file; give one")
         with path.open("rb") as file:
             size = os.fstat(file.fileno()).st_size
             check_bytes(size, field)

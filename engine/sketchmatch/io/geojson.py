@@ -47,16 +47,16 @@ from sketchmatch.model.labels import cleaned_label
 
 __all__ = ["TURNED", "decode_geojson", "is_geojson", "load_sequence", "polygons_of"]
 
-TURNED = "The coordinates are longitudes and latitudes: turned into metres."
+TURNED = "The coordinates are longitudes and latitudes, and were turned into metres."
 
 _POLYGON = Reason.INVALID_POLYGON
 _GEOMETRIES = {
     "Polygon": "",
     "MultiPolygon": "",
     "GeometryCollection": "",
-    "Point": "a point",
+    "Point": "points",
     "MultiPoint": "points",
-    "LineString": "an open line",
+    "LineString": "open lines",
     "MultiLineString": "lines",
 }
 _TYPES = {*_GEOMETRIES, "Feature", "FeatureCollection"}
@@ -290,13 +290,17 @@ def _notes(remarks: list[tuple[str, str]]) -> tuple[str, ...]:
     notes = []
     for kind, count in counts.items():
         others = f" and {count - 1} more" if count > 1 else ""
-        where = f"{first[kind] or 'The whole'}{others} {'are' if count > 1 else 'is'}"
+        where, several = f"{first[kind] or 'The geometry'}{others}", count > 1
+        left_out = f"{where} {'were' if several else 'was'} left out"
         if kind == "a closed line":
-            notes.append(f"{where} a closed line: taken as the outline of an object.")
+            taken = "are closed lines, taken as the outlines of objects"
+            if not several:
+                taken = "is a closed line, taken as the outline of an object"
+            notes.append(f"{where} {taken}.")
         elif kind == "nowhere":
-            notes.append(f"{where} without a place: left out.")
+            notes.append(f"{left_out}: {'they have' if several else 'it has'} no place.")
         else:
-            notes.append(f"{where} {kind}, which encloses no area: left out.")
+            notes.append(f"{left_out}: {kind} enclose no area.")
     return tuple(notes)
 
 

@@ -38,8 +38,8 @@ _VISIBLE = 64
 _STRIP = 1 << 20
 
 _SEVERAL = (
-    "Of the file's several pages or frames the first alone was read: save another by itself to "
-    "have that one."
+    "The file has several pages or frames, of which only the first was read: save another one as "
+    "a file of its own to use it."
 )
 
 

@@ -43,7 +43,7 @@ def with_objects(grid: OccupancyGrid, objects: str, content: str | None) -> Occu
     try:
         features = load_json(objects)
         if content is not None and not is_of(features, content):
-            note = "the file with objects is of another content of the map and was ignored"
+            note = "the file with objects was made for an earlier state of the map and was ignored"
             return replace(grid, notes=(*grid.notes, note))
         return replace(grid, objects=_objects_of({**features, "crs": None}))
     except InvalidInputError as error:

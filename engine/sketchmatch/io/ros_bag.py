@@ -129,7 +129,7 @@ class _Metered(io.BytesIO):
         data = super().read(size)
         self._left -= len(data)
         if self._left < 0:
-            raise ValueError("its index leads to the same place again and again")
+            raise ValueError("its index leads to the same place over and over")
         return data
 
 
@@ -163,13 +163,13 @@ class _Bounds:
             plain += piece
             self._check(len(plain))
             if len(plain) > said:
-                raise ValueError(f"a chunk unpacks to more than the {said} bytes that it says")
+                raise ValueError(f"a chunk unpacks to more than the {said} bytes that it states")
             while of_records and place + _HEAD <= len(plain):
                 place += _HEAD + int.from_bytes(plain[place + 1 : place + _HEAD], "little")
                 self._records -= 1
                 if self._records < 0:
-                    problem = f"packs more records into its {self._size} bytes than any recorder"
-                    raise _invalid(f"{problem} does; record it again")
+                    problem = f"has more records in its {self._size} bytes than any recorder writes"
+                    raise _invalid(f"{problem}; record it again")
         self._left -= len(plain)
         return bytes(plain)
 
@@ -195,7 +195,7 @@ def _pieces(packing: str, data: bytes) -> Iterator[bytes]:
     while not unpacker.eof:
         yield (piece := unpacker.decompress(data, _PIECE))
         if not piece and unpacker.needs_input:
-            raise ValueError("what is packed in it has no end")
+            raise ValueError("its compressed data is cut short")
         data = b""
 
 
@@ -247,7 +247,7 @@ def _last_map(bag: Path | _InMemory, topic: str) -> OccupancyGrid:
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise _invalid(
-            "is a ROS bag, which the package rosbags reads; pip install 'sketchmatch[rosbag]'"
+            "is a ROS bag, which needs the package rosbags; run pip install 'sketchmatch[rosbag]'"
         ) from None
     # A damaged bag makes packages raise whatever they stumble over.
     try:
@@ -267,7 +267,7 @@ def _last_map(bag: Path | _InMemory, topic: str) -> OccupancyGrid:
     except Exception as error:
         said = "".join(c for c in " ".join(str(error).split()) if c.isprintable())
         cause = said[:200].rstrip(".") or type(error).__name__
-        raise _invalid(f"is no ROS bag, or a damaged one ({cause}); record it again") from None
+        raise _invalid(f"is not a ROS bag, or is damaged ({cause}); record it again") from None
 
 
 def _ros_1(bag: Any, topic: str) -> _Recorded:
@@ -341,7 +341,7 @@ def _sqlite(bag: Path | _InMemory, topic: str) -> _Recorded:
             raise _empty(topic)
         data = database.execute("SELECT data FROM messages WHERE id = ?", message).fetchone()[0]
         if not isinstance(data, bytes):
-            raise ValueError(f"a message in {topic} is no bytes")
+            raise ValueError(f"the data of a message in {topic} are not bytes")
         return _Recorded(data, notes)
 
 
@@ -376,11 +376,11 @@ def _chosen(found: set[str], topic: str) -> tuple[str, tuple[str, ...]]:
     if not topics:
         raise _invalid("has no topic of type nav_msgs/OccupancyGrid; record one, such as /map")
     if topic and topic not in topics:
-        raise _invalid(f"has no maps in {_shown(topic)}; choose one of: {_named(topics)}")
+        raise _invalid(f"has no topic {_shown(topic)} with maps; choose one of: {_named(topics)}")
     first, *others = topics
     if topic or first == "/map" or not others:
         return topic or first, ()
-    said = f"the map is that of the topic {_shown(first)}; there are others: {_named(others)}"
+    said = f"the map was read from the topic {_shown(first)}; other topics: {_named(others)}"
     return first, (said,)
 
 
@@ -397,7 +397,7 @@ _MOST_NAMED = 10
 
 
 def _empty(topic: str) -> InvalidInputError:
-    return _invalid(f"has no message in {_shown(topic)}; record one, or name a topic")
+    return _invalid(f"has no message in {_shown(topic)}; record one, or choose another topic")
 
 
 def _grid(message: Any, notes: tuple[str, ...]) -> OccupancyGrid:
@@ -408,14 +408,14 @@ def _grid(message: Any, notes: tuple[str, ...]) -> OccupancyGrid:
         raise InvalidInputError(
             Reason.INVALID_GRID,
             "",
-            f"has a map of {cells.size} cells for {rows} × {columns}; record it again",
+            f"has a map of {rows} × {columns} cells with data for {cells.size}; record it again",
         )
     origin = message.info.origin
     yaw = _yaw(origin.orientation)
     if yaw is None:
         # As in a YAML: whoever made the map had no orientation to give.
         yaw = 0.0
-        notes = (*notes, "the orientation of the map's origin is not finite, read as none")
+        notes = (*notes, "the orientation of the map's origin is not finite and was read as 0")
     pose = (float(origin.position.x), float(origin.position.y), yaw)
     # The message holds 0.05 as 0.0500000007; its shortest digits are what was meant.
     resolution = float(str(np.float32(message.info.resolution)))

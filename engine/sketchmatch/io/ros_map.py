@@ -195,8 +195,8 @@ class MapServerHeader:
         cells[saved] = -1
         return (
             f"{share:.0%} of the map has the grey {picture.saved_unknown if self.negate else 205}, "
-            "with which map_server saves unknown cells; unless keep_unknown is false, they are "
-            f"unknown here too, although free_thresh {self.free_thresh:g} would call them free",
+            "with which map_server saves unknown cells; they stay unknown, although free_thresh "
+            f"{self.free_thresh:g} makes them free; set keep_unknown to false to have them free",
         )
 
     def _occupancy(self) -> NDArray[np.int8]:
@@ -308,7 +308,7 @@ def parse_header(yaml_text: str) -> MapServerHeader:
     landmarks = tuple(dict.fromkeys(_landmarks(values)))
     if len(landmarks) > _MOST_LANDMARKS:
         landmarks = landmarks[:_MOST_LANDMARKS]
-        notes = (*notes, f"of what the map's YAML names the first {_MOST_LANDMARKS} count")
+        notes = (*notes, f"only the first {_MOST_LANDMARKS} named places of the map's YAML count")
     header = MapServerHeader(
         resolution=_number(values["resolution"], "resolution"),
         origin=origin,
@@ -384,7 +384,7 @@ def _check_ranges(header: MapServerHeader) -> None:
 
 
 def _repeated(key: str, value: object) -> str:
-    return f"{key} stands in the map's YAML twice, and the first, {quoted(value)}, counts"
+    return f"the map's YAML has {key} twice, and the first, {quoted(value)}, was used"
 
 
 def _origin(value: object) -> tuple[tuple[float, float, float], tuple[str, ...]]:

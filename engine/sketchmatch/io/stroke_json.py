@@ -63,7 +63,7 @@ def _upward(document: dict[str, Any]) -> float:
     for key in document:
         if key != "y_axis" and _letters(key) == "yaxis":
             raise InvalidInputError(
-                _STROKE, quoted(key), 'is no key that is read; write "y_axis", or leave it out'
+                _STROKE, quoted(key), 'is not a key that is read; write "y_axis", or leave it out'
             )
     value = document.get("y_axis", "up")
     if not isinstance(value, str) or value not in _UPWARDS:
@@ -98,8 +98,8 @@ def _samples(points: list[Any], field: str) -> FloatArray:
             raise InvalidInputError(
                 _STROKE,
                 f"{field}[{k}]",
-                "has a time where others have none, or none where others have one; give a time "
-                "for every point of a stroke or for none",
+                "has a time although others have none, or none although others have one; give a "
+                "time for every point of a stroke or for none",
             )
     if width == 3 and all(point[2] is None for point in points):
         points, width = [point[:2] for point in points], 2

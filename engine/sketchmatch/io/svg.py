@@ -104,7 +104,7 @@ def decode_svg(data: bytes) -> StrokeSet:
     if tag_of(root) != "svg":
         raise invalid(
             "",
-            f"is XML but no SVG: it begins with <{tag_of(root)[:LONGEST_CAUSE]}>; save it as SVG",
+            f"is XML but not SVG: it begins with <{tag_of(root)[:LONGEST_CAUSE]}>; save it as SVG",
         )
     drawing = _Drawing(root, lines, _EXCALIDRAW in data)
     shapes = [shape for shape in drawing.shapes() if shape.subpaths]
@@ -128,7 +128,10 @@ def decode_svg(data: bytes) -> StrokeSet:
             for points in lines_of(shape, tolerance)
         ),
         (
-            *(f"{each.place} was taken for the paper: all else lies on it." for each in ground),
+            *(
+                f"{each.place} was taken as the paper and left out: all else lies on it."
+                for each in ground
+            ),
             *_note_on_dimensions([*drawing.dimensions, *dimensions]),
         ),
         tuple(drawing.names),
@@ -137,9 +140,11 @@ def decode_svg(data: bytes) -> StrokeSet:
 
 def _note_on_dimensions(places: list[str]) -> Iterator[str]:
     if places:
-        others = f" and {len(places) - 1} more are" if len(places) > 1 else " is"
-        ends = "arrowheads at both ends: left out"
-        yield f"{places[0]}{others} marked as a length is, with {ends}."
+        if len(places) > 1:
+            were = f"and {len(places) - 1} more were left out as dimension lines: they have"
+        else:
+            were = "was left out as a dimension line: it has"
+        yield f"{places[0]} {were} arrowheads at both ends."
 
 
 def _document(data: bytes) -> tuple[ElementTree.Element, list[int]]:
@@ -163,8 +168,8 @@ def _check_elements(count: int) -> None:
         raise InvalidInputError(
             Reason.LIMIT_EXCEEDED,
             "",
-            f"draws more than the limit of {limit} elements, a tenth of the vertices; simplify it, "
-            "or raise limits.max_vertices (SKETCHMATCH_LIMITS__MAX_VERTICES)",
+            f"draws more than the limit of {limit} elements, a tenth of that of vertices; simplify "
+            "it, or raise limits.max_vertices (SKETCHMATCH_LIMITS__MAX_VERTICES)",
         )
 
 
@@ -366,7 +371,7 @@ class _Drawing:
         href = next((use.get(name, "") for name in _HREFS if name in use.attrib), "").strip()
         if href and not href.startswith("#"):
             raise self._invalid(
-                use, "draws what lies in another file, which is never opened; embed it"
+                use, "draws something from another file, which is never opened; embed it"
             )
         target = self._named.get(href[1:]) if href else None
         drawn = target is not None and tag_of(target) in {*_DRAWN, "symbol"}
@@ -420,7 +425,7 @@ class _Drawing:
                 for axis, along in zip("xy", _sides(frame), strict=True)
             )
         except ValueError:
-            raise self._invalid(use, "has a <use> whose x or y is no length; correct it") from None
+            raise self._invalid(use, "has an x or y that is not a length; correct it") from None
         return svgelements.Matrix.translate(x, y) * context.matrix
 
     def _viewport(
@@ -452,7 +457,7 @@ class _Drawing:
             )
         except ValueError:
             raise self._invalid(
-                element, "has a place or size that is no length; correct it"
+                element, "has a place or size that is not a length; correct it"
             ) from None
         into = None
         if width is not None and height is not None:

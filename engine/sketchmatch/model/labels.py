@@ -111,11 +111,11 @@ def cleaned_sentences(texts: Sequence[str]) -> tuple[str, ...]:
     Examples
     --------
     >>> cleaned_sentences(["A dot is left out."] * 300_000)[-1]
-    '299000 more are left out.'
+    '299000 more notes are left out.'
     """
     told = tuple(map(cleaned_sentence, texts[:_MOST]))
     more = len(texts) - len(told)
-    return (*told, f"{more} more are left out.") if more else told
+    return (*told, f"{more} more notes are left out.") if more else told
 
 
 def label_from(given: Any) -> str:
@@ -136,7 +136,7 @@ def label_from(given: Any) -> str:
     if given is None or isinstance(given, str):
         return str(given or "")
     raise InvalidInputError(
-        Reason.INVALID_FIELD, "label", f"is {quoted(given)}, which is no name; give text"
+        Reason.INVALID_FIELD, "label", f"is {quoted(given)}; give text or a number"
     )
 
 

@@ -369,7 +369,7 @@ def _rings_of(shape: BaseGeometry) -> list[FloatArray]:
         return [shapely.get_coordinates(shape)]
     elif isinstance(shape, shapely.MultiPolygon):
         problem = (
-            f"has {len(shape.geoms)} parts, and an object has one outline; make an object of each "
+            f"has {len(shape.geoms)} parts, but an object has one outline; make an object of each "
             "of its .geoms, or take its convex_hull"
         )
     else:

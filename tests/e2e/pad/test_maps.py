@@ -163,7 +163,7 @@ def test_a_file_that_no_request_can_hold_is_refused_by_its_size(visit, tmp_path)
         ("plan.dxf", b"no drawing", "plan.dxf"),
         ("map.yaml", b"image: office.pgm\n", "The map's picture office.pgm is missing"),
         ("photo.png", b"\x89PNG broken", "picture"),
-        ("office.mcap", b"\x89MCAP0\r\n", "no ROS bag, or a damaged one"),
+        ("office.mcap", b"\x89MCAP0\r\n", "not a ROS bag, or is damaged"),
     ],
 )
 def test_a_broken_map_is_refused_in_words_and_the_map_stays(
@@ -381,4 +381,4 @@ def test_several_bags_at_once_are_refused_in_words(pad, visit, tmp_path):
     notice.get_by_text("These are several bags").wait_for()
     notice.get_by_role("button").click()
     page.get_by_test_id("map-file").set_input_files(files[0])
-    notice.get_by_text("no ROS bag, or a damaged one").wait_for()
+    notice.get_by_text("not a ROS bag, or is damaged").wait_for()

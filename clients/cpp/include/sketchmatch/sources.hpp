@@ -105,7 +105,7 @@ Source occupancy_grid(const std::vector<std::int8_t>& cells, std::uint32_t colum
 ///   holds one map. A picture that is not where the .yaml says is taken from beside it, which
 ///   `Source::notes` tells. So is the file beside it, of its name and ending in .objects.geojson,
 ///   that says what its objects are, as `sketchmatch segment --out` saves it; the server ignores
-///   one that is of another content of the map.
+///   one that was made for an earlier state of the map.
 /// @throws InvalidRequestError If the file or its picture cannot be read, or it names none.
 Source map_server_map(const std::filesystem::path& path);
 
