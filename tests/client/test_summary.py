@@ -47,7 +47,7 @@ def test_a_match_says_where_it_is_probably_another_place(match):
     match.result.ClearField("ambiguity")
     line = repr(match)
     assert line.startswith(
-        "<Match: probably not this place (0.499 that it is): 2 of 3 sketched objects matched, "
+        "<Match: probably not this place (this place: 0.499): 2 of 3 sketched objects matched, "
     )
     assert "this place 0" not in line
     match.result.place_probability = 0.5

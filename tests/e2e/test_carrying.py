@@ -262,7 +262,7 @@ def test_in_python_it_is_the_same(zones):
                 ("--weights", "1,2", "--weights '1,2' is not three, five or six numbers"),
                 ("--unmatched-price", "-1", "unmatched_price"),
                 ("--set", "searcher.maps=0", "maps"),
-                ("--synonyms", "couch", "--synonyms 'couch' is not two labels or more"),
+                ("--synonyms", "couch", "--synonyms 'couch' is not a list of two or more labels"),
             )
         ),
         (["carry", LIVING_ROOM_SKETCH, *ROOM[1:], *ROOM[1:]], "is not JSON"),

@@ -200,7 +200,7 @@ def test_an_overlay_never_takes_the_place_of_what_is_read(command_line, tmp_path
     for given, drawn in ((map_, "office.png"), (tmp_path, "office.png")):
         done = command_line("segment", given, "--overlay", tmp_path / drawn)
         assert done.returncode == ExitCode.INVALID_INPUT
-        assert "office.png', which is read here, and would be lost" in done.stderr
+        assert "office.png', which is read here and would be lost" in done.stderr
     assert (tmp_path / "office.png").read_bytes() == before
     for _ in range(2):  # what was drawn before may be drawn again
         done = command_line("segment", map_, "--overlay", tmp_path / "scene.png")
@@ -251,7 +251,7 @@ def test_former_names_of_options_hold_and_are_deprecated(command_line, command, 
     assert former.stdout == now.stdout
     assert (now.stderr, now.returncode, former.returncode) == ("", 0, 0)
     assert former.stderr == (
-        f"sketchmatch: --segmenter-{side} is deprecated; write --{side}-segmenter\n"
+        f"sketchmatch: --segmenter-{side} is deprecated; use --{side}-segmenter\n"
     )
     wrong = command_line(command, *ROOM, f"--segmenter-{side}", "best")
     (line,) = wrong.stderr.splitlines()
@@ -607,7 +607,7 @@ def assert_one_line(done, code, *words):
         (["match", *ROOM, "--time-budget", "nan"], ["time_budget", "give a positive time"]),
         (["match", *ROOM, "--overlay", "x.txt"], ["x.txt", ".png"]),
         (["match", "missing.svg", LIVING_ROOM_MAP], ["missing.svg does not exist", "check"]),
-        (["match", "", LIVING_ROOM_MAP], ["SKETCH", "it is empty where a file belongs"]),
+        (["match", "", LIVING_ROOM_MAP], ["SKETCH", "it is empty; give the path of a file"]),
         (["segment", LIVING_ROOM_MAP, "--out", ""], ["--out", "it is empty"]),
         (["match", LIVING_ROOM_SKETCH, "."], [". is a folder without a map", "give the .yaml"]),
         (["segment", __file__], ["is of no known kind", ".yaml"]),

@@ -185,8 +185,8 @@ def test_a_profile_or_file_that_is_not_there_is_refused(command_line):
     assert "away.toml does not exist" in said(command_line("match", *PAIR, "--config", "away.toml"))
     line = said(command_line("match", *PAIR, "--config", "a.toml", "--server", "127.0.0.1:1"))
     assert line == (
-        "sketchmatch: --config is for computing here, and the server has one of its own; "
-        "drop one of the two"
+        "sketchmatch: --config is not used with --server, as the server has its own; "
+        "leave out one of the two"
     )
 
 

@@ -147,8 +147,8 @@ def test_plot_draws_the_scene_and_its_histograms(command_line, tmp_path):
         done = command_line("describe", source, "--plot", tmp_path / "x.png")
         assert (done.returncode, len(done.stdout.splitlines())) == (0, 29)
         assert done.stderr == (
-            "sketchmatch: --plot: draws the 16 of 28 relations with the strongest forces, those of "
-            "large objects close together; choose others by --pair A,B\n"
+            "sketchmatch: --plot draws the 16 of 28 relations with the strongest forces, as "
+            "between large objects close together; choose others by --pair A,B\n"
         )
         with PIL.Image.open(tmp_path / "x.png") as picture:
             assert (picture.format, picture.width) == ("PNG", 1600)

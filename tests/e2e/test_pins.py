@@ -65,15 +65,18 @@ def test_a_contradiction_is_told_as_it_was_typed(command_line, files, where, opt
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--pin", "sofa"], "--pin 'sofa' has another form than SKETCHED=MAPPED, as in desk=3, 2="),
-        (["--pin", "a=b=c"], "--pin 'a=b=c' has another form"),
+        (["--pin", "sofa"], "--pin 'sofa' is not of the form SKETCHED=MAPPED, as in desk=3, 2="),
+        (["--pin", "a=b=c"], "--pin 'a=b=c' is not of the form"),
         (["--pin", "=3"], "--pin '=3' has another form"),
-        (["--pin", "0=1"], "--pin '0=1' names object 0; they count from 1"),
-        (["--pin", "-2=1"], "--pin '-2=1' names object -2; they count from 1"),
-        (["--pin", '""=1'], "--pin '\"\"=1' names nothing; give labels or numbers"),
-        (["--no-pin", "1=None"], "--no-pin '1=None' excludes none; name a mapped object"),
-        (["--synonyms", "couch"], "--synonyms 'couch' is not two labels or more, as in couch,sofa"),
-        (["--synonyms", "a,,b"], "--synonyms 'a,,b' is not two labels or more"),
+        (["--pin", "0=1"], "--pin '0=1' names object 0; numbers begin at 1"),
+        (["--pin", "-2=1"], "--pin '-2=1' names object -2; numbers begin at 1"),
+        (["--pin", '""=1'], "--pin '\"\"=1' names no object; give a label or a number"),
+        (["--no-pin", "1=None"], "--no-pin '1=None' excludes nothing; name a mapped object"),
+        (
+            ["--synonyms", "couch"],
+            "--synonyms 'couch' is not a list of two or more labels, as in couch,sofa",
+        ),
+        (["--synonyms", "a,,b"], "--synonyms 'a,,b' is not a list of two or more labels"),
     ],
 )
 def test_what_has_another_form_is_refused(command_line, files, options, sentence):

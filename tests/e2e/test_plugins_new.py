@@ -103,12 +103,12 @@ def test_it_writes_into_a_folder_that_is_still_to_be_made(command_line, tmp_path
     ("name", "kind", "sentence"),
     [
         *(
-            (name, "searcher", f"NAME {name!r} is no name for an algorithm; use up to 40 ")
+            (name, "searcher", f"NAME {name!r} cannot be the name of an algorithm; use up to 40 ")
             for name in ("Tabu", "2-opt", "a--b", "a_b", "../x", "", "x" * 41)
         ),
         ("easm", "searcher", "NAME 'easm' is a searcher of sketchmatch 0.1.0 already; "),
         ("client", "searcher", "NAME 'client' would make the package sketchmatch_client, "),
-        ("tabu", "sercher", "--kind 'sercher' is no kind; choose one of segmenter, histogram, "),
+        ("tabu", "sercher", "--kind is 'sercher'; choose one of: segmenter, histogram, "),
     ],
 )
 def test_what_it_refuses(name, kind, sentence, command_line, tmp_path):
@@ -128,7 +128,7 @@ def test_it_never_writes_over_anything(command_line, tmp_path):
     (tmp_path / "sketchmatch-tabu").mkdir()
     done = command_line("plugins", "new", "tabu", "--kind", "searcher", "--into", tmp_path)
     assert done.returncode == 2
-    assert "is there already; choose another NAME, or another folder with --into" in done.stderr
+    assert "exists already; choose another NAME, or another folder with --into" in done.stderr
     assert not list((tmp_path / "sketchmatch-tabu").iterdir())
 
 

@@ -46,10 +46,14 @@ def test_a_map_is_put_labelled_and_matched_with_by_its_name(scenes):
 @pytest.mark.parametrize(
     ("command", "arguments", "said"),
     [
-        ("scenes show", ["ff"], "'ff' begins no name of a scene; `sketchmatch scenes list` shows"),
+        (
+            "scenes show",
+            ["ff"],
+            "'ff' is not the beginning of a scene's name; `sketchmatch scenes list` shows",
+        ),
         ("scenes delete", ["f" * 64], f"name is {'f' * 64}, but you have stored no scene"),
-        ("scenes label", ["ff", "desk"], "'desk' is no label of an object; give its number"),
-        ("scenes label", ["ff", "0=desk"], "'0=desk' is no label of an object"),
+        ("scenes label", ["ff", "desk"], "'desk' is not of the form NUMBER=LABEL; number objects"),
+        ("scenes label", ["ff", "0=desk"], "'0=desk' is not of the form"),
         ("scenes put", ["missing.yaml"], "missing.yaml"),
         ("match", [LIVING_ROOM_SKETCH, "scene:"], "'' is no name of a scene"),
     ],
@@ -67,7 +71,7 @@ def test_objects_are_counted_from_1_where_there_is_none_of_the_number(scenes):
     name = scenes("scenes put", LIVING_ROOM_MAP).stdout.strip()
     done = scenes("scenes label", name, "1=desk", "9=lamp")
     assert (done.returncode, done.stdout) == (2, "")
-    assert "'9=' names no object: the scene has objects 1 to 8" in done.stderr
+    assert "'9=' names object 9, but the scene has objects 1 to 8" in done.stderr
 
 
 @pytest.mark.slow
@@ -93,4 +97,4 @@ def test_a_stored_map_takes_what_is_carried_as_its_file_does(scenes, tmp_path):
 def test_a_stored_scene_without_a_server_is_refused():
     done = sketchmatch("match", LIVING_ROOM_SKETCH, "scene:ab")
     assert done.returncode == 2
-    assert "'scene:ab' is kept by a server, and none is asked; give --server" in done.stderr
+    assert "'scene:ab' is a scene on a server, but no server is given; add --server" in done.stderr

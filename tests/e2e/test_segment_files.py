@@ -259,7 +259,7 @@ def test_what_people_say_of_another_content_is_never_replaced_unasked(command_li
     beside.write_text(json.dumps(document), encoding="utf-8")
     done = command_line(*save)
     assert done.returncode == 2
-    assert "not of this content of the map, and would be lost" in done.stderr
+    assert "which was made for another state of the map and would be lost" in done.stderr
     assert "by hand" in beside.read_text(encoding="utf-8")
     assert command_line(*save, "--segmenter", "occupancy-grid").returncode == 0
     assert "by hand" not in beside.read_text(encoding="utf-8")
@@ -294,5 +294,5 @@ def test_what_is_carried_never_takes_the_place_of_what_is_read(
     given = [tmp_path / each for each in ("drawn.geojson", "office.yaml", "office.yaml")]
     done = command_line("carry", *given, option, tmp_path / name)
     assert done.returncode == 2
-    assert "which is read here, and would be lost" in done.stderr
+    assert "which is read here and would be lost" in done.stderr
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before

@@ -66,14 +66,14 @@ def test_health_may_be_asked_over_http_without_certificates_and_proxies(
     assert (done.returncode, done.stdout, done.stderr) == (3, "NOT_SERVING\n", "")
     done = command_line("health", address, "--of", "searcher/easm")
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("sketchmatch: --of is not told over HTTP; ")
+    assert done.stderr.startswith("sketchmatch: --of cannot be asked over HTTP; ")
 
 
 @pytest.mark.parametrize("address", ["http://127.0.0.1:1", "http://", "http://[:1", "http://a b"])
 def test_a_probe_that_nobody_answers_is_exit_code_3_and_a_line(command_line, address):
     done = command_line("health", address)
     assert (done.returncode, done.stdout) == (3, "")
-    assert done.stderr.startswith(f"sketchmatch: nobody tells at {address} whether the server")
+    assert done.stderr.startswith(f"sketchmatch: {address} does not answer whether the")
     assert len(done.stderr.splitlines()) == 1
 
 

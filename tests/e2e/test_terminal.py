@@ -76,7 +76,7 @@ def test_at_80_columns_each_object_has_one_line_with_its_relation():
     assert all(len(line) <= 80 for line in lines)
     assert lines[0] == "8 of 8 sketched objects matched"
     assert re.split(r"\s{2,}", lines[1]) == [
-        *("in the sketch", "on the map", "likely", "lies in the sketch")
+        *("in the sketch", "on the map", "likely", "position in the sketch")
     ]
     rows = [re.split(r"\s{2,}", line) for line in lines[3:11]]
     assert (rows[0][:2], rows[0][3:]) == (
@@ -185,8 +185,8 @@ def test_an_answer_that_cannot_be_written_is_one_sentence_and_an_exit_code(argum
         )
     assert done.returncode == ExitCode.INVALID_INPUT
     assert done.stderr == (
-        "sketchmatch: standard output cannot be written (no space left on device); make room "
-        "there, or send it elsewhere\n"
+        "sketchmatch: standard output cannot be written (no space left on device); free some "
+        "space there, or send the answer elsewhere\n"
     )
 
 
@@ -343,7 +343,7 @@ def test_of_208_notes_one_is_told_and_how_many_more_there_are(command_line, plan
     assert len(said) == 2
     assert "was left out: its ends are" in said[0]
     assert said[0].endswith(" (and 207 more like it)")
-    assert said[1] == "sketchmatch: with -v all 208 notes are told"
+    assert said[1] == "sketchmatch: -v shows all 208 notes"
     assert len(command_line("segment", plan, "-v").stderr.splitlines()) == 208
     assert len(json.loads(command_line("segment", plan, "--json").stdout)["warnings"]) == 208
     both = command_line("match", plan, plan, "--json", "--verbose").stderr.splitlines()

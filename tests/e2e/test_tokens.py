@@ -76,7 +76,7 @@ def test_what_cannot_be_done_is_said_in_a_line(command_line, tmp_path):
         "sketchmatch: 'a b' is no name of a caller; take up to 64 letters, digits and . _ @ - "
         "as in robot-7"
     )
-    assert "--file is left out, and the configuration names none" in said(
+    assert "--file is not given, and the configuration has no" in said(
         command_line("tokens", "list")
     )
     assert f"{file} cannot be read (no such file" in said(
@@ -129,7 +129,7 @@ def test_commands_show_tokens_and_certificates(command_line, monkeypatch, tmp_pa
 def test_ways_into_a_server_are_of_no_use_without_one(command_line):
     line = said(command_line("plugins", "list", "--token-file", "token"))
     assert line == (
-        "sketchmatch: --token-file is for a server, and none is asked; give --server, or drop it"
+        "sketchmatch: --token-file needs a server, but none is given; add --server, or leave it out"
     )
 
 

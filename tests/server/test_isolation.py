@@ -403,7 +403,7 @@ def test_strict_plugins_keep_a_server_from_starting_and_a_denied_one_is_no_probl
     assert refused.returncode == 5
     assert re.fullmatch(
         r"sketchmatch: plugin acme-\S+ of acme-\S+ 1\.2 failed to load: .* "
-        r"\(and 1 more\); mend it, or do without strict plugins\n",
+        r"\(and 1 more\); correct it, or set plugins\.strict to false\n",
         refused.stderr,
     )
     file = tmp_path / "sketchmatch.toml"

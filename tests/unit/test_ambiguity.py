@@ -371,7 +371,9 @@ def test_on_another_place_the_answer_stands_but_nothing_is_asked():
     assert result.place_probability == pytest.approx(0.25)
     assert result.probability == pytest.approx(0.1)
     assert result.ambiguity is None
-    assert repr(result).startswith("<MatchResult: probably not this place (0.250 that it is): 3 of")
+    assert repr(result).startswith(
+        "<MatchResult: probably not this place (this place: 0.250): 3 of"
+    )
 
 
 @pytest.mark.parametrize(("columns", "rows", "turns"), [(3, 3, 4), (4, 3, 2)])

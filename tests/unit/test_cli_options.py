@@ -69,7 +69,7 @@ def commands(of):
 
 
 def test_no_command_takes_an_empty_path_for_the_folder_one_is_in():
-    with pytest.raises(typer.BadParameter, match="it is empty where a file belongs"):
+    with pytest.raises(typer.BadParameter, match="it is empty; give the path of a file"):
         to_path("")
     assert to_path("a b") == Path("a b")
     taken = [

@@ -326,7 +326,7 @@ def test_a_server_says_what_check_says_and_is_not_started_for_it_if_strict(file,
     ]
     error = refused(_setup, load(path, {"plugins.strict": True}))
     assert error.field == f"{path}: profiles.mine.searcher.name"
-    assert str(error).endswith("; mend it, or do without strict plugins")
+    assert str(error).endswith("; correct it, or set plugins.strict to false")
 
 
 def test_numbers_that_people_write_are_numbers(monkeypatch):

@@ -137,7 +137,7 @@ def test_probabilities_of_map_and_place_have_a_line_of_their_own(monkeypatch):
 def test_where_it_is_probably_another_place_that_is_said_first(monkeypatch):
     apart = answer(place_probability=0.49, ambiguity=ambiguity(2, 1))
     assert shown(apart, monkeypatch)[:2] == [
-        "Probably not this place (49 % that it is)",
+        "Probably not this place (this place: 49 %)",
         "3 of 3 sketched objects matched",
     ]
     here = answer(place_probability=0.5)
@@ -156,12 +156,12 @@ def test_of_maps_that_are_as_likely_it_is_said_what_to_tell(monkeypatch):
         match.scenes.sketch.CopyFrom(scene(*labels))
         return shown(match, monkeypatch)[0]
 
-    begin = "4 maps fit about equally well; say which mapped object is"
-    assert asked(1, "desk", "shelf", "") == f"{begin} shelf (--pin shelf=…)"
-    assert asked(2, "desk", "shelf", "") == f"{begin} No. 3 (--pin 3=…)"
-    assert asked(1, "bed", "tea table", "") == f"{begin} tea table (--pin 2=…)"
-    assert asked(1, "bed", "chair", "chair") == f"{begin} chair (2) (--pin 2=…)"
-    assert asked(1, "bed", "7", "") == f"{begin} 7 (--pin 2=…)"
+    begin = "4 object maps fit about equally well; state which mapped object"
+    assert asked(1, "desk", "shelf", "") == f"{begin} shelf is (--pin shelf=…)"
+    assert asked(2, "desk", "shelf", "") == f"{begin} No. 3 is (--pin 3=…)"
+    assert asked(1, "bed", "tea table", "") == f"{begin} tea table is (--pin 2=…)"
+    assert asked(1, "bed", "chair", "chair") == f"{begin} chair (2) is (--pin 2=…)"
+    assert asked(1, "bed", "7", "") == f"{begin} 7 is (--pin 2=…)"
 
 
 def test_alternatives_that_share_the_probability_are_as_good_and_say_how_likely_they_are(
@@ -211,7 +211,7 @@ def test_in_a_pipe_doubts_go_to_standard_error_and_the_columns_stay(monkeypatch,
     sure.result.unmatched_sketch_objects.append(3)
     display.show_match(sure, metres=False, verbose=False)
     told = capsys.readouterr()
-    assert told.err == "sketchmatch: Probably not this place (0.4 % that it is)\n"
+    assert told.err == "sketchmatch: Probably not this place (this place: 0.4 %)\n"
     assert told.out == plain_.out
 
 
@@ -323,10 +323,8 @@ def test_what_repeats_is_told_once_and_what_differs_is_told():
         "strokes[0] ('desk 0') is a mark (and 99 more like it)",
         "the map has a yaw of nan.",
         "1 rooms were left out (and 1 more like it)",
-        "with -v all 103 notes are told",
+        "-v shows all 103 notes",
     ]
     different = [f"note {chr(97 + k)}" for k in range(20)]
-    assert display.summary_of(different)[-1] == (
-        "15 others were noted; with -v all 20 notes are told"
-    )
+    assert display.summary_of(different)[-1] == ("15 other notes; -v shows all 20 notes")
     assert display.summary_of(different[:5]) == different[:5]

@@ -177,7 +177,7 @@ def test_a_pgm_of_other_greys_is_a_picture(tmp_path, picture, capsys):
     (tmp_path / "sketch.pgm").write_bytes(picture)
     assert isinstance(read_source(tmp_path / "sketch.pgm"), Image)
     assert source_of(tmp_path / "sketch.pgm").image.data == picture
-    words = "sketch.pgm is read as a drawing; for a robot's map give its .yaml"
+    words = "sketch.pgm was read as a drawing; if it is a robot's map, give its .yaml"
     assert words in " ".join(capsys.readouterr().err.split())
 
 

@@ -347,7 +347,7 @@ def test_a_result_says_whether_it_is_the_place(living_room):
     other = replace(living_room, place_probability=0.499)
     counted = "8 of 8 sketched objects matched, FMAP"
     assert repr(other).startswith(
-        f"<MatchResult: probably not this place (0.499 that it is): {counted}"
+        f"<MatchResult: probably not this place (this place: 0.499): {counted}"
     )
     assert "this place 0" not in repr(other)
     here = replace(living_room, place_probability=0.5)

@@ -143,7 +143,7 @@ std::string headline(const Match& match) {
   if (result.place_probability) {
     const std::string likely = likelihood(*result.place_probability);
     if (*result.place_probability < 0.5) {
-      line.insert(0, "probably not this place (" + likely + " that it is): ");
+      line.insert(0, "probably not this place (this place: " + likely + "): ");
     } else {
       line += ", this place " + likely;
     }

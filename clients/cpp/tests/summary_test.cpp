@@ -67,7 +67,7 @@ TEST(Summary, OfAnotherPlaceSaysSo) {
   match.result.probability = 0.9997;
   match.result.outcome = static_cast<Outcome>(77);  // of a newer server
   EXPECT_EQ(printed(match),
-            "probably not this place (0.250 that it is): 0 of 0 sketched objects matched, FMAP "
+            "probably not this place (this place: 0.250): 0 of 0 sketched objects matched, FMAP "
             "confidence 0.000, OMAP confidence 0.000, probability >0.999, 77\n"
             "in the sketch  on the map  confidence  probability  margin");
 }

@@ -73,7 +73,7 @@ def match_headline(result: MatchResult, sketch: Scene = _UNKNOWN) -> str:
     if result.HasField("place_probability"):
         likely = _likelihood(result.place_probability)
         if result.place_probability < 0.5:
-            facts[0] = f"probably not this place ({likely} that it is): {facts[0]}"
+            facts[0] = f"probably not this place (this place: {likely}): {facts[0]}"
         else:
             facts.insert(-1, f"this place {likely}")
     if result.ambiguity.deciding_sketch_objects:

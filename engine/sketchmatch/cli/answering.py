@@ -139,7 +139,7 @@ def naming(typed: Mapping[str, str]) -> Iterator[None]:
 def _refuse_access(access: Access) -> None:
     for name, value in vars(access).items():
         if value is not None:
-            problem = "is for a server, and none is asked; give --server, or drop it"
+            problem = "needs a server, but none is given; add --server, or leave it out"
             raise InvalidInputError(Reason.INVALID_FIELD, _option(name), problem)
 
 

@@ -167,12 +167,12 @@ def _is_usage_error(error: Exception) -> bool:
 def _sentence(error: Exception) -> str:
     if _is_usage_error(error):
         problem = error.format_message()  # type: ignore[attr-defined]
-        return output.clean(f"{problem.rstrip('.')}; --help tells what it takes")
+        return output.clean(f"{problem.rstrip('.')}; see --help")
     if _exit_code(error) is not ExitCode.UNFORESEEN:
         return output.clean(str(error))
     if os.environ.get("SKETCHMATCH_DEBUG"):
         return "".join(traceback.format_exception(error)).rstrip()
     return output.clean(
-        f"failed in a way nobody foresaw ({type(error).__name__}: {error}); "
-        "please report it with what SKETCHMATCH_DEBUG=1 prints"
+        f"failed with an unexpected error ({type(error).__name__}: {error}); please report it, "
+        "with what the same command prints if SKETCHMATCH_DEBUG=1 is set"
     )

@@ -170,7 +170,7 @@ def check_keepout(keepout: Path | None, target: Path) -> None:
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             "--keepout",
-            f"needs a map with cells, and {str(target)!r} has none; give the map's .yaml",
+            f"needs a map with cells, but {str(target)!r} has none; give the map's .yaml",
         )
 
 
@@ -195,8 +195,8 @@ def save(
         files.save_keepout(keepout, document, cells, "--keepout")
         if yaw := grid.origin[2]:
             say(
-                f"the map's origin is turned by {yaw:.3g} rad, and so is the mask's; nav2's "
-                "costmaps take no notice of that: save the map upright for them"
+                f"the map's origin is turned by {yaw:.3g} rad, and so is the mask's, but nav2's "
+                "costmaps ignore this: save the map upright for them"
             )
     if waypoints is not None:
         text = files.encode_waypoints(found.carried, found.properties, found.rotation)
@@ -231,7 +231,7 @@ def draw(found: Carriage, names: tuple[str, str], paths: tuple[Path, Path], targ
             ("Median deviation", _median(found)),
         ],
         alert=_doubt(answer),
-        footnote="Shades: within two standard deviations of where it was drawn and carried to.",
+        footnote="Shaded: two standard deviations around what was drawn and carried.",
         underlay=grid_in(paths[1]),
         sketch_underlay=grid_in(paths[0]),
         names=names,

@@ -85,7 +85,7 @@ def _address(process: subprocess.Popen[str]) -> str:
             with Client(found[1], tls=False, token="") as client:
                 client.wait_until_serving(_START_SECONDS)
             return found[1]
-    raise RuntimeError("the server ended before it listened")
+    raise RuntimeError("the server of the demo ended before it began to listen")
 
 
 def _pass_on(process: subprocess.Popen[str]) -> None:

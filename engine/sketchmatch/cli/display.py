@@ -242,7 +242,7 @@ def summary_of(notes: Sequence[str]) -> list[str]:
     Examples
     --------
     >>> summary_of([f"stroke {k} is a mark" for k in range(1, 209)])
-    ['stroke 1 is a mark (and 207 more like it)', 'with -v all 208 notes are told']
+    ['stroke 1 is a mark (and 207 more like it)', '-v shows all 208 notes']
     """
     if len(notes) <= _MOST_NOTES:
         return list(notes)
@@ -256,9 +256,8 @@ def summary_of(notes: Sequence[str]) -> list[str]:
         for alike in list(kinds.values())[:_MOST_NOTES]
     ]
     untold = len(notes) - sum(map(len, list(kinds.values())[:_MOST_NOTES]))
-    were = "was" if untold == 1 else "were"
-    others = f"{counted(untold, 'other')} {were} noted; " if untold else ""
-    return [*told, f"{others}with -v all {len(notes)} notes are told"]
+    others = f"{counted(untold, 'other note')}; " if untold else ""
+    return [*told, f"{others}-v shows all {len(notes)} notes"]
 
 
 def chosen(algorithm: Algorithm) -> dict[str, Any]:
@@ -310,14 +309,14 @@ def doubt(match: Match) -> str:
     """
     result = match.result
     if result.HasField("place_probability") and result.place_probability < 0.5:
-        return f"Probably not this place ({likely(result.place_probability)} that it is)"
+        return f"Probably not this place (this place: {likely(result.place_probability)})"
     if not result.ambiguity.deciding_sketch_objects:
         return ""
     first = result.ambiguity.deciding_sketch_objects[0]
     labels = [item.label for item in match.scenes.sketch.objects]
     return (
-        f"{result.ambiguity.maps} maps fit about equally well; say which mapped object is "
-        f"{named(first, labels)} (--pin {_pinned(first, labels)}=…)"
+        f"{result.ambiguity.maps} object maps fit about equally well; state which mapped object "
+        f"{named(first, labels)} is (--pin {_pinned(first, labels)}=…)"
     )
 
 
@@ -353,7 +352,7 @@ def _answer(match: Match, metres: bool) -> RenderableType:
         Column("likely", right=True),
         Column("confidence", right=True, dispensable=2 if counted else 1),
         Column("margin", right=True, dispensable=0 if unclear else 2),
-        Column("lies in the sketch", least=24, dispensable=1),
+        Column("position in the sketch", least=24, dispensable=1),
     ]
     rows = [
         [
@@ -379,11 +378,11 @@ def _answer(match: Match, metres: bool) -> RenderableType:
     ]
     parts = result.fmap_confidence
     detail = (
-        f"ζ {parts.total:.3f} of relations {parts.similarity:.3f}, "
-        f"rotations {parts.rotation:.3f}, dilations {parts.dilation:.3f}"
+        f"ζ {parts.total:.3f}: similarity {parts.similarity:.3f}, "
+        f"rotation {parts.rotation:.3f}, dilation {parts.dilation:.3f}"
     )
     if parts.HasField("shape"):
-        detail += f", shapes {parts.shape:.3f}, sizes {parts.size:.3f}"
+        detail += f", shape {parts.shape:.3f}, size {parts.size:.3f}"
     said = [f"{name} {value}" for name, value in facts(result, metres)]
     figures = (said[:-4], said[-4:-2], said[-2:])
     lines = ["  ".join(some) for some in figures if some]

@@ -63,7 +63,7 @@ def _is_ready(address: str, of: str, timeout: float) -> bool:
     from sketchmatch_client import ServerUnavailableError
 
     if of:
-        problem = "is not told over HTTP; give HOST:PORT of the server itself"
+        problem = "cannot be asked over HTTP; give HOST:PORT of the server itself"
         raise InvalidInputError(Reason.INVALID_FIELD, "--of", problem)
     try:
         # No proxy leads to where a probe is.
@@ -73,5 +73,6 @@ def _is_ready(address: str, of: str, timeout: float) -> bool:
         with error:
             return False
     except (OSError, HTTPException, ValueError) as error:
-        problem = f"nobody tells at {address} whether the server serves ({error})"
-        raise ServerUnavailableError(f"{problem}; start it with --metrics-address") from None
+        problem = f"{address} does not answer whether the server serves ({error})"
+        remedy = "check the address, or start the server with --metrics-address"
+        raise ServerUnavailableError(f"{problem}; {remedy}") from None

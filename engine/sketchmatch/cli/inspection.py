@@ -192,6 +192,6 @@ def _check_pairs(pairs: Pairs, scene: Scene, option: str, what: str) -> None:
                 raise InvalidInputError(
                     Reason.INVALID_FIELD,
                     option,
-                    f"'{pair[0] + 1},{pair[1] + 1}' names object {index + 1}; "
-                    f"the {what} has objects 1 … {len(scene)}, as `sketchmatch segment` shows them",
+                    f"'{pair[0] + 1},{pair[1] + 1}' names object {index + 1}, but the {what} has "
+                    f"objects 1 … {len(scene)}; `sketchmatch segment` shows them",
                 )

@@ -80,7 +80,7 @@ def match(
 
     options.refuse_config(config, server)
     if keep_running and server is None:
-        problem = "is for a server, and none is asked; give --server, or drop it"
+        problem = "needs a server, but none is given; add --server, or leave it out"
         raise InvalidInputError(Reason.INVALID_FIELD, "--keep-running", problem)
     if overlay is not None:
         pictures.check_path(overlay, sketch, map_)

@@ -62,7 +62,7 @@ def new(
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             str(folder),
-            "is there already; choose another NAME, or another folder with --into",
+            "exists already; choose another NAME, or another folder with --into",
         )
     _write(folder, _files(name, chosen))
     say(f"wrote the {chosen} {name} into {folder}; these commands install, test and use it")
@@ -78,7 +78,7 @@ def _kind(text: str) -> Kind:
     except ValueError:
         known = ", ".join(Kind)
         raise InvalidInputError(
-            Reason.INVALID_FIELD, "--kind", f"{quoted(text)} is no kind; choose one of {known}"
+            Reason.INVALID_FIELD, "--kind", f"is {quoted(text)}; choose one of: {known}"
         ) from None
 
 
@@ -89,14 +89,14 @@ def _check_name(name: str, kind: Kind) -> None:
     if not _NAME.fullmatch(name) or len(name) > _LONGEST_NAME:
         raise _about_name(
             name,
-            f"is no name for an algorithm; use up to {_LONGEST_NAME} small letters, digits and "
-            "single hyphens, a letter first, as in hill-climber",
+            f"cannot be the name of an algorithm; use up to {_LONGEST_NAME} small letters, digits "
+            "and single hyphens, and begin with a letter, as in hill-climber",
         )
     for item in default_registry().of_kind(kind):
         if item.name == name:
             raise _about_name(
                 name,
-                f"is a {kind} of {item.distribution} {item.version} already; choose another name",
+                f"is already a {kind} of {item.distribution} {item.version}; choose another name",
             )
     if find_spec(_module(name)) or f"sketchmatch-{name}" in _installed():
         raise _about_name(

@@ -66,7 +66,7 @@ def to_path(text: str) -> Path:
         If it is empty, as a variable is that nobody set: that would be the folder one is in.
     """
     if not str(text):
-        raise typer.BadParameter("it is empty where a file belongs")
+        raise typer.BadParameter("it is empty; give the path of a file")
     return Path(text)
 
 
@@ -367,13 +367,13 @@ def parse_settings(
             raise InvalidInputError(
                 Reason.INVALID_PARAMETER,
                 "--set",
-                f"{setting!r} has another form than STAGE.PARAMETER=VALUE, "
+                f"{setting!r} is not of the form STAGE.PARAMETER=VALUE, "
                 "as in searcher.population=400",
             )
         if allowed and stage not in allowed:
             known = " or ".join(f"{name}.…" for name in allowed)
             raise InvalidInputError(
-                Reason.INVALID_PARAMETER, "--set", f"{stage!r} is no stage here; use {known}"
+                Reason.INVALID_PARAMETER, "--set", f"{stage!r} is not a stage here; use {known}"
             )
         stages.setdefault(stage, {})[parameter] = value_of(text)
     return stages
@@ -388,7 +388,7 @@ def refuse_config(config: Path | None, server: str | None) -> None:
         If there is one, and a server.
     """
     if config is not None and server is not None:
-        problem = "is for computing here, and the server has one of its own; drop one of the two"
+        problem = "is not used with --server, as the server has its own; leave out one of the two"
         raise InvalidInputError(Reason.INVALID_FIELD, "--config", problem)
 
 
@@ -411,7 +411,7 @@ def parse_pairs(texts: Iterable[str] | None, option: str) -> list[tuple[int, int
             a, b = (int(part) for part in text.split(","))
         except ValueError:
             raise InvalidInputError(
-                Reason.INVALID_FIELD, option, f"{text!r} is not two numbers of objects, as in 3,1"
+                Reason.INVALID_FIELD, option, f"{text!r} is not of the form A,B, as in 3,1"
             ) from None
         if a == b:
             raise InvalidInputError(
@@ -450,14 +450,14 @@ Pin(sketch='3', map=None, excluded=False), Pin(sketch=1, map=4, excluded=True)])
                 raise InvalidInputError(
                     Reason.INVALID_FIELD,
                     option,
-                    f"{text!r} has another form than SKETCHED=MAPPED, as in desk=3, 2=5 or "
-                    "desk=none; put labels with a = or quotes of their own in double quotes",
+                    f"{text!r} is not of the form SKETCHED=MAPPED, as in desk=3, 2=5 or "
+                    "desk=none; put labels that contain = or quotes in double quotes",
                 )
             sketched, mapped = (part.strip() for part in found.groups())
             nothing = mapped.lower() == "none"
             if excluded and nothing:
                 raise InvalidInputError(
-                    Reason.INVALID_FIELD, option, f"{text!r} excludes none; name a mapped object"
+                    Reason.INVALID_FIELD, option, f"{text!r} excludes nothing; name a mapped object"
                 )
             known[f"{option} {text}"] = Pin(
                 _object_named(sketched, option, text),
@@ -475,11 +475,11 @@ def _object_named(typed: str, option: str, text: str) -> int | str:
         if 0 < int(typed) < 2**32:
             return int(typed) - 1
         raise InvalidInputError(
-            Reason.INVALID_FIELD, option, f"{text!r} names object {typed}; they count from 1"
+            Reason.INVALID_FIELD, option, f"{text!r} names object {typed}; numbers begin at 1"
         )
     if not typed:
         raise InvalidInputError(
-            Reason.INVALID_FIELD, option, f"{text!r} names nothing; give labels or numbers"
+            Reason.INVALID_FIELD, option, f"{text!r} names no object; give a label or a number"
         )
     return typed
 
@@ -522,7 +522,7 @@ def parse_synonyms(groups: Iterable[str] | None) -> list[tuple[str, ...]]:
             raise InvalidInputError(
                 Reason.INVALID_FIELD,
                 "--synonyms",
-                f"{text!r} is not two labels or more, as in couch,sofa",
+                f"{text!r} is not a list of two or more labels, as in couch,sofa",
             )
         read.append(labels)
     return read
@@ -561,7 +561,7 @@ def say_renamed(sketch_segmenter: str, map_segmenter: str) -> None:
     """Tell that a segmenter was chosen by an option's former name, after what was asked for."""
     for side, given in (("sketch", sketch_segmenter), ("map", map_segmenter)):
         if given:
-            say(f"--segmenter-{side} is deprecated; write --{side}-segmenter")
+            say(f"--segmenter-{side} is deprecated; use --{side}-segmenter")
 
 
 def say(sentence: str) -> None:

@@ -181,7 +181,7 @@ def discard() -> None:
 def unwritable(error: OSError) -> InvalidInputError:
     """Return what to tell of an answer that could not be written."""
     why = (error.strerror or str(error)).lower()
-    problem = f"cannot be written ({why}); make room there, or send it elsewhere"
+    problem = f"cannot be written ({why}); free some space there, or send the answer elsewhere"
     if error.errno == errno.EBADF:
         problem = "is closed; send the answer to a file, or to /dev/null"
     return InvalidInputError(Reason.INVALID_FILE, "standard output", problem)

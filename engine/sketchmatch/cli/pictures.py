@@ -11,6 +11,7 @@ import numpy as np
 from sketchmatch.cli.display import doubt, facts, likely
 from sketchmatch.cli.options import say
 from sketchmatch.cli.sources import check_spared, is_kept
+from sketchmatch.errors import counted
 from sketchmatch.io.files import read_map_files
 from sketchmatch.io.ros_bag import bag_and_topic, is_bag, read_bag
 from sketchmatch.model import FloatArray, OccupancyGrid, Scene, SceneObject, StrokeSet
@@ -99,7 +100,7 @@ def draw_segmentation(response: SegmentResponse, source: Path, target: Path, pen
     route = _way(response.route)
     scene = scene_of(response.scene)
     doubted = sum(item.doubtful for item in scene.objects)
-    caption = f"{doubted} in doubt, drawn hollow" if doubted else ""
+    caption = f"{counted(doubted, 'doubtful object')}, drawn hollow" if doubted else ""
     picture = draw_scene(scene, caption=caption, underlay=grid, pen=pen, route=route)
     save_overlay(target, picture)
 
@@ -118,14 +119,14 @@ def draw_description(found: Description, source: Path, target: Path) -> None:
     if left_out:
         kind += f", of the {MOST_PLOTS} pairs with the strongest forces"
         say(
-            f"--plot: draws the {MOST_PLOTS} of {len(found.pairs)} relations with the strongest "
-            "forces, those of large objects close together; choose others by --pair A,B"
+            f"--plot draws the {MOST_PLOTS} of {len(found.pairs)} relations with the strongest "
+            "forces, as between large objects close together; choose others by --pair A,B"
         )
     picture = draw_relations(
         found.scene,
         relations,
         left_out=[found.pairs[k] for k in left_out],
-        caption=f"{kind}, each drawn to its own peak; an arrow marks the main direction",
+        caption=f"{kind}, each scaled to its peak; an arrow marks the main direction",
         underlay=grid_in(source),
         pen=isinstance(found.source, StrokeSet),
     )
@@ -153,9 +154,9 @@ def _meaning(result: match_pb2.MatchResult) -> str:
     """Return what the probabilities of a result mean, those that it has."""
     if not result.HasField("probability"):
         return ""
-    said = "Bars: how likely each pair is right.  Probability: how likely all of it is right."
+    said = "Bars: probability of each pair.  Probability: of the whole answer."
     if result.HasField("place_probability"):
-        said += "  This place: how likely the sketch shows this place at all."
+        said += "  This place: probability that the sketch shows this place."
     return said
 
 

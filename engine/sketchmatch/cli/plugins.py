@@ -175,12 +175,12 @@ def _named(found: ListAlgorithmsResponse, name: str, kind: str) -> Algorithm:
     own = [item for item in items if item.distribution == OWN_DISTRIBUTION]
     kinds = {catalogue.kind(item) for item in items}
     if not items:
-        problem = f"is no {kind or 'algorithm'}; {_nearest(found, name)}"
+        problem = f"is not {f'a {kind}' if kind else 'an algorithm'}; {_nearest(found, name)}"
     elif len(kinds) > 1:
         problem = f"is a {' and a '.join(sorted(kinds))}; say which with --kind"
     elif len(items) > 1 and not own:
         owners = " and ".join(map(catalogue.origin, items))
-        problem = f"is offered by {owners}, and cannot be selected; uninstall one of them"
+        problem = f"is offered by {owners}, so it cannot be selected; uninstall one of them"
     else:
         return (own or items)[0]
     raise InvalidInputError(Reason.UNKNOWN_ALGORITHM, quoted(name), problem)

@@ -148,7 +148,7 @@ def label(
         whole = whole_name(name, client)
         count = len(client.get_scene(whole).stored_scene.scene.objects)
         if (most := max(given)) >= count:
-            problem = f"names no object: the scene has objects 1 to {count}"
+            problem = f"names object {most + 1}, but the scene has objects 1 to {count}"
             raise InvalidInputError(Reason.INVALID_FIELD, quoted(f"{most + 1}="), problem)
         output.write_line(client.update_scene(whole, given).name)
 
@@ -175,7 +175,7 @@ def _labels(typed: list[str]) -> Mapping[int, str]:
     for text in typed:
         number, equals, called = text.partition("=")
         if not (equals and number.isascii() and number.isdigit() and int(number) > 0):
-            problem = "is no label of an object; give its number, from 1, as in 3=sofa"
+            problem = "is not of the form NUMBER=LABEL; number objects from 1, as in 3=sofa"
             raise InvalidInputError(Reason.INVALID_FIELD, quoted(text), problem)
         found[int(number) - 1] = called
     return found

@@ -299,7 +299,7 @@ def serve(
         if _server_settings(configuration) != settings:
             say(
                 "addresses, server.grace_seconds, server.workers, what is kept and the names of "
-                "files stay until the server is started anew"
+                "files do not change before the server is started again"
             )
         return _setup(configuration)
 
@@ -372,7 +372,7 @@ def _setup(configuration: Configuration) -> Setup:
     refuse_faults(configuration, registry)
     for fault in idle_faults(configuration, registry):
         if configuration.strict:
-            problem = f"{fault.problem}; mend it, or do without strict plugins"
+            problem = f"{fault.problem}; correct it, or set plugins.strict to false"
             raise InvalidInputError(fault.reason, fault.field, problem)
         say(str(fault))
     server = configuration.settings.server

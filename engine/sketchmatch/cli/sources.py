@@ -60,7 +60,7 @@ def source_or_stored(path: Path, side: str, asked: Answerer) -> Source:
     if not is_kept(path):
         return source_of(path, side)
     if not isinstance(asked, Client):
-        problem = "is kept by a server, and none is asked; give --server"
+        problem = "is a scene on a server, but no server is given; add --server"
         raise InvalidInputError(Reason.INVALID_FIELD, quoted(str(path)), problem)
     return sources.stored_scene(whole_name(str(path).removeprefix(_KEPT), asked))
 
@@ -76,14 +76,14 @@ def whole_name(name: str, client: Client) -> str:
     if len(name) >= _DIGITS:
         return name
     if not name:
-        problem = "is no name of a scene; `sketchmatch scenes list` shows those there are"
+        problem = "is not the name of a scene; `sketchmatch scenes list` shows all names"
         raise InvalidInputError(Reason.INVALID_FIELD, quoted(name), problem)
     known = [each.name for each in client.list_scenes() if each.name.startswith(name)]
     if len(known) == 1:
         return known[0]
-    which = f"begins the names of {len(known)} scenes; type more of it"
+    which = f"is the beginning of the names of {len(known)} scenes; give more characters"
     if not known:
-        which = "begins no name of a scene; `sketchmatch scenes list` shows those there are"
+        which = "is not the beginning of a scene's name; `sketchmatch scenes list` shows all names"
     raise InvalidInputError(Reason.INVALID_FIELD, quoted(name), which)
 
 
@@ -111,7 +111,7 @@ def source_of(path: Path, side: str = "") -> Source:
     file, part = file_and_part(path)
     if not part and file.suffix.lower() in PICTURE_SUFFIXES:
         if file.suffix.lower() == ".pgm":
-            note = f"{path.name} is read as a drawing; for a robot's map give its .yaml"
+            note = f"{path.name} was read as a drawing; if it is a robot's map, give its .yaml"
             say_notes(side, [note], verbose=True)
         return sources.image(read_bytes(file))
     source = read_here(path)
@@ -162,7 +162,7 @@ def check_spared(path: Path, field: str, *given: Path | None) -> None:
             continue
         files = read_map_files(file)
         if path.samefile(file) or (files and path.read_bytes() == files.picture):
-            problem = f"is {str(path)!r}, which is read here, and would be lost; give another name"
+            problem = f"is {str(path)!r}, which is read here and would be lost; give another name"
             raise InvalidInputError(Reason.INVALID_FILE, field, problem)
 
 
@@ -177,8 +177,8 @@ def check_objects_spared(out: Path, map_: Path) -> None:
     content = content_of(map_) if is_of_a_map(out) and out.is_file() else ""
     if content and not is_of(load_json(decode_text(read_bytes(out))), content):
         problem = (
-            f"is {str(out)!r}, which is not of this content of the map, and would be lost; give "
-            "another name, or say --segmenter occupancy-grid to begin anew"
+            f"is {str(out)!r}, which was made for another state of the map and would be lost; give "
+            "another name, or add --segmenter occupancy-grid to start again from the map"
         )
         raise InvalidInputError(Reason.INVALID_FILE, "--out", problem)
 

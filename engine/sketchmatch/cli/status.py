@@ -112,7 +112,7 @@ def _limits(limits: ServerLimits) -> Iterator[str]:
         yield f"{_duration(limits.max_time_budget.ToTimedelta().total_seconds())} a match"
     if limits.HasField("default_time_budget"):
         usual = _duration(limits.default_time_budget.ToTimedelta().total_seconds())
-        yield f"{usual} where it does not say"
+        yield f"{usual} a match by default"
     for name, what in _LIMITS.items():
         if limits.HasField(name):  # type: ignore[arg-type]
             yield f"{getattr(limits, name)} {what}"

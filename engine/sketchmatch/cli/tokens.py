@@ -59,7 +59,7 @@ def add(name: _Name, file: _File = None, config: Config = None) -> None:
     token, known = new_token(name)
     _change(path, lambda lines, _: [*lines, known.line])
     output.write(f"{token}\n")
-    say(f"{path} knows a new token of {name}; keep what was printed, it is nowhere else")
+    say(f"{path} has a new token of {name}; keep the printed token, it is stored nowhere else")
 
 
 @app.command("list")
@@ -90,13 +90,14 @@ def remove(
     def without(lines: list[str], known: list[KnownToken | None]) -> list[str]:
         own = [index for index, token in enumerate(known) if token and token.name == name]
         if not own:
-            problem = f"has no token in {path}; `sketchmatch tokens list` shows who has"
+            problem = f"has no token in {path}; `sketchmatch tokens list` shows who has one"
             raise InvalidInputError(Reason.INVALID_FIELD, quoted(name), problem)
         removed = own[:-1] if old else own
         return [line for index, line in enumerate(lines) if index not in removed]
 
     before, after = _change(path, without)
-    say(f"{path} knows {before - after} token{'s' * (before - after != 1)} of {name} less")
+    removed = before - after
+    say(f"removed {removed} token{'s' * (removed != 1)} of {name} from {path}")
 
 
 def _file(named: Path | None, config: Path | None) -> Path:
@@ -106,7 +107,7 @@ def _file(named: Path | None, config: Path | None) -> Path:
 
     if configured := load(config).settings.server.tokens:
         return Path(configured)
-    problem = "is left out, and the configuration names none (server.tokens); give --file tokens"
+    problem = "is not given, and the configuration has no server.tokens; give --file tokens"
     raise InvalidInputError(Reason.MISSING_FIELD, "--file", problem)
 
 

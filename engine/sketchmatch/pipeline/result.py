@@ -354,7 +354,7 @@ class MatchResult(Tabular):
         if self.place_probability is not None:
             likely = likelihood(self.place_probability)
             if self.place_probability < 0.5:
-                facts[0] = f"probably not this place ({likely} that it is): {facts[0]}"
+                facts[0] = f"probably not this place (this place: {likely}): {facts[0]}"
             else:
                 facts.append(f"this place {likely}")
         if self.ambiguity is not None:

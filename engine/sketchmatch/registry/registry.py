@@ -216,7 +216,7 @@ class Registry:
         if self.problems:
             first, *others = self.problems
             more = f" (and {len(others)} more)" if others else ""
-            raise PluginError(f"{first}{more}; mend it, or do without strict plugins")
+            raise PluginError(f"{first}{more}; correct it, or set plugins.strict to false")
 
     def without(self, *distributions: str) -> Registry:
         """Return a registry that leaves out what some distributions offer."""
