@@ -386,7 +386,7 @@ CASES = [
         "unknown searcher",
         "UNKNOWN_ALGORITHM",
         "searcher.name",
-        "is 'quantum', which is no searcher",
+        "is 'quantum', which is not a searcher",
         "choose one of: ",
         chosen={"searcher": "quantum"},
     ),
@@ -394,7 +394,7 @@ CASES = [
         "algorithm of another kind",
         "UNKNOWN_ALGORITHM",
         "histogram.name",
-        "is 'easm', which is no histogram",
+        "is 'easm', which is not a histogram",
         "choose one of: ",
         chosen={"histogram": "easm"},
     ),
@@ -402,7 +402,7 @@ CASES = [
         "segmenter for another source",
         "WRONG_ALGORITHM",
         "map_segmenter.name",
-        "is 'strokes', which cannot read source polygon_set",
+        "is 'strokes', which cannot read a source of type polygon_set",
         "choose one of: polygons",
         chosen={"map_segmenter": "strokes"},
     ),
@@ -410,7 +410,7 @@ CASES = [
         "unknown parameter",
         "INVALID_PARAMETER",
         "searcher.parameters.populaton",
-        "is no parameter of easm",
+        "is not a parameter of easm",
         "it has: consistency, population",
         chosen={"searcher": "easm"},
         params={"searcher": {"populaton": 3}},
@@ -495,7 +495,7 @@ CASES = [
         "weight of shape for pairs",
         "INVALID_FIELD",
         "weights.shape",
-        "compares objects, and the searcher 'nn'",
+        "needs a searcher that finds one object map, which 'nn'",
         "choose another",
         weights=(1, 1, 1, 1, 0),
         chosen={"searcher": "nn"},
@@ -706,7 +706,7 @@ def test_half_timed_strokes_are_refused_with_the_path(stub, tmp_path):
 def test_a_name_of_any_length_gets_an_answer_that_fits_into_a_trailer(stub, tmp_path):
     wrong = asked(FINE, tmp_path)
     wrong.pipeline.searcher.name = "ζ" * 100_000
-    with pytest.raises(grpc.RpcError, match="which is no searcher; choose one of") as raised:
+    with pytest.raises(grpc.RpcError, match="which is not a searcher; choose one of") as raised:
         list(stub.Match(wrong, timeout=60))
     info, (violation,) = details(raised.value)
     assert raised.value.code() is grpc.StatusCode.INVALID_ARGUMENT

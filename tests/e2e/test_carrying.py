@@ -253,10 +253,10 @@ def test_in_python_it_is_the_same(zones):
             ([*command, option, value], words)
             for command in (["transfer", *ROOM, "DRAWN"], ["carry", "DRAWN", *ROOM[1:] * 2])
             for option, value, words in (
-                ("--searcher", "luck", "'luck', which is no searcher"),
-                ("--judge", "solomon", "'solomon', which is no judge"),
-                ("--histogram", "none", "'none', which is no histogram"),
-                ("--similarity", "taste", "'taste', which is no similarity"),
+                ("--searcher", "luck", "'luck', which is not a searcher"),
+                ("--judge", "solomon", "'solomon', which is not a judge"),
+                ("--histogram", "none", "'none', which is not a histogram"),
+                ("--similarity", "taste", "'taste', which is not a similarity"),
                 ("--seed", "-1", "seed"),
                 ("--time-budget", "0", "time_budget"),
                 ("--weights", "1,2", "--weights '1,2' is not three, five or six numbers"),

@@ -97,7 +97,7 @@ def test_check_says_every_fault_in_a_line(command_line, mine):
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.splitlines() == [
         f"sketchmatch: {mine}: server.max_matches is 0; it should be greater than or equal to 1",
-        f"sketchmatch: {mine}: server.colour is no setting; server has: address, grace_seconds, "
+        f"sketchmatch: {mine}: server.colour is not a setting; server has: address, grace_seconds, "
         "max_request_mib, max_matches, workers, max_waiting, max_waiting_mib, max_wait_seconds, "
         "max_time_budget_seconds, default_time_budget_seconds, max_matches_per_caller, "
         "max_requests_per_minute, max_stored_mib_per_caller, max_comparisons, max_candidates, "
@@ -164,8 +164,8 @@ def test_plugins_list_shows_what_is_the_default_here(command_line, mine):
     ("text", "words"),
     [
         ("[pipeline.searcher]\nname = 'best'", "pipeline.searcher.name is 'best', which is no sea"),
-        ("[sever]", "sever is no setting; did you mean server?"),
-        ("[server]\naddress = ?", "is no TOML at line 2, column 11 (invalid value); correct it"),
+        ("[sever]", "sever is not a setting; did you mean server?"),
+        ("[server]\naddress = ?", "is not TOML at line 2, column 11 (invalid value); correct it"),
     ],
 )
 def test_a_bad_file_is_refused_in_one_line(command_line, tmp_path, command, text, words):
@@ -179,7 +179,7 @@ def test_a_bad_file_is_refused_in_one_line(command_line, tmp_path, command, text
 def test_a_profile_or_file_that_is_not_there_is_refused(command_line):
     line = said(command_line("match", *PAIR, "--profile", "best"))
     assert line == (
-        "sketchmatch: pipeline.profile is 'best', which is no profile; "
+        "sketchmatch: pipeline.profile is 'best', which is not a profile; "
         "choose one of: proof, thesis, thesis-easm, thesis-fsnn"
     )
     assert "away.toml does not exist" in said(command_line("match", *PAIR, "--config", "away.toml"))
@@ -261,5 +261,5 @@ def test_a_profile_without_its_plugin_does_not_keep_a_server_from_starting(mine)
         with pytest.raises(InvalidRequestError) as caught:
             client.match(sketch, sketch, profile="other")
         assert str(caught.value).startswith(
-            "pipeline.profile is 'other', whose searcher.name is 'annealing', which is no searcher"
+            "pipeline.profile is 'other', whose searcher.name is 'annealing', which is not a search"
         )

@@ -96,7 +96,7 @@ def test_the_image_does_not_start_for_strangers(monkeypatch, tmp_path):
         monkeypatch.setenv(name, value)
     done = sketchmatch("serve")
     assert done.returncode == 2
-    assert "is reached from other machines, and whoever does may call" in done.stderr
+    assert "can be reached from other machines, and whoever reaches it may call" in done.stderr
 
 
 @pytest.fixture

@@ -359,7 +359,7 @@ def test_of_208_notes_one_is_told_and_how_many_more_there_are(command_line, plan
         ("127.0.0.1", "have a port, as in 127.0.0.1:50051", "add the port, as in"),
         ("", "have a port, as in 127.0.0.1:50051", "give host and port, as in"),
         ("::1", "have brackets around an IPv6 address, as in [::1]:50051", "give host and port"),
-        ("http://robot:50051", "be no URL but HOST:PORT", "give host and port alone"),
+        ("http://robot:50051", "be HOST:PORT and not a URL", "give host and port alone"),
         ("robot:http", "end with a port from", "give host and port"),
         ("robot:65536", "end with a port from", "give a port from"),
         (":50051", "begin with a host", "give host and port"),

@@ -73,8 +73,8 @@ def test_the_configuration_names_the_file(command_line, tmp_path):
 def test_what_cannot_be_done_is_said_in_a_line(command_line, tmp_path):
     file = tmp_path / "tokens"
     assert said(command_line("tokens", "add", "a b", "--file", file)) == (
-        "sketchmatch: 'a b' is no name of a caller; take up to 64 letters, digits and . _ @ - "
-        "as in robot-7"
+        "sketchmatch: 'a b' cannot be the name of a caller; use up to 64 letters, digits and . _ @ "
+        "- as in robot-7"
     )
     assert "--file is not given, and the configuration has no" in said(
         command_line("tokens", "list")
@@ -87,7 +87,7 @@ def test_what_cannot_be_done_is_said_in_a_line(command_line, tmp_path):
     )
     file.write_text("robot-7.secret\n")
     line = said(command_line("tokens", "add", "a", "--file", file))
-    assert line.startswith(f"sketchmatch: {file}, line 1, has another form than NAME:sha256:SALT")
+    assert line.startswith(f"sketchmatch: {file}, line 1, is not of the form NAME:sha256:SALT")
     assert "secret" not in line
     file.write_text("")
     assert "'a' has no token in" in said(command_line("tokens", "remove", "a", "--file", file))
@@ -119,7 +119,7 @@ def test_commands_show_tokens_and_certificates(command_line, monkeypatch, tmp_pa
         assert json.loads(done.stdout)["objectMatches"]
         assert command_line("segment", LIVING_ROOM_SKETCH, *at, *shown).returncode == 0
         line = said(command_line("plugins", "list", *at, *shown[:-2]), 6)
-        assert line.startswith("sketchmatch: this server wants a token, and the call carries none")
+        assert line.startswith("sketchmatch: this server requires a token, but the call has none")
         for option, value in way_in.items():
             variable = "SKETCHMATCH_" + option.removeprefix("--").replace("-", "_").upper()
             monkeypatch.setenv(variable, str(value))

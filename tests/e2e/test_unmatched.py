@@ -88,7 +88,9 @@ def test_a_server_says_what_is_in_force(place, address):
         profiles = {profile.name: profile for profile in client.algorithms().profiles}
         assert not profiles["proof"].allow_unmatched
         assert not profiles["proof"].HasField("weights")
-        with pytest.raises(InvalidRequestError, match="allow_unmatched compares maps of objects"):
+        with pytest.raises(
+            InvalidRequestError, match="allow_unmatched needs a searcher that finds"
+        ):
             client.match(*request, searcher="nn", allow_unmatched=True)
 
 
@@ -107,7 +109,7 @@ def test_a_profile_may_allow_it(command_line, files, place, tmp_path):
     mine.write_text("[profiles.mine]\nweights = [1, 2]\n")
     checked = command_line("config", "check", mine)
     assert (
-        "it should be three, five or six numbers, not all of the first five 0"
+        "it should be three, five or six numbers, the first five not all 0"
         in checked.stdout + checked.stderr
     )
 

@@ -37,4 +37,4 @@ def test_a_robot_that_is_no_web_socket_is_refused_before_it_is_part_of_a_header(
     (line,) = done.stderr.splitlines()
     assert done.returncode == 2
     assert "--web-robots" in line
-    assert "should be a WebSocket each, as in ws://robot.local:9090" in line
+    assert "should each be a WebSocket, as in ws://robot.local:9090" in line

@@ -299,9 +299,9 @@ def test_a_refusal_has_a_reason_for_programs_and_a_remedy_for_people(ask, guarde
         ask(guarded.address, "server_info", root_certificates=ours.certificate, token=wrong)
     assert caught.value.reason == "NOT_AUTHENTICATED"
     assert str(caught.value) == (
-        "the token is none that this server knows; ask its operator for another"
+        "this server does not know the token; ask its operator for another"
     )
-    with pytest.raises(NotAuthenticatedError, match="the call carries none; give the client"):
+    with pytest.raises(NotAuthenticatedError, match="the call has none; give the client"):
         ask(guarded.address, "server_info", root_certificates=ours.certificate)
 
 
@@ -395,10 +395,10 @@ def test_an_expired_certificate_is_replaced_while_a_match_runs_on(ours):
         assert early.server_info().version
     told = [re.sub(r"\d{4}-\d\d-\d\d", "DAY", line) for line in host.said if "certificate" in line]
     assert told == [
-        "the server's certificate is good until DAY",
-        "the certificates are read again; the server's certificate has expired on DAY: "
-        "no client trusts it; renew it",
-        "the certificates are read again; the server's certificate is good until DAY",
+        "the server's certificate is valid until DAY",
+        "the certificates are read again; the server's certificate expired on DAY, "
+        "so no client trusts it; renew it",
+        "the certificates are read again; the server's certificate is valid until DAY",
     ]
 
 
@@ -438,7 +438,7 @@ def test_tokens_change_while_the_server_runs(ours, tls, robot, tmp_path):
         assert new.server_info().version
     told = [line for line in host.said if "stay as they were" in line]
     assert len(told) == 2
-    assert f"{file}, line 1, has another form than NAME:sha256:SALT:HASH" in told[0]
+    assert f"{file}, line 1, is not of the form NAME:sha256:SALT:HASH" in told[0]
     assert not any(other in line for line in host.said)
 
 
@@ -487,9 +487,10 @@ def test_strangers_are_not_let_in_from_other_machines(address):
     with pytest.raises(InvalidInputError) as caught:
         Host(SETUP, ServerSettings(address, 0.0)).wait_until_listening()
     assert str(caught.value) == (
-        f"address {address!r} is reached from other machines, and whoever does may call and can "
-        "read along; give --tls-certificate and --tls-key, and --tokens or --tls-client-ca, "
-        "listen on 127.0.0.1, or say --insecure if that is meant"
+        f"address {address!r} can be reached from other machines, and whoever reaches it may "
+        "call and can read along; give --tls-certificate and --tls-key, and --tokens or "
+        "--tls-client-ca, "
+        "listen on 127.0.0.1, or allow this with --insecure"
     )
 
 
@@ -545,9 +546,9 @@ def test_files_of_no_use_are_refused_by_name(ours, others, tmp_path):
         ((away, pair.key), f"{away} cannot be read (no such file or directory); "),
         ((pair.certificate, away), f"{away} cannot be read"),
         ((pair.certificate, other.key), f"{other.key} is not the key of the certificate"),
-        ((text, pair.key), f"{text} and {pair.key} are no certificate and private key in PEM"),
-        ((pair.certificate, text), f"{pair.certificate} and {text} are no certificate"),
-        ((pair.certificate, pair.key, text), f"{text} holds no certificate in PEM"),
+        ((text, pair.key), f"{text} and {pair.key} are not a certificate and a private key in PEM"),
+        ((pair.certificate, text), f"{pair.certificate} and {text} are not a certificate"),
+        ((pair.certificate, pair.key, text), f"{text} has no certificate in PEM"),
     ):
         assert refused(tls=TlsFiles(*files)).startswith(problem)
     assert refused(tokens=away).startswith(f"{away} cannot be read")

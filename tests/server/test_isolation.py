@@ -165,9 +165,9 @@ def test_what_cannot_be_loaded_is_listed_and_named_to_whoever_asks_for_it(
 
 def test_a_wrong_name_is_refused_for_its_own_sake_though_workers_lack_the_plugins(site):
     words = {
-        "searcher": r"pipeline\.searcher\.name is 'guesing', which is no searcher; .* failed",
-        "judge": r"pipeline\.judge\.name is 'nonesuch', which is no judge; ",
-        "profile": r"pipeline\.profile is 'nonesuch', which is no profile; ",
+        "searcher": r"pipeline\.searcher\.name is 'guesing', which is not a searcher; .* failed",
+        "judge": r"pipeline\.judge\.name is 'nonesuch', which is not a judge; ",
+        "profile": r"pipeline\.profile is 'nonesuch', which is not a profile; ",
     }
     asked = {
         "searcher": {"searcher": "guesing"},

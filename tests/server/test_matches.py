@@ -201,7 +201,7 @@ def test_a_default_folder_that_another_server_uses_is_left_to_it_and_said(tmp_pa
         hosting(offering(), store=tmp_path, store_named=False) as second,
         Client(second.address) as client,
     ):
-        assert any("nothing is kept beyond" in said and "used by" in said for said in second.said)
+        assert any("nothing is kept after" in said and "used by" in said for said in second.said)
         name = client.match(scene(4, 0), scene(4, 1)).accepted.match_id
         assert client.get_match(name).match.state == MATCH_STATE_SUCCEEDED
 

@@ -208,7 +208,7 @@ def test_a_certificate_says_until_when_it_is_good_as_openssl_says_it(tmp_path, d
 def test_a_certificate_of_another_form_has_no_known_end_and_stops_nobody(pem):
     found = Pems(pem, b"", None, ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER))
     assert found.expires is None
-    assert "nobody can tell" in found.validity
+    assert "it cannot be told" in found.validity
 
 
 # Telling ----------------------------------------------------------------------------------------

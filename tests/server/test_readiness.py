@@ -95,7 +95,9 @@ def test_a_reload_changes_limits_but_that_of_the_size_of_requests(monkeypatch, s
         wait_until(lambda: "the configuration is reloaded" in host.said, "it is not reloaded")
         limits = client.server_info().limits
         assert (limits.max_request_bytes, limits.max_waiting) == (former, 6)
-        assert "server.max_request_mib stays until the server is started anew" in host.said
+        assert (
+            "server.max_request_mib does not change before the server is started again" in host.said
+        )
 
 
 def test_no_more_streams_watch_health_than_probes_need(monkeypatch):

@@ -58,7 +58,7 @@ def test_a_server_that_hangs_ends_itself_and_says_where_its_threads_are():
         _, errors = process.communicate(timeout=60)
         assert process.returncode == HUNG
     said, *where = errors.splitlines()
-    assert said.startswith("sketchmatch: nothing was answered for 1 s; the server ends itself")
+    assert said.startswith("sketchmatch: the server has been stuck for 1 s and ends itself")
     assert any("in say" in line for line in where)
 
 

@@ -171,11 +171,17 @@ def test_a_profile_of_ones_own_changes_the_built_in_one(file):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("[server\naddress = 1", "{file} is no TOML at line 1, column 8 (expected ']' at the end"),
-        ("a = 'b", "{file} is no TOML at its end ("),
-        ("[server]\nadress = 'x'", "{file}: server.adress is no setting; did you mean server.addr"),
-        ("sever = 1", "{file}: sever is no setting; did you mean server?"),
-        ("[server]\nx = 1", "{file}: server.x is no setting; server has: address, grace_seconds"),
+        ("[server\naddress = 1", "{file} is not TOML at line 1, column 8 (expected ']' at the end"),
+        ("a = 'b", "{file} is not TOML at its end ("),
+        (
+            "[server]\nadress = 'x'",
+            "{file}: server.adress is not a setting; did you mean server.addr",
+        ),
+        ("sever = 1", "{file}: sever is not a setting; did you mean server?"),
+        (
+            "[server]\nx = 1",
+            "{file}: server.x is not a setting; server has: address, grace_seconds",
+        ),
         ("[limits]\nmax_objects = 'few'", "{file}: limits.max_objects is 'few'; it should be a"),
         (
             "[limits]\nmax_objects = '50'",
@@ -197,25 +203,25 @@ def test_a_profile_of_ones_own_changes_the_built_in_one(file):
         ("[server]\ngrace_seconds = inf", "{file}: server.grace_seconds is inf; it should be a f"),
         (
             "profile = 'best'",
-            "{file}: profile is 'best', which is no profile; choose one of: proof",
+            "{file}: profile is 'best', which is not a profile; choose one of: proof",
         ),
         (
             "[pipeline.searcher]\nname = 'best'",
-            "{file}: pipeline.searcher.name is 'best', which is no searcher; choose one of: align",
+            "{file}: pipeline.searcher.name is 'best', which is not a searcher; choose one of: al",
         ),
         (
             "[algorithms.searcher.easm]\ncolour = 1",
-            "{file}: algorithms.searcher.easm.colour is no parameter of easm; it has: consistency",
+            "{file}: algorithms.searcher.easm.colour is not a parameter of easm; it has: con",
         ),
         (
             "[algorithms.judge.confidence]\nodds = 3",
-            "{file}: algorithms.judge.confidence.odds is no parameter of confidence; it has: none",
+            "{file}: algorithms.judge.confidence.odds is not a parameter of confidence; it has",
         ),
         (
             "[pipeline.map_segmenter.parameters]\nmin_size = 1",
-            "{file}: pipeline.map_segmenter.parameters.min_size is set for no segmenter; give its",
+            "{file}: pipeline.map_segmenter.parameters.min_size is set without the name of a seg",
         ),
-        ("[profiles.'My Own']", "{file}: profiles.My Own is no name for a profile; use small let"),
+        ("[profiles.'My Own']", "{file}: profiles.My Own cannot be the name of a profile; use"),
     ],
 )
 def test_a_fault_is_one_sentence_with_its_place(file, text, sentence):
@@ -229,15 +235,19 @@ def test_a_fault_is_one_sentence_with_its_place(file, text, sentence):
 @pytest.mark.parametrize(
     ("variable", "value", "sentence"),
     [
-        ("SERVER__ADRESS", "x", "is no setting; did you mean SKETCHMATCH_SERVER__ADDRESS?"),
-        ("FOO__BAR", "x", "is no setting; a configuration has: profile, pipeline,"),
-        ("MAX_BYTES", "1", "is no setting; did you mean SKETCHMATCH_LIMITS__MAX_BYTES?"),
-        ("LIMITS_MAX_BYTES", "1", "is no setting; did you mean SKETCHMATCH_LIMITS__MAX_BYTES?"),
+        ("SERVER__ADRESS", "x", "is not a setting; did you mean SKETCHMATCH_SERVER__ADDRESS?"),
+        ("FOO__BAR", "x", "is not a setting; a configuration has: profile, pipeline,"),
+        ("MAX_BYTES", "1", "is not a setting; did you mean SKETCHMATCH_LIMITS__MAX_BYTES?"),
+        ("LIMITS_MAX_BYTES", "1", "is not a setting; did you mean SKETCHMATCH_LIMITS__MAX_BYTES?"),
         ("LIMITS__MAX_BYTES", "0", "is 0; it should be greater than or equal to 1"),
         ("LIMITS__MAX_BYTES", "[" * 99_999, "is '[[[[[[[[[["),
         ("LIMITS__MAX_BYTES", "1" * 5000, "is '1111111111111111111111111111111111111111111111"),
-        ("PROFILE", "best", "is 'best', which is no profile; choose one of: proof, thesis"),
-        ("PIPELINE__SEARCHER", '{"nmae": 1}', ": nmae is no setting; did you mean SKETCHMATCH_PIP"),
+        ("PROFILE", "best", "is 'best', which is not a profile; choose one of: proof, thesis"),
+        (
+            "PIPELINE__SEARCHER",
+            '{"nmae": 1}',
+            ": nmae is not a setting; did you mean SKETCHMATCH_PIP",
+        ),
     ],
 )
 def test_a_bad_variable_is_named(monkeypatch, variable, value, sentence):
@@ -247,7 +257,7 @@ def test_a_bad_variable_is_named(monkeypatch, variable, value, sentence):
     assert str(error).startswith(f"SKETCHMATCH_{variable}{joint}{sentence}")
 
 
-DEEP = "has tables or lists in each other, more than 50 deep"
+DEEP = "has tables or lists nested more than 50 deep"
 
 
 @pytest.mark.parametrize(
@@ -414,7 +424,7 @@ def test_check_goes_on_with_the_environment_where_the_file_is_no_toml(file, monk
         ("deny = ['zzz']", "is 'zzz', which is not installed or has no plugin; those with plugins"),
         ("allow = ['Acme_Search', 'zzz']", "those with plugins are: acme-search"),
         ("trusted = ['*', 'zzz']", "is 'zzz', which is not installed"),
-        ("deny = ['sketchmatch']", "the engine itself, which is never denied; drop it"),
+        ("deny = ['sketchmatch']", "the engine itself, which cannot be denied; drop it"),
     ],
 )
 def test_check_finds_distributions_that_are_named_in_vain(file, monkeypatch, text, words):
@@ -449,8 +459,8 @@ def test_check_finds_distributions_that_are_named_in_vain(file, monkeypatch, tex
         ("localhost:65536", "end with a port from 0 to 65535"),
         ("localhost:-1", "end with a port from 0 to 65535"),
         ("localhost:²", "end with a port from 0 to 65535"),
-        ("dns:///localhost:1", "be no URL but HOST:PORT"),
-        (f"unix:/{'x' * 107}", "name a file by at most 107 bytes"),
+        ("dns:///localhost:1", "be HOST:PORT and not a URL"),
+        (f"unix:/{'x' * 107}", "a path of at most 107 bytes"),
         ("unix:", "name a file"),
     ],
 )

@@ -123,7 +123,7 @@ def test_a_third_partys_plugin_is_found(install):
         ("def broken(:", "SyntaxError"),
         (
             HEADER + "@hookimpl\ndef sketchmatch_register_searcher():\n    return []",
-            "it has sketchmatch_register_searcher, which is no hook; choose among: "
+            "it has sketchmatch_register_searcher, which is not a hook; hooks are: "
             "sketchmatch_register_histograms, sketchmatch_register_judges, ",
         ),
         (
@@ -180,15 +180,15 @@ class Finder(Segmenter):
 def sketchmatch_register_segmenters():
     return [Finder]
 """,
-            "Finder.sources is no tuple of some of StrokeSet, PolygonSet, OccupancyGrid, Image",
+            "Finder.sources is not a tuple of some of StrokeSet, PolygonSet, OccupancyGrid, Image",
         ),
         (
             "sketchmatch_api_version = 99\n" + SEARCHER.format(name="x"),
-            "it is written for version 99 of the plugin API, and this engine has 1; upgrade sketch",
+            "it is written for version 99 of the plugin API, but this engine has 1; upgrade sketch",
         ),
         (
             "sketchmatch_api_version = 0\n" + SEARCHER.format(name="x"),
-            "it is written for version 0 of the plugin API, and this engine has 1; upgrade the pl",
+            "it is written for version 0 of the plugin API, but this engine has 1; upgrade the pl",
         ),
         (
             "sketchmatch_api_version = '1'\n" + SEARCHER.format(name="x"),
@@ -224,7 +224,7 @@ def test_a_request_for_what_a_broken_plugin_may_have_offered_tells_of_it(install
     assert caught.value.reason is Reason.UNKNOWN_ALGORITHM
     assert caught.value.field == "name"
     assert caught.value.problem == (
-        "is 'clever', which is no searcher; plugin acme-broken of acme-broken failed to load: "
+        "is 'clever', which is not a searcher; plugin acme-broken of acme-broken failed to load: "
         "RuntimeError: no licence; choose one of: lucky"
     )
 
@@ -233,13 +233,14 @@ def test_of_two_with_the_same_name_neither_is_taken_and_both_are_named(install):
     source = SEARCHER.format(name="lucky")
     registry = discover([*install(source, "acme-one", "1.1"), *install(source, "acme-two", "2.2")])
     sentence = (
-        "is offered by acme-one 1.1 and acme-two 2.2{}; uninstall one or deny it in plugins.deny"
+        "is offered by acme-one 1.1 and acme-two 2.2{}; "
+        "uninstall one of them or put it into plugins.deny"
     )
     with pytest.raises(InvalidInputError) as caught:
         registry.find(Kind.SEARCHER, "lucky")
     assert caught.value.problem == "is 'lucky', which " + sentence.format("")
     assert registry.of_kind(Kind.SEARCHER) == ()
-    told = "searcher 'lucky' " + sentence.format(": neither is taken")
+    told = "searcher 'lucky' " + sentence.format(": neither is used")
     assert registry.problems == (told,)
     assert [(status.state, status.reason) for status in registry.statuses] == [
         (PluginState.ACTIVE, told),
@@ -252,7 +253,7 @@ def test_a_plugin_cannot_take_the_name_of_a_built_in_algorithm_away(install):
     registry = discover([*install(SEARCHER.format(name="auto"), "acme-search", "2.1"), own])
     assert registry.find(Kind.SEARCHER, "auto").distribution == "sketchmatch"
     theirs, ours = registry.statuses
-    assert "that of sketchmatch is taken" in theirs.reason
+    assert "that of sketchmatch is used" in theirs.reason
     assert ours.reason == ""
     assert registry.problems == (theirs.reason,)
 
@@ -492,15 +493,19 @@ def test_a_plugin_may_bring_readers_alone(install):
         ("return [Plans]", "return [3]", "offers 3, which is not a Reader"),
         ("def read(", "def look(", "Plans does not define read"),
         ('name = "plans"', 'name = "My Plans"', "use small letters, digits and hyphens"),
-        ('(".plan", ".plan.json")', '".plan"', "Plans.suffixes is no tuple of strings"),
+        ('(".plan", ".plan.json")', '".plan"', "Plans.suffixes is not a tuple of strings"),
         ('(".plan", ".plan.json")', '(".json",)', "Plans reads '.json'; use small letters, as in"),
         ('(".plan", ".plan.json")', '("plan",)', "Plans reads 'plan'; use small letters"),
-        ('("walls",)', "(3,)", "Plans.keys is no tuple of strings"),
-        ("source = PolygonSet", "source = dict", "Plans.source is none of StrokeSet, PolygonSet"),
+        ('("walls",)', "(3,)", "Plans.keys is not a tuple of strings"),
+        (
+            "source = PolygonSet",
+            "source = dict",
+            "Plans.source is not one of StrokeSet, PolygonSet",
+        ),
         (
             'suffixes = (".plan", ".plan.json")\n    keys = ("walls",)',
             "",
-            "Plans has neither suffixes nor keys to know its files by",
+            "Plans has neither suffixes nor keys to recognise its files by",
         ),
     ],
 )
@@ -530,7 +535,7 @@ def test_of_two_readers_of_the_same_files_ours_is_taken_and_otherwise_both_are_n
     readers = discover([*install(READER, "acme-a"), *install(READER, "acme-b")]).readers
     with pytest.raises(InvalidInputError, match=r"reader plans of acme-a 1\.0 and reader plans of"):
         reader_by_name(readers, "x.plan")
-    with pytest.raises(InvalidInputError, match=r"deny one of them in plugins\.deny"):
+    with pytest.raises(InvalidInputError, match=r"put one of them into plugins\.deny"):
         reader_by_keys(readers, ["walls"])
     ours = RegisteredReader(readers[0].reader, "sketchmatch", "1")
     assert reader_by_name([*readers, ours], "x.plan") is ours

@@ -57,7 +57,7 @@ def _file_fault(path: str) -> str:
     if not path or "\0" in path:
         return "should name a file, as in unix:/run/sketchmatch.sock"
     if len(path.encode(errors="surrogateescape")) > _LONGEST_PATH:
-        return f"should name a file by at most {_LONGEST_PATH} bytes; take a shorter path"
+        return f"should name a file by a path of at most {_LONGEST_PATH} bytes"
     return ""
 
 
@@ -68,7 +68,7 @@ def network_fault(address: str) -> str:
     numbered = port.isascii() and port.isdecimal() and len(port) <= _DIGITS
     numbered = numbered and int(port) <= _PORTS
     faults = (
-        (_URL.match(address), "be no URL but HOST:PORT, as in 127.0.0.1:50051"),
+        (_URL.match(address), "be HOST:PORT and not a URL, as in 127.0.0.1:50051"),
         (not colon, f"have a port, as in {address or '127.0.0.1'}:50051"),
         (
             ":" in host and not bracketed,
@@ -91,9 +91,9 @@ def bridge_fault(address: str) -> str:
     >>> bridge_fault("ws://robot.local:9090")
     ''
     >>> bridge_fault("robot.local:9090")
-    'should be a WebSocket each, as in ws://robot.local:9090'
+    'should each be a WebSocket, as in ws://robot.local:9090'
     """
     # It becomes part of a header, in which spaces, commas and semicolons have a meaning.
     if _BRIDGE.fullmatch(address):
         return ""
-    return "should be a WebSocket each, as in ws://robot.local:9090"
+    return "should each be a WebSocket, as in ws://robot.local:9090"

@@ -332,9 +332,9 @@ def _faults(error: ValidationError, layers: Sequence[Layer]) -> Iterator[Invalid
         path = tuple(str(part) for part in fault["loc"])
         place = _place(layers, path)
         if fault["type"] == "extra_forbidden":
-            problem = f"is no setting; {_known(path, place)}"
+            problem = f"is not a setting; {_known(path, place)}"
         elif path[-1] == "[key]":
-            problem = "is no name for a profile; use small letters, digits and hyphens"
+            problem = "cannot be the name of a profile; use small letters, digits and hyphens"
         else:
             problem = fault_of(fault["input"], fault["msg"])
         yield InvalidInputError(Reason.INVALID_PARAMETER, place, problem)
@@ -367,8 +367,8 @@ def _segmenter_faults(settings: Settings) -> Iterator[_Fault]:
         for stage, choice in selection.items():
             if kind_of(stage) is Kind.SEGMENTER and not choice.name:
                 problem = (
-                    "is set for no segmenter; give its name beside it, or set the parameter in "
-                    "algorithms.segmenter.NAME"
+                    "is set without the name of a segmenter; give the name beside it, or set the "
+                    "parameter in algorithms.segmenter.NAME"
                 )
                 whole = (*path, stage, "parameters", next(iter(choice.parameters)))
                 yield whole, InvalidInputError(Reason.INVALID_PARAMETER, stage, problem)
@@ -428,7 +428,7 @@ def _distribution_faults(configuration: Configuration, registry: Registry) -> It
     for key in ("allow", "deny", "trusted"):
         for name in getattr(plugins, key) or ():
             if key == "deny" and canonical(name) == OWN_DISTRIBUTION:
-                problem = f"is {quoted(name)}, the engine itself, which is never denied; drop it"
+                problem = f"is {quoted(name)}, the engine itself, which cannot be denied; drop it"
             elif canonical(name) in installed or (key, name) == ("trusted", "*"):
                 continue
             else:

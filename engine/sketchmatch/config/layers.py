@@ -56,7 +56,7 @@ _BUILTIN = Path(__file__).with_name("builtin.toml")
 # A file may be a pipe, as of a shell's <(…), but no endless device.
 _MOST_BYTES = 1024 * 1024
 _DEEPEST = 50
-_TOO_DEEP = f"has tables or lists in each other, more than {_DEEPEST} deep; give a configuration"
+_TOO_DEEP = f"has tables or lists nested more than {_DEEPEST} deep; give a configuration file"
 
 
 class Origin(StrEnum):
@@ -275,7 +275,7 @@ def _parsed(path: Path) -> dict[str, Any]:
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
         if len(data) > _MOST_BYTES:
-            problem = f"has more than {_MOST_BYTES // 1024} KiB; give a configuration"
+            problem = f"has more than {_MOST_BYTES // 1024} KiB; give a configuration file"
         elif _is_deep(values := tomllib.loads(data.decode("utf-8-sig"))):
             problem = _TOO_DEEP
         else:
@@ -285,7 +285,7 @@ def _parsed(path: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         what, _, place = str(error).partition(" (at ")
         where = place.rstrip(")").replace("end of document", "its end")
-        problem = f"is no TOML at {where} ({what[:1].lower()}{what[1:]}); correct it"
+        problem = f"is not TOML at {where} ({what[:1].lower()}{what[1:]}); correct it"
     except UnicodeDecodeError:
         problem = "is not UTF-8 text; save it as UTF-8"
     except IsADirectoryError:
@@ -316,7 +316,7 @@ def _path_of(variable: str) -> tuple[str, ...] | None:
         near += get_close_matches(variable, known, 1, 0.9)
         if not near:
             return None
-        problem = f"is no setting; did you mean {near[0]}?"
+        problem = f"is not a setting; did you mean {near[0]}?"
         raise InvalidInputError(Reason.INVALID_PARAMETER, variable, problem)
     named = {"algorithms": 2, "profiles": 1}.get(path[0], len(path))
     return tuple(part.replace("_", "-") if k == named else part for k, part in enumerate(path))
@@ -327,7 +327,8 @@ def _put(values: dict[str, Any], path: Sequence[str], value: Any, label: str) ->
     for part in above:
         values = values.setdefault(part, {})
         if not isinstance(values, dict):
-            problem = f"is set beside {variable_of(path[: path.index(part) + 1])}; drop one of them"
+            other = variable_of(path[: path.index(part) + 1])
+            problem = f"cannot be set together with {other}; leave out one of them"
             raise InvalidInputError(Reason.INVALID_PARAMETER, label, problem)
     values[last] = value
 

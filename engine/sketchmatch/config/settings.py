@@ -37,7 +37,7 @@ def _listed(value: Any) -> Any:
 
 def _weighing(weights: tuple[float, ...]) -> tuple[float, ...]:
     if len(weights) not in WEIGHT_COUNTS or not sum(weights[:5]):
-        raise ValueError("should be three, five or six numbers, not all of the first five 0")
+        raise ValueError("should be three, five or six numbers, the first five not all 0")
     if any(exponent > MAX_DISTANCE for exponent in weights[5:]):
         raise ValueError(f"should have an exponent of distance of at most {MAX_DISTANCE:g}")
     return weights

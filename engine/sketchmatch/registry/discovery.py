@@ -130,12 +130,12 @@ def _presumed(point: EntryPoint) -> tuple[EntryPoint, PluginStatus]:
     metadata: Any = point.dist.metadata
     name, version = metadata.get("Name"), metadata.get("Version")
     if not name:
-        raise ValueError("it has no Name")
+        raise ValueError("its metadata has no Name")
     return point, PluginStatus(point.name, name, version or "")
 
 
 def _unreadable(file: str, error: Exception) -> str:
-    return f"its {file} cannot be read ({type(error).__name__}: {error}); install it anew"
+    return f"its {file} cannot be read ({type(error).__name__}: {error}); install it again"
 
 
 def _named_by_folder(distribution: Distribution) -> tuple[str, str]:
@@ -213,7 +213,7 @@ def _check_hooks(manager: pluggy.PluginManager) -> None:
     known = sorted(name for name, hook in hooks.items() if hook.has_spec())
     for name, hook in hooks.items():
         if name not in known and not all(each.optionalhook for each in hook.get_hookimpls()):
-            raise ValueError(f"it has {name}, which is no hook; choose among: {', '.join(known)}")
+            raise ValueError(f"it has {name}, which is not a hook; hooks are: {', '.join(known)}")
 
 
 def _check_version(version: Any) -> None:
@@ -221,12 +221,12 @@ def _check_version(version: Any) -> None:
         raise TypeError(f"sketchmatch_api_version is {version!r}, which is not a whole number")
     if version > API_VERSION:
         raise ValueError(
-            f"it is written for version {version} of the plugin API, and this engine has "
+            f"it is written for version {version} of the plugin API, but this engine has "
             f"{API_VERSION}; upgrade sketchmatch"
         )
     if version < API_VERSION:
         raise ValueError(
-            f"it is written for version {version} of the plugin API, and this engine has "
+            f"it is written for version {version} of the plugin API, but this engine has "
             f"{API_VERSION}; upgrade the plugin"
         )
 
@@ -255,7 +255,7 @@ def _checked_reader(offered: Any) -> type[Reader]:
     for attribute in ("suffixes", "keys"):
         texts = getattr(offered, attribute)
         if not (isinstance(texts, tuple) and all(isinstance(text, str) for text in texts)):
-            raise TypeError(f"{offered.__name__}.{attribute} is no tuple of strings")
+            raise TypeError(f"{offered.__name__}.{attribute} is not a tuple of strings")
     for suffix in offered.suffixes:
         if not _SUFFIX.fullmatch(suffix) or suffix == ".json":
             raise ValueError(
@@ -263,9 +263,11 @@ def _checked_reader(offered: Any) -> type[Reader]:
                 "for .json"
             )
     if not (offered.suffixes or offered.keys):
-        raise ValueError(f"{offered.__name__} has neither suffixes nor keys to know its files by")
+        raise ValueError(
+            f"{offered.__name__} has neither suffixes nor keys to recognise its files by"
+        )
     if not _is_source(getattr(offered, "source", None)):
-        raise TypeError(f"{offered.__name__}.source is none of {_KNOWN_SOURCES}")
+        raise TypeError(f"{offered.__name__}.source is not one of {_KNOWN_SOURCES}")
     return offered
 
 
@@ -292,7 +294,7 @@ def _check_params(offered: type[Algorithm]) -> None:
 def _check_sources(offered: type[Segmenter]) -> None:
     sources = getattr(offered, "sources", None)
     if not (isinstance(sources, tuple) and sources and all(map(_is_source, sources))):
-        raise TypeError(f"{offered.__name__}.sources is no tuple of some of {_KNOWN_SOURCES}")
+        raise TypeError(f"{offered.__name__}.sources is not a tuple of some of {_KNOWN_SOURCES}")
 
 
 def _is_source(kind: Any) -> bool:

@@ -101,5 +101,5 @@ def _one_of(fits: Sequence[RegisteredReader], what: str) -> RegisteredReader:
         return (own or fits)[0]
     names = " and ".join(each.origin for each in fits)
     raise InvalidInputError(
-        Reason.INVALID_FILE, "", f"{what} that {names} read; deny one of them in plugins.deny"
+        Reason.INVALID_FILE, "", f"{what} that {names} read; put one of them into plugins.deny"
     )

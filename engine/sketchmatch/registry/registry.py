@@ -121,7 +121,7 @@ class Conflict:
     taken: str = ""
 
     def __str__(self) -> str:
-        effect = f"that of {self.taken} is taken" if self.taken else "neither is taken"
+        effect = f"that of {self.taken} is used" if self.taken else "neither is used"
         return f"{self.kind} {self.name!r} {self.offered}: {effect}; {_REMEDY}"
 
     @property
@@ -130,7 +130,7 @@ class Conflict:
         return f"is offered by {' and '.join(self.owners)}"
 
 
-_REMEDY = "uninstall one or deny it in plugins.deny"
+_REMEDY = "uninstall one of them or put it into plugins.deny"
 
 
 class Registry:
@@ -241,7 +241,7 @@ class Registry:
             if (conflict.kind, conflict.name) == (kind, name):
                 problem = f"is {name!r}, which {conflict.offered}; {_REMEDY}"
                 raise InvalidInputError(Reason.UNKNOWN_ALGORITHM, "name", problem)
-        problem = f"is {quoted(name)}, which is no {kind}; {self._known(kind)}"
+        problem = f"is {quoted(name)}, which is not a {kind}; {self._known(kind)}"
         raise InvalidInputError(Reason.UNKNOWN_ALGORITHM, "name", problem)
 
     def default(self, kind: Kind, source: type[Any] | None = None) -> str:

@@ -93,7 +93,7 @@ class Handlers:
             find = partial(interceptor.intercept_service, find)
         handler: Any = await find(call.details)
         if handler is None:
-            raise CallRefused(grpc.StatusCode.UNIMPLEMENTED, f"there is no {call.path}", ())
+            raise CallRefused(grpc.StatusCode.UNIMPLEMENTED, f"there is no method {call.path}", ())
         read, encode = handler.request_deserializer, handler.response_serializer
         kind = kind_of(handler)
         response = await getattr(handler, kind)(read(request) if read else request, call)

@@ -66,17 +66,17 @@ class CallerInterceptor(grpc.aio.ServerInterceptor):
         ]
         if not shown:
             raise NotAuthenticatedError(
-                "this server wants a token, and the call carries none; "
-                "give the client its token, which goes as metadata, authorization: Bearer TOKEN"
+                "this server requires a token, but the call has none; "
+                "give the client its token, which it sends as metadata, authorization: Bearer TOKEN"
             )
         if len(shown) > 1 or not shown[0].lower().startswith(_SCHEME):
             raise NotAuthenticatedError(
-                "the metadata authorization has another form than one Bearer TOKEN; send it so"
+                "the metadata authorization is not one Bearer TOKEN; send one token in this form"
             )
         name = self._tokens.value.caller_of(shown[0][len(_SCHEME) :].strip())
         if not name:
             raise NotAuthenticatedError(
-                "the token is none that this server knows; ask its operator for another"
+                "this server does not know the token; ask its operator for another"
             )
         return name
 

@@ -196,7 +196,7 @@ def _from_json(data: bytes, kind: type[Message], limit: int) -> bytes:
         text = inflated(data, limit)
         return json_format.Parse(text, kind()).SerializeToString()
     except (json_format.ParseError, UnicodeDecodeError, RecursionError, zlib.error) as error:
-        problem = f"the request is no {kind.DESCRIPTOR.name} in JSON: {_line(error)}"
+        problem = f"the request is not a {kind.DESCRIPTOR.name} in JSON: {_line(error)}"
         raise InvalidInputError(Reason.INVALID_FIELD, "", problem) from None
 
 

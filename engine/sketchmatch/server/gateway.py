@@ -70,9 +70,9 @@ class Gateway:
 
             from sketchmatch.server.connect import connect_application
         except ImportError:
-            problem = "is set, and the package connectrpc or uvicorn is not installed; "
+            problem = "is set, but connectrpc and uvicorn are not both installed; "
             raise InvalidInputError(
-                Reason.INVALID_FIELD, _SETTING, f"{problem}pip install 'sketchmatch[web]'"
+                Reason.INVALID_FIELD, _SETTING, f"{problem}run pip install 'sketchmatch[web]'"
             ) from None
         connect = connect_application(
             services,
@@ -83,7 +83,7 @@ class Gateway:
         pages = bundled_pages(robots)
         self._socket, self.address = _listening(address)
         self.url = f"{'https' if pems else 'http'}://{self.address}/"
-        self.lacking = () if pages else ("the sketch pad is not built; make web does",)
+        self.lacking = () if pages else ("the sketch pad is not built; run make web",)
         front = _Front(connect, pages, origins, local=is_of_this_machine(address))
         self._server = _server(uvicorn, front, pems)
         self._end: asyncio.Task[None] | None = None
@@ -113,7 +113,7 @@ class _Front:
         headers = {key.lower(): value.decode("latin-1") for key, value in scope["headers"]}
         # A page from elsewhere whose name was made to mean this machine has no business here.
         if self._local and not _names_this_machine(headers.get(b"host", "")):
-            text = "this server is asked by the name of this machine alone, such as localhost"
+            text = "this server answers only at names of this machine, such as localhost; use one"
             await answer_plainly(send, HTTPStatus.MISDIRECTED_REQUEST, text)
             return
         if not scope["path"].startswith("/sketchmatch."):

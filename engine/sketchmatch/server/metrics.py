@@ -166,7 +166,8 @@ class Metrics:
         self.stage_seconds = Histogram(
             Metric(
                 "sketchmatch_stage_seconds",
-                "How long stages of matches took, a scene's by its map, and the wait before them.",
+                "How long stages of matches took, and the wait before them; of both scenes, a "
+                "stage has the algorithm of the map.",
                 ("stage", "algorithm"),
             )
         )

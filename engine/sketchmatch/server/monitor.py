@@ -124,11 +124,11 @@ def _exposition(metrics: Metrics) -> Callable[[], tuple[str, bytes]]:
         import prometheus_client
         from prometheus_client import core
     except ImportError:
-        problem = "is set, and the package prometheus-client is not installed; "
+        problem = "is set, but the package prometheus-client is not installed; "
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             "server.metrics_address",
-            f"{problem}pip install 'sketchmatch[metrics]'",
+            f"{problem}run pip install 'sketchmatch[metrics]'",
         ) from None
 
     class Collector:

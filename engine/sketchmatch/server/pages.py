@@ -86,9 +86,9 @@ class Pages:
         path = scope["path"]
         page = self._pages.get("/index.html" if path == "/" else path)
         if scope["method"] not in ("GET", "HEAD"):
-            await answer_plainly(send, HTTPStatus.METHOD_NOT_ALLOWED, "pages are only read")
+            await answer_plainly(send, HTTPStatus.METHOD_NOT_ALLOWED, "pages can only be read")
         elif page is None:
-            text = "there is no such page" if self else "the sketch pad is not built; make web does"
+            text = "there is no such page" if self else "the sketch pad is not built; run make web"
             await answer_plainly(send, HTTPStatus.NOT_FOUND, text)
         else:
             await _answer(page, self._headers, scope, send)

@@ -36,7 +36,8 @@ class _Health(health.aio.HealthServicer):
         if self._watchers >= MOST_WATCHERS:
             await context.abort(
                 grpc.StatusCode.RESOURCE_EXHAUSTED,
-                f"{MOST_WATCHERS} streams watch the health of this server already; use Check",
+                f"{MOST_WATCHERS} streams already watch the health of this server, which is the "
+                "limit; use Check",
             )
         self._watchers += 1
         try:
@@ -46,7 +47,7 @@ class _Health(health.aio.HealthServicer):
 
     async def List(self, _: Any, context: Any) -> None:  # noqa: N802
         """Tell nobody all names that health knows."""
-        problem = "this server lists no names; ask of one, or of '', the whole server, by Check"
+        problem = "this server lists no names; use Check with a name, or '' for the whole server"
         await context.abort(grpc.StatusCode.UNIMPLEMENTED, problem)
 
 

@@ -226,7 +226,7 @@ async def serve(
             await _first(asyncio.ensure_future(warming.go_on()), stopping)
         await stopping.wait()
         notify("STOPPING=1")
-        say(f"stopping; running matches have {settings.grace:g} s to end")
+        say(f"stopping; running matches may take {settings.grace:g} s more")
     finally:
         try:
             await _drain(server, beside, app, readiness, settings.grace)
@@ -287,7 +287,7 @@ class _Files:
             try:
                 await asyncio.to_thread(self.look)
             except Exception:  # nobody else would look from then on
-                _log.exception("the files of certificates and tokens were not looked at")
+                _log.exception("the check of the files of certificates and tokens failed")
 
 
 class _Beside:
@@ -409,7 +409,7 @@ class _Reloading:
             try:
                 setup = await asyncio.to_thread(self._load)
             except SketchmatchError as error:
-                self._say(f"the configuration stays as it is: {error}")
+                self._say(f"the configuration was not reloaded: {error}")
                 return
             self._app.change(self._of_former_size(setup))
             await self._readiness.know(setup.engine.registry.algorithms)
@@ -422,14 +422,14 @@ class _Reloading:
         """Return a setup for requests as large as the ports take them since the start."""
         former = self._app.setup.limits.max_request_bytes
         if setup.limits.max_request_bytes != former:
-            self._say("server.max_request_mib stays until the server is started anew")
+            self._say("server.max_request_mib does not change before the server is started again")
         return replace(setup, limits=replace(setup.limits, max_request_bytes=former))
 
 
 def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readiness) -> None:
     """Have metrics tell how things are, beside what happened."""
     metrics.watch(
-        Metric("sketchmatch_build_info", "What serves.", ("version",)),
+        Metric("sketchmatch_build_info", "Version of the server.", ("version",)),
         lambda: {(sketchmatch.__version__,): 1.0},
     )
     metrics.watch(
@@ -463,7 +463,10 @@ def _watch(metrics: Metrics, app: Application, files: _Files, readiness: Readine
         },
     )
     metrics.watch(
-        Metric("sketchmatch_certificate_expires_timestamp_seconds", "When the certificate does."),
+        Metric(
+            "sketchmatch_certificate_expires_timestamp_seconds",
+            "When the server's certificate expires.",
+        ),
         files.expiry,
     )
 
@@ -483,7 +486,7 @@ def _opened(settings: ServerSettings, say: Callable[[str], None]) -> Store | Non
     except StoreError as error:
         if settings.store_named:
             raise InvalidInputError(Reason.INVALID_FIELD, "server.store", str(error)) from None
-        say(f"nothing is kept beyond the life of this server: {error}")
+        say(f"nothing is kept after this server stops: {error}")
         return None
 
 
@@ -588,9 +591,8 @@ def _refuse_strangers(settings: ServerSettings) -> str:
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             named,
-            f"{address!r} is reached from other machines, and whoever does {lacking}; "
-            f"give {', and '.join(remedies)}, listen on 127.0.0.1, or say --insecure if that is "
-            "meant",
+            f"{address!r} can be reached from other machines, and whoever reaches it {lacking}; "
+            f"give {', and '.join(remedies)}, listen on 127.0.0.1, or allow this with --insecure",
         )
     return lacking
 

@@ -82,7 +82,7 @@ def refusal(error: BaseException) -> Refusal:
             return _refusal(_CODES[type(error)], error, error.reason)
     return Refusal(
         grpc.StatusCode.INTERNAL,
-        "the server failed in a way nobody foresaw; its log has the details, please report them",
+        "the server failed with an unexpected error; its log has the details, please report them",
     )
 
 

@@ -60,11 +60,11 @@ class Pems:
         """Until when it is good, for people."""
         expires = self.expires
         if expires is None:
-            return "nobody can tell until when the server's certificate is good"
+            return "it cannot be told until when the server's certificate is valid"
         if expires < datetime.now(UTC):
-            problem = f"the server's certificate has expired on {expires:%Y-%m-%d}"
-            return f"{problem}: no client trusts it; renew it"
-        return f"the server's certificate is good until {expires:%Y-%m-%d}"
+            problem = f"the server's certificate expired on {expires:%Y-%m-%d}"
+            return f"{problem}, so no client trusts it; renew it"
+        return f"the server's certificate is valid until {expires:%Y-%m-%d}"
 
     @property
     def configuration(self) -> grpc.ServerCertificateConfiguration:
@@ -149,10 +149,10 @@ def _context(files: TlsFiles) -> ssl.SSLContext:
         context.load_cert_chain(files.certificate, files.key, password=_refuse_password)
     except ssl.SSLError as error:
         if error.reason == "KEY_VALUES_MISMATCH":
-            problem = f"is not the key of the certificate in {files.certificate}; give that"
+            problem = f"is not the key of the certificate in {files.certificate}; give that key"
             raise InvalidInputError(Reason.INVALID_FILE, str(files.key), problem) from None
         problem = (
-            f"and {files.key} are no certificate and private key in PEM; "
+            f"and {files.key} are not a certificate and a private key in PEM; "
             "give files that begin with -----BEGIN"
         )
         raise InvalidInputError(Reason.INVALID_FILE, str(files.certificate), problem) from None
@@ -163,7 +163,7 @@ def _context(files: TlsFiles) -> ssl.SSLContext:
         try:
             context.load_verify_locations(files.client_ca)
         except ssl.SSLError:
-            problem = "holds no certificate in PEM; give those of the authorities of clients"
+            problem = "has no certificate in PEM; give those of the authorities of clients"
             raise InvalidInputError(Reason.INVALID_FILE, str(files.client_ca), problem) from None
         context.verify_mode = ssl.CERT_REQUIRED
     return context

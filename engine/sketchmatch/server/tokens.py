@@ -101,7 +101,8 @@ def check_name(name: str) -> str:
         If it is none.
     """
     if not _NAME.fullmatch(name):
-        problem = "is no name of a caller; take up to 64 letters, digits and . _ @ - as in robot-7"
+        allowed = "up to 64 letters, digits and . _ @ - as in robot-7"
+        problem = f"cannot be the name of a caller; use {allowed}"
         raise InvalidInputError(Reason.INVALID_FIELD, quoted(name), problem)
     return name
 
@@ -129,7 +130,7 @@ def parse_tokens(text: str, place: str) -> list[KnownToken]:
         parts = _LINE.fullmatch(stripped)
         if parts is None:
             problem = (
-                "has another form than NAME:sha256:SALT:HASH; write lines with "
+                "is not of the form NAME:sha256:SALT:HASH; add tokens with "
                 "`sketchmatch tokens add NAME`"
             )
             raise InvalidInputError(Reason.INVALID_FILE, f"{place}, line {number},", problem)

@@ -76,9 +76,11 @@ class Traces:
             from opentelemetry.sdk.trace import TracerProvider
             from opentelemetry.sdk.trace.export import BatchSpanProcessor
         except ImportError:
-            problem = "is set, and OpenTelemetry is not installed; pip install 'sketchmatch[otel]'"
+            problem = "is set, but OpenTelemetry is not installed; "
             raise InvalidInputError(
-                Reason.INVALID_FIELD, "server.traces_endpoint", problem
+                Reason.INVALID_FIELD,
+                "server.traces_endpoint",
+                f"{problem}run pip install 'sketchmatch[otel]'",
             ) from None
         named = {} if _is_named() else {"service.name": _NAME}
         provider = TracerProvider(resource=Resource.create(named))

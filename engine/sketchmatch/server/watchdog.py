@@ -94,7 +94,7 @@ def _asks(loop: asyncio.AbstractEventLoop, alive: threading.Event) -> bool:
 
 def _end(silent: float) -> None:
     """End the process without asking anybody: any lock may be held by a thread that hangs."""
-    sentence = f"sketchmatch: nothing was answered for {silent:g} s; the server ends itself\n"
+    sentence = f"sketchmatch: the server has been stuck for {silent:g} s and ends itself\n"
     with suppress(OSError):
         if stat.S_ISFIFO(os.fstat(_STANDARD_ERROR).st_mode):
             os.set_blocking(_STANDARD_ERROR, False)  # nobody may be reading

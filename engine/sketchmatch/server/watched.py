@@ -95,10 +95,11 @@ def content_of(path: Path, what: str, setting: str) -> bytes:
             data = file.read(_MOST_BYTES + 1)
     except (OSError, ValueError) as error:
         why = (getattr(error, "strerror", None) or str(error)).lower()
-        problem = f"cannot be read ({why}); {setting} names {what}"
+        problem = f"cannot be read ({why}); check {setting}, which names {what}"
         raise InvalidInputError(Reason.INVALID_FILE, str(path), problem) from None
     if len(data) > _MOST_BYTES:
-        problem = f"has more than {_MOST_BYTES // 1024**2} MiB; {setting} names {what}"
+        limit = f"{_MOST_BYTES // 1024**2} MiB"
+        problem = f"has more than {limit}; check {setting}, which names {what}"
         raise InvalidInputError(Reason.INVALID_FILE, str(path), problem)
     return data
 
