@@ -95,7 +95,7 @@ def test_labelme_points_and_lines_are_left_out_with_a_note():
 def test_an_outline_that_crosses_itself_is_its_largest_part():
     found = labelme(shape("polygon", [[0, 0], [6, 6], [6, 0], [0, 1]]))
     assert objects(found)[0][1] == pytest.approx(15.428, abs=1e-3)
-    assert found.notes == ("Objects in several parts, of which the largest counts: 1.",)
+    assert found.notes == ("Objects of which only the largest of several parts was taken: 1.",)
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_an_outline_that_crosses_itself_is_its_largest_part():
         ({"shapes": [3]}, "shapes[0] is 3; give a shape"),
         ({"shapes": [{}]}, "shapes[0].points is missing; give a list of [x, y]"),
         ({"shapes": [shape("polygon", [[0]])]}, "shapes[0].points[0] is a list of 1; give [x, y]"),
-        ({"shapes": [shape("circle", [[0, 0]])]}, "is a list of 1; give two for a circle"),
+        ({"shapes": [shape("circle", [[0, 0]])]}, "is a list of 1; give two points for a circle"),
         ({"shapes": [shape("cone", [])]}, 'shapes[0].shape_type is "cone", which is not known'),
         ({"shapes": [shape("mask", [[0, 0], [1, 1]])]}, "mask is missing; give a picture"),
         (
@@ -184,7 +184,7 @@ def test_a_compressed_mask_of_coco_is_the_same_as_a_plain_one():
 def test_an_object_of_coco_in_two_pieces_is_the_larger_one():
     found = coco({"segmentation": [[0, 0, 4, 0, 4, 2], [9, 9, 10, 9, 10, 10]]})
     assert objects(found) == [("bed", 4.0, (0, -2, 4, 0))]
-    assert found.notes == ("Objects in several parts, of which the largest counts: 1.",)
+    assert found.notes == ("Objects of which only the largest of several parts was taken: 1.",)
 
 
 def test_of_several_pictures_one_is_chosen_by_name_or_id():
@@ -198,7 +198,9 @@ def test_of_several_pictures_one_is_chosen_by_name_or_id():
     for part, area in (("b.jpg", 2.0), ("2", 2.0), ("img/a.jpg", 1.0), ("a.jpg", 1.0)):
         assert [item[1] for item in objects(coco(*given, images=images, part=part))] == [area]
     assert coco(*given, images=images, part="none.jpg").polygons == ()
-    with pytest.raises(InvalidInputError, match=r"has no picture 'c.jpg', or several; choose"):
+    with pytest.raises(
+        InvalidInputError, match=r"has no picture 'c.jpg', or several of that name; choose"
+    ):
         coco(*given, images=images, part="c.jpg")
 
 
@@ -269,7 +271,7 @@ def test_a_frame_of_a_film_in_cvat_is_chosen_by_its_number():
     ("data", "words"),
     [
         (b"<annotations", "is not XML (unclosed token"),
-        (b"<svg/>", "is XML but not of CVAT: it begins with <svg>"),
+        (b"<svg/>", "is XML but not from CVAT: it begins with <svg>"),
         (b'<!DOCTYPE a [<!ENTITY l "<b/>">]><annotations>&l;</annotations>', "defines entities"),
         (b"<annotations>" + b"<g>" * 300, "is nested deeper than the limit"),
         (
@@ -352,7 +354,7 @@ def test_all_masks_together_may_have_so_many_runs(reader):
         limited_to(SourceLimits(max_vertices=10_000)),
         pytest.raises(
             InvalidInputError,
-            match=r"and the masks before have .* more than the limit of 10000 vertices",
+            match=r"and those before have .* more than the limit of 10000 vertices",
         ),
     ):
         reader().read(data)
@@ -399,11 +401,13 @@ def test_all_masks_of_labelme_together_have_as_many_pixels_as_a_picture_may():
     mask = shape("mask", [[0, 0], [9, 9]], mask=png(np.ones((10, 10))))
     with limited_to(SourceLimits(max_pixels=300)):
         assert len(labelme(mask, mask, mask).polygons) == 3
-        with pytest.raises(InvalidInputError, match="masks before have 400 pixels, more than the"):
+        with pytest.raises(InvalidInputError, match="those before have 400 pixels, more than the"):
             labelme(mask, mask, mask, mask)
 
 
 def test_a_mask_that_is_noise_is_refused_at_once():
     noise = np.random.default_rng(0).random((300, 300)) < 0.5
-    with pytest.raises(InvalidInputError, match="runs of pixels, and the limit is 10000; smooth"):
+    with pytest.raises(
+        InvalidInputError, match="runs of pixels, more than the limit of 10000; smooth"
+    ):
         labelme(shape("mask", [[0, 0], [299, 299]], mask=png(noise)))

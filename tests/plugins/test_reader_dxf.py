@@ -219,7 +219,7 @@ def test_a_drawing_without_a_unit_is_taken_as_it_is(drawing):
     drawing.modelspace().add_lwpolyline(SQUARE, close=True)
     found = read(drawing)
     assert area(found.polygons[0]) == pytest.approx(2e6)
-    assert found.notes == ("The drawing does not say its unit: lengths are taken as they are.",)
+    assert found.notes == ("The drawing does not state its unit: lengths are taken as they are.",)
 
 
 def test_a_binary_drawing_is_read_like_any(drawing, tmp_path):
@@ -278,7 +278,7 @@ def test_counting_shapes_stops_far_above_what_is_allowed(drawing):
     drawing.modelspace().add_blockref("CHAIR", (0, 0), grid)
     with limited_to(SourceLimits(max_objects=20)), pytest.raises(InvalidInputError) as caught:
         read(drawing)
-    assert "has more than 100 closed shapes, and the limit is 20 objects" in str(caught.value)
+    assert "has more than 100 closed shapes, more than the limit of 20 objects" in str(caught.value)
 
 
 def test_hundreds_of_hatches_over_each_other_are_compared_soon(drawing):
@@ -296,7 +296,7 @@ def test_islands_in_islands_have_an_end(drawing):
     for k in range(200):
         corners = [(k, k), (999 - k, k), (999 - k, 999 - k), (k, 999 - k)]
         hatch.paths.add_polyline_path(corners, is_closed=True)
-    with pytest.raises(InvalidInputError, match="islands in islands, more than 50 deep; draw it"):
+    with pytest.raises(InvalidInputError, match="islands nested more than 50 deep; draw it"):
         read(drawing)
 
 

@@ -102,7 +102,7 @@ def test_arrows_pictures_and_what_nobody_sees_are_no_strokes():
         element("image"),
     )
     assert len(found.strokes) == 2
-    assert found.notes == ("No objects, and left out: arrows (2), pictures (1).",)
+    assert found.notes == ("Left out because they are not objects: arrows (2), pictures (1).",)
 
 
 def test_odd_names_in_a_drawing_can_be_shown():
@@ -129,7 +129,7 @@ def test_a_frame_is_no_shape_and_chooses_what_is_in_it():
     )
     found = read(*elements)
     assert [stroke.points[0, 0] for stroke in found.strokes] == [1, 2, 3]
-    assert found.notes == ("All of 2 frames is read; FILE#FRAME reads one: 'hall', 'kitchen'.",)
+    assert found.notes == ("All 2 frames were read; FILE#FRAME reads one: 'hall', 'kitchen'.",)
     assert [s.points[0, 0] for s in read(*elements, part="hall").strokes] == [2]
     with pytest.raises(InvalidInputError, match="has no frame 'attic'; choose one of: 'kitchen'"):
         read(*elements, part="attic")
@@ -199,4 +199,4 @@ def test_a_note_with_an_odd_name_is_told_once():
     segmenter = resolve_segmenter(default_registry(), Choice(), source)
     found = segment(source, segmenter, default_registry(), "sketch.stroke_set")
     odd = "elements of type \N{REPLACEMENT CHARACTER} (1)."
-    assert found.warnings == (f"No objects, and left out: {odd}",)
+    assert found.warnings == (f"Left out because they are not objects: {odd}",)

@@ -108,7 +108,7 @@ def test_an_object_without_a_box_is_left_out_with_a_note():
 def test_rooms_are_read_where_they_are_chosen_or_there_is_nothing_else():
     desk, hall = node(1, 2, "desk", box()), node(9, 4, "hall", box((8, 9, 1)))
     assert [p.label for p in read(desk, hall).polygons] == ["desk"]
-    assert read(desk, hall).notes == ("The graph holds rooms too (1); FILE#rooms reads them.",)
+    assert read(desk, hall).notes == ("The graph also has rooms (1); FILE#rooms reads them.",)
     assert [p.label for p in read(desk, hall, part="rooms").polygons] == ["hall"]
     assert [p.label for p in read(desk, hall, part="objects,rooms").polygons] == ["desk", "hall"]
     assert [p.label for p in read(hall).polygons] == ["hall"]
@@ -159,7 +159,7 @@ def test_layers_are_told_by_the_graph_or_by_number():
         ([node(1, 2, "a", box([1, 2]))], "bounding_box.dimensions is a list of 2; give [x, y, z]"),
         (
             [node(1, 2, "a", box(kind="OBB", turn={"w": 0, "x": 0, "y": 0, "z": 0}))],
-            "world_R_center is no rotation; give a unit quaternion",
+            "world_R_center is not a rotation; give a unit quaternion",
         ),
     ],
 )

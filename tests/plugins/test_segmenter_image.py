@@ -249,7 +249,7 @@ def test_walls_of_several_rooms_are_left_out_and_what_is_in_them_found():
         cv2.rectangle(pixels, (left + 330, 390), (left + 345, 410), 240, cv2.FILLED)  # a gap
     found = segmented(pixels)
     assert len(found.scene.objects) == 8
-    assert found.warnings[0].startswith("2 outlines around other shapes were taken for walls")
+    assert found.warnings[0].startswith("2 outlines around other shapes were taken as walls")
     assert len(segmented(pixels, frame="keep").scene.objects) == 2
 
 
@@ -325,7 +325,7 @@ def table(*chairs):
 
 
 PARTED = (
-    "1 drawing of touching or overlapping outlines was parted into the likely objects: draw "
+    "1 drawing of touching or overlapping outlines was split into the likely objects: draw "
     "objects apart to be sure."
 )
 DIVIDED = (

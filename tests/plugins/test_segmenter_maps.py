@@ -121,7 +121,8 @@ def test_the_object_in_which_a_place_lies_or_the_nearest_in_reach_has_its_name()
     )
     assert labels(found(grid)) == ["bed", "lamp", ""]
     assert found(grid).warnings == (
-        "No object is left within 0.5 m of door, which the map's file names.",
+        "No object was named door: none is left within 0.5 m of where the map's file has this "
+        "name.",
     )
     assert labels(found(grid, label_reach=0.6)) == ["bed", "lamp", "door"]
     assert found(grid, label_reach=0.6).warnings == ()
@@ -141,8 +142,8 @@ def test_of_several_names_the_nearest_counts_and_each_names_one_object():
 def test_many_names_that_are_left_are_cut_short():
     landmarks = [Landmark(f"n{k}\n", (30.0, 30.0)) for k in range(11)]
     (warning,) = found(named(*landmarks)).warnings
-    assert warning.startswith(r"No object is left within 0.5 m of 'n0\n', 'n1\n',")
-    assert "'n7\\n' and 3 more, which the map's file names." in warning
+    assert warning.startswith(r"No object was named 'n0\n', 'n1\n',")
+    assert "'n7\\n' and 3 more: none is left within 0.5 m of where" in warning
 
 
 def test_rooms_take_the_names_of_rooms_in_them():
@@ -156,7 +157,9 @@ def test_rooms_take_the_names_of_rooms_in_them():
     grid = OccupancyGrid(cells, 0.2, landmarks=landmarks)
     rooms = RoomSegmenter(RoomSegmenter.Params(door_width=0.8)).segment(grid)
     assert labels(rooms) == ["", "kitchen"]
-    assert rooms.warnings == ("No object is left around garden, which the map's file names.",)
+    assert rooms.warnings == (
+        "No object was named garden: none is left around where the map's file has this name.",
+    )
 
 
 def test_montreal_names_things_of_which_its_map_shows_a_door():

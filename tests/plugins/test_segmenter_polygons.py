@@ -32,7 +32,9 @@ def test_open_lines_are_told_to_be_left_out_and_whose_walls_they_may_be():
     square, lines = LabelledPolygon((np.array(SQUARE, float),)), (np.zeros((2, 2)), np.ones((3, 2)))
     found = PolygonSegmenter().segment(PolygonSet((square, square), lines=lines))
     assert found.warnings == ("Left out because they enclose no area: open lines (2).",)
-    with pytest.raises(InvalidInputError, match=r"segmenter rooms, to which its open lines \(2\)"):
+    with pytest.raises(
+        InvalidInputError, match=r"segmenter rooms, which takes its open lines \(2\)"
+    ):
         PolygonSegmenter().segment(PolygonSet((square,), lines=lines))
 
 

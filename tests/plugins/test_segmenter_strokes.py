@@ -91,7 +91,9 @@ def test_a_figure_of_eight_keeps_its_larger_half_and_says_so():
     eight = [[0, 0], [4, 4], [4, 0], [0, 4], [-2, 2], [0, 0]]
     found = segmented(eight, TRIANGLE)
     assert found.scene.objects[0].area == pytest.approx(8.0)
-    assert found.warnings == ("strokes[0] encloses separate areas: the largest alone was taken.",)
+    assert found.warnings == (
+        "strokes[0] encloses separate areas, of which only the largest was taken.",
+    )
 
 
 def test_an_open_stroke_is_left_out_and_named():
@@ -174,7 +176,7 @@ def test_a_tap_of_the_pen_is_left_out_and_told_by_its_place(points):
     assert [len(found.scene), found.route] == [2, None]
     # From −1 to 24 and from 3 down to −1.
     assert found.warnings == (
-        "strokes[1] (20% from the left, 100% from the top) was left out: a dot of the pen, which "
+        "strokes[1] (20% from the left, 100% from the top) was left out as a dot of the pen, which "
         "encloses nothing.",
     )
 
@@ -185,20 +187,20 @@ def test_many_taps_share_a_sentence_and_the_strokes_keep_their_numbers():
     empty, dots, flick = found.warnings
     assert empty == "strokes[10] was left out: it has no point."
     assert dots.startswith("strokes[0] (4% from the left, 80% from the top), strokes[1] (8% ")
-    assert dots.endswith(" and 3 more were left out: a dot of the pen, which encloses nothing.")
-    assert flick.startswith("strokes[12] (4% from the left, 0% from the top) was left out: far")
+    assert dots.endswith(" and 3 more were left out as a dot of the pen, which encloses nothing.")
+    assert flick.startswith("strokes[12] (4% from the left, 0% from the top) was left out as far")
 
 
 def test_strokes_of_no_points_share_a_sentence():
     found = segmented(np.empty((0, 2)), circle(1.0), np.empty((0, 2)), TRIANGLE)
-    assert found.warnings == ("strokes[0] and 1 more were left out: without a point.",)
+    assert found.warnings == ("strokes[0] and 1 more were left out: they have no points.",)
 
 
 def test_a_tap_that_is_called_a_route_is_none():
     found = segmented(circle(1.0), Stroke(np.array([[3.0, 3.0]]), label="route"), TRIANGLE)
     assert found.route is None
     assert found.warnings == (
-        "strokes[1] (route) was left out: a dot of the pen, which encloses nothing.",
+        "strokes[1] (route) was left out as a dot of the pen, which encloses nothing.",
     )
 
 

@@ -105,8 +105,8 @@ def _rasterised(scene: Scene, pixels: int) -> tuple[float, tuple[PixelObject, ..
             raise about_object(
                 Reason.INVALID_PARAMETER,
                 object_name(scene, k),
-                f"holds no pixel of a grid of {pixels}; raise histogram.pixels or leave the "
-                "object out",
+                f"covers no pixel of a grid of {pixels} pixels; raise histogram.pixels or leave "
+                "the object out",
             )
         objects.append(found)
     return pixel, tuple(objects), outlines(objects)

@@ -73,12 +73,14 @@ class Areas:
             raise InvalidInputError(
                 Reason.LIMIT_EXCEEDED,
                 field,
-                f"is a mask of {len(merged)} runs of pixels, and the limit is {_MOST_RUNS}; "
+                f"is a mask of {len(merged)} runs of pixels, more than the limit of {_MOST_RUNS}; "
                 "smooth it, or save it as a polygon",
             )
         self._runs += len(merged)
         check_vertices(
-            _VERTICES_OF_ELEMENT * self._runs, field, f"and the masks before have {self._runs} runs"
+            _VERTICES_OF_ELEMENT * self._runs,
+            field,
+            f"and those before have {self._runs} runs",
         )
         return runs_area(merged, columns=columns)
 
@@ -91,7 +93,7 @@ class Areas:
             raise InvalidInputError(
                 Reason.LIMIT_EXCEEDED,
                 field,
-                f"and the masks before have {self._pixels} pixels, more than the limit of {limit}; "
+                f"and those before have {self._pixels} pixels, more than the limit of {limit}; "
                 "save them as polygons, or raise limits.max_pixels "
                 "(SKETCHMATCH_LIMITS__MAX_PIXELS)",
             )
@@ -104,11 +106,11 @@ class Areas:
         """Return the objects, y turned up, with notes on what is missing."""
         if self._left_out:
             counts = ", ".join(f"{what} ({count})" for what, count in self._left_out.items())
-            notes = (*notes, f"Left out because they enclose no area or are no objects: {counts}.")
+            notes = (*notes, f"Left out because they enclose no area or are not objects: {counts}.")
         if self._parts:
             notes = (
                 *notes,
-                f"Objects in several parts, of which the largest counts: {self._parts}.",
+                f"Objects of which only the largest of several parts was taken: {self._parts}.",
             )
         return PolygonSet(
             tuple(LabelledPolygon(_rings(area, upwards), label) for area, label in self._found),
@@ -157,7 +159,7 @@ def _check_crossings(ring: FloatArray) -> None:
                 Reason.INVALID_POLYGON,
                 "",
                 f"has an outline of {len(ring)} points that crosses itself more than "
-                f"{_MOST_CROSSINGS} times; draw it anew",
+                f"{_MOST_CROSSINGS} times; draw it again",
             )
 
 

@@ -33,7 +33,8 @@ def chosen_picture(names: Mapping[str, str], annotated: Collection[str], part: s
         if len(fits) == 1 or part in names:
             return fits[0] if len(fits) == 1 else part
         problem = (
-            f"has no picture {listed([part])}, or several; choose one of {listed(shown.values())}"
+            f"has no picture {listed([part])}, or several of that name; choose one of "
+            f"{listed(shown.values())}"
         )
         raise InvalidInputError(Reason.INVALID_FILE, "", problem)
     known = [key for key in shown if key in annotated]

@@ -139,7 +139,7 @@ def _mask(value: dict[str, Any], field: str) -> IntArray:
         raise InvalidInputError(
             _POLYGON,
             f"{field}.counts",
-            f"are of {sum(counts)} pixels, and the picture has {height * width}; save it again",
+            f"are of {sum(counts)} pixels, but the picture has {height * width}; save it again",
         )
     return unfolded(counts, height)
 

@@ -69,7 +69,7 @@ class CvatReader(Reader):
             raise InvalidInputError(
                 Reason.INVALID_FILE,
                 "",
-                f"is XML but not of CVAT: it begins with <{root.tag[:60]}>; export it as "
+                f"is XML but not from CVAT: it begins with <{root.tag[:60]}>; export it as "
                 "'CVAT for images'",
             )
         names: dict[str, str] = {}

@@ -155,7 +155,7 @@ def _drawing(data: bytes) -> Any:
         from ezdxf.lldxf.tagger import binary_tags_loader
     except ImportError:
         raise _invalid(
-            "is a DXF drawing, which the package ezdxf reads; pip install 'sketchmatch[dxf]'"
+            "is a DXF drawing, which needs the package ezdxf; run pip install 'sketchmatch[dxf]'"
         ) from None
     lines = data.count(b"\n")
     check_vertices(lines // _LINES, "", f"has {lines} lines")
@@ -174,7 +174,7 @@ def _refusing_damage() -> Iterator[None]:
     except Exception as error:
         cause = cleaned_label(str(error))[:200].rstrip(".") or type(error).__name__
         raise _invalid(
-            f"is no DXF drawing, or a damaged one ({cause}); save it as DXF again"
+            f"is not a DXF drawing, or is damaged ({cause}); save it as DXF again"
         ) from None
 
 
@@ -211,7 +211,7 @@ def _metres(drawing: Any) -> tuple[float, tuple[str, ...]]:
         unit = InsertUnits(drawing.header.get("$INSUNITS", 0))
         return float(units.conversion_factor(unit, InsertUnits.Meters)), ()
     except (TypeError, ValueError, KeyError, IndexError):
-        return 1.0, ("The drawing does not say its unit: lengths are taken as they are.",)
+        return 1.0, ("The drawing does not state its unit: lengths are taken as they are.",)
 
 
 def _shapes(
@@ -294,13 +294,13 @@ class _Sizes:
             raise InvalidInputError(
                 Reason.LIMIT_EXCEEDED,
                 "",
-                f"unfolds to more than the limit of {limit} elements, a tenth of the vertices; "
+                f"unfolds to more than the limit of {limit} elements, a tenth of that of vertices; "
                 "choose layers, or raise limits.max_vertices (SKETCHMATCH_LIMITS__MAX_VERTICES)",
             )
 
     def _of(self, insert: Any, depth: int) -> int:
         if depth > _DEEPEST:
-            raise _invalid(f"has blocks in blocks, more than {_DEEPEST} deep; explode some")
+            raise _invalid(f"has blocks nested more than {_DEEPEST} deep; explode some")
         name = insert.dxf.get("name", "")
         if name not in self._known:
             block = self._blocks.get(name)
@@ -366,7 +366,7 @@ def _alternating(areas: list[Any]) -> Any:
         around = tree.query(area, predicate="within") if area.area > 0.0 else ()
         if len(around) > _DEEPEST:
             raise _invalid(
-                f"has a hatch with islands in islands, more than {_DEEPEST} deep; draw it anew"
+                f"has a hatch with islands nested more than {_DEEPEST} deep; draw it again"
             )
         depths.append(sum(areas[j].area > area.area for j in around))
     covered: Any = shapely.Polygon()
@@ -511,7 +511,7 @@ def _too_many(shapes: list[_Shape], count: str) -> InvalidInputError:
     return InvalidInputError(
         Reason.LIMIT_EXCEEDED,
         "",
-        f"has {count} closed shapes, and the limit is {source_limits().max_objects} objects; "
+        f"has {count} closed shapes, more than the limit of {source_limits().max_objects} objects; "
         f"choose layers as in FILE#LAYER,… ({_counted(shapes)}), or raise limits.max_objects "
         "(SKETCHMATCH_LIMITS__MAX_OBJECTS)",
     )

@@ -163,10 +163,10 @@ def _notes(elements: Sequence[_Element], frames: dict[str, str], part: str) -> I
             counts[what] = counts.get(what, 0) + 1
     if counts:
         listed_counts = ", ".join(f"{what} ({count})" for what, count in counts.items())
-        yield f"No objects, and left out: {listed_counts}."
+        yield f"Left out because they are not objects: {listed_counts}."
     used = {frames[each.frame] or each.frame for each in elements if each.frame in frames}
     if not part and len(used) > 1:
-        yield f"All of {len(used)} frames is read; FILE#FRAME reads one: {listed(sorted(used))}."
+        yield f"All {len(used)} frames were read; FILE#FRAME reads one: {listed(sorted(used))}."
 
 
 def _outline(each: _Element) -> FloatArray:

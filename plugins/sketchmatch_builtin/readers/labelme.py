@@ -104,7 +104,9 @@ def _area(areas: Areas, shape: dict[str, Any], field: str) -> Any | None:
             return areas.of_runs(runs, at, columns=False)
         case "rectangle" | "circle" | "mask":
             raise InvalidInputError(
-                _POLYGON, f"{field}.points", f"is a list of {len(points)}; give two for a {kind}"
+                _POLYGON,
+                f"{field}.points",
+                f"is a list of {len(points)}; give two points for a {kind}",
             )
         case _ if isinstance(kind, str) and kind in _NO_AREA:
             areas.leave_out(_NO_AREA[kind])

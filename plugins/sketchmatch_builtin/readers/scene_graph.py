@@ -149,7 +149,7 @@ def _notes(nodes: list[_Node], wanted: set[str], part: str) -> Iterator[str]:
         for other in sorted(set(_PARTS) - wanted):
             count = sum(node.kind == other for node in nodes)
             if count:
-                yield f"The graph holds {other} too ({count}); FILE#{other} reads them."
+                yield f"The graph also has {other} ({count}); FILE#{other} reads them."
 
 
 def _classes(document: dict[str, Any]) -> Mapping[int, str]:
@@ -203,7 +203,7 @@ def _rotation(value: Any, field: str) -> FloatArray:
     w, x, y, z = (number(given.get(key), f"{field}.{key}", _POLYGON) for key in "wxyz")
     length = math.sqrt(w * w + x * x + y * y + z * z)
     if not 0.0 < length < math.inf:
-        raise InvalidInputError(_POLYGON, field, "is no rotation; give a unit quaternion")
+        raise InvalidInputError(_POLYGON, field, "is not a rotation; give a unit quaternion")
     w, x, y, z = w / length, x / length, y / length, z / length
     return np.array(
         [

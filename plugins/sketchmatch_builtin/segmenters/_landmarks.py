@@ -114,4 +114,5 @@ def left_over(landmarks: Sequence[Landmark], where: str, what: str) -> tuple[str
     shown = [name if name.isprintable() else repr(name) for name in names[:_MOST_NAMED]]
     listed = ", ".join(name[:_LONGEST_NAME] for name in shown)
     more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-    return (f"No object is left {where} {listed}{more}, which {what} names.",)
+    named = "this name" if len(names) == 1 else "these names"
+    return (f"No object was named {listed}{more}: none is left {where} where {what} has {named}.",)

@@ -102,12 +102,12 @@ def lines_of(source: StrokeSet | PolygonSet) -> list[FloatArray]:
         lines, path = [*source.lines, *closed], "polygons"
     points = np.concatenate([np.zeros((0, 2)), *lines])
     if not len(points) or not (np.abs(points) < _LARGEST).all():
-        what = "hold no point" if not len(points) else "hold a point that is no plain number"
+        what = "hold no point" if not len(points) else "hold a point that is not finite"
         raise InvalidInputError(Reason.TOO_FEW_OBJECTS, path, f"{what}; draw the walls of rooms")
     span = float(np.ptp(points, axis=0).max())
     if 0.0 < span < _SMALLEST:
         raise InvalidInputError(
-            Reason.TOO_FEW_OBJECTS, path, f"are {span:g} wide; draw them in a usual unit"
+            Reason.TOO_FEW_OBJECTS, path, f"are {span:g} units wide; draw them in a usual unit"
         )
     return lines
 

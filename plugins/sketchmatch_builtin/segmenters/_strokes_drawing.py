@@ -15,12 +15,12 @@ from ._strokes_trace import Trace, span_of
 
 __all__ = ["DOT", "FLICK", "LONGHAND", "ROUTE", "TANGLED", "WRITING", "Drawing", "Outline"]
 
-DOT = "left out: a dot of the pen, which encloses nothing"
-FLICK = "left out: far smaller than the objects"
-LONGHAND = "left out: many small loops, as longhand has them"
-ROUTE = "taken as the route: open, and across much of the sketch"
-WRITING = "left out: small and close to each other in a row, as writing is"
-TANGLED = "left out: the strokes cross themselves too often to look at them all; draw fewer"
+DOT = "left out as a dot of the pen, which encloses nothing"
+FLICK = "left out as far smaller than the objects"
+LONGHAND = "left out as longhand, which has many small loops"
+ROUTE = "taken as the route, which is open and goes across much of the sketch"
+WRITING = "left out as writing, which is small and close together in a row"
+TANGLED = "left out, as the strokes cross themselves too often to look at them all; draw fewer"
 
 # Reasons why something that a person drew is missing, who wants to know where it is.
 _MISSING = {DOT, FLICK, LONGHAND, TANGLED, WRITING}
@@ -126,11 +126,11 @@ class Drawing:
 
     def inside(self, host: Iterable[int]) -> str:
         """Return the reason to leave out what lies in an object."""
-        return f"left out: inside {self.named(host)}, as marks and labels are"
+        return f"left out as a mark or label inside {self.named(host)}"
 
     def again(self, first: Iterable[int]) -> str:
         """Return the reason to leave out what repeats an outline."""
-        return f"counted once with {self.named(first)}: drawn over it again"
+        return f"counted once with {self.named(first)}, over which it was drawn again"
 
     def explain(self, which: Iterable[int], reason: str) -> None:
         """Say why strokes are no object; those with the same reason share a sentence."""

@@ -177,8 +177,8 @@ def _said(found: Tracing) -> Iterator[str]:
         yield _FRAMED
     if found.rooms:
         yield (
-            f"{_count(found.rooms, 'outline')} around other shapes {_was(found.rooms)} taken for "
-            "walls of rooms and left out: set frame to 'keep' to have what encloses others alone."
+            f"{_count(found.rooms, 'outline')} around other shapes {_was(found.rooms)} taken as "
+            "walls of rooms and left out: set frame to 'keep' to have only what encloses others."
         )
     if found.attached:
         yield (
@@ -193,7 +193,7 @@ def _said(found: Tracing) -> Iterator[str]:
     if found.parted:
         yield (
             f"{_count(found.parted, 'drawing')} of touching or overlapping outlines "
-            f"{_was(found.parted)} parted into the likely objects: draw objects apart to be sure."
+            f"{_was(found.parted)} split into the likely objects: draw objects apart to be sure."
         )
     if found.divided:
         yield (
@@ -204,7 +204,7 @@ def _said(found: Tracing) -> Iterator[str]:
     if found.closed:
         yield (
             f"{_count(found.closed, 'outline')} with gaps {_was(found.closed)} closed: lower "
-            f"max_gap if {'it is no object' if found.closed == 1 else 'they are no objects'}."
+            f"max_gap if {'it is not an object' if found.closed == 1 else 'they are not objects'}."
         )
     if found.open_lines:
         yield (

@@ -42,7 +42,7 @@ class PolygonSegmenter(Segmenter):
             remedy = "a match compares relations between objects, so give at least two"
             if lines:
                 remedy += (
-                    f", or take the segmenter rooms, to which its open lines ({lines}) are walls"
+                    f", or use the segmenter rooms, which takes its open lines ({lines}) as walls"
                 )
             raise InvalidInputError(
                 Reason.TOO_FEW_OBJECTS,

@@ -282,7 +282,7 @@ class StrokeSegmenter(Segmenter):
                     verb = "encloses" if len(members) == 1 else "enclose"
                     drawing.note(
                         members[0],
-                        f"{name} {verb} separate areas: the largest alone was taken.",
+                        f"{name} {verb} separate areas, of which only the largest was taken.",
                     )
         return objects, writing
 
@@ -403,7 +403,9 @@ def _checked(stroke: Stroke, field: str) -> FloatArray:
 def _without_points(empty: list[int]) -> tuple[str, ...]:
     """Return what is said of strokes that are nowhere."""
     if len(empty) > 1:
-        return (f"strokes[{empty[0]}] and {len(empty) - 1} more were left out: without a point.",)
+        return (
+            f"strokes[{empty[0]}] and {len(empty) - 1} more were left out: they have no points.",
+        )
     return tuple(f"strokes[{k}] was left out: it has no point." for k in empty)
 
 
