@@ -441,7 +441,7 @@ def test_more_of_the_latest_sketch_is_carried_on_demand(carrying, carrier):
     assert (early.routes, early.zones) == ([], [])
     assert "send a goal to match_sketch first" in early.error
     executed(carrying)
-    carrier.notes = ["route 0: What comes after point 1 cannot be reached."]
+    carrier.notes = ["route 0: Nothing after point 1 can be reached."]
     found = carrying.services["~/carry"](wanted)
     assert found.notes == carrier.notes
     assert carrying.said[-1] == ("warning", f"carried otherwise than drawn: {carrier.notes[0]}")

@@ -80,8 +80,8 @@ def test_geojson_is_read_kind_by_kind(tmp_path):
     assert found.features[5].points.tolist() == (ZONE + 5).tolist()
     assert found.properties[0] == {"name": "dock", "yaw": 0.5}
     assert found.notes == (
-        "features[5] is without a place: left out.",
-        "features[6] 'attic' is without a place: left out.",
+        "features[5] was left out: it has no place.",
+        "features[6] 'attic' was left out: it has no place.",
     )
 
 
@@ -90,7 +90,7 @@ def test_geojson_is_read_kind_by_kind(tmp_path):
     [
         ("{", "is not JSON"),
         ([], r"is a list of 0; give GeoJSON"),
-        ({"type": "Curve"}, "type is no geometry"),
+        ({"type": "Curve"}, "type is not a geometry"),
         (collection(), "holds no point, route or zone"),
         (collection(feature("Point", [1])), r"features\[0\]\.geometry\.coordinates\[0\] has fewer"),
         (collection(feature("LineString", [[1, 2]])), "has 1 points; a route has 2 or more"),
@@ -337,7 +337,9 @@ def test_what_a_mask_forbids_in_part_is_said_to_be_left_out(tmp_path):
     path = written(tmp_path, text.replace("trinary", "scale"), "mask.yaml")
     found = read_features(path)
     assert len(found.features) == 1
-    assert found.notes == ("2 cells of the mask are neither free nor forbidden: left out.",)
+    assert found.notes == (
+        "2 cells of the mask are neither free nor forbidden, and were left out.",
+    )
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -461,7 +463,7 @@ def test_that_nav2_takes_no_notice_of_a_turned_mask_is_said(tmp_path, capsys, ya
 def test_mask_and_waypoints_do_not_overwrite_each_other(tmp_path):
     mask, way = tmp_path / "nav2.yaml", tmp_path / "way.yaml"
     check_targets(None, mask, way)
-    with pytest.raises(InvalidInputError, match="which --keepout is saved under") as refused:
+    with pytest.raises(InvalidInputError, match="under which --keepout is saved") as refused:
         check_targets(None, mask, tmp_path / ".." / tmp_path.name / "nav2.yaml")
     assert refused.value.field == "--waypoints"
 

@@ -172,7 +172,7 @@ def test_what_is_one_together_has_one_colour_and_is_not_alone(drawn):
     drawn.texts.clear()
     image = draw_overlay(scene, map_, matches, groups=[([0], [1, 2])])
     texts = [text for text, _ in drawn.texts]
-    assert "with 3 mapped" in texts
+    assert "with mapped 3" in texts
     assert "no partner: 1 sketched and 1 mapped" in texts
     assert "1 of 2 objects matched" in texts
     tint = mixed(WHITE, pair_colour(1), 0.42)

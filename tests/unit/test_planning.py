@@ -94,7 +94,7 @@ def test_a_side_that_costs_far_too_long_a_way_is_given_up(gap, between):
     sides = [each.sentence for each in changes if each.reason is ChangeReason.OTHER_SIDE]
     assert length(found) < (18.0 if between else 26.0)
     assert len(sides) == (0 if between else 1)
-    assert between or "on that side there is no way, or a far longer one" in sides[0]
+    assert between or "the drawn side has no way, or a far longer one" in sides[0]
 
 
 @pytest.mark.parametrize("door", [3, 5])

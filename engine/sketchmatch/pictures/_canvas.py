@@ -249,7 +249,7 @@ def printable(text: str) -> str:
 def _font(pixels: int) -> ImageFont.FreeTypeFont:
     font = ImageFont.load_default(pixels)
     if not isinstance(font, ImageFont.FreeTypeFont):
-        raise ImportError("Pillow was built without FreeType; install a wheel of it")
+        raise ImportError("Pillow was built without FreeType; install a wheel of Pillow")
     return font
 
 

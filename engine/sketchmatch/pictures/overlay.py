@@ -357,10 +357,10 @@ def _check_matches(sketch: Scene, map: Scene, matches: Sequence[OverlayMatch]) -
         for side, index, scene in sides:
             field = f"matches[{k}].{side}_object"
             if not 0 <= index < len(scene):
-                problem = f"is {index}; the {side} has objects 0 … {len(scene) - 1}"
+                problem = f"is {index}, but the {side} has objects 0 … {len(scene) - 1}"
                 raise InvalidInputError(Reason.INVALID_FIELD, field, problem)
             if (side, index) in seen:
-                problem = f"is {index} again; give each object one partner at most"
+                problem = f"is {index} again; give each object at most one partner"
                 raise InvalidInputError(Reason.INVALID_FIELD, field, problem)
             seen.add((side, index))
         if not math.isfinite(match.confidence):
@@ -377,7 +377,7 @@ def _check_groups(
         for side, scene, indices in zip(("sketch", "map"), scenes, group, strict=True):
             wrong = [index for index in indices if not 0 <= index < len(scene)]
             if wrong or not indices:
-                problem = f"are {[*indices]}; the {side} has objects 0 … {len(scene) - 1}"
+                problem = f"are {[*indices]}, but the {side} has objects 0 … {len(scene) - 1}"
                 field = f"groups[{k}].{side}_objects"
                 raise InvalidInputError(Reason.INVALID_FIELD, field, problem)
 
@@ -387,12 +387,12 @@ def _check_relations(scene: Scene, relations: Sequence[OverlayRelation]) -> None
         raise InvalidInputError(
             Reason.INVALID_FIELD,
             "relations",
-            f"are {len(relations)}; give 1 … {MOST_PLOTS}, and the number left out",
+            f"are {len(relations)}; give 1 … {MOST_PLOTS}, and the others as left_out",
         )
     for k, relation in enumerate(relations):
         for name, index in (("a", relation.a), ("b", relation.b)):
             if not 0 <= index < len(scene):
-                problem = f"is {index}; the scene has objects 0 … {len(scene) - 1}"
+                problem = f"is {index}, but the scene has objects 0 … {len(scene) - 1}"
                 raise InvalidInputError(Reason.INVALID_FIELD, f"relations[{k}].{name}", problem)
 
 
@@ -439,7 +439,7 @@ def _name(
             others = [(ours, match.sketch_object, "sketched"), (theirs, match.map_object, "mapped")]
             for indices, own, word in others:
                 if rest := [str(k + 1) for k in indices if k != own]:
-                    said.append(f"with {' and '.join(rest)} {word}")
+                    said.append(f"with {word} {' and '.join(rest)}")
     return " · ".join(dict.fromkeys(said))
 
 

@@ -83,7 +83,7 @@ def course_between(
     likely = None if weights is None else np.asarray(weights, dtype=np.float64)
     warp = fit_warp(drawn, places, likely, around, doubt)
     names = tuple(
-        target.labels[b] or source.labels[a] or f"what is at ({x:.4g}, {y:.4g})"
+        target.labels[b] or source.labels[a] or f"the object at ({x:.4g}, {y:.4g})"
         for (a, b), (x, y) in zip(pairs, places, strict=True)
     )
     sizes = np.array([math.sqrt(target.objects[b].area) for _, b in pairs])
@@ -158,7 +158,7 @@ def _carried_points(
 def _blocked(place: FloatArray, obstacles: Obstacles, radius: float, unit: str) -> Change:
     """Return what is to be said of a point that is no place for a robot: it is not moved."""
     near = obstacles.nearest_clear(place, radius, max(_FARTHEST_CLEAR, 10.0 * radius))
-    there = "" if near is None else f"; the nearest that is none is ({near[0]:.6g}, {near[1]:.6g})"
+    there = "" if near is None else f"; the nearest clear place is ({near[0]:.6g}, {near[1]:.6g})"
     kept = obstacles.kept(radius)
     sentence = f"It lies in an obstacle, or less than {kept:.6g} {unit} from one{there}."
     return Change(ChangeReason.BLOCKED, 0, 0, sentence)

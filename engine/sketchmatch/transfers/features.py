@@ -113,13 +113,13 @@ class Feature:
     def _checked_speeds(self, given: ArrayLike, count: int) -> FloatArray:
         speeds = frozen_floats(given)
         if self.kind is not FeatureKind.ROUTE:
-            raise _refused("speeds", f"are given for a {self.kind}; only routes have some")
+            raise _refused("speeds", f"are given for a {self.kind}; only routes have speeds")
         if speeds.shape != (count,):
             raise _refused(
                 "speeds", f"are {speeds.size} for {count} points; give one for each or none"
             )
         if not ((speeds >= 0.0) & np.isfinite(speeds)).all():
-            raise _refused("speeds", "have one that is negative or not finite; give m/s")
+            raise _refused("speeds", "hold one that is negative or not finite; give them in m/s")
         return speeds
 
 

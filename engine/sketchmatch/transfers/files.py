@@ -69,7 +69,7 @@ _STEP = 0.5
 _ROUNDING = 1e-9
 _CRS84 = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}
 _OCCUPIED = 65
-_PALER = "{} cells of the mask are neither free nor forbidden: left out."
+_PALER = "{} cells of the mask are neither free nor forbidden, and were left out."
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +249,7 @@ def check_targets(out: Path | None, keepout: Path | None, waypoints: Path | None
         if path is not None:
             check_target(path, field, YAML_SUFFIXES, ".yaml")
     if keepout and waypoints and keepout.resolve() == waypoints.resolve():
-        problem = f"is {str(waypoints)!r}, which --keepout is saved under; give another name"
+        problem = f"is {str(waypoints)!r}, under which --keepout is saved; give another name"
         raise InvalidInputError(_FILE, "--waypoints", problem)
 
 
@@ -279,7 +279,7 @@ def _read(path: Path, origin: tuple[float, float] | None) -> FeatureFile:
     files = read_map_files(path)
     if files is None:
         raise InvalidInputError(
-            _FILE, "", "is neither the mask of a keep-out filter nor a list of waypoints; give one"
+            _FILE, "", "is neither a mask of nav2's keep-out filter nor waypoints; give one of them"
         )
     return _of_mask(files.grid())
 
@@ -316,7 +316,8 @@ def _of_geojson(document: Any) -> FeatureFile:
             name = ""
         if geometry is None:
             which = f" {quoted(name)}" if name else ""
-            notes.append(f"{field.removesuffix('.geometry')}{which} is without a place: left out.")
+            place = field.removesuffix(".geometry")
+            notes.append(f"{place}{which} was left out: it has no place.")
             continue
         for part, at in _parts(mapping(geometry, field, _FILE, "a geometry"), field):
             features.append(_of_part(part, at, name, said, about))
@@ -346,8 +347,8 @@ def _in_metres(
         raise InvalidInputError(
             _FILE,
             "",
-            f"holds longitudes and latitudes, and the sketch or map that they are of {where}; give "
-            'its own coordinates, and say "crs": null if these are',
+            f"holds longitudes and latitudes, but the sketch or map {where}; give coordinates of "
+            'the sketch or map, or add "crs": null if these already are',
         )
     return found
 
@@ -365,7 +366,7 @@ def _parts(geometry: dict[str, Any], field: str) -> list[tuple[dict[str, Any], s
     raise InvalidInputError(
         _FILE,
         f"{field}.type" if field else "type",
-        "is no geometry that can be carried; give a Point, LineString or Polygon",
+        "is not a geometry that can be carried; give a Point, LineString or Polygon",
     )
 
 

@@ -164,8 +164,8 @@ def kept_clear(
             missed.append(beyond)
         if found is None:
             sentence = (
-                f"What comes after point {len(done.points)} cannot be reached: obstacles leave no "
-                f"way of {kept:.6g} {unit} to each side; the route ends there."
+                f"Nothing after point {len(done.points)} can be reached: obstacles leave no way "
+                f"with {kept:.6g} {unit} to each side; the route ends there."
             )
             end = len(done.points) - 1
             changes.append(Change(ChangeReason.UNREACHABLE, end, end, sentence))
@@ -214,7 +214,7 @@ def _clear_stretches(way: Way, obstacles: Obstacles, radius: float) -> BoolArray
 
 def _moved(way: Way, given: int, taken: int, reason: ChangeReason, verb: str, unit: str) -> Change:
     away = float(np.hypot(*(way.points[taken] - way.points[given])))
-    sentence = f"It {verb} {away:.2g} {unit} from where it was carried to: there are obstacles."
+    sentence = f"It {verb} {away:.2g} {unit} from where it was carried to, because of obstacles."
     return Change(reason, 0, 0, sentence)
 
 
@@ -272,7 +272,7 @@ def _around(
         np.stack([np.interp(shares, places, column) for column in carried.drawn.T], axis=1),
     )
     sentence = (
-        "Passes {} on another side than drawn: on that side there is no way, or a far longer one."
+        "Passes {} on another side than drawn: the drawn side has no way, or a far longer one."
     )
     changes = [
         Change(ChangeReason.OTHER_SIDE, 0, 0, sentence.format(landmarks.names[k])) for k in odd

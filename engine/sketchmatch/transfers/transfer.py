@@ -266,7 +266,7 @@ def _check_pairs(pairs: tuple[tuple[int, int], ...]) -> None:
             if not isinstance(index, Integral) or index < 0:
                 raise _refused(field, f"is {quoted(index)}; give the index of an object, from 0")
             if index in seen:
-                raise _refused(field, f"is {index} again; name each object once at most")
+                raise _refused(field, f"is {index} again; name each object at most once")
             seen.add(int(index))
 
 
@@ -276,7 +276,7 @@ def _check_objects(pairs: tuple[tuple[int, int], ...], sketch: Scene, map_: Scen
             if index >= len(scene):
                 raise _refused(
                     f"object_map[{k}].{name}_object",
-                    f"is {index}; the {name} has objects 0 … {len(scene) - 1}",
+                    f"is {index}, but the {name} has objects 0 … {len(scene) - 1}",
                 )
 
 

@@ -309,12 +309,14 @@ def _check(given: ComplexArray, wanted: ComplexArray) -> None:
         raise InvalidInputError(
             Reason.TOO_FEW_OBJECTS,
             "",
-            f"has {count} with a partner; to carry something takes two or more",
+            f"has {count} with a partner; carrying needs at least two",
         )
     for places in (given, wanted):
         if not np.isfinite(places).all():
             raise InvalidInputError(
-                Reason.INVALID_FIELD, "", "has an object at no finite place; give plain numbers"
+                Reason.INVALID_FIELD,
+                "",
+                "has an object at no finite place; give plain numbers",
             )
         if np.abs(places - places[0]).max() <= 1e-12 * np.abs(places).max():
             raise InvalidInputError(
