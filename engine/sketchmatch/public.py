@@ -524,7 +524,7 @@ def label_force_histograms(labels: Any, *, r: float = 0.0, directions: int = 180
         raise InvalidInputError(
             Reason.INVALID_IMAGE,
             "labels",
-            "are not 0 and 1 … N, N at least 2, without a gap; number the objects from 1",
+            "are not 0 and 1 … N without a gap, N at least 2; number the objects from 1",
         )
     objects = [pixel_object((image == label)[::-1]) for label in present]
     return _pixel_forces(objects, params, lambda k: f"labels {k + 1}")
@@ -575,7 +575,7 @@ def _forces(r: float, directions: int) -> _Forces:
         raise InvalidInputError(
             Reason.INVALID_PARAMETER,
             "directions",
-            "is None; give an even number, as no scene is there to choose it by",
+            "is None; give an even number, as there is no scene to choose it by",
         )
     return _Forces(params.r, params.directions)
 
@@ -589,7 +589,7 @@ def _mask(name: str, value: Any) -> BoolArray:
         raise InvalidInputError(
             Reason.INVALID_IMAGE,
             name,
-            "is no mask with a pixel in it; give two boolean arrays of shape (rows, columns)",
+            "is not a mask with any pixel in it; give two boolean arrays of shape (rows, columns)",
         )
     return np.asarray(value)
 
@@ -638,7 +638,7 @@ def _selection(
             raise InvalidInputError(
                 Reason.INVALID_PARAMETER,
                 f"params.{stage}",
-                f"is no stage; choose one of: {', '.join(STAGES)}",
+                f"is not a stage; choose one of: {', '.join(STAGES)}",
             )
     return {
         stage: Choice(named.get(stage, ""), _mapping(f"params.{stage}", params.get(stage)))

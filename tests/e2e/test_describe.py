@@ -250,7 +250,7 @@ def test_relate_takes_algorithms_and_their_parameters(command_line):
         (["relate", *ROOM, "--map-pair", "1,1"], ["--map-pair '1,1'", "one object twice"]),
         (["relate", *ROOM, "--limit", "0"], ["--limit", "--help"]),
         (["relate", *ROOM, "--similarity", "best"], ["similarity.name is 'best'"]),
-        (["relate", *ROOM, "--set", "searcher.x=1"], ["'searcher' is no stage here"]),
+        (["relate", *ROOM, "--set", "searcher.x=1"], ["'searcher' is not a stage here"]),
     ],
     ids=lambda value: " ".join(str(part).rpartition("/")[2] for part in value)[-50:],
 )

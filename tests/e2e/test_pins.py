@@ -43,17 +43,20 @@ def test_the_command_line_obeys_and_counts_from_one(command_line, files, where):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--pin", "chiar=3"], "--pin chiar=3 names 'chiar', and the labels of the sketch are 'ar"),
-        (["--pin", "1=9"], "--pin 1=9 names an object beyond the 8 of the map; give one of them"),
+        (["--pin", "chiar=3"], "--pin chiar=3 names 'chiar', but the labels of the sketch are 'ar"),
+        (["--pin", "1=9"], "--pin 1=9 names an object beyond the 8 of the map; name one of these"),
         (
             ["--pin", "sofa=2", "--no-pin", "7=2"],
-            "--no-pin 7=2 contradicts --pin sofa=2, which says that it is this one",
+            "--no-pin 7=2 contradicts --pin sofa=2, which gives the sketched object this partner",
         ),
         (
             ["--pin", "sofa=none", "--no-allow-unmatched"],
-            "--pin sofa=none says that it is on no map, but every object",
+            "--pin sofa=none says that the object is not on the map, but every",
         ),
-        (["--pin", "sofa=2", "--searcher", "nn"], "pins are of objects, and the searcher 'nn'"),
+        (
+            ["--pin", "sofa=2", "--searcher", "nn"],
+            "pins need a searcher that finds one object map, which 'nn'",
+        ),
     ],
 )
 def test_a_contradiction_is_told_as_it_was_typed(command_line, files, where, options, sentence):
@@ -87,7 +90,7 @@ def test_what_has_another_form_is_refused(command_line, files, options, sentence
 
 def test_quotes_make_a_label_of_a_number(command_line, files):
     done = command_line("match", *files, "--pin", '"3"=1')
-    assert "names '3', and the labels of the sketch are" in done.stderr
+    assert "names '3', but the labels of the sketch are" in done.stderr
 
 
 def test_python_and_a_server_give_the_same_answer(address, files):

@@ -522,7 +522,7 @@ def test_it_yields_often(objects):
         ({"variety": float("inf")}, "variety", "finite"),
         ({"offspring": 0}, "offspring", "greater than or equal to 1"),
         ({"patience": 0}, "patience", "greater than or equal to 1"),
-        ({"speed": 9}, "speed", "is no parameter of direct; it has: population, tournament"),
+        ({"speed": 9}, "speed", "is not a parameter of direct; it has: population, tournament"),
     ],
 )
 def test_a_parameter_out_of_bounds_is_refused_by_its_name(parameters, field, words):

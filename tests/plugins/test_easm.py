@@ -303,7 +303,7 @@ def test_free_pairs_seldom_do_worse_than_object_maps(sketches):
         ({"generations": 0}, "generations", "greater than or equal to 1"),
         ({"patience": 0}, "patience", "greater than or equal to 1"),
         ({"consistency": "sloppy"}, "consistency", "'object' or 'pairwise'"),
-        ({"speed": 9}, "speed", "is no parameter of easm; it has: consistency, population"),
+        ({"speed": 9}, "speed", "is not a parameter of easm; it has: consistency, population"),
     ],
 )
 def test_a_parameter_out_of_bounds_is_refused_by_its_name(parameters, field, words):

@@ -330,7 +330,7 @@ SWARM_FAULTS = [
     ({"velocity_limit": -0.2}, "velocity_limit", "greater than 0"),
     ({"iterations": 0}, "iterations", "greater than or equal to 1"),
     ({"patience": 0}, "patience", "greater than or equal to 1"),
-    ({"speed": 9}, "speed", "is no parameter of .*nn-pso; it has: rotation, particles, c1"),
+    ({"speed": 9}, "speed", "is not a parameter of .*nn-pso; it has: rotation, particles, c1"),
 ]
 
 
@@ -342,14 +342,14 @@ SWARM_FAULTS = [
             "nn",
             {"particles": 3},
             "particles",
-            "is no parameter of nn; it has: rotation, seed_points",
+            "is not a parameter of nn; it has: rotation, seed_points",
         ),
         *(("nn-pso", *fault) for fault in SWARM_FAULTS),
         *(("fsnn-pso", *fault) for fault in SWARM_FAULTS),
         ("fsnn-pso", {"alpha": 0}, "alpha", "greater than 0"),
         ("fsnn-pso", {"alpha": -10}, "alpha", "greater than 0"),
         ("fsnn-pso", {"k": -1}, "k", "greater than or equal to 0"),
-        ("nn-pso", {"alpha": 10}, "alpha", "is no parameter of nn-pso"),
+        ("nn-pso", {"alpha": 10}, "alpha", "is not a parameter of nn-pso"),
     ],
 )
 def test_a_parameter_out_of_bounds_is_refused_by_its_name(name, parameters, field, words):

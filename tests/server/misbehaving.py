@@ -187,13 +187,13 @@ class FarSearcher(Searcher):
         yield progress(problem, np.full(6, 12))
 
 
-@broken("searcher", "it says that its FMAP has ζ nan, and it has 1")
+@broken("searcher", "it says that its FMAP has ζ nan, but that has 1")
 class NanSearcher(Searcher):
     def search(self, problem, rng):
         yield progress(problem, confidence=np.nan)
 
 
-@broken("searcher", r"it says that its FMAP has ζ 0.99, and it has 0\.\d+")
+@broken("searcher", r"it says that its FMAP has ζ 0.99, but that has 0\.\d+")
 class BoastingSearcher(Searcher):
     def search(self, problem, rng):
         yield progress(problem, other_map(problem).entries, confidence=0.99)
@@ -224,7 +224,7 @@ class OddAlternativeSearcher(Searcher):
         yield progress(problem, alternatives=(Fmap(np.full(6, -1)),))
 
 
-@broken("searcher", "its upper bound is 0.2, and its FMAP has ζ 1")
+@broken("searcher", "its upper bound is 0.2, but its FMAP has ζ 1")
 class ModestSearcher(Searcher):
     def search(self, problem, rng):
         yield progress(problem, upper_bound=0.2)
@@ -426,7 +426,7 @@ class SilentJudge(Judge):
         return ()
 
 
-@broken("judge", "its maps are no tuple of JudgedMap")
+@broken("judge", "its maps are not a tuple of JudgedMap")
 class UnjudgingJudge(Judge):
     def judge(self, problem):
         return Judgement(problem.candidates)
@@ -462,7 +462,7 @@ class BigamousJudge(Judge):
         return says([0, 1, 2, 2])
 
 
-@broken("judge", "its object map matches 3 objects, and at least 4 must")
+@broken("judge", "its object map matches 3 objects, fewer than 4")
 class ForgetfulJudge(Judge):
     def judge(self, problem):
         return says([0, 1, 2, -1])
@@ -486,7 +486,7 @@ class DisplacedJudge(Judge):
         return says([0, 1, 2, 3], elsewhere=-0.5)
 
 
-@broken("judge", "right with probability 0.75, and the place another one with 0.5")
+@broken("judge", "right with probability 0.75, but the place is another one with 0.5")
 class TornJudge(Judge):
     def judge(self, problem):
         return says([0, 1, 2, 3], probability=0.75, elsewhere=0.5)

@@ -135,7 +135,7 @@ def test_a_scene_that_is_not_there_is_named_with_the_side(client, side):
 
 
 def test_a_segmenter_for_what_is_segmented_is_refused(client, name):
-    with pytest.raises(InvalidRequestError, match="needs none; drop it") as caught:
+    with pytest.raises(InvalidRequestError, match="needs no segmenter; drop it") as caught:
         client.match(SKETCH, sources.stored_scene(name), map_segmenter="polygons")
     assert caught.value.field == "pipeline.map_segmenter"
 

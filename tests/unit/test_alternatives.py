@@ -118,7 +118,7 @@ def test_a_symmetric_scene_shows_its_symmetric_answers():
 def test_more_alternatives_than_there_are_maps_are_refused():
     pair = Scene.from_polygons([SQUARE, np.add(SQUARE, (3, 1))])
     assert len(match(pair, pair).alternatives) == 1
-    with pytest.raises(InvalidInputError, match="2 objects in 2 have 1 other map; ask"):
+    with pytest.raises(InvalidInputError, match="2 objects on 2 have only 1 other object map; ask"):
         match(pair, pair, alternatives=2)
     with pytest.raises(InvalidInputError, match="alternatives is -1"):
         match(pair, pair, alternatives=-1)

@@ -234,7 +234,7 @@ def test_without_weights_for_objects_the_answer_is_the_thesis_s(searcher):
 )
 def test_a_search_of_pairs_is_refused(searcher, params, weights, field):
     scene = random_scene(np.random.default_rng(0), 3)
-    words = rf"^weights\.{field} compares objects, and the searcher '{searcher}'.*choose another"
+    words = rf"^weights\.{field} needs a searcher .* which '{searcher}'.*choose another"
     with pytest.raises(InvalidInputError, match=words):
         match(scene, scene, searcher=searcher, params={"searcher": params}, weights=weights)
 

@@ -219,7 +219,7 @@ def test_a_note_of_a_search_is_one_line_that_somebody_can_read(note, told):
 
 @pytest.mark.parametrize("outcome", [Outcome.TIME_BUDGET, "SERVER_STOPPING"])
 def test_a_search_that_speaks_for_the_host_is_blamed(outcome):
-    with pytest.raises(PluginError, match=r"it returned [A-Z_]+, which the host alone can say"):
+    with pytest.raises(PluginError, match=r"it returned [A-Z_]+, which only the host may say"):
         matched(searcher(outcome=outcome), "searcher")
 
 

@@ -90,7 +90,7 @@ def test_what_is_said_twice_or_follows_is_no_contradiction():
     [
         (
             [Pin("bed", 0)],
-            "pins[0].sketch_object names 'bed', and the labels of the sketch are 'Desk', 'chair', "
+            "pins[0].sketch_object names 'bed', but the labels of the sketch are 'Desk', 'chair', "
             "'chair 2'; give one of these, or a number",
         ),
         (
@@ -98,7 +98,7 @@ def test_what_is_said_twice_or_follows_is_no_contradiction():
             "pins[0].map_object names 'CHAIR', the label of 2 objects of the map; give the number "
             "of the one that is meant",
         ),
-        ([Pin(4, 0)], "pins[0].sketch_object names an object beyond the 4 of the sketch; give o"),
+        ([Pin(4, 0)], "pins[0].sketch_object names an object beyond the 4 of the sketch; name"),
         ([Pin(0, 0), Pin(0, 5)], "pins[1].map_object names an object beyond the 5 of the map"),
         (
             [Pin(0, 0), Pin("desk", 1)],
@@ -113,16 +113,16 @@ def test_what_is_said_twice_or_follows_is_no_contradiction():
         ),
         (
             [Pin(0, 2, excluded=True), Pin(1, 1), Pin(0, "Chair")],
-            "pins[0].excluded contradicts pins[2], which says that it is this one; drop one",
+            "pins[0].excluded contradicts pins[2], which gives the sketched object this partner",
         ),
         (
             [Pin(1, 0), Pin(0, None), Pin(3, None)],
-            "pins[1].map_object says that it is on no map, but every object of the sketch must "
-            "find a partner; allow unmatched objects or drop the pin",
+            "pins[1].map_object says that the object is not on the map, but every object of the "
+            "sketch must find a partner; allow unmatched objects or drop the pin",
         ),
         (
             [Pin(0, k, excluded=True) for k in range(5)],
-            "pins leave no map in which every object of the sketch finds a partner of its own; "
+            "pins leave no object map in which every object of the sketch has a partner; "
             "drop some or allow unmatched objects",
         ),
     ],
@@ -136,7 +136,7 @@ def test_labels_that_are_many_or_none_are_told_in_short():
     assert "'thing g', 'thing h', …; give one of these" in refused(Pin(0, "x"), map_=many)
     unnamed = scene("", "", "", "")
     assert refused(Pin("x", 0), sketch=unnamed) == (
-        "pins[0].sketch_object names 'x', and no object of the sketch has a label; give its number"
+        "pins[0].sketch_object names 'x', but no object of the sketch has a label; give its number"
     )
 
 
@@ -150,8 +150,8 @@ def test_at_least_three_objects_find_a_partner():
     alone = [Pin(a, None) for a in range(4)]
     assert known(*alone[:1], partial=True).allowed.sum() == 15
     assert refused(*alone[:2], partial=True) == (
-        "pins leave no map in which 3 objects find a partner, the fewest that tell anything; "
-        "drop some"
+        "pins leave no object map in which 3 objects have a partner, which is the least "
+        "that an answer needs; drop some"
     )
 
 
@@ -159,7 +159,7 @@ def test_a_larger_sketch_may_leave_out_as_many_as_it_has_more():
     scenes = {"sketch": MAP, "map_": SKETCH, "swapped": True}
     assert known(Pin(0, None), **scenes).allowed.sum() == 16
     assert refused(Pin(0, None), Pin(1, None), **scenes) == (
-        "pins leave no map in which every object of the map finds a partner of its own; "
+        "pins leave no object map in which every object of the map has a partner; "
         "drop some or allow unmatched objects"
     )
 
@@ -190,10 +190,13 @@ def test_what_is_no_pin_is_refused(pins, sentence):
     [
         ("couch", "synonyms is 'couch'; give groups of labels"),
         (["couch"], "synonyms[0].labels is 'couch'; give labels"),
-        ([("a", "b"), ("couch",)], "synonyms[1].labels are fewer than two; give labels that mean"),
+        ([("a", "b"), ("couch",)], "synonyms[1].labels are fewer than two; give at least two"),
         ([("couch", "")], "synonyms[0].labels hold ''; give labels that are not empty"),
         ([("couch", 5)], "synonyms[0].labels hold 5; give labels that are not empty"),
-        ([("a", "b")] * 251, "synonyms hold more than 500 labels in all; give those of these"),
+        (
+            [("a", "b")] * 251,
+            "synonyms hold more than 500 labels in all; give only labels of these",
+        ),
     ],
 )
 def test_what_are_no_synonyms_is_refused(synonyms, sentence):
@@ -209,7 +212,9 @@ def test_synonyms_reach_the_names():
 def test_searchers_of_pairs_refuse_pins():
     check_pins_obeyed([Pin(0, 0)], Auto())
     check_pins_obeyed([], FsnnPso())
-    with pytest.raises(InvalidInputError, match=r"^pins are of objects, and the searcher 'fsnn-p"):
+    with pytest.raises(
+        InvalidInputError, match=r"^pins need a searcher that finds one object map, which 'fsnn-p"
+    ):
         check_pins_obeyed([Pin(0, 0)], FsnnPso())
 
 

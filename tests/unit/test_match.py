@@ -565,7 +565,7 @@ def with_odd(monkeypatch, behaviour):
         ("short", r"shape \(1,\), not \(21,\)"),
         ("twice", "takes a pair of objects twice, or a pair and its dual"),
         ("dual", "takes a pair of objects twice, or a pair and its dual"),
-        ("another", "says that its FMAP has ζ 1, and it has 0."),
+        ("another", "says that its FMAP has ζ 1, but that has 0."),
     ],
 )
 def test_a_searcher_that_breaks_its_contract_is_named(monkeypatch, behaviour, words):

@@ -162,17 +162,23 @@ def test_segmenters_and_their_parameters_are_chosen_by_side():
     [
         (
             {"map_segmenter": "room"},
-            r"map_segmenter\.name is 'room', which is no segmenter; choose",
+            r"map_segmenter\.name is 'room', which is not a segmenter; choose",
         ),
-        ({"map_segmenter": "strokes"}, r"is 'strokes', which cannot read source occupancy_grid"),
-        ({"sketch_segmenter": "image"}, r"is 'image', which cannot read source stroke_set"),
+        (
+            {"map_segmenter": "strokes"},
+            r"is 'strokes', which cannot read a source of type occupancy_grid",
+        ),
+        (
+            {"sketch_segmenter": "image"},
+            r"is 'image', which cannot read a source of type stroke_set",
+        ),
         (
             {"params": {"map_segmenter": {"size": 1}}},
             r"map_segmenter\.parameters\.size is no param",
         ),
         (
             {"params": {"segmenter_map": {}}},
-            r"params\.segmenter_map is no stage; choose .*map_segm",
+            r"params\.segmenter_map is not a stage; choose .*map_segm",
         ),
         ({"params": {"map_segmenter": 3}}, r"params\.map_segmenter is 3; give a dict"),
         ({"params": [1]}, r"params is \[1\]; give a dict"),
@@ -240,8 +246,8 @@ def test_a_time_budget_reaches_the_match():
         ({"searcher": "best"}, r"searcher\.name is 'best'.*choose one of: .*easm"),
         ({"histogram": "best"}, r"histogram\.name is 'best'"),
         ({"similarity": "best"}, r"similarity\.name is 'best'"),
-        ({"params": {"finder": {}}}, r"params\.finder is no stage"),
-        ({"params": {"searcher": {"speed": 1}}}, r"speed is no parameter of align"),
+        ({"params": {"finder": {}}}, r"params\.finder is not a stage"),
+        ({"params": {"searcher": {"speed": 1}}}, r"speed is not a parameter of align"),
         ({"params": {"map_segmenter": {"min_size": 1}}}, r"map_segmenter is set for a scene"),
         ({"seed": -1}, "seed is -1"),
         ({"time_budget": -1}, "time_budget is -1 s"),

@@ -105,7 +105,7 @@ def test_an_empty_choice_leaves_a_scene_alone():
     [
         ({"min_size": -1}, "min_size", "is -1; it should be greater than or equal to 0"),
         ({"min_size": "wide"}, "min_size", "is 'wide'; it should be a valid number"),
-        ({"colour": 1}, "colour", "is no parameter of occupancy-grid; it has: free_threshold"),
+        ({"colour": 1}, "colour", "is not a parameter of occupancy-grid; it has: free_threshold"),
     ],
 )
 def test_a_wrong_parameter_of_a_segmenter_is_refused_by_its_path(parameters, field, words):
@@ -201,7 +201,7 @@ def test_a_configured_segmenter_is_used_for_the_sources_that_it_reads():
 
 
 def test_a_segmenter_in_the_request_stays_strict():
-    with pytest.raises(InvalidInputError, match="cannot read source polygon_set"):
+    with pytest.raises(InvalidInputError, match="cannot read a source of type polygon_set"):
         resolve(
             default_registry(), {"map_segmenter": Choice("image")}, None, SOURCES["polygons"], MAPS
         )
@@ -228,7 +228,7 @@ def test_an_unknown_profile_is_refused_with_the_choices():
             call()
         assert caught.value.reason is Reason.UNKNOWN_PROFILE
         assert str(caught.value) == (
-            "profile is 'best', which is no profile; choose one of: fast, mine"
+            "profile is 'best', which is not a profile; choose one of: fast, mine"
         )
 
 
@@ -240,7 +240,7 @@ def test_a_profile_of_no_use_is_refused_and_says_why():
         "searcher.name",
         "histogram.parameters.directions",
     ]
-    words = "profile is 'mine', whose searcher.name is 'annealing', which is no searcher"
+    words = "profile is 'mine', whose searcher.name is 'annealing', which is not a searcher"
     with pytest.raises(InvalidInputError, match=words):
         resolve(registry, {"searcher": Choice("easm")}, defaults=defaults, profile="mine")
     with pytest.raises(InvalidInputError, match=words):

@@ -280,7 +280,10 @@ def test_progress_never_falls_and_the_time_budget_holds():
         ),
         ({"allow_unmatched": True, "unmatched_price": 0.0}, "unmatched_price is 0; give a number"),
         ({"allow_unmatched": True, "unmatched_price": math.nan}, "unmatched_price is nan; give"),
-        ({"allow_unmatched": True, "searcher": "nn"}, "allow_unmatched compares maps of objects"),
+        (
+            {"allow_unmatched": True, "searcher": "nn"},
+            "allow_unmatched needs a searcher that finds",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused(settings, sentence):

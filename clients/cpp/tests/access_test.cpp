@@ -69,7 +69,7 @@ TEST(Address, WhatIsNoneIsRefusedWithTheRemedy) {
   EXPECT_EQ(refusal("robot:abc"),
             "address is 'robot:abc'; give host and port, as in 'localhost:50051' or '[::1]:50051'");
   EXPECT_EQ(refusal("unix:"),
-            "address is 'unix:'; name a file by at most 107 bytes, as in "
+            "address is 'unix:'; a path of at most 107 bytes, as in "
             "'unix:/run/sketchmatch.sock'");
 }
 

@@ -149,7 +149,7 @@ def _check_comparisons(sketch: Scene, map_: Scene) -> None:
         raise InvalidInputError(
             Reason.LIMIT_EXCEEDED,
             "sketch",
-            f"has {len(sketch)} objects and the map {len(map_)}, which makes {comparisons} "
+            f"has {len(sketch)} objects and the map has {len(map_)}, which makes {comparisons} "
             f"comparisons of relations, more than the limit of {_MAX_COMPARISONS}; "
             "leave out small objects",
         )

@@ -163,7 +163,7 @@ def checked_progress(
     _check_confidence(progress, problem, former)
     bound = progress.upper_bound
     if bound is not None and not progress.confidence - _DOUBT <= bound < math.inf:
-        raise ValueError(f"its upper bound is {bound}, and its FMAP has ζ {progress.confidence:g}")
+        raise ValueError(f"its upper bound is {bound}, but its FMAP has ζ {progress.confidence:g}")
     for name in ("iteration", "evaluations"):
         count = getattr(progress, name)
         if not (isinstance(count, int | np.integer) and 0 <= count < _COUNTABLE):
@@ -178,7 +178,7 @@ def checked_outcome(returned: Any) -> Outcome:
     """Return why a search ended by itself, of which it need not say anything."""
     outcome = Outcome(returned or Outcome.CONVERGED)
     if outcome in _OF_THE_HOST:
-        raise ValueError(f"it returned {outcome}, which the host alone can say")
+        raise ValueError(f"it returned {outcome}, which only the host may say")
     return outcome
 
 
@@ -204,9 +204,9 @@ def check_map(partners: Any, problem: MatchProblem | JudgeProblem) -> None:
     partial = problem.price < math.inf if isinstance(problem, JudgeProblem) else problem.partial
     fewest = min(FEWEST, template) if partial else template
     if len(kept) < fewest:
-        raise ValueError(f"its object map matches {len(kept)} objects, and at least {fewest} must")
+        raise ValueError(f"its object map matches {len(kept)} objects, fewer than {fewest}")
     if problem.allowed is not None and not problem.allowed[kept, partners[kept]].all():
-        raise ValueError("its object map holds a pairing that is ruled out")
+        raise ValueError("its object map has a pairing that is ruled out")
     if problem.pinned is not None and breaks_pins(partners, problem.pinned):
         raise ValueError("its object map leaves out a pairing that is known")
 
@@ -275,7 +275,7 @@ def _check_confidence(
 
     confidence = fmap_confidence(progress.fmap, problem.table, problem.weights).total
     if not abs(claimed - confidence) <= _DOUBT:  # nor NaN
-        raise ValueError(f"it says that its FMAP has ζ {claimed:g}, and it has {confidence:g}")
+        raise ValueError(f"it says that its FMAP has ζ {claimed:g}, but that has {confidence:g}")
     if former is not None and claimed < former.confidence - _DOUBT:
         raise ValueError(f"its ζ fell from {former.confidence:g} to {claimed:g}")
 

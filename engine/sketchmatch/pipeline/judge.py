@@ -240,7 +240,7 @@ def check_maps(judgement: Any, problem: JudgeProblem) -> None:
         raise TypeError(f"it returned a {type(judgement).__name__}, not a Judgement")
     maps = judgement.maps
     if not (isinstance(maps, tuple) and all(isinstance(each, JudgedMap) for each in maps)):
-        raise TypeError("its maps are no tuple of JudgedMap")
+        raise TypeError("its maps are not a tuple of JudgedMap")
     if not maps:
         raise ValueError("it returned no map")
     for each in maps:
@@ -265,8 +265,8 @@ def check_probabilities(judgement: Judgement, problem: JudgeProblem) -> None:
         if sums.max() > 1.0 + _SUMMED:
             k = int(sums.argmax())
             raise ValueError(
-                f"its lines of template object {k} are right with {sums[k]:g} together, of which "
-                "one at most is"
+                f"the probabilities of its lines of template object {k} sum to {sums[k]:g}, which "
+                "is more than 1"
             )
     if elsewhere is not None:
         _check_probability("elsewhere", elsewhere)
@@ -276,22 +276,22 @@ def check_probabilities(judgement: Judgement, problem: JudgeProblem) -> None:
         _check_probability("probability of a map", each.probability)
         if elsewhere is not None and each.probability > 1.0 - elsewhere + _ROUNDING:
             raise ValueError(
-                f"its map is right with probability {each.probability:g}, and the place another "
+                f"its map is right with probability {each.probability:g}, but the place is another "
                 f"one with {elsewhere:g}"
             )
         if lines is not None:
             least = lines[np.arange(len(lines)), each.partners].min()  # −1 is the last, of none
             if each.probability > least + _ROUNDING:
                 raise ValueError(
-                    f"its map is right with probability {each.probability:g}, and one of its "
-                    f"lines with {least:g}"
+                    f"its map is right with probability {each.probability:g}, but one of its lines "
+                    f"only with {least:g}"
                 )
 
     together = sum(float(each.probability or 0.0) for each in judgement.maps)
     if together > 1.0 + _SUMMED:
         raise ValueError(
-            f"its {len(judgement.maps)} maps are right with {together:g} together, of which one at "
-            "most is"
+            f"the probabilities of its {len(judgement.maps)} maps sum to {together:g}, which is "
+            "more than 1"
         )
 
 

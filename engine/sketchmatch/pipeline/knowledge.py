@@ -72,7 +72,7 @@ def check_synonyms(synonyms: Any) -> tuple[tuple[str, ...], ...]:
         field = f"synonyms[{k}].labels"
         labels = tuple(_items(field, group, "labels"))
         if len(labels) < 2:
-            _refuse(field, "are fewer than two; give labels that mean the same")
+            _refuse(field, "are fewer than two; give at least two that mean the same")
         for label in labels:
             if not isinstance(label, str) or not folded(label):
                 _refuse(field, f"hold {quoted(label)}; give labels that are not empty")
@@ -81,7 +81,7 @@ def check_synonyms(synonyms: Any) -> tuple[tuple[str, ...], ...]:
         raise InvalidInputError(
             Reason.LIMIT_EXCEEDED,
             "synonyms",
-            f"hold more than {_MOST_SYNONYMS} labels in all; give those of these scenes alone",
+            f"hold more than {_MOST_SYNONYMS} labels in all; give only labels of these scenes",
         )
     return tuple(groups)
 
@@ -98,9 +98,8 @@ def check_pins_obeyed(pins: Sequence[Pin], searcher: Searcher) -> None:
     if pins and not searcher.object_consistent:
         _refuse(
             "pins",
-            f"are of objects, and the searcher {searcher.name!r}, as it is set here, maps pairs "
-            "that need not lead to one map of objects; choose another, such as 'auto', or drop "
-            "them",
+            f"need a searcher that finds one object map, which {searcher.name!r} as set here need "
+            "not do; choose another, such as 'auto', or drop the pins",
         )
 
 
@@ -219,7 +218,7 @@ def _check_pin(pin: Any, field: str) -> Pin:
         raise InvalidInputError(
             Reason.MISSING_FIELD,
             f"{field}.map_object",
-            "is not set, though the pin excludes one; name the mapped object that it is not",
+            "is not set, though the pin excludes one; name the mapped object that is excluded",
         )
     return pin
 
@@ -255,7 +254,7 @@ def _read_pins(pins: Sequence[Pin], sketch: Scene, map_: Scene) -> tuple[BoolArr
         if a in known and known[a][1] == c:
             _refuse(
                 f"pins[{k}].excluded",
-                f"contradicts pins[{known[a][0]}], which says that it is this one; "
+                f"contradicts pins[{known[a][0]}], which gives the sketched object this partner; "
                 "drop one of the two",
             )
     partners = {a: c for a, (_, c) in known.items() if c is not None}
@@ -278,20 +277,20 @@ def _check_possible(pins: Sequence[Pin], allowed: BoolArray, swapped: bool, part
     if alone and not partial and not swapped:
         _refuse(
             f"pins[{alone[0]}].map_object",
-            "says that it is on no map, but every object of the sketch must find a partner; "
-            "allow unmatched objects or drop the pin",
+            "says that the object is not on the map, but every object of the sketch must find a "
+            "partner; allow unmatched objects or drop the pin",
         )
     if partial:
         _refuse(
             "pins",
-            f"leave no map in which {needed} objects find a partner, the fewest that tell "
-            "anything; drop some",
+            f"leave no object map in which {needed} objects have a partner, which is the least "
+            "that an answer needs; drop some",
         )
     smaller = "map" if swapped else "sketch"
     _refuse(
         "pins",
-        f"leave no map in which every object of the {smaller} finds a partner of its own; drop "
-        "some or allow unmatched objects",
+        f"leave no object map in which every object of the {smaller} has a partner; drop some or "
+        "allow unmatched objects",
     )
 
 
@@ -300,7 +299,7 @@ def _found(reference: int | str, scene: Scene, field: str, side: str) -> int:
     if not isinstance(reference, str):
         if reference >= len(scene):
             _refuse(
-                field, f"names an object beyond the {len(scene)} of the {side}; give one of them"
+                field, f"names an object beyond the {len(scene)} of the {side}; name one of these"
             )
         return int(reference)
     wanted = folded(reference)
@@ -315,7 +314,7 @@ def _found(reference: int | str, scene: Scene, field: str, side: str) -> int:
             f"names {quoted(reference)}, the label of {len(alike)} objects of the {side}; "
             "give the number of the one that is meant",
         )
-    return _refuse(field, f"names {quoted(reference)}, and {_labels_of(scene, side)}")
+    return _refuse(field, f"names {quoted(reference)}, but {_labels_of(scene, side)}")
 
 
 def _labels_of(scene: Scene, side: str) -> str:

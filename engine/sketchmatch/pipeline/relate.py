@@ -167,7 +167,7 @@ def _check_alike(template: SceneDescriptor, argument: SceneDescriptor) -> None:
         raise InvalidInputError(
             Reason.INVALID_PARAMETER,
             "argument",
-            f"is described by {theirs} in {their_directions} directions and the template by "
+            f"is described by {theirs} in {their_directions} directions, but the template by "
             f"{ours} in {our_directions}; describe both by the same histogram",
         )
 

@@ -125,8 +125,8 @@ def check_objects_weighed(weights: ConfidenceWeights, searcher: Searcher) -> Non
         name = "shape" if weights.shape > 0 else "size"
         raise _refused(
             f"weights.{name}",
-            f"compares objects, and the searcher {searcher.name!r}, as it is set here, maps pairs "
-            "that need not lead to one map of objects; choose another, such as 'auto', or weight 0",
+            f"needs a searcher that finds one object map, which {searcher.name!r} as set here need "
+            "not do; choose another, such as 'auto', or give weight 0",
         )
 
 
@@ -173,9 +173,8 @@ def price_in_force(
     if not searcher.object_consistent:
         raise _refused(
             "allow_unmatched",
-            f"compares maps of objects, and the searcher {searcher.name!r}, as it is set here, "
-            "maps pairs that need not lead to one; choose another, such as 'auto', or switch it "
-            "off",
+            f"needs a searcher that finds one object map, which {searcher.name!r} as set here need "
+            "not do; choose another, such as 'auto', or give False",
         )
     return _price_of(pipeline.judge, weights, registry) if price is None else price
 
@@ -200,8 +199,8 @@ def alternatives_wanted(requested: int | None, sketch: Scene, map_: Scene) -> in
     if requested > there_are:
         raise _refused(
             "alternatives",
-            f"is {requested}, but {few} objects in {many} have "
-            f"{counted(there_are, 'other map')}; ask for no more",
+            f"is {requested}, but {few} objects on {many} have only "
+            f"{counted(there_are, 'other object map')}; ask for no more",
         )
     return requested
 
@@ -216,8 +215,8 @@ def _checked_weights(given: RequestWeights) -> tuple[float, ...]:
     if len(weights) not in WEIGHT_COUNTS:
         raise _refused(
             "weights",
-            f"are {len(weights)} numbers; give three, {', '.join(names[:3])}, five, with "
-            f"{' and '.join(names[3:5])}, or six, with the exponent of {names[5]}",
+            f"are {len(weights)} numbers; give three ({', '.join(names[:3])}), five (with "
+            f"{' and '.join(names[3:5])}) or six (with the exponent of {names[5]})",
         )
     for name, weight in zip(names, weights, strict=False):
         most = MAX_DISTANCE if name == "distance" else MAX_WEIGHT

@@ -123,7 +123,7 @@ def search(
         first = first_parts(goal.allowed, fixed)
         fewest = whole.objects if goal.price == math.inf else min(FEWEST, whole.objects)
         if len(first[0]) < fewest:
-            raise AnswerUnavailableError("no map keeps to what is known of the objects; pin fewer")
+            raise AnswerUnavailableError("no object map agrees with all pins; pin fewer objects")
     plan = trials(first, weights, math.inf if goal.at_once else goal.price, fixed)
     trial, so_far, rivals = next(plan), None, list[Rival]()
     while True:

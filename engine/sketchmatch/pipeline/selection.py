@@ -140,7 +140,7 @@ class Defaults:
             if known.name == wanted:
                 return known
         names = ", ".join(sorted(known.name for known in self.profiles)) or "none"
-        problem = f"is {quoted(wanted)}, which is no profile; choose one of: {names}"
+        problem = f"is {quoted(wanted)}, which is not a profile; choose one of: {names}"
         raise InvalidInputError(Reason.UNKNOWN_PROFILE, "profile", problem)
 
 
@@ -226,7 +226,9 @@ def resolve(
     for stage in selection:
         if stage not in STAGES:
             raise InvalidInputError(
-                Reason.INVALID_PARAMETER, stage, f"is no stage; choose one of: {', '.join(STAGES)}"
+                Reason.INVALID_PARAMETER,
+                stage,
+                f"is not a stage; choose one of: {', '.join(STAGES)}",
             )
     levels = _Levels(registry, defaults, profile)
     levels.check_profile()
@@ -236,7 +238,9 @@ def resolve(
         if source is None:
             if choice.name or choice.parameters:
                 raise InvalidInputError(
-                    Reason.WRONG_ALGORITHM, stage, "is set for a scene, which needs none; drop it"
+                    Reason.WRONG_ALGORITHM,
+                    stage,
+                    "is set for a scene, which needs no segmenter; drop it",
                 )
             segmenters[stage] = None
         else:
@@ -475,7 +479,7 @@ class _Levels:
             raise InvalidInputError(
                 Reason.WRONG_ALGORITHM,
                 f"{path}.name",
-                f"is {segmenter.name!r}, which cannot read source {source.field}; "
+                f"is {segmenter.name!r}, which cannot read a source of type {source.field}; "
                 f"choose one of: {fitting}",
             )
         return segmenter
@@ -521,7 +525,7 @@ def _parameter_errors(
         path = ".".join(str(part)[:_LONGEST_NAME] for part in fault["loc"])
         if fault["type"] == "extra_forbidden":
             known = ", ".join(algorithm.Params.model_fields) or "none"
-            problem = f"is no parameter of {algorithm.name}; it has: {known}"
+            problem = f"is not a parameter of {algorithm.name}; it has: {known}"
         else:
             problem = fault_of(fault["input"], fault["msg"])
         yield InvalidInputError(Reason.INVALID_PARAMETER, path, problem)

@@ -133,7 +133,9 @@ def directional_relation(histogram: Any) -> DirectionalRelation:
         )
     if not (np.isfinite(row).all() and (row >= 0.0).all()):
         raise InvalidInputError(
-            Reason.INVALID_PARAMETER, "histogram", "is not finite or negative; give forces"
+            Reason.INVALID_PARAMETER,
+            "histogram",
+            "has values that are negative or not finite; give forces",
         )
     (relation,) = directional_relations(row[None])
     return relation
