@@ -94,7 +94,7 @@ def test_options_that_are_given_win():
         (":50051", "give host and port"),
         ("localhost:0", "give a port from 1 to 65535"),
         ("localhost:65536", "give a port from 1 to 65535"),
-        ("unix:", "a path of at most 107 bytes, as in 'unix:/run/sketchmatch.sock'"),
+        ("unix:", "name a file by a path of at most 107 bytes, as in 'unix:/run/sketchmatch.sock'"),
         ("localhost:" + "9" * 5000, "give a port from 1 to 65535"),
         ("a\0b:50051", "give host and port, as in 'localhost:50051'"),
         ("\ud800:50051", "give host and port, as in 'localhost:50051'"),
@@ -113,7 +113,7 @@ def test_what_is_no_address_is_refused_at_once(kind, address, remedy):
 
 def test_the_path_of_a_socket_is_no_longer_than_a_socket_takes():
     Client(f"unix:{107 * 'x'}").close()
-    with pytest.raises(InvalidRequestError, match="; a path of at most 107 bytes"):
+    with pytest.raises(InvalidRequestError, match="; name a file by a path of at most 107 bytes"):
         Client(f"unix:{108 * 'x'}")
 
 

@@ -262,7 +262,7 @@ def test_faults_of_the_callers_own_functions_are_not_the_servers(url):
     assert tokens == [
         "invalid token token cannot be had (token is not a function); "
         "give a function that returns it",
-        "invalid token token is no token; give what `sketchmatch tokens add` printed",
+        "invalid token token is not a token; give what `sketchmatch tokens add` printed",
     ]
     assert version == "sketchmatch.v1"
 

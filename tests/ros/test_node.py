@@ -185,7 +185,7 @@ def test_a_goal_without_strokes_and_one_before_the_map_are_refused(ros, server, 
     early.go("configure", "inactive")
     early.go("activate", "active")
     assert early.action_server.accepts(goal()) is GoalResponse.REJECT
-    assert "no map has come on map yet" in early.said[-1][1]
+    assert "no map has arrived on map yet" in early.said[-1][1]
     early.go("shutdown", "finalized")
     assert early.action_server.destroyed
 
@@ -444,7 +444,7 @@ def test_more_of_the_latest_sketch_is_carried_on_demand(carrying, carrier):
     carrier.notes = ["route 0: Nothing after point 1 can be reached."]
     found = carrying.services["~/carry"](wanted)
     assert found.notes == carrier.notes
-    assert carrying.said[-1] == ("warning", f"carried otherwise than drawn: {carrier.notes[0]}")
+    assert carrying.said[-1] == ("warning", f"not carried as drawn: {carrier.notes[0]}")
     places = [(pose.pose.position.x, pose.pose.position.y) for pose in found.routes[0].poses]
     assert places == [(1, 2), (3, 2)]
     assert [(p.x, p.y) for p in found.zones[0].points] == [(1, 2), (3, 2)]
@@ -471,7 +471,7 @@ def test_what_the_server_changed_about_a_route_is_a_warning(transferring, server
         features=[transfer_service_pb2.CarriedFeature(changes=[change])]
     )
     executed(transferring)
-    told = "carried otherwise than drawn: route 0: The route ends there."
+    told = "not carried as drawn: route 0: The route ends there."
     assert ("warning", told) in transferring.said
 
 
@@ -513,7 +513,7 @@ def test_a_goal_that_is_over_waits_for_no_call_and_leaves_all_as_it_was(
 
 def test_zones_are_refused_where_nothing_carries_them(node):
     assert node.action_server.accepts(with_zone(goal())) is GoalResponse.REJECT
-    assert "no carrier for zones" in node.said[-1][1]
+    assert "cannot transfer zones" in node.said[-1][1]
     assert node.services == {}
 
 

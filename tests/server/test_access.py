@@ -341,13 +341,13 @@ def test_a_certificate_for_another_name_is_not_trusted_unless_the_name_is_said(a
 
 
 def test_plaintext_on_a_port_with_tls_is_told_what_may_be_wanted(ask, guarded, robot):
-    with pytest.raises(ServerUnavailableError, match="wants encryption") as caught:
+    with pytest.raises(ServerUnavailableError, match="requires encryption") as caught:
         ask(guarded.address, "server_info", token=robot[0])
     assert robot[0] not in str(caught.value)
 
 
 def test_tls_on_a_port_without_is_told_that_it_does_not_encrypt(ask, address, ours):
-    with pytest.raises(ServerUnavailableError, match="it does not encrypt"):
+    with pytest.raises(ServerUnavailableError, match="it does not use encryption"):
         ask(address, "server_info", root_certificates=ours.certificate)
 
 

@@ -30,7 +30,7 @@ struct Said {
       return read_bytes(value);
     } catch (const std::system_error& error) {
       refuse("names " + value + ", which cannot be read (" + lowered(error.code().message()) +
-             "); name a file that can");
+             "); check the path");
     }
   }
 };
@@ -79,7 +79,7 @@ std::optional<bool> tls_of(const ClientOptions& options) {
     return false;
   }
   if (!text.empty()) {
-    found->refuse("is " + in_quotes(text) + "; say 1 or 0");
+    found->refuse("is " + in_quotes(text) + "; give 1 or 0");
   }
   return std::nullopt;
 }
@@ -112,7 +112,7 @@ void refuse_all(const ClientOptions& options, const char* problem, bool with_tls
 std::shared_ptr<grpc::ChannelCredentials> credentials_of(const ClientOptions& options) {
   const auto tls = tls_of(options);
   if (tls == false) {
-    refuse_all(options, "is of no use without encryption; drop tls = false", false);
+    refuse_all(options, "needs encryption; leave out tls = false", false);
     return nullptr;
   }
   const auto roots = said("root_certificates", options.root_certificates);
@@ -142,7 +142,7 @@ bool is_token(const std::string& token) {
 /// Returns what was said of a token, if anything.
 std::optional<Said> token_of(const ClientOptions& options) {
   if (options.token && options.token_file) {
-    refuse("token_file", "is given beside token; drop one of the two");
+    refuse("token_file", "cannot be used with token; drop one of the two");
   }
   const auto token_file = options.token_file ? std::optional(text_of(*options.token_file))
                                              : std::optional<std::string>();
@@ -163,7 +163,7 @@ Access access_to(const std::string& address, const ClientOptions& options) {
   Access access;
   access.credentials = options.credentials;
   if (access.credentials) {
-    refuse_all(options, "is said by credentials already; drop one of the two", true);
+    refuse_all(options, "cannot be used with credentials; drop one of the two", true);
   } else {
     access.credentials = credentials_of(options);
   }
@@ -178,12 +178,12 @@ Access access_to(const std::string& address, const ClientOptions& options) {
   const std::string token = stripped(found->content());
   if (!is_token(token)) {
     // What it is instead is not told: it may be a secret all the same.
-    found->refuse("is no token; give what `sketchmatch tokens add` printed");
+    found->refuse("is not a token; give what `sketchmatch tokens add` printed");
   }
   if (!access.credentials && !is_here(address)) {
     found->refuse("would go to " + address +
-                  " without encryption, for others to read; give the certificates of the server's "
-                  "authority (root_certificates), or encrypt (tls)");
+                  " without encryption, so others could read it; give the root_certificates of the "
+                  "server's authority, or switch on tls");
   }
   access.authorization = "Bearer " + token;
   return access;

@@ -88,7 +88,7 @@ void check_file(const std::string& address) {
     path.remove_prefix(2);
   }
   if (path.empty() || path.size() > kLongestPath) {
-    refuse_address(address, "name a file by at most " + std::to_string(kLongestPath) +
+    refuse_address(address, "name a file by a path of at most " + std::to_string(kLongestPath) +
                                 " bytes, as in 'unix:/run/sketchmatch.sock'");
   }
 }

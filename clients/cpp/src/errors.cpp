@@ -117,7 +117,7 @@ std::optional<std::string> distrust(const std::string& message) {
   }
   const std::string why = stripped(found[1].str());
   // OpenSSL does not say why.
-  return why.empty() ? "nobody whom the client trusts vouches for it, or it has expired" : why;
+  return why.empty() ? "it is of no authority that the client trusts, or it has expired" : why;
 }
 
 /// Returns what gRPC says of a link that did not come about; it has no status for that.
@@ -125,8 +125,8 @@ Failure unavailable(const std::string& message, const std::string& address) {
   if (const auto why = distrust(message)) {
     return {Failure::Kind::not_authenticated,
             "the certificate of the server at " + address + " cannot be trusted (" + *why +
-                "); give the root_certificates of its authority and a name that it is for, or "
-                "have it renewed",
+                "); give the root_certificates of its authority and a server_name that it is for, "
+                "or renew it",
             {},
             {},
             {},
@@ -145,10 +145,10 @@ Failure unavailable(const std::string& message, const std::string& address) {
   }
   std::string remedy = "start it, or check the address";
   if (contains(message, "WRONG_VERSION_NUMBER") || contains(message, "wrong version number")) {
-    remedy = "it does not encrypt: ask it without certificates and tls";
+    remedy = "it does not use encryption: leave out certificates and tls";
   } else if (contains(message, "Socket closed")) {
     remedy =
-        "it ended the link, as one does that stops, or wants encryption or a certificate of the "
+        "it closed the connection: it is stopping, or requires encryption or a certificate of the "
         "client that it trusts; start it, or give root_certificates, certificate and key";
   } else if (contains(message, "http1.x server")) {
     remedy = "it speaks HTTP/1.1, as the port for browsers does; give the address for gRPC";

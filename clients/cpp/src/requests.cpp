@@ -200,7 +200,7 @@ void write_segmenting(const Source& source, const SegmentOptions& options, Reque
 /// Refuses an option that a match alone has a use for.
 void refuse_for_transfer(bool given, const char* option) {
   if (given) {
-    refuse(option, "is for matches; a transfer has one answer, and no name: leave it out");
+    refuse(option, "is only for matches; leave it out of a transfer");
   }
 }
 
@@ -220,7 +220,7 @@ void write(const Feature& feature, v1::Feature& message, const std::string& fiel
       write_points(ring, *written->add_rings());
     }
   } else {
-    refuse(field, "is nothing; give a Point, a Route or a Zone");
+    refuse(field, "is empty; give a Point, a Route or a Zone");
   }
 }
 

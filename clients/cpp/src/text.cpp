@@ -71,7 +71,7 @@ bool is_utf8(std::string_view bytes) {
 
 const std::string& checked_text(const std::string& text, const std::string& field) {
   if (!is_utf8(text)) {
-    refuse(field, "is " + in_quotes(text) + ", which is no UTF-8; convert it");
+    refuse(field, "is " + in_quotes(text) + ", which is not UTF-8; convert it");
   }
   return text;
 }

@@ -114,8 +114,8 @@ TEST(Token, DoesNotLeaveThisMachineWithoutEncryption) {
   ClientOptions options;
   options.token = "robot-7.secret";
   EXPECT_EQ(refusal("robot:50051", options),
-            "token would go to robot:50051 without encryption, for others to read; give the "
-            "certificates of the server's authority (root_certificates), or encrypt (tls)");
+            "token would go to robot:50051 without encryption, so others could read it; "
+            "give the root_certificates of the server's authority, or switch on tls");
   for (const char* here : {"localhost:1", "127.4.5.6:1", "[::1]:1", "[::ffff:127.0.0.1]:1",
                            "pad.localhost.:1", "unix:/s", "dns:///localhost:1"}) {
     EXPECT_EQ(refusal(here, options), "taken") << here;
@@ -131,15 +131,15 @@ TEST(Token, WhatIsNoneIsRefusedAndNotTold) {
   ClientOptions options;
   options.token = "my secret";
   EXPECT_EQ(refusal("localhost:1", options),
-            "token is no token; give what `sketchmatch tokens add` printed");
+            "token is not a token; give what `sketchmatch tokens add` printed");
   options.token_file = "x";
   EXPECT_EQ(refusal("localhost:1", options),
-            "token_file is given beside token; drop one of the two");
+            "token_file cannot be used with token; drop one of the two");
   options.token.reset();
   options.token_file = "/nowhere/token";
   EXPECT_EQ(refusal("localhost:1", options),
             "token_file names /nowhere/token, which cannot be read (no such file or directory); "
-            "name a file that can");
+            "check the path");
 }
 
 TEST(Encryption, PartsThatContradictEachOtherAreRefused) {
@@ -148,7 +148,7 @@ TEST(Encryption, PartsThatContradictEachOtherAreRefused) {
   EXPECT_EQ(refusal("localhost:1", options), "certificate is given without key; give both");
   options.tls = false;
   EXPECT_EQ(refusal("localhost:1", options),
-            "certificate is of no use without encryption; drop tls = false");
+            "certificate needs encryption; leave out tls = false");
   ClientOptions other;
   other.key = Pem::content("-----BEGIN PRIVATE KEY-----");
   EXPECT_EQ(refusal("localhost:1", other), "key is given without certificate; give both");
@@ -157,7 +157,7 @@ TEST(Encryption, PartsThatContradictEachOtherAreRefused) {
   EXPECT_EQ(refusal("localhost:1", own), "taken");
   own.root_certificates = Pem::content(kCertificate);
   EXPECT_EQ(refusal("localhost:1", own),
-            "root_certificates is said by credentials already; drop one of the two");
+            "root_certificates cannot be used with credentials; drop one of the two");
 }
 
 TEST(Encryption, WhatIsNoPemIsRefused) {
@@ -176,7 +176,7 @@ TEST(Encryption, WhatIsNoPemIsRefused) {
 
 TEST(Encryption, TheSwitchOfTheEnvironmentIsOnOrOff) {
   const Variable tls("SKETCHMATCH_TLS", "perhaps");
-  EXPECT_EQ(refusal("localhost:1"), "SKETCHMATCH_TLS is 'perhaps'; say 1 or 0");
+  EXPECT_EQ(refusal("localhost:1"), "SKETCHMATCH_TLS is 'perhaps'; give 1 or 0");
   const Variable on("SKETCHMATCH_TLS", " TRUE ");
   EXPECT_EQ(refusal("robot"), "taken");
   const Variable off("SKETCHMATCH_TLS", "0");
@@ -192,7 +192,7 @@ TEST(Encryption, AServerThatDoesNotEncryptIsToldFromOneThatIsAway) {
     static_cast<void>(Client(server.address(), options).server_info());
     FAIL();
   } catch (const ServerUnavailableError& error) {
-    EXPECT_EQ(error.remedy(), "it does not encrypt: ask it without certificates and tls");
+    EXPECT_EQ(error.remedy(), "it does not use encryption: leave out certificates and tls");
   }
 }
 

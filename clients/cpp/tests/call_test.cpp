@@ -412,7 +412,7 @@ TEST_F(Calls, TheRemedyOfALinkThatDidNotComeAboutIsOursAndNotWhatGrpcSays) {
            std::pair("Connection refused", "start it, or check the address"),
            std::pair("Socket closed", "start it, or give root_certificates, certificate and key"),
            std::pair("wrong version number",
-                     "it does not encrypt: ask it without certificates and tls"),
+                     "it does not use encryption: leave out certificates and tls"),
            std::pair("Trying to connect an http1.x server", "give the address for gRPC"),
        }) {
     server.fail(status_of(grpc::StatusCode::UNAVAILABLE, grpc + said));
@@ -431,7 +431,7 @@ TEST_F(Calls, WhyACertificateIsNotTrustedIsSaidAsFarAsItIsKnown) {
   const std::string grpc = "last error: UNKNOWN: ipv4:127.0.0.1:1: Ssl handshake failed: ";
   for (const auto& [said, why] : {
            std::pair("SSL_ERROR_SSL: error:0A000086:SSL routines::certificate verify failed",
-                     "nobody whom the client trusts vouches for it, or it has expired"),
+                     "it is of no authority that the client trusts, or it has expired"),
            std::pair("SSL_ERROR_SSL: error:1000007d:SSL routines:OPENSSL_internal:"
                      "CERTIFICATE_VERIFY_FAILED: certificate has expired",
                      "certificate has expired"),

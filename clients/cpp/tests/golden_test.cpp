@@ -394,18 +394,18 @@ TEST_F(Golden, WhatIsForMatchesAloneIsRefusedForATransfer) {
   TransferOptions options;
   options.alternatives = 2;
   EXPECT_EQ(field_of(options, {}),
-            "alternatives is for matches; a transfer has one answer, and no name: leave it out");
+            "alternatives is only for matches; leave it out of a transfer");
   options = {};
   options.request_id = "3f0e";
-  EXPECT_EQ(field_of(options, {}).find("request_id is for matches"), 0U);
+  EXPECT_EQ(field_of(options, {}).find("request_id is only for matches"), 0U);
   options = {};
   options.keep_running = true;
-  EXPECT_EQ(field_of(options, {}).find("keep_running is for matches"), 0U);
+  EXPECT_EQ(field_of(options, {}).find("keep_running is only for matches"), 0U);
   options = {};
   options.priority = Priority::low;
-  EXPECT_EQ(field_of(options, {}).find("priority is for matches"), 0U);
+  EXPECT_EQ(field_of(options, {}).find("priority is only for matches"), 0U);
   EXPECT_EQ(field_of({}, {{"dock", Point{}}, {"attic", {}}}),
-            "features[1] is nothing; give a Point, a Route or a Zone");
+            "features[1] is empty; give a Point, a Route or a Zone");
   EXPECT_TRUE(server.requests().empty());
 }
 

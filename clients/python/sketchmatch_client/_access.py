@@ -80,7 +80,7 @@ class _Said:
             return Path(path).read_bytes()
         except (OSError, ValueError, TypeError) as error:
             why = (getattr(error, "strerror", None) or str(error)).lower()
-            self.refuse(f"names {path}, which cannot be read ({why}); name a file that can")
+            self.refuse(f"names {path}, which cannot be read ({why}); check the path")
 
 
 def access_to(
@@ -104,13 +104,13 @@ def access_to(
         could read the token.
     """
     if unknown := set(options) - set(AccessOptions.__annotations__):
-        raise TypeError(f"{min(unknown)!r} is no argument of a client")
+        raise TypeError(f"{min(unknown)!r} is not an argument of a client")
     if credentials is None:
         credentials = _credentials(options)
     else:
         for name in ("tls", *_PEMS):
             if options.get(name) is not None:
-                _Said(name, name, "").refuse("is said by credentials already; drop one of the two")
+                _Said(name, name, "").refuse("cannot be used with credentials; drop one of the two")
     check_address(address, credentials is not None)
     other = _said("server_name", options)
     named: ChannelOptions = (("grpc.ssl_target_name_override", other.value),) if other else ()
@@ -119,8 +119,8 @@ def access_to(
         return Access(credentials, named)
     if credentials is None and not is_here(address):
         said.refuse(
-            f"would go to {address} without encryption, for others to read; give the certificates "
-            "of the server's authority (root_certificates), or encrypt (tls)"
+            f"would go to {address} without encryption, so others could read it; give the "
+            "root_certificates of the server's authority, or switch on tls"
         )
     return Access(credentials, named, (("authorization", f"Bearer {token}"),))
 
@@ -131,7 +131,7 @@ def _credentials(options: AccessOptions) -> grpc.ChannelCredentials | None:
     if tls is False:
         for name in _PEMS:
             if options.get(name) is not None:
-                _Said(name, name, "").refuse("is of no use without encryption; drop tls=False")
+                _Said(name, name, "").refuse("needs encryption; leave out tls=False")
         return None
     said = {name: _said(name, options) for name in _PEMS}
     roots, certificate, key = (_pem(item) for item in said.values())
@@ -156,7 +156,7 @@ def _check_pair(certificate: _Said, key: _Said) -> None:
         context.load_cert_chain(first, second, password="")
     except ssl.SSLError:
         own = f"is not the key of {certificate.place}, or has a passphrase"
-        key.refuse(f"{own}; give its own without one")
+        key.refuse(f"{own}; give the key of that certificate, without a passphrase")
 
 
 def _said(name: str, options: AccessOptions) -> _Said | None:
@@ -175,14 +175,16 @@ def _tls(options: AccessOptions) -> bool | None:
         return cast("bool | None", said and said.value)
     text = cast("str", said.value).strip().lower()
     if text not in _SWITCH:
-        said.refuse(f"is {text!r}; say 1 or 0")
+        said.refuse(f"is {text!r}; give 1 or 0")
     return _SWITCH[text]
 
 
 def _token(options: AccessOptions) -> tuple[_Said | None, str]:
     """Return what was said of a token, if anything, and the token."""
     if options.get("token") is not None and options.get("token_file") is not None:
-        _Said("token_file", "token_file", "").refuse("is given beside token; drop one of the two")
+        _Said("token_file", "token_file", "").refuse(
+            "cannot be used with token; drop one of the two"
+        )
     here = options.get("token") is not None
     said = _said("token", options)
     if not here and (said is None or options.get("token_file") is not None):
@@ -193,7 +195,7 @@ def _token(options: AccessOptions) -> tuple[_Said | None, str]:
     token = text.strip() if isinstance(text, str) else ""
     # What it is instead is not told: it may be a secret all the same.
     if not token or not token.isascii() or not token.isprintable() or " " in token:
-        said.refuse("is no token; give what `sketchmatch tokens add` printed")
+        said.refuse("is not a token; give what `sketchmatch tokens add` printed")
     return said, token
 
 

@@ -87,8 +87,8 @@ def check_address(address: str, encrypted: bool) -> None:
         raise _refused(address, "give host and port, as in 'localhost:50051'")
     file = _FILE.fullmatch(address)
     if file is not None and not 0 < len(os.fsencode(file[1])) <= _LONGEST_PATH:
-        remedy = f"name a file by at most {_LONGEST_PATH} bytes, as in 'unix:/run/sketchmatch.sock'"
-        raise _refused(address, remedy)
+        limit = f"a path of at most {_LONGEST_PATH} bytes"
+        raise _refused(address, f"name a file by {limit}, as in 'unix:/run/sketchmatch.sock'")
     if _SCHEMES.match(address):
         return
     if "://" in address:

@@ -114,7 +114,7 @@ def watched(match_id: str, after: int) -> Course:
     InvalidRequestError
         If these are no name and no number.
     """
-    with refused_as("INVALID_FIELD", "match_id", "is no text; give the name of a match"):
+    with refused_as("INVALID_FIELD", "match_id", "is not text; give the name of a match"):
         WatchMatchRequest(match_id=match_id)
     with refused_as("INVALID_FIELD", "after", f"is {after!r}; give the number of an event, or 0"):
         WatchMatchRequest(after=after)

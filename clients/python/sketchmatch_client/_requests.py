@@ -147,7 +147,7 @@ def match_request(
     )
     for name, value in given.items():
         if name not in _FIELDS:
-            raise TypeError(f"unknown option {name!r}; MatchOptions lists those there are")
+            raise TypeError(f"unknown option {name!r}; MatchOptions lists all options")
         remedy, converted = _FIELDS[name]
         with refused_as("INVALID_FIELD", name, f"is {reprlib.repr(value)}; {remedy}"):
             request.MergeFrom(MatchRequest(**{name: converted(value)}))

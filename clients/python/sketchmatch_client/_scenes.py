@@ -50,7 +50,7 @@ def update_request(
     if not isinstance(labels, Mapping):
         problem = f"labels is {reprlib.repr(labels)}; give a dict from objects to labels"
         raise InvalidRequestError(problem, "INVALID_FIELD", "labels")
-    with refused_as("INVALID_FIELD", "labels", "does not lead from indices, from 0, to text"):
+    with refused_as("INVALID_FIELD", "labels", "is not a dict from indices, from 0, to text"):
         given = [ObjectLabel(object=k, label=label) for k, label in labels.items()]
     called = None if title is None else _title(title)
     return UpdateSceneRequest(name=_name(name), labels=given, title=called)
@@ -63,7 +63,7 @@ def delete_request(name: str) -> DeleteSceneRequest:
 
 def _title(given: Any) -> str:
     if not isinstance(given, str):
-        problem = f"title is {reprlib.repr(given)}; give text that people know the scene by"
+        problem = f"title is {reprlib.repr(given)}; give text by which people know the scene"
         raise InvalidRequestError(problem, "INVALID_FIELD", "title")
     return given
 

@@ -199,14 +199,14 @@ def update_request(
     names = list(strokes)
     drawn = sources.strokes(strokes.values(), [labels.get(name) for name in names])
     request = UpdateSketchRequest(sketch_id=sketch_id)
-    with refused_as("INVALID_FIELD", "set_strokes", "has a name of a stroke that is no text"):
+    with refused_as("INVALID_FIELD", "set_strokes", "has a stroke whose name is not text"):
         request.set_strokes.extend(
             SketchStroke(stroke_id=name, stroke=stroke)
             for name, stroke in zip(names, drawn.stroke_set.strokes, strict=True)
         )
-    with refused_as("INVALID_FIELD", "erase_strokes", "is no list of names of strokes"):
+    with refused_as("INVALID_FIELD", "erase_strokes", "is not a list of names of strokes"):
         request.erase_strokes.extend([erase] if isinstance(erase, str) else erase)
-    with refused_as("INVALID_FIELD", "restore_revision", "is no number of a revision"):
+    with refused_as("INVALID_FIELD", "restore_revision", "is not the number of a revision"):
         if restore is not None:
             request.restore_revision = restore
     if pins is not None:

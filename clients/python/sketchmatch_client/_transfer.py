@@ -71,7 +71,7 @@ def transfer_request(
     for name in _FOR_MATCHES:
         if given.pop(name, None) is not None:
             raise InvalidRequestError(
-                f"{name} is for matches; a transfer has one answer, and no name: leave it out",
+                f"{name} is only for matches; leave it out of a transfer",
                 "INVALID_FIELD",
                 name,
             )
@@ -79,7 +79,7 @@ def transfer_request(
     # What both requests have has the same numbers in both.
     request = TransferRequest.FromString(matching.SerializeToString())
     with refused_as(
-        "INVALID_FIELD", "features", "is no list of what sketchmatch_client.features makes"
+        "INVALID_FIELD", "features", "is not a list of what sketchmatch_client.features makes"
     ):
         request.features.extend(features)
     for name, value in own.items():

@@ -212,8 +212,8 @@ _UNTRUSTED = re.compile(
     r"|Hostname Verification Check|Peer name .* is not in peer"
 )
 _REMEDIES = {
-    "WRONG_VERSION_NUMBER": "it does not encrypt: ask it without certificates and tls",
-    "Socket closed": "it ended the link, as one does that stops, or wants encryption or a "
+    "WRONG_VERSION_NUMBER": "it does not use encryption: leave out certificates and tls",
+    "Socket closed": "it closed the connection: it is stopping, or requires encryption or a "
     "certificate of the client that it trusts; start it, or give root_certificates, certificate "
     "and key",
     "http1.x server": "it speaks HTTP/1.1, as the port for browsers does; "
@@ -227,11 +227,11 @@ def _unavailable(message: str, address: str) -> SketchmatchError:
     if untrusted := _UNTRUSTED.search(message):
         why = "it is for another name"
         if untrusted["why"] is not None:  # of older versions of gRPC, empty
-            unknown = "nobody whom the client trusts vouches for it, or it has expired"
+            unknown = "it is of no authority that the client trusts, or it has expired"
             why = untrusted["why"].strip() or unknown
         return NotAuthenticatedError(
             f"the certificate of the server at {address} cannot be trusted ({why}); give the "
-            "root_certificates of its authority and a name that it is for, or have it renewed"
+            "root_certificates of its authority and a server_name that it is for, or renew it"
         )
     if any(sign in message for sign in _UNUSABLE):
         return InvalidRequestError(

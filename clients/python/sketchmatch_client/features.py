@@ -82,7 +82,9 @@ def zone(rings: Sequence[Any], name: str = "") -> Feature:
     >>> len(zone([(0, 0), (2, 0), (2, 1)], "no-go").zone.rings[0].points)
     3
     """
-    with refused_as("INVALID_FIELD", "zone.rings", f"is {reprlib.repr(rings)}; give corners"):
+    with refused_as(
+        "INVALID_FIELD", "zone.rings", f"is {reprlib.repr(rings)}; give (x, y) corners"
+    ):
         given = [rings] if _is_point(rings[0]) else rings
         found = [source_pb2.Ring(points=_points(ring, "zone.rings")) for ring in given]
     return _named(Feature(zone=Zone(rings=found)), name)
@@ -93,7 +95,7 @@ def _is_point(given: Any) -> bool:
 
 
 def _named(feature: Feature, name: str) -> Feature:
-    problem = f"is {reprlib.repr(name)}; give a text"
+    problem = f"is {reprlib.repr(name)}; give text"
     with refused_as("INVALID_FIELD", "name", problem):
         feature.name = name
     return feature

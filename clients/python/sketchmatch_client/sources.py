@@ -123,7 +123,7 @@ def polygons(
     for polygon, label in zip(drawn, _labels(labels, len(drawn), "polygons"), strict=True):
         polygon.label = label
     field = "polygon_set.polygons"
-    with refused_as("INVALID_FIELD", field, "have other certainties than a number for each"):
+    with refused_as("INVALID_FIELD", field, "need certainties that are a number for each"):
         for polygon, certainty in zip(drawn, certainties or [None] * len(drawn), strict=True):
             if certainty is not None:
                 polygon.certainty = certainty

@@ -178,7 +178,7 @@ function told(token: () => string): string {
   }
   // What it is instead is not told: it may be a secret all the same.
   if (!/^[!-~]*$/.test(shown))
-    throw invalid("token is no token; give what `sketchmatch tokens add` printed", "token");
+    throw invalid("token is not a token; give what `sketchmatch tokens add` printed", "token");
   return shown;
 }
 

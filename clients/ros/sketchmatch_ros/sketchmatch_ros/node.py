@@ -153,7 +153,7 @@ class SketchmatchNode(LifecycleNode):
         try:
             source = conversions.map_source(grid)
         except SketchmatchError as error:
-            self.get_logger().error(f"the map cannot be used, and the one before stays: {error}")
+            self.get_logger().error(f"the new map cannot be used, the former one stays: {error}")
             return
         self._map = _Map(grid, source)
         self.get_logger().info(
@@ -165,11 +165,11 @@ class SketchmatchNode(LifecycleNode):
         if not self._active:
             reason = "the node is not active; activate it"
         elif self._map is None:
-            reason = f"no map has come on {self._said('map_topic')} yet; start map_server"
+            reason = f"no map has arrived on {self._said('map_topic')} yet; start map_server"
         elif not goal.sketch.strokes:
             reason = "the sketch has no strokes; draw two objects or more"
         elif goal.sketch.zones and self._carry is None:
-            reason = "this node has no carrier for zones; leave them out"
+            reason = "this node cannot transfer zones; leave them out"
         else:
             return GoalResponse.ACCEPT
         self.get_logger().warning(f"refuses a goal: {reason}")
@@ -185,7 +185,7 @@ class SketchmatchNode(LifecycleNode):
 
         try:
             if map_ is None:
-                raise CallCancelledError("the node was cleaned up since it took the goal")
+                raise CallCancelledError("the node was cleaned up after it took the goal")
             sketch = conversions.sketch_source(goal.sketch)
             match = self._matching.match(
                 sketch,
@@ -262,7 +262,7 @@ class SketchmatchNode(LifecycleNode):
 
         found = self._matching.carried(carry, last.map_.source, is_over)
         for note in found.notes:
-            self.get_logger().warning(f"carried otherwise than drawn: {note}")
+            self.get_logger().warning(f"not carried as drawn: {note}")
         return found
 
     def _header(self, grid: OccupancyGrid) -> Header:
