@@ -149,7 +149,7 @@ def test_what_contradicts_itself_or_is_no_pem_is_refused_by_name(kind, pair, mon
         ("key", {"certificate": pem, "key": pem}, "holds no private key, without a passphrase, in"),
         ("certificate", {"certificate": away, "key": key}, f"names {away}, which cannot be read ("),
         ("token_file", {"token_file": away}, f"names {away}, which cannot be read (no such file"),
-        ("token_file", {"token_file": text}, "is no token; "),
+        ("token_file", {"token_file": text}, "is not a token; "),
         ("token_file", {"token_file": text, "token": "a"}, "cannot be used with token; drop one"),
         ("key", {"tls": False, "key": key}, "needs encryption; leave out tls=False"),
         ("tls", {"tls": True, "credentials": credentials}, "cannot be used with credentials; "),

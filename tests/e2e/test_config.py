@@ -163,7 +163,10 @@ def test_plugins_list_shows_what_is_the_default_here(command_line, mine):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[pipeline.searcher]\nname = 'best'", "pipeline.searcher.name is 'best', which is no sea"),
+        (
+            "[pipeline.searcher]\nname = 'best'",
+            "pipeline.searcher.name is 'best', which is not a s",
+        ),
         ("[sever]", "sever is not a setting; did you mean server?"),
         ("[server]\naddress = ?", "is not TOML at line 2, column 11 (invalid value); correct it"),
     ],
@@ -249,7 +252,7 @@ def test_a_command_names_a_profile_of_the_server(command_line, address):
     done = command_line("match", *PAIR, "--server", address, "--profile", "proof", "--json")
     assert json.loads(done.stdout)["outcome"] == "OUTCOME_OPTIMAL", done.stderr
     line = said(command_line("match", *PAIR, "--server", address, "--profile", "best"))
-    assert "is 'best', which is no profile" in line
+    assert "is 'best', which is not a profile" in line
 
 
 @pytest.mark.slow

@@ -70,7 +70,7 @@ def test_a_contradiction_is_told_as_it_was_typed(command_line, files, where, opt
     [
         (["--pin", "sofa"], "--pin 'sofa' is not of the form SKETCHED=MAPPED, as in desk=3, 2="),
         (["--pin", "a=b=c"], "--pin 'a=b=c' is not of the form"),
-        (["--pin", "=3"], "--pin '=3' has another form"),
+        (["--pin", "=3"], "--pin '=3' is not of the form"),
         (["--pin", "0=1"], "--pin '0=1' names object 0; numbers begin at 1"),
         (["--pin", "-2=1"], "--pin '-2=1' names object -2; numbers begin at 1"),
         (["--pin", '""=1'], "--pin '\"\"=1' names no object; give a label or a number"),

@@ -55,7 +55,7 @@ def test_a_map_is_put_labelled_and_matched_with_by_its_name(scenes):
         ("scenes label", ["ff", "desk"], "'desk' is not of the form NUMBER=LABEL; number objects"),
         ("scenes label", ["ff", "0=desk"], "'0=desk' is not of the form"),
         ("scenes put", ["missing.yaml"], "missing.yaml"),
-        ("match", [LIVING_ROOM_SKETCH, "scene:"], "'' is no name of a scene"),
+        ("match", [LIVING_ROOM_SKETCH, "scene:"], "'' is not the name of a scene"),
     ],
 )
 def test_what_is_of_no_use_is_said_in_one_line(scenes, command, arguments, said):

@@ -159,7 +159,7 @@ MISTAKES = {
         "pins[0].exclude",
         "pins[0] has no 'exclude'; did you mean 'excluded'?",
     ),
-    f"{{ pins: {{ sketchObject: {PLACE} }} }}": ("pins", "pins is no list; give [ … ]"),
+    f"{{ pins: {{ sketchObject: {PLACE} }} }}": ("pins", "pins is not a list; give [ … ]"),
     "{ pins: [{ sketchObject: { index: 0 } }] }": (
         "pins[0].sketchObject.index",
         "pins[0].sketchObject has no 'index'; write kind: { case: 'index', value: … }",

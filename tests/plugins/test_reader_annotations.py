@@ -110,7 +110,7 @@ def test_an_outline_that_crosses_itself_is_its_largest_part():
         ({"shapes": [shape("mask", [[0, 0], [1, 1]])]}, "mask is missing; give a picture"),
         (
             {"shapes": [shape("mask", [[0, 0], [1, 1]], mask="AAAA")]},
-            "shapes[0].mask is no picture in base64; save",
+            "shapes[0].mask is not a picture in base64; save",
         ),
     ],
 )
@@ -215,7 +215,7 @@ def test_of_several_pictures_one_is_chosen_by_name_or_id():
         ({"segmentation": {"size": [2, 0], "counts": []}}, "size is a list of 2; give [height"),
         ({"segmentation": {"size": [2, 2], "counts": [1, 2]}}, "are of 3 pixels, and the picture"),
         ({"segmentation": {"size": [2, 2], "counts": [5, -1]}}, "are of 4 pixels, and the picture"),
-        ({"segmentation": {"size": [2, 2], "counts": "~"}}, "is no run-length encoding of COCO"),
+        ({"segmentation": {"size": [2, 2], "counts": "~"}}, "is not a run-length encoding of COCO"),
         ({"segmentation": {"size": [9**9, 9**9], "counts": []}}, "more than the limit of 64"),
     ],
 )

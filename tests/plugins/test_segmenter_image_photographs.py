@@ -179,7 +179,9 @@ def test_gaps_are_closed_as_far_as_allowed():
     cv2.ellipse(pixels, (350, 300), (70, 70), 0, 15, 345, 30, 5)
     found = found_in(pixels, max_gap=0.3)
     assert len(found.scene) == 3
-    assert found.warnings == ("1 outline with gaps was closed: lower max_gap if it is no object.",)
+    assert found.warnings == (
+        "1 outline with gaps was closed: lower max_gap if it is not an object.",
+    )
     assert len(found_in(pixels, max_gap=0.05).scene) == 2
 
 

@@ -57,7 +57,7 @@ def test_new_requests_get_the_new_configuration_and_a_running_search_its_own(run
     events = client.events(scene(8), scene(8, 1), params=ENDLESS["params"], time_budget=5.0)
     accepted = next(events).accepted
     assert accepted.pipeline.searcher.name == "easm"
-    with pytest.raises(InvalidRequestError, match="'careful', which is no profile"):
+    with pytest.raises(InvalidRequestError, match="'careful', which is not a profile"):
         client.match(scene(4), scene(4), profile="careful")
 
     reload(DIRECT, "the configuration is reloaded$")

@@ -312,7 +312,7 @@ def test_a_profile_of_no_use_harms_only_those_who_name_it(file):
     error = refused(run_match, request, registry, configuration.defaults)
     assert error.field == "pipeline.profile"
     assert error.problem.startswith(
-        "is 'mine', whose searcher.name is 'annealing', which is no sea"
+        "is 'mine', whose searcher.name is 'annealing', which is not a s"
     )
     _, faults = check(path)
     assert [fault.field for fault in faults] == [

@@ -1041,9 +1041,9 @@ def test_an_expected_failure_that_passes_is_a_violation():
 
 
 def test_an_expected_failure_names_a_check_of_a_class_that_is_checked():
-    with pytest.raises(ValueError, match="'no-such-check', which is no check; choose among: "):
+    with pytest.raises(ValueError, match="'no-such-check', which is not a check; choose one of: "):
         check_plugin(Cosine, expected_failures={"no-such-check": "?"})
-    with pytest.raises(ValueError, match="'no-such-check', which is no check; choose among: "):
+    with pytest.raises(ValueError, match="'no-such-check', which is not a check; choose one of: "):
         parametrize_plugins([Cosine], {Cosine: {"no-such-check": "?"}})
     with pytest.raises(ValueError, match="names Boxes, which is not checked"):
         parametrize_plugins([Cosine], {Boxes: {"y-points-up": "?"}})

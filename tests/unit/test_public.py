@@ -174,7 +174,7 @@ def test_segmenters_and_their_parameters_are_chosen_by_side():
         ),
         (
             {"params": {"map_segmenter": {"size": 1}}},
-            r"map_segmenter\.parameters\.size is no param",
+            r"map_segmenter\.parameters\.size is not a p",
         ),
         (
             {"params": {"segmenter_map": {}}},
@@ -198,7 +198,7 @@ def test_a_scene_is_read_as_its_profile_and_configuration_say(tmp_path):
     large = read_scene(LIVING_ROOM_MAP, profile="large", config=file)
     assert large.identity == read_scene(LIVING_ROOM_MAP, params={"min_size": 0.5}).identity
     assert len(read_scene(LIVING_ROOM_MAP, config=file)) == 8
-    with pytest.raises(InvalidInputError, match="profile is 'large', which is no profile"):
+    with pytest.raises(InvalidInputError, match="profile is 'large', which is not a profile"):
         read_scene(LIVING_ROOM_MAP, profile="large")
 
 

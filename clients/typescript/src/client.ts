@@ -21,46 +21,49 @@ import { SketchService } from "./gen/sketchmatch/v1/sketch_service_pb.js";
 import type { Source } from "./gen/sketchmatch/v1/source_pb.js";
 import { TransferService } from "./gen/sketchmatch/v1/transfer_service_pb.js";
 
-/** How to get in at a server. */
+/** What a server requires of its callers. */
 export interface Access {
-  /** Returns the token to show; an empty one is not shown. It is asked for at each call. */
+  /** Returns the token to send, or an empty text for none. It is called before each call. */
   readonly token?: () => string;
 }
 
-/** What else a request says; `MatchRequest` in the contract explains each. */
+/** The options of a match; `MatchRequest` in the contract explains each. */
 export type MatchOptions = Omit<
   Extract<MessageInitShape<typeof MatchRequestSchema>, { $typeName?: never }>,
   "sketch" | "map"
 >;
 
-/** Called while a match runs, each as often as there is something new. */
+/** Functions that are called while a match runs, each time there is something new. */
 export interface MatchWatchers {
   readonly accepted?: (accepted: MatchAccepted) => void;
   readonly scenes?: (scenes: MatchScenes) => void;
   readonly progress?: (progress: MatchProgress) => void;
 }
 
-/** What came of a match. Indices of the result point into the scenes. */
+/** The answer of a match. Indices in the result refer to objects of the scenes. */
 export interface Answer {
   readonly scenes: MatchScenes;
   readonly result: MatchResult;
 }
 
-/** Asks a server at its address for browsers, as in `http://127.0.0.1:8080`. */
+/** A client of a server at its address for browsers, such as `http://127.0.0.1:8080`. */
 export class SketchmatchClient {
   readonly #address: string;
   readonly #matches: Client<typeof MatchService>;
   readonly #catalog: Client<typeof CatalogService>;
-  /** Scenes that the server keeps. Calls of this and the two below throw what `RequestFailed.from` reads. */
+  /**
+   * Stored scenes. Pass what calls of this client and of the two below throw to
+   * `RequestFailed.from`.
+   */
   readonly scenes: Client<typeof SceneService>;
-  /** Sketches that are matched while they are drawn. */
+  /** Sketches in progress, which are matched while they are drawn. */
   readonly sketches: Client<typeof SketchService>;
-  /** Carries points, routes and zones from one scene to another. */
+  /** Transfers points, routes and zones from one scene to another. */
   readonly transfers: Client<typeof TransferService>;
-  /** Calls any service of the contract, those too that have no method here. */
+  /** The transport, with which a client of any service of the contract can be created. */
   readonly transport: Transport;
 
-  /** @throws RequestFailed if the address is none. */
+  /** @throws RequestFailed if the address is not a URL. */
   constructor(address: string, access: Access = {}) {
     if (!/^https?:\/\/[^/]/i.test(address))
       throw invalid(
@@ -72,7 +75,7 @@ export class SketchmatchClient {
       baseUrl: address,
       useBinaryFormat: true,
       interceptors: [showing(access.token ?? (() => ""))],
-      // A page that is closed still ends its sketch.
+      // A page that is being closed can still delete its sketch.
       fetch: (input, init) =>
         fetch(input, { ...init, keepalive: String(input).endsWith("/DeleteSketch") }),
     });
@@ -85,10 +88,10 @@ export class SketchmatchClient {
   }
 
   /**
-   * Find out which sketched object is which mapped object.
+   * Finds which sketched object is which mapped object.
    *
-   * @throws RequestFailed, with `failure` `"cancelled"` if `signal` aborts it; what a watcher throws
-   *   goes through as it is.
+   * @throws RequestFailed, with `failure` `"cancelled"` if `signal` aborts the match. What a watcher
+   *   throws is passed on as it is.
    */
   async match(
     sketch: Source,
@@ -115,10 +118,11 @@ export class SketchmatchClient {
           if (scenes) return { scenes, result: event.value };
       }
     }
-    throw new RequestFailed("the server broke off", "away", "", "", undefined);
+    const sentence = "the server ended the match without a result; send it again";
+    throw new RequestFailed(sentence, "away", "", "", undefined);
   }
 
-  /** Find the objects of one source; `includeMap` asks for its occupancy grid, too. */
+  /** Finds the objects of one source; with `includeMap` the answer also has its occupancy grid. */
   async segment(
     source: Source,
     options: {
@@ -131,17 +135,17 @@ export class SketchmatchClient {
     return this.#failing(() => this.scenes.segment({ ...options, source }, stopping(signal)));
   }
 
-  /** Return what there is to choose from. */
+  /** Returns the algorithms, profiles and readers of the server. */
   async algorithms(signal?: AbortSignal): Promise<ListAlgorithmsResponse> {
     return this.#failing(() => this.#catalog.listAlgorithms({}, stopping(signal)));
   }
 
-  /** Return the server's versions and limits. */
+  /** Returns the versions and limits of the server. */
   async info(signal?: AbortSignal): Promise<GetServerInfoResponse> {
     return this.#failing(() => this.#catalog.getServerInfo({}, stopping(signal)));
   }
 
-  /** Yield what a stream holds; what the reader throws meanwhile is none of its faults. */
+  /** Yields what a stream has; errors that the reader of this generator throws are not translated. */
   async *#read<T>(stream: AsyncIterable<T>): AsyncGenerator<T> {
     try {
       yield* stream;
@@ -167,7 +171,7 @@ function showing(token: () => string): Interceptor {
   };
 }
 
-/** Return the token; one that cannot be had or sent is not the server's fault. */
+/** Returns the token, or throws if it cannot be had or sent. */
 function told(token: () => string): string {
   let shown: string;
   try {
@@ -176,7 +180,7 @@ function told(token: () => string): string {
     const why = thrown instanceof Error ? thrown.message : String(thrown);
     throw invalid(`token cannot be had (${why}); give a function that returns it`, "token");
   }
-  // What it is instead is not told: it may be a secret all the same.
+  // The error does not quote it: it may be a secret all the same.
   if (!/^[!-~]*$/.test(shown))
     throw invalid("token is not a token; give what `sketchmatch tokens add` printed", "token");
   return shown;

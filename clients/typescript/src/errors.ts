@@ -7,18 +7,18 @@ import {
 } from "./gen/google/rpc/error_details_pb.js";
 
 /**
- * What a program does about a failed call:
+ * What a program can do about a failed call:
  *
- * - `invalid`: the request cannot be answered; correct it, `field` says where.
- * - `busy`: send the same again after `retrySeconds`.
- * - `away`: nobody answers there, or not now; try again later.
- * - `unauthenticated`: the server wants a token, or another one.
- * - `gone`: what the request names is not there, or no more; make it anew.
- * - `late`: the time was too short.
- * - `store`: the server cannot keep things, or not now; tell its operator.
- * - `unsupported`: the server does not know the method; it is older, or another server.
- * - `cancelled`: the caller wanted no answer any more.
- * - `failed`: the server or an algorithm is at fault.
+ * - `invalid`: the request is wrong; correct it. `field` says where.
+ * - `busy`: the server is busy; send the same request again after `retrySeconds`.
+ * - `away`: the server does not answer; try again later.
+ * - `unauthenticated`: the server requires a token, or another one.
+ * - `gone`: what the request names does not exist, or no longer; create it again.
+ * - `late`: the time limit was too short; allow more time.
+ * - `store`: the server cannot store anything at present; tell its operator.
+ * - `unsupported`: the server does not know the method; it is older, or another kind of server.
+ * - `cancelled`: the caller cancelled the call.
+ * - `failed`: the server or an algorithm failed.
  */
 export type Failure =
   | "invalid"
@@ -45,25 +45,25 @@ const FAILURES: Partial<Record<Code, Failure>> = {
   [Code.Canceled]: "cancelled",
 };
 
-/** A call that brought no answer. Its `message` is a sentence for people. */
+/** The error of a call without an answer. Its `message` is a sentence for people. */
 export class RequestFailed extends Error {
   override readonly name = "RequestFailed";
 
   constructor(
     message: string,
-    /** What to do about it. */
+    /** What a program can do about it. */
     readonly failure: Failure,
-    /** For programs, as in `INVALID_STROKE`; empty where the server gave none. */
+    /** The reason for programs, such as `INVALID_STROKE`; empty if the server gave none. */
     readonly reason: string,
-    /** Path of the field at fault, as in `sketch.stroke_set.strokes[3]`; empty where there is none. */
+    /** Path of the wrong field, such as `sketch.stroke_set.strokes[3]`; empty if there is none. */
     readonly field: string,
-    /** After how many seconds the same request may succeed; undefined where nobody knows. */
+    /** Seconds after which the same request may succeed; undefined if this is not known. */
     readonly retrySeconds: number | undefined,
   ) {
     super(message);
   }
 
-  /** Return what went wrong with a call, whatever was thrown; `address` is who was asked. */
+  /** Returns the error of a call, whatever it threw; `address` is that of the server. */
   static from(thrown: unknown, address = ""): RequestFailed {
     if (thrown instanceof RequestFailed) return thrown;
     const error = ConnectError.from(thrown);
@@ -86,7 +86,7 @@ export class RequestFailed extends Error {
   }
 }
 
-/** Whether the server's transport refused a request, which has no status of its own for that. */
+/** Whether the server's transport refused a request as too large; it has no own status for that. */
 function isTooLarge(error: ConnectError): boolean {
   return error.code === Code.ResourceExhausted && /larger than .*max/.test(error.rawMessage);
 }
@@ -97,12 +97,12 @@ function tooLarge(address: string): RequestFailed {
   return new RequestFailed(message, "invalid", "MESSAGE_TOO_LARGE", "", undefined);
 }
 
-/** Return the error of a request that cannot be sent as it is. */
+/** Returns the error of a request that cannot be sent as it is. */
 export function invalid(message: string, field: string): RequestFailed {
   return new RequestFailed(message, "invalid", "INVALID_FIELD", field, undefined);
 }
 
-/** Whether nobody answered, or not to the end: fetch throws a TypeError then, in browsers and in Node.js. */
+/** Whether the server did not answer, or not to the end: fetch then throws a TypeError. */
 function isUnreachable(error: ConnectError): boolean {
   return error.code === Code.Unknown && error.cause instanceof TypeError;
 }
@@ -121,7 +121,7 @@ function unreachable(error: ConnectError, address: string): RequestFailed {
   );
 }
 
-/** Whether a value has no place in its message, which is found out before anything is sent. */
+/** Whether a value does not fit its field, which is found before anything is sent. */
 function isUnsendable(error: ConnectError): boolean {
   return error.code === Code.Internal && error.rawMessage.startsWith("serialize ");
 }

@@ -1,4 +1,4 @@
-/** Refuses what a message has no field for, and would be left out in silence. */
+/** Refuses values for which a message has no field; protobuf would ignore them silently. */
 
 import {
   type DescField,
@@ -12,7 +12,7 @@ import type { Transport } from "@connectrpc/connect";
 import { invalid, type RequestFailed } from "./errors.js";
 import { SourceSchema } from "./gen/sketchmatch/v1/source_pb.js";
 
-/** Return a transport that looks through each request before it goes out. */
+/** Returns a transport that checks each request before it is sent. */
 export function checking(transport: Transport): Transport {
   return {
     unary: async (method, signal, timeoutMs, header, input, values) => {
@@ -33,9 +33,9 @@ async function* checked<T>(schema: DescMessage, requests: AsyncIterable<T>): Asy
   }
 }
 
-/** Refuse what a message, or one in it, has no field for; `path` leads to it. */
+/** Refuses names that a message, or one within it, has no field for; `path` leads to it. */
 function check(schema: DescMessage, given: unknown, path = ""): void {
-  // What `sources` made has no other names, and perhaps a million points.
+  // What `sources` made has no unknown names, but perhaps a million points.
   if (given === undefined || isMessage(given, SourceSchema)) return;
   if (!isObject(given)) throw invalid(`${path} is ${said(given)}; give { ${names(schema)} }`, path);
   for (const [name, value] of Object.entries(given)) {
@@ -53,8 +53,8 @@ function checkMember(member: DescField | DescOneof, given: unknown, path: string
   else if (member.fieldKind !== "list") checkValue(member, given, path);
   else if (Array.isArray(given))
     given.forEach((one, index) => checkValue(member, one, `${path}[${index}]`));
-  // A Float64Array is as good where numbers are wanted.
-  else if (!ArrayBuffer.isView(given)) throw invalid(`${path} is no list; give [ … ]`, path);
+  // A Float64Array is accepted as a list of numbers.
+  else if (!ArrayBuffer.isView(given)) throw invalid(`${path} is not a list; give [ … ]`, path);
 }
 
 function checkOneof(oneof: DescOneof, given: unknown, path: string): void {
@@ -62,16 +62,16 @@ function checkOneof(oneof: DescOneof, given: unknown, path: string): void {
   const field = oneof.fields.find(({ localName }) => localName === name);
   if (Object.keys(others).length || !field !== (value === undefined) || (name && !field)) {
     const cases = oneof.fields.map(({ localName }) => `'${localName}'`).join(" or ");
-    throw invalid(`${path} is unclear; give { case, value } with the case ${cases}`, path);
+    throw invalid(`${path} is not a choice; give { case, value } with the case ${cases}`, path);
   }
   if (field) checkValue(field, value, `${path}.value`);
 }
 
 function checkValue(field: DescField, given: unknown, path: string): void {
-  // The names in a Struct are the server's.
+  // The server checks the names in a Struct.
   if (field.message && field.message.typeName !== "google.protobuf.Struct")
     check(field.message, given, path);
-  // Written as it is, "false" would be true.
+  // As a boolean, the text "false" would be true.
   if (field.scalar === ScalarType.BOOL && typeof given !== "boolean")
     throw invalid(`${path} is ${said(given)}; give true or false`, path);
 }
@@ -87,7 +87,7 @@ function unknown(schema: DescMessage, name: string, path: string, inner: string)
   return invalid(`${path || schema.name} has no '${name}'; ${remedy}`, inner);
 }
 
-/** Return the name of a message's field that somebody may have meant. */
+/** Returns the name of the field that was probably meant, if there is one. */
 function nearest(name: string, schema: DescMessage): string | undefined {
   const names = schema.members.map(({ localName }) => localName);
   for (const edits of [0, 1, 2].filter((edits) => edits <= name.length / 2)) {
@@ -101,7 +101,7 @@ function plain(name: string): string {
   return name.replaceAll("_", "").toLowerCase();
 }
 
-/** Whether so many letters put in, left out or exchanged make one word the other. */
+/** Whether at most so many letters inserted, deleted or replaced turn one word into the other. */
 function isNear(one: string, other: string, edits: number): boolean {
   if (edits < 0) return false;
   if (!one || !other) return one.length + other.length <= edits;

@@ -1,4 +1,4 @@
-/** What a person or a robot hands in, as `Source` messages. */
+/** Functions that make `Source` messages of sketches and maps. */
 
 import { create } from "@bufbuild/protobuf";
 
@@ -6,30 +6,33 @@ import { invalid, RequestFailed } from "./errors.js";
 import { type Scene } from "./gen/sketchmatch/v1/scene_pb.js";
 import { type Source, SourceSchema, YAxis } from "./gen/sketchmatch/v1/source_pb.js";
 
-/** Which way y grows: `"down"` on screens. Read with the wrong one, a sketch is its mirror image. */
+/** Which way y grows: `"down"` on screens. With the wrong one, a sketch becomes its mirror image. */
 export type Axis = "up" | "down";
 
-/** A stroke from pen down to pen up: `[x, y]` or `[x, y, seconds]`, and perhaps a name. */
+/** A stroke from pen down to pen up: points `[x, y]` or `[x, y, seconds]`, and optionally a name. */
 export interface PenStroke {
   readonly points: readonly (readonly number[])[];
   readonly label?: string | undefined;
 }
 
-/** A polygon: the outer ring, then holes, perhaps a name, and how sure it is, up to 1, one thing. */
+/**
+ * A polygon: the outer ring, then holes; optionally a name, and the certainty, above 0 and up to 1,
+ * that it is one object.
+ */
 export interface NamedPolygon {
   readonly rings: readonly (readonly (readonly [number, number])[])[];
   readonly label?: string | undefined;
   readonly certainty?: number | undefined;
 }
 
-/** Where a grid lies: its lower left corner, in metres, and radians counter-clockwise. */
+/** Pose of a grid: its lower left corner in metres, and its yaw in radians, counter-clockwise. */
 export interface Origin {
   readonly x: number;
   readonly y: number;
   readonly yaw?: number;
 }
 
-/** Return strokes of a pen. Screens' y grows down, as it does here unless told otherwise. */
+/** Returns strokes of a pen as a source. By default y grows down, as on screens. */
 export function strokes(drawn: readonly PenStroke[], y: Axis = "down"): Source {
   const value = {
     yAxis: axis(y),
@@ -45,7 +48,7 @@ export function strokes(drawn: readonly PenStroke[], y: Axis = "down"): Source {
   return create(SourceSchema, { kind: { case: "strokeSet", value } });
 }
 
-/** Return polygons that are objects already; a robot's y grows up. */
+/** Returns polygons that are already objects as a source. By default y grows up, as on maps. */
 export function polygons(drawn: readonly NamedPolygon[], y: Axis = "up"): Source {
   const value = {
     yAxis: axis(y),
@@ -58,7 +61,7 @@ export function polygons(drawn: readonly NamedPolygon[], y: Axis = "up"): Source
   return create(SourceSchema, { kind: { case: "polygonSet", value } });
 }
 
-/** Return the objects of a scene as they are. */
+/** Returns the objects of a scene as a source. */
 export function scene(found: Scene): Source {
   const polygons = found.objects.map(({ rings, label, certainty }) => ({
     rings,
@@ -70,8 +73,9 @@ export function scene(found: Scene): Source {
 }
 
 /**
- * Return a robot's occupancy grid: `data`, `info.width`, `info.resolution` and `info.origin` of a
- * `nav_msgs/OccupancyGrid`, -1 unknown, 0 free … 100 occupied, row by row from the lowest.
+ * Returns a robot's occupancy grid as a source: `data`, `info.width`, `info.resolution` and
+ * `info.origin` of a `nav_msgs/OccupancyGrid`. Cells are -1 for unknown and 0 (free) to 100
+ * (occupied), row by row from the lowest row.
  */
 export function occupancyGrid(
   cells: Int8Array | readonly number[],
@@ -81,7 +85,7 @@ export function occupancyGrid(
 ): Source {
   const rows = cells.length / columns;
   if (!Number.isInteger(rows)) {
-    const sentence = `${cells.length} cells are no rows of ${columns}; give the number of cells in a row`;
+    const sentence = `occupancy_grid.columns is ${columns} for ${cells.length} cells; give the number of cells in a row`;
     throw new RequestFailed(
       sentence,
       "invalid",
@@ -100,28 +104,28 @@ export function occupancyGrid(
   return create(SourceSchema, { kind: { case: "occupancyGrid", value } });
 }
 
-/** Return a scene that the server keeps, by its name. */
+/** Returns the scene that is stored on the server under a name. */
 export function storedScene(name: string): Source {
   return create(SourceSchema, { kind: { case: "storedScene", value: name } });
 }
 
 /**
- * Return a map as ROS map_server saves it: the text of the yaml, the bytes of its picture.
+ * Returns a map as ROS map_server saves it: the text of its YAML and the bytes of its picture.
  *
- * `objects` is GeoJSON of what its objects are, in metres, where somebody has put them right; they
- * stand for the map where no segmenter is chosen.
+ * `objects` is GeoJSON with its manually corrected objects, in metres; they are used unless a
+ * segmenter is chosen.
  */
 export function mapServerMap(yaml: string, image: Uint8Array, objects = ""): Source {
   const value = { yaml, image, objects, ownObjects: objects !== "" };
   return create(SourceSchema, { kind: { case: "mapServerMap", value } });
 }
 
-/** Return a picture: PNG, JPEG, WebP, GIF, BMP, TIFF or PGM. */
+/** Returns a picture as a source: PNG, JPEG, WebP, GIF, BMP, TIFF or PGM. */
 export function image(data: Uint8Array): Source {
   return create(SourceSchema, { kind: { case: "image", value: { data } } });
 }
 
-/** Return a file of another tool; its ending says which. */
+/** Returns a file of another tool as a source; the ending of its name tells the kind of file. */
 export function file(name: string, data: Uint8Array, part = ""): Source {
   return create(SourceSchema, { kind: { case: "file", value: { name, data, part } } });
 }

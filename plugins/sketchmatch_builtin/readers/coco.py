@@ -159,7 +159,7 @@ def _uncompressed(text: str, field: str) -> list[int]:
         bits = ord(character) - 48
         if not 0 <= bits < 64 or shift > 30:
             raise InvalidInputError(
-                _POLYGON, field, "is no run-length encoding of COCO; save it again"
+                _POLYGON, field, "is not a run-length encoding of COCO; save it again"
             )
         value |= (bits & 0x1F) << shift
         shift += 5

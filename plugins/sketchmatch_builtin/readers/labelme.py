@@ -143,7 +143,7 @@ def _mask(areas: Areas, value: Any, corner: FloatArray, field: str) -> IntArray:
 def _pixels(areas: Areas, value: Any, field: str) -> Any:
     from PIL import Image as Picture
 
-    problem = "is no picture in base64; save the file with labelme again"
+    problem = "is not a picture in base64; save the file with labelme again"
     if not isinstance(value, str):
         raise InvalidInputError(_POLYGON, field, f"is {shown(value)}; give a picture in base64")
     try:

@@ -171,8 +171,8 @@ def _refuse_unknown(algorithm: type[Any], reasons: Reasons) -> None:
     for name in reasons:
         if name not in known:
             raise ValueError(
-                f"expected_failures of {algorithm.__name__} names {name!r}, which is no check; "
-                f"choose among: {', '.join(sorted(known))}"
+                f"expected_failures of {algorithm.__name__} names {name!r}, which is not a check; "
+                f"choose one of: {', '.join(sorted(known))}"
             )
 
 
