@@ -141,7 +141,7 @@ def test_a_server_that_wants_a_token_is_given_it(tmp_path, browser):
         dialog = page.get_by_role("dialog")
         dialog.locator("input").fill("not this one")
         dialog.get_by_role("button").click()
-        dialog.get_by_text("This server wants a token.").wait_for()
+        dialog.get_by_text("This server requires a token.").wait_for()
         page.keyboard.press("Escape")
         dialog.wait_for(state="hidden")
         page.get_by_test_id("headline").get_by_role("button", name="Connect").click()
