@@ -167,7 +167,7 @@ MISTAKES = {
     **{
         f"{{ pins: [{{ mapObject: {{ kind: {kind} }} }}] }}": (
             "pins[0].mapObject.kind",
-            "pins[0].mapObject.kind is unclear; "
+            "pins[0].mapObject.kind is not a choice; "
             "give { case, value } with the case 'index' or 'label'",
         )
         for kind in ("'index'", "{ case: 'indx', value: 0 }", "{ value: 0 }", "{ case: 'index' }")
