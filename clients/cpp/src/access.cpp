@@ -13,7 +13,7 @@ namespace sketchmatch::detail {
 
 namespace {
 
-/// Something that was said, and where: the name of an option, or a variable.
+/// A value that was given, and where: the name of an option or of a variable.
 struct Said {
   std::string place;
   std::string value;
@@ -21,7 +21,7 @@ struct Said {
 
   [[noreturn]] void refuse(const std::string& problem) const { detail::refuse(place, problem); }
 
-  /// Returns what was said, or is in the file that was named.
+  /// Returns the value itself, or the content of the file that it names.
   [[nodiscard]] std::string content() const {
     if (!is_file) {
       return value;
@@ -47,7 +47,7 @@ std::optional<Said> from_environment(const std::string& name, bool is_file) {
   return Said{variable, text, is_file};
 }
 
-/// Returns what was said, by an option or else by the environment.
+/// Returns the value of an option, or else of its environment variable.
 std::optional<Said> said(const std::string& name, const std::optional<std::string>& given,
                          bool is_file) {
   if (given) {
@@ -108,7 +108,7 @@ void refuse_all(const ClientOptions& options, const char* problem, bool with_tls
   }
 }
 
-/// Returns what encrypts, or nothing for no encryption.
+/// Returns the credentials for encryption, or nothing for none.
 std::shared_ptr<grpc::ChannelCredentials> credentials_of(const ClientOptions& options) {
   const auto tls = tls_of(options);
   if (tls == false) {
@@ -139,7 +139,7 @@ bool is_token(const std::string& token) {
          std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c < 0x7F; });
 }
 
-/// Returns what was said of a token, if anything.
+/// Returns the token and where it was given, if it was.
 std::optional<Said> token_of(const ClientOptions& options) {
   if (options.token && options.token_file) {
     refuse("token_file", "cannot be used with token; drop one of the two");
@@ -177,7 +177,7 @@ Access access_to(const std::string& address, const ClientOptions& options) {
   }
   const std::string token = stripped(found->content());
   if (!is_token(token)) {
-    // What it is instead is not told: it may be a secret all the same.
+    // The error does not quote it: it may be a secret all the same.
     found->refuse("is not a token; give what `sketchmatch tokens add` printed");
   }
   if (!access.credentials && !is_here(address)) {

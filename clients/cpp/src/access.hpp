@@ -1,5 +1,5 @@
 /// @file
-/// How a client gets in: encryption, certificates and tokens, from options or the environment.
+/// How a client connects: encryption, certificates and tokens, from options or the environment.
 #pragma once
 
 #include <grpcpp/security/credentials.h>
@@ -11,16 +11,16 @@
 
 namespace sketchmatch::detail {
 
-/// What a channel and its calls need to be let in.
+/// Credentials of a channel and of its calls.
 struct Access {
   std::shared_ptr<grpc::ChannelCredentials> credentials;
   std::optional<std::string> server_name;
   std::string authorization;  // empty without a token
 };
 
-/// Returns how to get in at an address.
-/// @throws InvalidRequestError If the address is none, a file cannot be read, parts contradict each
-///   other, or others could read the token.
+/// Returns the credentials for an address.
+/// @throws InvalidRequestError If the address is invalid, a file cannot be read, options contradict
+///   each other, or others could read the token.
 Access access_to(const std::string& address, const ClientOptions& options);
 
 }  // namespace sketchmatch::detail

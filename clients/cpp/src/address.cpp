@@ -42,7 +42,7 @@ bool is_number(std::string_view text) {
          std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
-/// Returns host and port, perhaps behind the scheme and the name server that look the host up.
+/// Returns host and port, without a scheme and a name server before them.
 std::optional<Place> place_of(std::string_view address) {
   if (starts_with(address, "dns://")) {
     const auto end = address.find('/', 6);
@@ -98,7 +98,7 @@ bool is_own(in_addr number) {
   return value == 0 || value >> 24U == 127;
 }
 
-/// Whether an IP address is this machine's; none if it is no IP address.
+/// Whether an IP address is this machine's; nothing if it is not an IP address.
 std::optional<bool> is_own_number(const std::string& host) {
   in_addr v4{};
   in6_addr v6{};

@@ -6,13 +6,14 @@
 
 namespace sketchmatch::detail {
 
-/// Refuses what cannot be the address of a server.
+/// Throws if a text cannot be the address of a server.
 /// @param address Host and port, or another address that gRPC takes.
-/// @param encrypted Whether the link is encrypted; there is a default port then.
-/// @throws InvalidRequestError If it is a URL, lacks a port, or names no file that can be a socket.
+/// @param encrypted Whether the connection is encrypted; then there is a default port.
+/// @throws InvalidRequestError If it is a URL, has no port, or names a file that cannot be a
+/// socket.
 void check_address(const std::string& address, bool encrypted);
 
-/// Whether an address is one of this very machine.
+/// Whether an address is one of this machine.
 bool is_here(const std::string& address);
 
 }  // namespace sketchmatch::detail

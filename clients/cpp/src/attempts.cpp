@@ -14,9 +14,9 @@ namespace {
 constexpr Seconds kShortestPause{0.1};
 constexpr Seconds kLongestPause{5.0};
 constexpr Seconds kLongestPauseBegun{1.0};
-// In which a server is expected back that had begun to answer.
+// Time in which a server that had begun to answer should be back.
 constexpr std::chrono::seconds kAway{60};
-// gRPC fails at once where the deadline is further away than its clock can tell.
+// gRPC fails at once if the deadline is beyond the range of its clock.
 constexpr Seconds kForEver{1e8};
 
 double between(double low, double high) {

@@ -1,5 +1,5 @@
 /// @file
-/// When the same request is sent again: it changes nothing, so that any may be.
+/// When a request is sent again. Any may be, since requests have no side effects.
 #pragma once
 
 #include <grpcpp/client_context.h>
@@ -12,28 +12,28 @@
 
 namespace sketchmatch::detail {
 
-/// Returns how long a call may take; none for no limit.
-/// @throws InvalidRequestError If it is negative or no number.
+/// Returns how long a call may take, or nothing for no limit.
+/// @throws InvalidRequestError If it is negative or not a number.
 std::optional<Seconds> limit_of(Seconds timeout);
 
-/// The attempts of one call, which share its time.
+/// The attempts of one call, which share its time limit.
 class Attempts {
  public:
   /// @param retries How often the request may be sent again.
-  /// @param limit For all attempts together, or none.
+  /// @param limit Time for all attempts together, or nothing for no limit.
   Attempts(int retries, std::optional<Seconds> limit);
 
-  /// Says until when the next attempt may take.
+  /// Sets the deadline of the next attempt.
   void limit(grpc::ClientContext& context) const;
 
-  /// Returns after which time to send the request again; none if it is in vain. It is no less than
-  /// the server asks for, grows from one attempt to the next, and differs from caller to caller, so
-  /// that not all come back at once.
-  /// @param begun Whether the answer had begun: that is worth a minute's attempts, whatever their
+  /// Returns the time after which to send the request again, or nothing if that is pointless. It is
+  /// at least what the server asks for, grows from one attempt to the next, and varies randomly, so
+  /// that callers do not all return at once.
+  /// @param begun Whether the answer had begun: then attempts go on for a minute, whatever their
   ///   number, unless there are to be none.
   std::optional<Seconds> pause_after(const Failure& failure, bool begun = false);
 
-  /// Hears that the server answers.
+  /// Notes that the server answers.
   void succeeded();
 
  private:

@@ -21,7 +21,7 @@
 
 namespace sketchmatch::detail {
 
-/// A connection, and how calls are made over it.
+/// A connection, and what all its calls share.
 struct Connection {
   std::string address;
   std::string authorization;
@@ -29,14 +29,14 @@ struct Connection {
   int retries = 0;
   std::shared_ptr<grpc::Channel> channel;
 
-  /// Adds what says who calls.
+  /// Adds the caller's token.
   void authorize(grpc::ClientContext& context) const;
 
   /// Returns how long a call may take.
   [[nodiscard]] std::optional<Seconds> limit(const CallOptions& call) const;
 };
 
-/// Makes a call, again where that helps, and returns its answer.
+/// Makes a call, repeats it if that helps, and returns its answer.
 /// @param ask Called with a context and an answer to fill; returns the status.
 template <typename Answer, typename Ask>
 Answer asked(const Connection& connection, const CallOptions& call, const Ask& ask) {
@@ -63,7 +63,7 @@ Answer asked(const Connection& connection, const CallOptions& call, const Ask& a
   }
 }
 
-/// A match that a server is doing.
+/// A running match.
 class MatchStream {
  public:
   MatchStream(std::shared_ptr<const Connection> connection, Course course, const CallOptions& call);
@@ -73,26 +73,26 @@ class MatchStream {
   MatchStream& operator=(MatchStream&&) = delete;
   ~MatchStream();
 
-  /// Returns the next event; none at the end.
+  /// Returns the next event, or nothing at the end.
   std::optional<MatchEvent> next();
 
   /// Waits for the end.
   Match result(const ProgressCallback& on_progress);
 
-  /// The number of the last event that the server told.
+  /// The number of the last event that the server sent.
   [[nodiscard]] std::uint64_t last_event() const { return course_.after(); }
 
-  /// Stops the match, also one that is to keep running; any thread may.
+  /// Stops the match, even if it is to keep running; any thread may call this.
   void cancel() {
     cancelled_ = true;
     own_->cancel();
   }
 
-  /// Reads it no more; any thread may.
+  /// Stops reading it; any thread may call this.
   void leave() { own_->cancel(); }
 
  private:
-  /// One attempt: it is stopped where it is left.
+  /// One attempt, which is stopped when it is left.
   struct Attempt;
 
   std::optional<v1::MatchResponse> read();

@@ -1,5 +1,5 @@
 /// @file
-/// What calls see of a cancellation.
+/// The state that calls share with a cancellation.
 #pragma once
 
 #include <condition_variable>
@@ -13,7 +13,7 @@
 
 namespace sketchmatch::detail {
 
-/// Whether something was cancelled, and what is to be done then.
+/// Whether something was cancelled, and what is done then.
 class CancellationState {
  public:
   void cancel();
@@ -32,7 +32,7 @@ class CancellationState {
   std::map<std::uint64_t, std::function<void()>> actions_;
 };
 
-/// Does something when a state is cancelled, at once if it is already; no more once this is gone.
+/// Calls a function when a state is cancelled, at once if it already is; not after destruction.
 class OnCancel {
  public:
   OnCancel(std::shared_ptr<CancellationState> state, std::function<void()> action);

@@ -90,21 +90,21 @@ grpc::Status ask(const std::shared_ptr<grpc::Channel>& channel, const char* meth
 
 grpc::ChannelArguments channel_arguments(const std::string& address, const detail::Access& access) {
   grpc::ChannelArguments arguments;
-  // What is too large is the server's to say: only it knows its memory.
+  // The server decides which answers are too large: only it knows its memory.
   arguments.SetMaxSendMessageSize(-1);
   arguments.SetMaxReceiveMessageSize(-1);
-  // Buffer as little as there may be: what waits here for a slow reader is progress that the server
-  // can no longer replace by the latest. A whole message passes at once all the same.
+  // Buffer as little as possible: the server can no longer replace progress that waits here for a
+  // slow reader by the latest. A whole message still passes at once.
   arguments.SetInt("grpc.http2.lookahead_bytes", 1);
   arguments.SetInt("grpc.http2.bdp_probe", 0);
-  // A robot's link may vanish without a word: find out within 40 s, and reconnect soon.
+  // A robot's connection may be lost silently: detect this within 40 s, and reconnect soon.
   arguments.SetInt("grpc.keepalive_time_ms", 30'000);
   arguments.SetInt("grpc.keepalive_timeout_ms", 10'000);
   arguments.SetInt("grpc.http2.ping_timeout_ms", 10'000);
   arguments.SetInt("grpc.initial_reconnect_backoff_ms", 100);
   arguments.SetInt("grpc.max_reconnect_backoff_ms", 5'000);
   if (detail::is_here(address)) {
-    // No proxy, whatever http_proxy says, leads to where the client itself is.
+    // A proxy from http_proxy cannot reach the client's own machine.
     arguments.SetInt("grpc.enable_http_proxy", 0);
   }
   if (access.server_name) {
@@ -134,7 +134,7 @@ class PendingMatch {
 
   void cancel() { stream_->cancel(); }
 
-  /// Leaves the match, and waits until its thread has ended, unless that is this very thread.
+  /// Leaves the match, and waits for the end of its thread, unless it is called by that thread.
   void end() {
     stream_->leave();
     if (thread_.get_id() == std::this_thread::get_id()) {
@@ -379,7 +379,7 @@ void Client::delete_scene(const std::string& name, const CallOptions& call) cons
     if (sent == 1) {
       throw;
     }
-    // It is gone by a request whose answer was lost.
+    // An earlier request has deleted it, but its answer was lost.
   }
 }
 

@@ -1,5 +1,5 @@
 /// @file
-/// The course of a match as its reader sees it: one stream, however often the link is lost.
+/// The course of a match as its reader sees it: one stream, even if connections are lost.
 #pragma once
 
 #include <sketchmatch/v1/match_service.pb.h>
@@ -16,36 +16,36 @@
 
 namespace sketchmatch::detail {
 
-/// What is known of a match that is read, and so, how to go on after a link was lost.
+/// What is known of a match that is read, and thus how to continue after a lost connection.
 class Course {
  public:
-  /// A match to begin; the request is given a name if it has none.
+  /// A match that is to begin; its request is given a name if it has none.
   explicit Course(v1::MatchRequest request);
-  /// A match that was begun before, after an event that is known of it.
+  /// A match that has begun, to be read after an event that is already known.
   Course(const std::string& match_id, std::uint64_t after);
 
-  /// What began the match, or will; none where it is only watched.
+  /// The request that begins the match; none if it is only watched.
   [[nodiscard]] const std::optional<v1::MatchRequest>& request() const { return request_; }
-  /// What to ask for to go on; none to begin, by the request.
+  /// The request with which to continue; none if the match is yet to begin.
   [[nodiscard]] std::optional<v1::WatchMatchRequest> watching() const;
   /// The name of the match; empty before it is known.
   [[nodiscard]] const std::string& match_id() const { return match_id_; }
   /// The number of the last event that is known.
   [[nodiscard]] std::uint64_t after() const { return after_; }
 
-  /// Whether all is told: a link that is lost after the result is none of the match.
+  /// Whether the result has come: a connection that is lost later does not matter.
   [[nodiscard]] bool ends(const Failure& failure) const;
 
-  /// Hears the next event, and returns whether to tell it: its like may have been told before.
+  /// Notes the next event, and returns whether to report it: the same may have come before.
   bool take(const v1::MatchResponse& event);
 
-  /// Returns the time after which to ask again; none if it is in vain. What to ask for then is what
-  /// `watching` says.
+  /// Returns the time after which to ask again, or nothing if that is pointless. `watching` returns
+  /// what to ask for then.
   std::optional<Seconds> pause_after(Failure failure, Attempts& attempts);
 
  private:
-  /// Whether a match is as far as was told; one that is done again may not be for a while. Other
-  /// progress than that of the search, as that of rooms that are joined, has no confidence.
+  /// Whether a match is as far as was reported; a match that is done again may not be for a while.
+  /// Other progress than that of the search, such as of joining rooms, has no confidence.
   bool is_further(const v1::MatchProgress& progress);
 
   std::optional<v1::MatchRequest> request_;

@@ -16,7 +16,7 @@
 
 namespace sketchmatch::detail {
 
-/// Returns an event; none for one of a kind that this version does not know.
+/// Returns an event, or nothing for a kind that this version does not know.
 std::optional<MatchEvent> decoded(const v1::MatchResponse& message);
 MatchSummary decoded(const v1::MatchSummary& message);
 MatchRecord decoded(const v1::GetMatchResponse& message);

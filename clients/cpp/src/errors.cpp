@@ -102,7 +102,7 @@ bool contains(const std::string& text, const char* part) {
   return text.find(part) != std::string::npos;
 }
 
-/// Why gRPC says that a certificate cannot be trusted; none if it does not say that.
+/// Why a certificate cannot be trusted, by what gRPC says; nothing if it does not say that.
 std::optional<std::string> distrust(const std::string& message) {
   static const std::regex other_name("Hostname Verification Check|Peer name .* is not in peer");
   // As BoringSSL says it, and as OpenSSL does.
@@ -120,7 +120,7 @@ std::optional<std::string> distrust(const std::string& message) {
   return why.empty() ? "it is of no authority that the client trusts, or it has expired" : why;
 }
 
-/// Returns what gRPC says of a link that did not come about; it has no status for that.
+/// Returns the error for a connection that failed, for which gRPC has no status of its own.
 Failure unavailable(const std::string& message, const std::string& address) {
   if (const auto why = distrust(message)) {
     return {Failure::Kind::not_authenticated,
@@ -132,7 +132,7 @@ Failure unavailable(const std::string& message, const std::string& address) {
             {},
             {}};
   }
-  // gRPC sees it when it is about to connect, and says so in words of older and newer versions.
+  // gRPC notices this when it connects; older and newer versions use different words.
   if (contains(message, "empty address list") || contains(message, "create security handshaker")) {
     return {Failure::Kind::invalid_request,
             "the certificates for the server at " + address +

@@ -1,6 +1,6 @@
 /// @file
-/// The fields of answers that the client knows, each named once: a value's member is called as the
-/// message's field. Decoding goes by them, and so do the tests, back again.
+/// The fields of answers that the client knows, each named once: a value's member has the name of
+/// the message's field. Decoding uses them, and the tests use them for encoding.
 #pragma once
 
 #include <sketchmatch/catalogue.hpp>
@@ -46,9 +46,9 @@ constexpr OneOf<Kind, Variant> one_of(Variant& variant) {
       #name, [](auto& value) -> decltype(auto) { return (member); },        \
       [](const auto& message) -> decltype(auto) { return message.name(); }, \
       [](const auto& message) -> decltype(message.has_##name()) { return message.has_##name(); })
-/// A field that is called as the member is.
+/// A field with the name of the member.
 #define FIELD(name) MEMBER(name, value.name)
-/// A field that the member `kind` holds where it is of a kind.
+/// A field that is held by the member `kind` if it is of this kind.
 #define KIND(name, type) MEMBER(name, one_of<type>(value.kind))
 // NOLINTEND(cppcoreguidelines-macro-usage)
 

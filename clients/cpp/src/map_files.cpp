@@ -77,7 +77,7 @@ std::vector<std::string> images_in(const YAML::Node& document) {
   return names;
 }
 
-/// Returns the picture names of a YAML file that describes a map; none where it is something else.
+/// Returns the picture names in a YAML file that describes a map; none for other files.
 std::vector<std::string> images_of_map(const fs::path& file) {
   std::error_code ignored;
   if (!is_file(file) || fs::file_size(file, ignored) > kMostBytes) {
@@ -132,8 +132,8 @@ fs::path yaml_in(const fs::path& folder) {
   return found.front();
 }
 
-/// Returns the YAML file beside a picture that names it. Of several, the one that is called as the
-/// picture is counts.
+/// Returns the YAML file beside a picture that names it. Of several, the one with the name of the
+/// picture is used.
 fs::path yaml_of(const fs::path& picture) {
   std::vector<fs::path> found;
   std::error_code ignored;
@@ -193,7 +193,7 @@ FoundFile find_picture(const fs::path& file, const std::vector<std::string>& ima
              there.filename().string() + ", was used"}};
   }
   for (const auto& image : images) {
-    // A name from Windows has backslashes, which are letters elsewhere.
+    // A path from Windows has backslashes, which other systems take as letters.
     std::string name = stripped(image);
     name = name.substr(name.find_last_of("/\\") + 1);
     const auto beside = folder / (name.empty() ? image : name);

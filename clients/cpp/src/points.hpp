@@ -1,5 +1,5 @@
 /// @file
-/// Points as messages hold them.
+/// Points in messages.
 #pragma once
 
 #include <sketchmatch/v1/source.pb.h>

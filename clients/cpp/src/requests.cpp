@@ -14,7 +14,7 @@ namespace sketchmatch::detail {
 
 namespace {
 
-/// A stage of the pipeline: its name, its option, and where it goes in the message.
+/// A stage of the pipeline: its name, its option, and its field in the message.
 struct Stage {
   const char* name;
   std::string MatchOptions::*option;
@@ -197,7 +197,7 @@ void write_segmenting(const Source& source, const SegmentOptions& options, Reque
   }
 }
 
-/// Refuses an option that a match alone has a use for.
+/// Throws if an option is given that is only for matches.
 void refuse_for_transfer(bool given, const char* option) {
   if (given) {
     refuse(option, "is only for matches; leave it out of a transfer");

@@ -20,7 +20,7 @@ namespace {
 using detail::refuse;
 using detail::written;
 
-/// Returns the label of the thing with a number; empty where there are none.
+/// Returns the label of the thing with a number, or an empty text if there are no labels.
 std::string label_of(const std::vector<std::string>& labels, std::size_t number) {
   if (labels.empty()) {
     return {};
@@ -28,7 +28,7 @@ std::string label_of(const std::vector<std::string>& labels, std::size_t number)
   return detail::checked_text(labels.at(number), "labels[" + std::to_string(number) + "]");
 }
 
-/// Refuses what is not one for each thing.
+/// Throws if there is another number of values than of things.
 void check_count(const std::string& field, std::size_t given, const char* of, std::size_t count,
                  const char* what) {
   if (given != 0 && given != count) {

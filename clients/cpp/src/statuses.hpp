@@ -1,5 +1,5 @@
 /// @file
-/// What ended a call, from the status that gRPC has of it.
+/// Errors of calls, from the statuses of gRPC.
 #pragma once
 
 #include <grpcpp/support/status.h>
@@ -31,14 +31,14 @@ struct Failure {
   std::string reason;
   std::string field;
   std::optional<Seconds> retry_after;
-  /// What gRPC says of a link that did not come about.
+  /// What gRPC reports about a connection that failed.
   std::string detail;
 
   /// Throws it.
   [[noreturn]] void raise() const;
 };
 
-/// Returns what a status that is not OK says of a call to a server at an address.
+/// Returns the error for a status that is not OK, of a call to the server at an address.
 Failure failure_of(const grpc::Status& status, const std::string& address);
 
 }  // namespace sketchmatch::detail

@@ -28,7 +28,7 @@ std::string fixed(double number, int digits) {
   return out.str();
 }
 
-/// Returns a number with four digits that count.
+/// Returns a number with four significant digits.
 std::string rounded(double number) {
   std::ostringstream out;
   out.precision(4);
@@ -54,7 +54,7 @@ std::size_t width_of(const std::string& text) {
       std::count_if(text.begin(), text.end(), [](char byte) { return !continues(byte); }));
 }
 
-/// Returns what fits into a cell, in one line and without what terminals would obey.
+/// Returns what fits into a cell: one line, without control sequences for terminals.
 std::string cut(const std::string& text, std::size_t longest) {
   std::string line;
   for (const char each : detail::stripped(text)) {
@@ -83,7 +83,7 @@ std::string named(std::uint32_t index, const Scene& scene) {
   return named(index, index < scene.objects.size() ? scene.objects.at(index).label : std::string());
 }
 
-/// Returns a table whose first columns are names, which stand at the left.
+/// Returns a table whose first columns are names, which are aligned left.
 std::string table(const std::string& title, const std::vector<Row>& rows, std::size_t names,
                   std::size_t most = kRows) {
   const std::size_t shown = std::min(rows.size(), most + 1);  // one has the heads
@@ -108,7 +108,7 @@ std::string table(const std::string& title, const std::vector<Row>& rows, std::s
   return text;
 }
 
-/// Whether a sketched object is something together with others, or several things.
+/// Whether a sketched object belongs to a group.
 bool grouped(const MatchResult& result, std::uint32_t object) {
   return std::any_of(result.object_groups.begin(), result.object_groups.end(),
                      [object](const ObjectGroup& group) {
@@ -126,7 +126,7 @@ std::string named(const std::vector<std::uint32_t>& objects, const Scene& scene)
   return names;
 }
 
-/// Returns what came out of a match as a whole.
+/// Returns a line that summarises a match.
 std::string headline(const Match& match) {
   const auto& result = match.result;
   const auto& alone = result.unmatched_sketch_objects;
@@ -155,7 +155,7 @@ std::string headline(const Match& match) {
   return line + ", " + name_of(result.outcome);
 }
 
-/// Returns the name of an enum's value without what all of them begin with.
+/// Returns the name of an enum's value without the prefix that all have.
 template <typename Kind>
 std::string enum_name(Kind kind, const std::string& name, const char* prefix) {
   return name.empty() ? std::to_string(static_cast<int>(kind))

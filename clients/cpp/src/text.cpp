@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kLongest = 60;
 
-/// How many bytes a character takes whose first one this is; 0 if it is none.
+/// How many bytes a character has that begins with this byte; 0 if none does.
 std::size_t length_of(unsigned char first) {
   if (first < 0x80) {
     return 1;

@@ -1,5 +1,5 @@
 /// @file
-/// Texts: what is UTF-8, how values are shown in errors, and how files are read.
+/// Texts: UTF-8, values in errors, and reading files.
 #pragma once
 
 #include <filesystem>
@@ -12,20 +12,20 @@ namespace sketchmatch::detail {
 [[noreturn]] void refuse(const std::string& field, const std::string& problem,
                          const std::string& reason = "INVALID_FIELD");
 
-/// Whether bytes are UTF-8, which alone may stand in a text of a message.
+/// Whether bytes are UTF-8, as texts of messages must be.
 bool is_utf8(std::string_view bytes);
 
 /// Returns a text of a message.
-/// @throws InvalidRequestError If it is no UTF-8.
+/// @throws InvalidRequestError If it is not UTF-8.
 const std::string& checked_text(const std::string& text, const std::string& field);
 
-/// Returns a text in quotes, cut and without what a terminal would take for a command.
+/// Returns a text in quotes, shortened and without control sequences for terminals.
 std::string in_quotes(std::string_view text);
 
 /// Returns a number as people write it: 2.5, 60, nan.
 std::string shown(double number);
 
-/// Returns a text with the first of a pattern's places replaced; `{}` is the place.
+/// Returns a pattern with its first `{}` replaced by a text.
 std::string filled(std::string_view pattern, std::string_view value);
 
 /// Whether a text begins with another.
@@ -37,7 +37,7 @@ std::string lowered(std::string text);
 /// Returns a text without spaces at both ends.
 std::string stripped(std::string_view text);
 
-/// Returns what is in a file.
+/// Returns the content of a file.
 /// @throws std::system_error With the reason, if it cannot be read.
 std::string read_bytes(const std::filesystem::path& path);
 

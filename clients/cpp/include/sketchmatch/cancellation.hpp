@@ -10,18 +10,19 @@ namespace detail {
 class CancellationState;
 }
 
-/// Stops the calls that it was given to. Copies stop the same ones; any thread may.
+/// Stops the calls that it was given to. Copies stop the same calls, from any thread.
 class Cancellation {
  public:
   Cancellation();
 
-  /// Stops these calls, now and later: whoever waits for one gets a `CallCancelledError`.
+  /// Stops these calls, and those to which it is given later: threads that wait for one get a
+  /// `CallCancelledError`.
   void cancel() const;
 
   /// Whether it was cancelled.
   [[nodiscard]] bool cancelled() const;
 
-  /// What calls see of it.
+  /// The state that calls share with it.
   [[nodiscard]] const std::shared_ptr<detail::CancellationState>& state() const noexcept {
     return state_;
   }

@@ -18,14 +18,14 @@ class SketchmatchError : public std::runtime_error {
   /// @param message One sentence for people.
   /// @param reason A name of `sketchmatch.v1.ErrorReason` without its prefix; empty if none was
   ///   given.
-  /// @param detail What others say of it, such as gRPC of a link: in brackets behind the sentence.
+  /// @param detail What gRPC or another part reports; it is put in brackets behind the sentence.
   explicit SketchmatchError(const std::string& message, std::string reason = {},
                             const std::string& detail = {});
 
   /// A name of `sketchmatch.v1.ErrorReason` without its prefix, e.g. `"INVALID_STROKE"`.
   [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
 
-  /// What to do, as the sentence says it behind its semicolon; empty where it does not.
+  /// What to do: the part of the sentence behind its semicolon, or empty if there is none.
   [[nodiscard]] const std::string& remedy() const noexcept { return remedy_; }
 
  private:
@@ -33,7 +33,7 @@ class SketchmatchError : public std::runtime_error {
   std::string remedy_;
 };
 
-/// The request cannot be used as it is; correct it, the same one fails again.
+/// The request is wrong; correct it. The same request would fail again.
 class InvalidRequestError : public SketchmatchError {
  public:
   /// @param message One sentence with the remedy.
@@ -53,52 +53,53 @@ class InvalidRequestError : public SketchmatchError {
 class RetryableError : public SketchmatchError {
  public:
   /// @param message One sentence.
-  /// @param reason Why it does not now.
-  /// @param retry_after After which time to send the request again, if the server said it.
-  /// @param detail What others say of it.
+  /// @param reason Why it did not succeed now.
+  /// @param retry_after Time after which to send the request again, if the server said so.
+  /// @param detail What gRPC or another part reports.
   explicit RetryableError(const std::string& message, std::string reason = {},
                           std::optional<Seconds> retry_after = std::nullopt,
                           const std::string& detail = {});
 
-  /// After which time to send the same request again; none where the server did not say.
+  /// Time after which to send the same request again, if the server said so.
   [[nodiscard]] std::optional<Seconds> retry_after() const noexcept { return retry_after_; }
 
  private:
   std::optional<Seconds> retry_after_;
 };
 
-/// No server answers, it is starting or stopping, or it lost the process that answered.
+/// No server answers, or it is starting or stopping, or its process for the request has crashed.
 class ServerUnavailableError : public RetryableError {
   using RetryableError::RetryableError;
 };
 
-/// The server has no room for the request now; send it again after `retry_after()`.
+/// The server is too busy for the request now; send it again after `retry_after()`.
 class ServerBusyError : public RetryableError {
   using RetryableError::RetryableError;
 };
 
-/// The time ended before there was an answer; allow more of it.
+/// The time limit passed before there was an answer; allow more time.
 class DeadlineExceededError : public SketchmatchError {
   using SketchmatchError::SketchmatchError;
 };
 
-/// The server does not know the token, or the client does not trust the server's certificate. A
-/// server that wants a certificate of the client, or another one, is a `ServerUnavailableError`.
+/// The server does not know the token, or the client does not trust the server's certificate. If
+/// the server requires a certificate of the client, or another one, the error is a
+/// `ServerUnavailableError`.
 class NotAuthenticatedError : public SketchmatchError {
   using SketchmatchError::SketchmatchError;
 };
 
-/// The server keeps nothing of this name, or it is another caller's.
+/// The server has nothing of this name, or it belongs to another caller.
 class NotFoundError : public SketchmatchError {
   using SketchmatchError::SketchmatchError;
 };
 
-/// The server cannot read or write what it keeps on disk; its operator has to act.
+/// The server cannot read or write its store on disk; its operator has to act.
 class StoreError : public SketchmatchError {
   using SketchmatchError::SketchmatchError;
 };
 
-/// The server does not know the method; it is older than this client, or another server.
+/// The server does not know the method; it is older than this client, or another kind of server.
 class NotSupportedError : public SketchmatchError {
   using SketchmatchError::SketchmatchError;
 };
@@ -108,7 +109,7 @@ class CallCancelledError : public SketchmatchError {
   using SketchmatchError::SketchmatchError;
 };
 
-/// The server could not do what it should; the message says which part of it failed.
+/// The server or an algorithm failed; the message says which.
 class ServerFailedError : public SketchmatchError {
   using SketchmatchError::SketchmatchError;
 };

@@ -1,5 +1,5 @@
 /// @file
-/// How to match, how to call and how to get in.
+/// Options of matches, of calls and of clients.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ class ChannelCredentials;
 
 namespace sketchmatch {
 
-/// An object of a scene: its index, from 0, or its label, which no other one has.
+/// An object of a scene: its index, from 0, or its label, if no other object has the same.
 class ObjectReference {
  public:
   /// An object by its index.
@@ -45,27 +45,27 @@ class ObjectReference {
   std::variant<std::int64_t, std::string> kind_;
 };
 
-/// What is known of a sketched object.
+/// What is known about a sketched object.
 struct Pin {
   ObjectReference sketch;              ///< The sketched object.
-  std::optional<ObjectReference> map;  ///< The mapped one that it is; none: it is on no map.
+  std::optional<ObjectReference> map;  ///< Its mapped object, or nothing: it is not on the map.
   bool excluded = false;               ///< Whether it is *not* this one: any other may be, or none.
 };
 
-/// What the parts of ζ count for.
+/// The weights of the parts of ζ.
 struct Weights {
   double similarity = 1.0;         ///< How alike the relations are.
   double rotation = 1.0;           ///< How well their rotations agree.
   double dilation = 1.0;           ///< How well their dilations agree.
   std::optional<double> shape;     ///< How alike in shape the objects are.
   std::optional<double> size;      ///< How well their sizes agree.
-  std::optional<double> distance;  ///< β: rotations of objects d apart count for d^β.
+  std::optional<double> distance;  ///< β: a rotation of objects d apart has weight d^β.
 };
 
-/// Which of a caller's own requests come first while they wait.
+/// The order of a caller's own requests while they wait.
 enum class Priority { unspecified, low, normal, high };
 
-/// How to match; whatever is left out is the server's to decide.
+/// How to match. For what is left out, the server has defaults.
 struct MatchOptions {
   std::string sketch_segmenter;  ///< Name of an algorithm; `Client::algorithms` lists them.
   std::string map_segmenter;     ///< Name of an algorithm.
@@ -78,48 +78,49 @@ struct MatchOptions {
   std::map<std::string, Parameters> params;
   /// Seed of everything random; the same request with the same seed has the same result.
   std::optional<std::uint64_t> seed;
-  /// After which time the best match so far is the result.
+  /// Time after which the search stops, with the best match so far as the result.
   std::optional<Seconds> time_budget;
-  /// What the parts of ζ count for.
+  /// The weights of the parts of ζ.
   std::optional<Weights> weights;
-  /// Whether an object may stay without partner on both sides where that is likelier.
+  /// Whether objects of both sides may stay without partner where that is more likely.
   std::optional<bool> allow_unmatched;
-  /// What a match loses that leaves all objects of the smaller scene out, in units of ζ.
+  /// Price of leaving out all objects of the smaller scene, in units of ζ.
   std::optional<double> unmatched_price;
-  /// How many of the next best object maps the result shall hold, at most 100.
+  /// Number of next best object maps in the result, at most 100.
   std::optional<std::uint32_t> alternatives;
-  /// What is known of single objects, which the answer obeys.
+  /// What is known about single objects; the answer obeys it.
   std::vector<Pin> pins;
-  /// Labels that mean the same: `{{"couch", "sofa"}}`. Labels are evidence, and force nothing.
+  /// Labels that mean the same: `{{"couch", "sofa"}}`. Labels are evidence; they do not force a
+  /// match.
   std::vector<std::vector<std::string>> synonyms;
-  /// Name of one of the server's pipelines, such as "proof", to start from.
+  /// Name of a profile of the server, such as "proof", to start from.
   std::string profile;
-  /// A name for the request, at most 128 bytes: sent again under the same name it is the same
-  /// match, done once. Left out: the client makes one for each match.
+  /// A name for the request, at most 128 bytes. A request that is sent again under the same name
+  /// is done only once. If left out, the client makes a name for each match.
   std::string request_id;
-  /// Whether the match goes on when nobody reads it; `Client::watch` reads it again.
+  /// Whether the match continues when no client reads it; `Client::watch` reads it again.
   bool keep_running = false;
-  /// Which of one's own requests come first while they wait. Left out: as `normal`.
+  /// The order among this caller's requests while they wait; by default `normal`.
   Priority priority = Priority::unspecified;
 };
 
-/// How to find the objects of one source; whatever is left out is the server's to decide.
+/// How to find the objects of one source. For what is left out, the server has defaults.
 struct SegmentOptions {
   std::string segmenter;     ///< Name of the algorithm.
   Parameters params;         ///< Its parameters.
-  std::string profile;       ///< The server's pipeline that decides what is left out.
-  bool include_map = false;  ///< Whether the occupancy grid is wanted, too, such as that of a bag.
+  std::string profile;       ///< Profile of the server for what is left out.
+  bool include_map = false;  ///< Whether to return the occupancy grid, too, such as that of a bag.
 };
 
 /// How to make a call.
 struct CallOptions {
-  /// After which time the call fails; infinity for no limit. Left out: as the client says.
+  /// Time after which the call fails, or infinity for no limit; by default that of the client.
   std::optional<Seconds> timeout;
-  /// What stops the call from elsewhere.
+  /// Stops the call from elsewhere.
   Cancellation cancellation;
 };
 
-/// A file in PEM, or what is in it.
+/// A file in PEM, or its content.
 class Pem {
  public:
   /// A file.
@@ -129,14 +130,14 @@ class Pem {
   Pem(const std::string& file) : Pem(std::filesystem::path(file)) {}  // NOLINT
   /// A file.
   Pem(const char* file) : Pem(std::filesystem::path(file)) {}  // NOLINT
-  /// What is in a file.
+  /// The content of a file.
   static Pem content(const std::string& text) {
     Pem pem{std::filesystem::path(text)};
     pem.is_file_ = false;
     return pem;
   }
 
-  /// The path of the file, or what is in it.
+  /// The path of the file, or its content.
   [[nodiscard]] const std::string& value() const noexcept { return value_.native(); }
   /// Whether it is a file.
   [[nodiscard]] bool is_file() const noexcept { return is_file_; }
@@ -146,32 +147,32 @@ class Pem {
   bool is_file_;
 };
 
-/// How a client works and gets in. What is left out from `token` on, the environment may say:
-/// `SKETCHMATCH_TOKEN` is `token`, and so on. An empty text says that there is none.
+/// How a client connects and identifies itself. Options from `token` on that are left out are taken
+/// from the environment, such as `token` from `SKETCHMATCH_TOKEN`. An empty text means none.
 struct ClientOptions {
-  /// How long a call may take where the call itself does not say. Left out: no limit.
+  /// Time limit of calls that have none of their own; by default there is no limit.
   std::optional<Seconds> timeout;
-  /// How often a request is sent again where the server is not available or has no room, after a
-  /// pause that the server asks for or that grows from 0.1 s. The timeout is for all attempts
-  /// together. A match that has begun goes on by itself where its link is lost, for a minute
-  /// whatever their number, unless it is 0.
+  /// How often a request is sent again if the server is not available or busy, after a pause that
+  /// the server asks for or that grows from 0.1 s. The timeout is for all attempts together. If the
+  /// connection of a running match is lost, the client tries for a minute to continue it, whatever
+  /// this number is, unless it is 0.
   int retries = 3;
-  /// Shown with every call: it says who calls.
+  /// The token that is sent with every call and identifies the caller.
   std::optional<std::string> token;
-  /// A file that holds the token, instead.
+  /// A file with the token, instead of the token itself.
   std::optional<std::filesystem::path> token_file;
-  /// Whether to encrypt; left out, certificates decide. True alone trusts the authorities that gRPC
-  /// trusts.
+  /// Whether to encrypt; by default this is done if certificates are given. True alone trusts the
+  /// authorities that gRPC trusts.
   std::optional<bool> tls;
-  /// The authorities to trust instead of these.
+  /// Certificates of the authorities to trust instead.
   std::optional<Pem> root_certificates;
-  /// To be shown to the server: it says who calls.
+  /// The client's certificate, which identifies the caller.
   std::optional<Pem> certificate;
   /// The private key of the certificate.
   std::optional<Pem> key;
-  /// The name that the server's certificate is for, where it is not the one in the address.
+  /// The name in the server's certificate, if it is not the one in the address.
   std::optional<std::string> server_name;
-  /// Credentials of gRPC's own making, in place of what is said of encryption.
+  /// Credentials of gRPC, instead of the options for encryption above.
   std::shared_ptr<grpc::ChannelCredentials> credentials;
 };
 

@@ -1,6 +1,6 @@
 /// @file
-/// The contract as it goes over the wire: generated messages and stubs, for whoever needs more than
-/// the client offers. `Client::channel`, `Client::authorize` and `Client::check` go with them.
+/// The generated messages and stubs of the contract, for programs that need more than the client
+/// offers. Use them with `Client::channel`, `Client::authorize` and `Client::check`.
 #pragma once
 
 #include <grpcpp/grpcpp.h>

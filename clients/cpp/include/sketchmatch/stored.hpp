@@ -1,5 +1,5 @@
 /// @file
-/// Scenes that a server keeps, for later matches.
+/// Scenes that are stored on a server for later matches.
 #pragma once
 
 #include <chrono>
@@ -14,45 +14,45 @@
 
 namespace sketchmatch {
 
-/// A scene that the server keeps; `sources::stored_scene` takes its name.
+/// A scene that is stored on the server; pass its name to `sources::stored_scene`.
 struct StoredScene {
-  std::string name;                   ///< The hash of what it is: 64 digits.
+  std::string name;                   ///< The hash of its content: 64 digits.
   Scene scene;                        ///< The objects.
   std::vector<std::string> warnings;  ///< As in `Segmentation`.
-  AlgorithmSelection segmenter;       ///< The segmenter that found the objects, as it ran.
+  AlgorithmSelection segmenter;       ///< The segmenter with the parameters it ran with.
   std::vector<Point> route;           ///< As in `Segmentation`.
-  std::string title;                  ///< What you call it; empty if nothing.
+  std::string title;                  ///< Its title; may be empty.
   std::vector<Passage> passages;      ///< As in `Segmentation`.
 };
 
-/// How to find the objects of a scene that is put, and what to call it.
+/// How to find the objects of a scene that is to be stored, and its title.
 struct PutOptions : SegmentOptions {
-  /// For people who choose among scenes: up to 200 characters, and no part of the scene's name.
-  /// Left out: a scene that you have put already keeps its title.
+  /// A title for people, up to 200 characters. It does not change the scene's name. If left out, a
+  /// scene that this caller has already stored keeps its title.
   std::string title;
 };
 
-/// What came of `Client::put_scene`.
+/// The result of `Client::put_scene`.
 struct PutScene {
-  StoredScene stored_scene;  ///< The scene that is kept.
-  bool created = false;      ///< Whether the caller had not put it before.
+  StoredScene stored_scene;  ///< The stored scene.
+  bool created = false;      ///< Whether the caller had not stored it before.
 };
 
-/// What `Client::get_scene` found.
+/// The result of `Client::get_scene`.
 struct GotScene {
   StoredScene stored_scene;      ///< The scene.
-  std::optional<Source> source;  ///< What it was found in, where that was wanted.
+  std::optional<Source> source;  ///< The source of its objects, if requested.
 };
 
-/// What a list tells of a scene.
+/// A scene in a list.
 struct SceneSummary {
   using Time = std::chrono::system_clock::time_point;  ///< A moment.
 
   std::string name;                 ///< Its name.
   std::uint32_t object_count = 0;   ///< How many objects it has.
-  std::vector<std::string> labels;  ///< Those of its objects that have one, in their order.
-  Time put_time;                    ///< When the caller put it, or gave it its labels.
-  std::string title;                ///< What you call it; empty if nothing.
+  std::vector<std::string> labels;  ///< Labels of the objects that have one, in their order.
+  Time put_time;                    ///< When the caller stored it or gave it its labels.
+  std::string title;                ///< Its title; may be empty.
 };
 
 /// Labels of objects by their index, from 0.

@@ -1,5 +1,5 @@
 /// @file
-/// What servers answer, in a line or a small table.
+/// Answers of servers as a line or a small table.
 #pragma once
 
 #include <ostream>
@@ -10,20 +10,20 @@
 
 namespace sketchmatch {
 
-/// Returns what came out of a match: a line that sums it up, and which object is which.
+/// Returns a line that summarises a match, and a table of which object is which.
 std::string summary(const Match& match);
-/// Returns how far a match is, in a line.
+/// Returns a line that says how far a match is.
 std::string summary(const Progress& progress);
 /// Returns the objects of a source in a table.
 std::string summary(const Segmentation& found);
 /// Returns the algorithms of a server in a table.
 std::string summary(const Catalogue& catalogue);
 
-/// Returns what an outcome is called, e.g. "OPTIMAL"; its number where only newer servers know it.
+/// Returns the name of an outcome, e.g. "OPTIMAL", or its number if this client does not know it.
 std::string name_of(Outcome outcome);
-/// Returns what a phase is called, e.g. "SEARCH".
+/// Returns the name of a phase, e.g. "SEARCH".
 std::string name_of(Phase phase);
-/// Returns what a kind of algorithms is called, e.g. "SEARCHER".
+/// Returns the name of a kind of algorithms, e.g. "SEARCHER".
 std::string name_of(AlgorithmKind kind);
 
 /// Writes the summary of a match.

@@ -1,5 +1,5 @@
 /// @file
-/// Points, routes and zones, and what becomes of them on the way from one scene to another.
+/// Points, routes and zones, and their transfer from one scene to another.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +14,10 @@
 
 namespace sketchmatch {
 
-/// A way that is driven in the order of its points.
+/// A route that is driven in the order of its points.
 struct Route {
   std::vector<Point> points;                     ///< Its points, two or more.
-  std::vector<double> speeds_meters_per_second;  ///< From each of its points on; or none at all.
+  std::vector<double> speeds_meters_per_second;  ///< The speed from each point on, or empty.
 };
 
 /// An area.
@@ -28,37 +28,37 @@ struct Zone {
 /// Something at a place, with a name: `{"dock", Point{1.0, 2.0}}`.
 struct Feature {
   std::string name;                                       ///< A name for people.
-  std::variant<std::monostate, Point, Route, Zone> kind;  ///< What it is; in an answer nothing
-                                                          ///< where none of it can be reached.
+  std::variant<std::monostate, Point, Route, Zone> kind;  ///< What it is; in an answer empty if
+                                                          ///< none of it can be reached.
 };
 
-/// From where to where features are carried.
+/// The direction in which features are transferred.
 enum class TransferDirection {
   unspecified,    ///< As `sketch_to_map`.
   sketch_to_map,  ///< From the sketch to the map, or from the old map to the new one.
   map_to_sketch   ///< From the map to the sketch.
 };
 
-/// How to carry features; whatever is left out is the server's to decide.
+/// How to transfer features. For what is left out, the server has defaults.
 ///
-/// What is about a match that has a name is for matches alone, and refused: `alternatives`,
-/// `request_id`, `keep_running` and `priority`.
+/// `alternatives`, `request_id`, `keep_running` and `priority` are only for matches, and are
+/// refused here.
 struct TransferOptions : MatchOptions {
-  /// Which sketched object is which mapped one, where that is known, as `Match::object_map` says:
-  /// then nothing is matched. Two pairs or more.
+  /// Which sketched object is which mapped one, if that is known, such as `Match::object_map`; two
+  /// pairs or more. Nothing is matched then.
   ObjectMap object_map;
-  /// From where to where.
+  /// The direction of the transfer.
   TransferDirection direction = TransferDirection::unspecified;
-  /// Which way y grows in the features; in the answer it grows upwards.
+  /// Which way y grows in the given features; in the answer it always grows upwards.
   YAxis y_axis = YAxis::up;
-  /// How far routes are kept away from obstacles: half the width of the robot. Left out: 0 on a
-  /// grid; elsewhere routes are not kept out of objects then.
+  /// Distance of routes from obstacles: half the width of the robot. By default 0 on a grid; on
+  /// other maps routes may then cross objects.
   std::optional<double> radius;
-  /// Whether cells that nobody has seen are no obstacles.
+  /// Whether routes may cross unknown cells.
   bool allow_unknown = false;
 };
 
-/// Why something was changed, or could not be had.
+/// Why a feature was changed, or could not be transferred.
 enum class ChangeReason {
   unspecified,
   obstacle,
@@ -70,53 +70,53 @@ enum class ChangeReason {
   outside
 };
 
-/// What was changed about a feature, or could not be had.
+/// A change of a feature, or why it could not be transferred.
 struct FeatureChange {
-  ChangeReason reason = ChangeReason::unspecified;  ///< Of which kind it is.
+  ChangeReason reason = ChangeReason::unspecified;  ///< The kind of the change.
   std::uint32_t first_point = 0;                    ///< The first of the carried points.
   std::uint32_t last_point = 0;                     ///< The last of them.
   std::string sentence;                             ///< What was done and why, for people.
 };
 
-/// What is to be known of a line of carried points, beside where they are.
+/// The accuracy of a line of transferred points, and where they come from.
 struct CarriedPoints {
   std::vector<double> deviations;  ///< Standard deviation of each, along each axis.
-  std::vector<double> sources;     ///< Which given point each is, by index, or between which two.
+  std::vector<double> sources;     ///< Index of the given point of each, or a fraction between two.
 };
 
-/// A feature where it was carried to.
+/// A transferred feature.
 struct CarriedFeature {
-  Feature feature;                     ///< What it is there, y upwards.
-  std::vector<CarriedPoints> lines;    ///< For the point or route as one, or the rings of a zone.
+  Feature feature;                   ///< The feature in the other scene, with y upwards.
+  std::vector<CarriedPoints> lines;  ///< One for a point or route, or one for each ring of a zone.
   std::vector<FeatureChange> changes;  ///< What was changed, in the order of the points.
   bool drawn = false;                  ///< Whether it is the route that was found in the sketch.
 };
 
-/// What a warp may do beside turning, scaling and shifting the whole.
+/// What a warp may do beyond rotating, scaling and shifting everything.
 enum class WarpKind { unspecified, similarity, affine, spline };
 
 /// The warp that carried the features.
 struct Warp {
-  WarpKind kind = WarpKind::unspecified;  ///< What it may do.
-  double rotation_radians = 0.0;          ///< Counter-clockwise, by which it turns the whole.
-  double scale = 0.0;                     ///< By which it enlarges the whole.
-  double residual = 0.0;                  ///< Root mean square of what the objects miss by.
-  std::vector<double> weights;            ///< What each of `Transfer::partners` counts for.
+  WarpKind kind = WarpKind::unspecified;  ///< The kind of warp.
+  double rotation_radians = 0.0;          ///< Its rotation, counter-clockwise.
+  double scale = 0.0;                     ///< The factor by which it enlarges.
+  double residual = 0.0;                  ///< Root mean square of how far objects are off.
+  std::vector<double> weights;            ///< The weight of each of `Transfer::partners`.
 };
 
-/// Two objects that are the same.
+/// A sketched and a mapped object that are the same.
 struct Partners {
   std::uint32_t sketch_object = 0;  ///< Index in the sketch, from 0.
   std::uint32_t map_object = 0;     ///< Index in the map, from 0.
 };
 
-/// The features where they were carried to.
+/// The answer of a transfer.
 struct Transfer {
   std::vector<CarriedFeature> features;  ///< The route found in the sketch, then those given.
-  Warp warp;                             ///< How they were carried.
-  std::vector<Partners> partners;        ///< Which object is which, as it was given or matched.
-  MatchScenes scenes;                    ///< The objects that were found on both sides.
-  std::optional<MatchResult> match;      ///< The match; none where the object map was given.
+  Warp warp;                             ///< The warp that carried them.
+  std::vector<Partners> partners;        ///< Which object is which, as given or matched.
+  MatchScenes scenes;                    ///< The objects that were found in both scenes.
+  std::optional<MatchResult> match;      ///< The match, unless the object map was given.
 
   /// For each sketched object with a partner the index of its mapped object, from 0.
   [[nodiscard]] ObjectMap object_map() const;

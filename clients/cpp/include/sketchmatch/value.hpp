@@ -12,9 +12,9 @@
 
 namespace sketchmatch {
 
-/// A value as JSON has them: null, true or false, a number, a text, a list or an object.
+/// A value of JSON: null, true or false, a number, a text, a list or an object.
 ///
-/// Plain values convert to it by themselves: `options.params["searcher"]["population"] = 200`.
+/// Plain values are converted to it implicitly: `options.params["searcher"]["population"] = 200`.
 class Value {
  public:
   /// Values in an order.

@@ -1,5 +1,5 @@
 /// @file
-/// Which client this is.
+/// Version of the client.
 #pragma once
 
 namespace sketchmatch {
