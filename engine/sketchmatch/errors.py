@@ -1,4 +1,4 @@
-"""What can go wrong because of the caller, said in one sentence.
+"""Errors that a caller can cause, each with one clear sentence.
 
 Every error that a caller can cause carries a machine-readable reason, the path of the field at
 fault and a sentence with the remedy. The command line prints the sentence and exits with 2; the

@@ -1,4 +1,4 @@
-"""What can go wrong in a call, each with one sentence for people and a reason for programs."""
+"""The errors of calls, each with one sentence for people and a reason for programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Points, routes and zones to hand to :meth:`Client.transfer`."""
+"""Functions that make the points, routes and zones for :meth:`Client.transfer`."""
 
 from __future__ import annotations
 

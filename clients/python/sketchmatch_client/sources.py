@@ -1,4 +1,4 @@
-"""Sketches and maps to hand to a client, from what people and robots have at hand.
+"""Functions that make the sketches and maps that a client sends.
 
 These functions check the form of what they are given. Whether a stroke makes an object, or a map
 shows anything, is the server's to say.

@@ -1,4 +1,4 @@
-"""The files of a robot's map: which they are, what stands in the YAML, and whose objects these are.
+"""The files of a robot's map: finding them, and reading its YAML and its corrected objects.
 
 Client and engine read them here alike, and as ROS does. Its reader, yaml-cpp, keeps every value as
 the text that is written, and who asks for a number gets one; so nothing depends on whether YAML

@@ -1,4 +1,4 @@
-"""What a match looks like: as rows of a table, as GeoJSON and as a picture.
+"""A match as rows of a table, as GeoJSON and as a picture.
 
 Client and engine show their matches through it alike. It needs nothing but Python.
 """

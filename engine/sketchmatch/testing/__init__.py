@@ -1,4 +1,4 @@
-"""What contributors test with: contracts of plugins, an oracle, and data with known truth.
+"""Tools for testing plugins: contracts, an oracle, and data with known truth.
 
 - Contracts: :func:`check_plugin` puts a class of any kind to all of them, :func:`plugin_checks`
   yields them one by one, :func:`parametrize_plugins` makes a pytest test of each, and

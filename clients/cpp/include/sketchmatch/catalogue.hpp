@@ -80,19 +80,18 @@ struct Catalogue {
 
 /// Limits on requests. Where a value is absent, there is no limit.
 struct ServerLimits {
-  std::optional<std::uint64_t> max_request_bytes;       ///< Largest request.
-  std::optional<std::uint32_t> max_objects;             ///< Most objects in a scene.
-  std::optional<std::uint32_t> max_concurrent_matches;  ///< Most matches at the same time.
-  std::optional<Seconds> max_time_budget;               ///< Longest time budget.
-  std::optional<std::uint32_t> max_waiting;             ///< Most requests that wait.
-  std::optional<Seconds> max_wait;                      ///< Longest wait.
-  std::optional<Seconds> default_time_budget;           ///< The budget where none is given.
-  std::optional<std::uint32_t> max_matches_per_caller;  ///< Most requests of one caller at once.
-  std::optional<std::uint32_t>
-      max_requests_per_minute;                     ///< Most requests of one caller in a minute.
-  std::optional<std::uint64_t> max_comparisons;    ///< Most comparisons of a match.
-  std::optional<std::uint64_t> max_candidates;     ///< Most maps that a search evaluates.
-  std::optional<std::uint64_t> max_waiting_bytes;  ///< Most bytes of waiting requests.
+  std::optional<std::uint64_t> max_request_bytes;        ///< Largest request.
+  std::optional<std::uint32_t> max_objects;              ///< Most objects in a scene.
+  std::optional<std::uint32_t> max_concurrent_matches;   ///< Most matches at the same time.
+  std::optional<Seconds> max_time_budget;                ///< Longest time budget.
+  std::optional<std::uint32_t> max_waiting;              ///< Most requests that wait.
+  std::optional<Seconds> max_wait;                       ///< Longest wait.
+  std::optional<Seconds> default_time_budget;            ///< The budget where none is given.
+  std::optional<std::uint32_t> max_matches_per_caller;   ///< Most requests of one caller at once.
+  std::optional<std::uint32_t> max_requests_per_minute;  ///< Most of one caller in a minute.
+  std::optional<std::uint64_t> max_comparisons;          ///< Most comparisons of a match.
+  std::optional<std::uint64_t> max_candidates;           ///< Most maps that a search evaluates.
+  std::optional<std::uint64_t> max_waiting_bytes;        ///< Most bytes of waiting requests.
 };
 
 /// Versions and limits of a server.

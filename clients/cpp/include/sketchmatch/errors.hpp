@@ -1,5 +1,5 @@
 /// @file
-/// What can go wrong in a call, each with one sentence for people and a reason for programs.
+/// The errors of calls, each with one sentence for people and a reason for programs.
 #pragma once
 
 #include <chrono>
