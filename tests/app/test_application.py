@@ -321,7 +321,7 @@ async def test_a_request_of_exactly_the_limit_passes_and_one_byte_more_does_not(
 async def test_an_error_is_what_the_log_ends_with(app):
     with begun(app, match_request(SCENE, SCENE, searcher="nobody")) as task:
         assert await ended(task) == []
-        with pytest.raises(InvalidInputError, match="no searcher") as refused:
+        with pytest.raises(InvalidInputError, match="not a searcher") as refused:
             task.log.check()
     assert refused.value.field == "pipeline.searcher.name"
 

@@ -159,7 +159,7 @@ def test_what_contradicts_itself_or_is_no_pem_is_refused_by_name(kind, pair, mon
         assert str(caught.value).startswith(f"{field} {problem}")
         assert (caught.value.reason, caught.value.field) == ("INVALID_FIELD", field)
     monkeypatch.setenv("SKETCHMATCH_TLS", "maybe")
-    with pytest.raises(InvalidRequestError, match=r"^SKETCHMATCH_TLS is 'maybe'; say 1 or 0"):
+    with pytest.raises(InvalidRequestError, match=r"^SKETCHMATCH_TLS is 'maybe'; give 1 or 0"):
         kind("localhost:1")
 
 

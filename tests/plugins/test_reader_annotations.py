@@ -73,7 +73,7 @@ def test_labelme_shapes_of_one_label_and_group_are_one_object():
         ("sofa", 24.0), ("lamp", 1.0), ("sofa", 24.0), ("sofa", 12.0), ("sofa", 8.0),
     ]  # fmt: skip
     assert found.notes == (
-        "Left out because they enclose no area or are no objects: shapes labelled __ignore__ (1).",
+        "Left out because they enclose no area or are not objects: shapes labelled __ignore__ (1).",
     )
 
 
@@ -87,7 +87,7 @@ def test_labelme_points_and_lines_are_left_out_with_a_note():
     )
     assert found.polygons == ()
     assert found.notes == (
-        "Left out because they enclose no area or are no objects: lines (3), points (1), "
+        "Left out because they enclose no area or are not objects: lines (3), points (1), "
         "shapes without area (1).",
     )
 
@@ -213,8 +213,8 @@ def test_of_several_pictures_one_is_chosen_by_name_or_id():
         ({"segmentation": "x"}, 'segmentation is "x"; give polygons'),
         ({"segmentation": {"counts": []}}, "segmentation.size is missing"),
         ({"segmentation": {"size": [2, 0], "counts": []}}, "size is a list of 2; give [height"),
-        ({"segmentation": {"size": [2, 2], "counts": [1, 2]}}, "are of 3 pixels, and the picture"),
-        ({"segmentation": {"size": [2, 2], "counts": [5, -1]}}, "are of 4 pixels, and the picture"),
+        ({"segmentation": {"size": [2, 2], "counts": [1, 2]}}, "are of 3 pixels, but the picture"),
+        ({"segmentation": {"size": [2, 2], "counts": [5, -1]}}, "are of 4 pixels, but the picture"),
         ({"segmentation": {"size": [2, 2], "counts": "~"}}, "is not a run-length encoding of COCO"),
         ({"segmentation": {"size": [9**9, 9**9], "counts": []}}, "more than the limit of 64"),
     ],
@@ -249,7 +249,7 @@ def test_cvat_shapes_with_an_area_are_objects():
     assert c[:2] == ("c", pytest.approx(np.pi * 2, rel=5e-3))
     assert mask == ("L", 5.0, (11, -24, 14, -21))
     assert found.notes == (
-        "Left out because they enclose no area or are no objects: lines (1), points (1).",
+        "Left out because they enclose no area or are not objects: lines (1), points (1).",
     )
 
 

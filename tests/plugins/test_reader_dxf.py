@@ -94,7 +94,7 @@ def test_lines_of_no_length_are_left_out_with_a_note(drawing):
     found = read(drawing)
     assert found.lines == ()
     assert found.notes == (
-        "Left out because they enclose no area or are no objects: empty lines (1).",
+        "Left out because they enclose no area or are not objects: empty lines (1).",
     )
 
 

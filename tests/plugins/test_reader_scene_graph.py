@@ -100,7 +100,7 @@ def test_an_object_without_a_box_is_left_out_with_a_note():
     )
     assert [polygon.label for polygon in found.polygons] == ["c"]
     assert found.notes == (
-        "Left out because they enclose no area or are no objects: "
+        "Left out because they enclose no area or are not objects: "
         "objects without a bounding box (2).",
     )
 

@@ -109,7 +109,7 @@ def test_a_name_that_two_distributions_offer_is_refused_with_both(show):
     code, said = show("acme", "zeta")
     assert code == 2
     assert said == (
-        "sketchmatch: 'hill-climb' is offered by acme 1.2 and zeta 1.2, and cannot be selected; "
+        "sketchmatch: 'hill-climb' is offered by acme 1.2 and zeta 1.2, so it cannot be selected; "
         "uninstall one of them\n"
     )
 

@@ -265,9 +265,12 @@ DEEP = "has tables or lists nested more than 50 deep"
     [
         (lambda path: path.write_bytes(b"\xff"), "is not UTF-8 text; save it as UTF-8"),
         (lambda path: path.mkdir(), "is a directory; give a file in it"),
-        (lambda path: path.symlink_to("/dev/zero"), "has more than 1024 KiB; give a configuration"),
-        (lambda path: path.write_text(f"a = {'[' * 9999}"), f"{DEEP}; give a configuration"),
-        (lambda path: path.write_text(f"[{'a.' * 60}a]"), f"{DEEP}; give a configuration"),
+        (
+            lambda path: path.symlink_to("/dev/zero"),
+            "has more than 1024 KiB; give a configuration file",
+        ),
+        (lambda path: path.write_text(f"a = {'[' * 9999}"), f"{DEEP}; give a configuration file"),
+        (lambda path: path.write_text(f"[{'a.' * 60}a]"), f"{DEEP}; give a configuration file"),
     ],
 )
 def test_a_file_that_cannot_be_read_is_refused(tmp_path, make, sentence):
@@ -460,7 +463,7 @@ def test_check_finds_distributions_that_are_named_in_vain(file, monkeypatch, tex
         ("localhost:-1", "end with a port from 0 to 65535"),
         ("localhost:²", "end with a port from 0 to 65535"),
         ("dns:///localhost:1", "be HOST:PORT and not a URL"),
-        (f"unix:/{'x' * 107}", "a path of at most 107 bytes"),
+        (f"unix:/{'x' * 107}", "name a file by a path of at most 107 bytes"),
         ("unix:", "name a file"),
     ],
 )

@@ -426,7 +426,7 @@ def test_a_map_has_three_lines_all_different(partners, words):
         (math.nan, None, None, "probability of a map is nan, not a number"),
         (None, None, -0.5, "elsewhere is -0.5, not a number within 0 … 1"),
         (None, 1.5, None, "it returned 1.5, which is more than 1"),
-        (0.6, 0.5, None, "right with probability 0.6, and one of its lines with 0.5"),
+        (0.6, 0.5, None, "right with probability 0.6, but one of its lines only with 0.5"),
         (0.6, None, 0.5, "right with probability 0.6, but the place is another one with 0.5"),
     ],
 )

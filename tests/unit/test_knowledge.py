@@ -142,7 +142,7 @@ def test_labels_that_are_many_or_none_are_told_in_short():
 
 def test_two_objects_that_only_one_may_take_leave_no_map_unless_one_may_stay_alone():
     pins = [Pin(a, c, excluded=True) for a in (0, 1) for c in range(1, 5)]
-    assert refused(*pins).startswith("pins leave no map in which every object of the sketch")
+    assert refused(*pins).startswith("pins leave no object map in which every object of the sketch")
     assert known(*pins, partial=True).allowed.sum() == 12
 
 

@@ -315,7 +315,11 @@ def discovered_beside(folder, monkeypatch):
         ("exit", "acme-exit", "SystemExit: 3"),
         ("kbd", "acme-kbd", "KeyboardInterrupt"),
         ("missingmod", "acme-missing", "ModuleNotFoundError: "),
-        ("noname", "acme-noname", "its METADATA cannot be read (ValueError: it has no Name); inst"),
+        (
+            "noname",
+            "acme-noname",
+            "its METADATA cannot be read (ValueError: its metadata has no Name); inst",
+        ),
         ("recur", "acme-recur", "RecursionError: "),
         ("syntax", "acme-syntax", "SyntaxError: "),
         ("ver", "acme-ver", "ValueError: it offers no algorithm"),

@@ -77,7 +77,7 @@ def test_an_unknown_stage_is_refused_with_the_choices():
 def test_an_unknown_algorithm_is_refused_with_the_choices(stage):
     error = refused({stage: Choice("best")})
     assert (error.reason, error.field) == (Reason.UNKNOWN_ALGORITHM, f"{stage}.name")
-    assert f"is 'best', which is no {stage}; choose one of: " in error.problem
+    assert f"is 'best', which is not a {stage}; choose one of: " in error.problem
 
 
 def test_an_algorithm_of_another_kind_is_unknown():

@@ -209,7 +209,7 @@ def test_many_rows_are_as_each_alone():
         ([1.0, 2.0, 3.0], r"has shape \(3,\); give one number for each of an even count"),
         ([1.0, 2.0], "4 or more"),
         (np.zeros((2, 8)), r"has shape \(2, 8\)"),
-        ([1.0, -1.0, 0.0, 0.0], "negative; give forces"),
+        ([1.0, -1.0, 0.0, 0.0], "has values that are negative"),
         ([1.0, math.nan, 0.0, 0.0], "or not finite"),
         ([1.0, 1j, 0.0, 0.0], r"give a list of real numbers"),
         ("abcd", "is 'abcd'; give a list of real numbers"),
