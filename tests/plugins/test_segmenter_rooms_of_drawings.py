@@ -677,6 +677,39 @@ def test_a_wall_is_no_dimension():
     assert not dimensions([np.array(line, dtype=float) for line in [round_, *ends]])
 
 
+APART = [box(x, y, 4, 3) for y in (0, 3.6) for x in (0, 4.6, 9.2)]
+"""Rooms that are shapes of their own, with space between them."""
+
+
+def lettered(lines, letters):
+    middles = [tuple(np.mean(line[:-1], axis=0).tolist()) for line in lines]
+    pairs = zip(letters, middles, strict=False)
+    return named(lines, *((letter, at, 0.3) for letter, at in pairs))
+
+
+@SLOW
+@pytest.mark.parametrize("frame", [[], [box(-2, -2, 17.2, 10.6)]])
+def test_space_between_rooms_that_are_shapes_with_names_is_none(frame):
+    found = segmented(lettered([*APART, *frame], "ABCDEF"))
+    assert sorted(item.label for item in found.scene.objects) == [*"ABCDEF"]
+    assert "left out, having no name" in " ".join(found.warnings)
+    assert {k for pair in found.passages for k in pair} <= {*range(6)}
+    # It is a room if it has a name, too, or few of the others have one.
+    assert len(segmented(lettered([*APART, *frame], "ABC")).scene) > 6
+    hall = Landmark("hall", (6.6, 3.3), "room", 0.3)
+    source = lettered([*APART, *frame], "ABCDEF")
+    source = replace(source, landmarks=(*source.landmarks, hall))
+    assert "hall" in [item.label for item in segmented(source).scene.objects]
+
+
+@SLOW
+def test_a_room_without_a_name_that_walls_bound_is_no_space_between_shapes():
+    walls = [[(14, -1), (20, -1), (20, 3), (14, 3), (14, -0.8)]]
+    walls += [[(20, 3), (20, 7), (14, 7), (14, 3)]]
+    found = segmented(lettered([*APART, *walls], "ABCDEF"))
+    assert sorted(item.label for item in found.scene.objects) == ["", "", *"ABCDEF"]
+
+
 @pytest.mark.slow
 def test_small_holes_of_walls_are_rooms_though_larger_ones_open_into_each_other():
     small = [box(1.5 * x, 1.5 * y, 1.49, 1.49) for x in range(6) for y in range(4)]

@@ -55,6 +55,7 @@ from sketchmatch_builtin.segmenters._plan_things import (
     within,
 )
 from sketchmatch_builtin.segmenters._plans import Plan, drawn, lines_of
+from sketchmatch_builtin.segmenters._spaces import spaces_between
 from sketchmatch_builtin.segmenters._swings import is_swing
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 
@@ -111,10 +112,11 @@ class RoomSegmenter(Segmenter):
     bound rooms; nor is what a later, opaque filling hides of an outline. Small closed strokes are
     furniture if they stand free in a room, or at its walls while rooms open into each other; evenly
     spaced parallel lines are ruled paper, many of them or a thin grid of few, and a separate
-    straight line with ticks at both ends is a dimension. A match may use another cut, where free
-    space becomes less than 0.4 or 0.6 times as wide. A room is named by the largest text in it that
-    is not a measure or a compass's letter, or else by a label that only one line has. If polygons
-    come with texts, as from DXF, their labels are those of layers and blocks.
+    straight line with ticks at both ends is a dimension. If the rooms are shapes of their own with
+    names, what is left between them without a name is no room. A match may use another cut, where
+    free space becomes less than 0.4 or 0.6 times as wide. A room is named by the largest text in it
+    that is not a measure or a compass's letter, or else by a label that only one line has. If
+    polygons come with texts, as from DXF, their labels are those of layers and blocks.
 
     Rooms come in reading order: by their highest point from the top down, then from the left. An
     entry of the map's file with the type ``room`` names the room in which its place lies.
@@ -367,11 +369,17 @@ class RoomSegmenter(Segmenter):
         area = least * plan.cell**2
         found, passages = self._outlines(plan.free | plan.doors, parts, area, plan.cell, path, cut)
         rooms = [[plan.cell * ring + plan.corner for ring in _rings(room)] for room in found]
-        labels, warnings = _named(
-            [shapely.Polygon(outer, inner) for outer, *inner in rooms], source
+        areas = [shapely.Polygon(outer, inner) for outer, *inner in rooms]
+        labels, warnings = _named(areas, source)
+        lines = () if isinstance(source, Image) else lines_of(source)
+        spaces = spaces_between(areas, labels, lines)
+        kept = [k for k in range(len(rooms)) if k not in spaces]
+        place = {k: n for n, k in enumerate(kept)}
+        return Segmentation(
+            Scene(tuple(SceneObject.from_rings(rooms[k], labels[k]) for k in kept)),
+            (*warnings, *_without_spaces(len(spaces))),
+            passages=tuple((place[a], place[b]) for a, b in passages if a in place and b in place),
         )
-        objects = map(SceneObject.from_rings, rooms, labels)
-        return Segmentation(Scene(tuple(objects)), warnings, passages=passages)
 
     def _outlines(
         self,
@@ -438,6 +446,14 @@ def _named(
         "around",
         "the drawing",
     )
+
+
+def _without_spaces(count: int) -> tuple[str, ...]:
+    """Return what is said of spaces that are no rooms."""
+    if not count:
+        return ()
+    spaces = "A space" if count == 1 else f"{count} spaces"
+    return (f"{spaces} between rooms that are shapes with names: left out, having no name.",)
 
 
 def _called(source: StrokeSet | PolygonSet) -> list[Landmark]:
