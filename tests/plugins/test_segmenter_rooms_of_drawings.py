@@ -487,6 +487,27 @@ def test_a_door_of_which_both_sides_are_drawn_closes_where_a_wall_is():
     assert leaf == pytest.approx(np.array([[3.92, 0], [4.88, 0]]), abs=1e-6)
 
 
+def test_an_arc_alone_is_a_door_where_walls_are_at_its_hinge_and_a_tip():
+    wall, beyond = np.array([[0.0, 0], [4, 0]]), np.array([[4.8, 0.0], [9, 0]])
+    arc = np.array(quarter((4, 0), (0, 1), (1, 0)))
+    left, (leaf,) = doors_apart([wall, arc, beyond])
+    assert len(left) == 2
+    assert leaf == pytest.approx(np.array([[3.92, 0], [4.88, 0]]), abs=1e-6)
+    # In a corner it opens along another wall.
+    left, (again,) = doors_apart([wall, np.array([[4.0, 0], [4, 3]]), arc, beyond])
+    assert (len(left), again.tolist()) == (3, leaf.tolist())
+    # A wall that goes on there is closed already.
+    left, closed = doors_apart([np.array([[0.0, 0], [9, 0]]), arc])
+    assert (len(left), len(closed)) == (1, 0)
+
+
+@pytest.mark.parametrize("lines", [[[(0, 0), (4, 0)], [(4.8, 0.8), (9, 3)]], [[(4.8, 0), (9, 0)]]])
+def test_an_arc_alone_is_no_door_without_a_wall_at_its_hinge_and_a_tip(lines):
+    arc = quarter((4, 0), (0, 1), (1, 0))
+    left, closed = doors_apart([np.array(line, dtype=float) for line in [*lines, arc]])
+    assert (len(left), len(closed)) == (len(lines) + 1, 0)
+
+
 def test_doors_are_not_looked_for_in_a_scribble_without_end():
     rng = np.random.default_rng(0)
     scribble = [np.cumsum(rng.normal(size=(2001, 2)), axis=0) for _ in range(100)]

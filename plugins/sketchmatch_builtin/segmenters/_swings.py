@@ -70,7 +70,8 @@ def doors_apart(lines: Sequence[FloatArray]) -> tuple[list[FloatArray], list[Flo
     """Return lines without the leaves of doors and the arcs at these, and these doors closed.
 
     An arc is one if a straight line leads from its middle to one of its ends, as does the leaf. A
-    leaf may be a narrow box, the arc and it one line, and that closed.
+    leaf may be a narrow box, the arc and it one line, and that closed. It may also be left out, if
+    a wall is at the arc's middle and another, or the same, at one of its ends.
 
     Parameters
     ----------
@@ -94,14 +95,19 @@ def doors_apart(lines: Sequence[FloatArray]) -> tuple[list[FloatArray], list[Flo
     may = (chords > 0.0) & (chords < 2.0 * widest) & (pieces.last - pieces.first > 1)
     found = [_arc(k, _points(rolled, pieces, k)) for k in np.flatnonzero(may).tolist()]
     arcs = [arc for arc in found if arc and _NARROWEST * span <= arc.radius <= widest]
-    swings = list(_swings(arcs, rolled, pieces)) if 0 < len(arcs) <= _MOST_ARCS else []
+    if not 0 < len(arcs) <= _MOST_ARCS:
+        return list(lines), []
+    swings = list(_swings(arcs, rolled, pieces))
     dropped = {k for arc, leaves in swings for k in (arc.piece, *leaves[0], *leaves[1])}
-    left = _left(rolled, lines, pieces, dropped)
-    walls = shapely.MultiLineString([line for line in left if len(line) > 1])
-    return left, [
-        _closed(arc, pieces.ends[arc.piece], [bool(each) for each in leaves], walls)
-        for arc, leaves in swings
-    ]
+    alone = [arc for arc in arcs if arc.piece not in dropped]
+    walls = _together(_left(rolled, lines, pieces, dropped.union(arc.piece for arc in alone)))
+    hung = [(arc, _gap(arc, pieces.ends[arc.piece], walls)) for arc in alone]
+    hung = [(arc, gap) for arc, gap in hung if gap is not None]
+    left = _left(rolled, lines, pieces, dropped.union(arc.piece for arc, _ in hung))
+    walls = _together(left)
+    closing = [(arc, [bool(each) for each in leaves]) for arc, leaves in swings]
+    closing += [(arc, [False, False]) for arc, gap in hung if gap]
+    return left, [_closed(arc, pieces.ends[arc.piece], leaves, walls) for arc, leaves in closing]
 
 
 def is_swing(line: FloatArray) -> bool:
@@ -217,6 +223,23 @@ def _between(sides: list[int], ends: FloatArray, near: float, pieces: _Pieces) -
             if (away <= near).all(axis=0).any():
                 found.append(k)
     return found
+
+
+def _gap(arc: _Arc, tips: FloatArray, walls: shapely.Geometry) -> bool | None:
+    """Return whether a door, drawn as an arc alone, closes a gap; None if it is no door.
+
+    Walls are at the hinge and at a tip. There is no gap if a wall goes on between these; round a
+    corner of walls, without one, is something else.
+    """
+    spots = np.stack([arc.hinge, *tips, *((arc.hinge + tips) / 2.0)])
+    away = np.asarray(shapely.distance(shapely.points(spots), walls) / arc.radius)
+    met = away[1:3] <= _MEETS
+    gap = bool((met & (away[3:] >= _BEYOND)).any())
+    return gap if away[0] <= _MEETS and met.any() and (gap or not met.all()) else None
+
+
+def _together(lines: Sequence[FloatArray]) -> shapely.Geometry:
+    return shapely.MultiLineString([line for line in lines if len(line) > 1])
 
 
 def _closed(

@@ -107,16 +107,17 @@ class RoomSegmenter(Segmenter):
     a picture, in which either the walls or the free space may be dark; what joins the picture's
     border is outside. Metres are unknown there, so everything is measured relative to the drawing:
     free space is cut where it becomes less than half as wide [2]_, at doors as well as where a
-    corridor opens into a hall. A drawn door, a leaf with its swing arc, is closed: it is not a
-    wall, and a room ends there. Dashed lines, such as beams, rugs and axes, are not walls if others
-    bound rooms; nor is what a later, opaque filling hides of an outline. Small closed strokes are
-    furniture if they stand free in a room, or at its walls while rooms open into each other; evenly
-    spaced parallel lines are ruled paper, many of them or a thin grid of few, and a separate
-    straight line with ticks at both ends is a dimension. If the rooms are shapes of their own with
-    names, what is left between them without a name is no room. A match may use another cut, where
-    free space becomes less than 0.4 or 0.6 times as wide. A room is named by the largest text in it
-    that is not a measure or a compass's letter, or else by a label that only one line has. If
-    polygons come with texts, as from DXF, their labels are those of layers and blocks.
+    corridor opens into a hall. A drawn door, a leaf with its swing arc or an arc alone with walls
+    at its middle and an end, is closed: it is not a wall, and a room ends there. Dashed lines, such
+    as beams, rugs and axes, are not walls if others bound rooms; nor is what a later, opaque
+    filling hides of an outline. Small closed strokes are furniture if they stand free in a room, or
+    at its walls while rooms open into each other; evenly spaced parallel lines are ruled paper,
+    many of them or a thin grid of few, and a separate straight line with ticks at both ends is a
+    dimension. If the rooms are shapes of their own with names, what is left between them without a
+    name is no room. A match may use another cut, where free space becomes less than 0.4 or 0.6
+    times as wide. A room is named by the largest text in it that is not a measure or a compass's
+    letter, or else by a label that only one line has. If polygons come with texts, as from DXF,
+    their labels are those of layers and blocks.
 
     Rooms come in reading order: by their highest point from the top down, then from the left. An
     entry of the map's file with the type ``room`` names the room in which its place lies.
