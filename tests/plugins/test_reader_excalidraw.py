@@ -12,6 +12,7 @@ from sketchmatch.pipeline.segment import segment
 from sketchmatch.pipeline.selection import Choice, resolve_segmenter
 from sketchmatch.registry import default_registry
 from sketchmatch_builtin.readers.excalidraw import ExcalidrawReader
+from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
 from tests.pace import within
 from tests.tools import ROOT
 
@@ -88,6 +89,49 @@ def test_a_text_names_the_shape_that_it_is_bound_to_grouped_with_or_over():
         element("text", 5000, 100, 20, 10, id="f", text="a title"),
     )
     assert [s.label for s in found.strokes] == ["living room", "desk", "bed", "sofa"]
+
+
+def test_all_texts_but_those_of_arrows_are_names_of_rooms():
+    found = read(
+        element("line", points=[[0, 0], [10, 0]], id="a"),
+        element("arrow", id="b", points=[[0, 0], [10, 0]]),
+        element("text", 10, 20, 40, 10, text="dining\nroom", fontSize=20),
+        element("text", 0, 0, text="bound", containerId="a", fontSize="?"),
+        element("text", 0, 0, text="3 m", containerId="b"),
+        element("text", 0, 0, text=" "),
+    )
+    assert [(each.name, each.point, each.size) for each in found.landmarks] == [
+        ("dining room", (30.0, -25.0), 20.0),
+        ("bound", (50.0, -25.0), 0.0),
+    ]
+    assert not found.strokes[0].label.startswith("3 m")
+
+
+@pytest.mark.parametrize(
+    ("more", "dashed", "opaque"),
+    [
+        ({}, False, False),
+        ({"strokeStyle": "dashed"}, True, False),
+        ({"strokeStyle": "dotted", "backgroundColor": "#ffc9c9"}, False, True),
+        ({"backgroundColor": "#ffc9c9", "fillStyle": "solid"}, False, True),
+        ({"backgroundColor": "#ffc9c980", "fillStyle": "solid"}, False, False),
+        ({"backgroundColor": "#ffc9c9", "fillStyle": "hachure"}, False, False),
+        ({"backgroundColor": "#ffc9c9", "fillStyle": "solid", "opacity": 50}, False, False),
+    ],
+)
+def test_lines_with_gaps_and_fillings_are_known(more, dashed, opaque):
+    (stroke,) = read(element("rectangle", strokeWidth=4, **{"fillStyle": "solid", **more})).strokes
+    assert (stroke.dashed, stroke.opaque, stroke.width) == (dashed, opaque, 4.0)
+
+
+@pytest.mark.slow
+def test_rooms_of_a_plan_of_lines_have_the_names_written_in_them():
+    walls = element("rectangle", width=600, height=400)
+    between = element("line", 300, 0, points=[[0, 0], [0, 400]])
+    rug = element("rectangle", 40, 40, 200, 320, strokeStyle="dashed")
+    texts = [element("text", x, 190, 40, 20, text=text) for x, text in ((130, "a"), (430, "b"))]
+    found = RoomSegmenter().segment(read(walls, between, rug, *texts))
+    assert [item.label for item in found.scene.objects] == ["a", "b"]
 
 
 def test_arrows_pictures_and_what_nobody_sees_are_no_strokes():

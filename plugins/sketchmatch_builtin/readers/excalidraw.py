@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +21,7 @@ from sketchmatch.api.documents import (
     sequence,
     shown,
 )
-from sketchmatch.model import FloatArray, Stroke, StrokeSet
+from sketchmatch.model import FloatArray, Landmark, Stroke, StrokeSet
 from sketchmatch.model.limits import check_vertices
 
 from ._areas import box, check_elements, ellipse, within_reach
@@ -41,6 +42,10 @@ _OTHERS = {
 # As Excalidraw rounds corners: by a share of the smaller side, or by a length where that is less.
 _ROUND_SHARE, _ROUND_LENGTH = 0.25, 32.0
 _ARC, _CURVE = 6, 8
+# A colour of four parts, of which the last, how much is seen of it, is not all.
+_SEEN_THROUGH = re.compile(
+    r"#[0-9a-f]{6}(?!ff)[0-9a-f]{2}|#[0-9a-f]{3}(?!f)[0-9a-f]", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,14 +68,21 @@ class _Element:
             return otherwise
         return number(value, f"{self.field}.{key}", _STROKE)
 
+    def size(self, key: str) -> float:
+        """Return what is not needed to read a drawing: 0 where it is no size."""
+        value = self.data.get(key)
+        known = isinstance(value, (int, float)) and math.isfinite(value)
+        return max(float(value), 0.0) if known else 0.0
+
 
 class ExcalidrawReader(Reader):
     """Reads the shapes of a drawing as strokes, whether drawn by hand or not.
 
     Rectangles, ellipses, diamonds, lines and freehand strokes are strokes, in their order; arrows,
     pictures and what was deleted or is invisible are not. A text that is bound to a shape, grouped
-    with one alone, or lies over it is the shape's name. Frames are no shapes; their names choose
-    what is read, as in ``house.excalidraw#kitchen``.
+    with one alone, or lies over it is the shape's name, and all texts but those of arrows are names
+    of rooms to the segmenter ``rooms``, to which lines with gaps are no walls. Frames are no
+    shapes; their names choose what is read, as in ``house.excalidraw#kitchen``.
 
     References
     ----------
@@ -110,12 +122,24 @@ class ExcalidrawReader(Reader):
             raise InvalidInputError(
                 _STROKE, "elements", "has no shape in it; draw rectangles, ellipses or strokes"
             )
-        names = _names([each for each in inside if each.kind == "text"], shapes, outlines)
+        texts = [each for each in inside if each.kind == "text"]
+        names = _names(texts, shapes, outlines)
         strokes = (
-            Stroke(outline * (1.0, -1.0), None, " ".join(names.get(k, ())))
-            for k, outline in enumerate(outlines)
+            Stroke(
+                outline * (1.0, -1.0),
+                None,
+                " ".join(names.get(k, ())),
+                _dashed(each),
+                each.size("strokeWidth"),
+                _opaque(each),
+            )
+            for k, (each, outline) in enumerate(zip(shapes, outlines, strict=True))
         )
-        return StrokeSet(tuple(strokes), tuple(_notes(inside, frames, part)))
+        held = {each.id for each in shapes}
+        free = [each for each in texts if each.data.get("containerId") in (None, *held)]
+        return StrokeSet(
+            tuple(strokes), tuple(_notes(inside, frames, part)), tuple(_landmarks(free))
+        )
 
 
 def _elements(document: dict[str, Any]) -> Iterator[_Element]:
@@ -152,6 +176,34 @@ def _visible(each: _Element) -> bool:
         return False
     paints = (each.data.get("strokeColor", "#000000"), each.data.get("backgroundColor"))
     return any(paint not in (None, "", "transparent") for paint in paints)
+
+
+def _dashed(each: _Element) -> bool:
+    """Whether nothing of an element is seen but a line with gaps."""
+    empty = each.data.get("backgroundColor") in (None, "", "transparent")
+    return empty and each.data.get("strokeStyle") in ("dashed", "dotted")
+
+
+def _opaque(each: _Element) -> bool:
+    """Whether a shape hides what was drawn there before."""
+    paint = each.text("backgroundColor")
+    plain = paint not in ("", "transparent") and not _SEEN_THROUGH.fullmatch(paint)
+    solid = each.data.get("fillStyle") == "solid" and each.data.get("opacity", 100) == 100
+    return each.kind in _CLOSED and plain and solid
+
+
+def _landmarks(texts: Sequence[_Element]) -> Iterator[Landmark]:
+    """Yield what texts say, in their middles."""
+    for each in texts:
+        name = " ".join((each.text("originalText") or each.text("text")).split())
+        if name:
+            x, y = _middle(each)
+            yield Landmark(name, (x, -y), "room", each.size("fontSize"))
+
+
+def _middle(text: _Element) -> tuple[float, float]:
+    x, y, width, height = (text.number(key, 0.0) for key in ("x", "y", "width", "height"))
+    return x + width / 2, y + height / 2
 
 
 def _notes(elements: Sequence[_Element], frames: dict[str, str], part: str) -> Iterator[str]:
@@ -280,9 +332,7 @@ class _Places:
             members = self._by_group.get(group, [])
             if len(members) == 1:
                 return members[0]
-        x = text.number("x") + text.number("width", 0.0) / 2
-        y = text.number("y") + text.number("height", 0.0) / 2
-        found = hulls.query(shapely.Point(x, y), predicate="within")
+        found = hulls.query(shapely.Point(_middle(text)), predicate="within")
         areas = {int(k): hulls.geometries[k].area for k in np.sort(found)}
         return min((k for k in areas if areas[k] > 0.0), key=areas.__getitem__, default=None)
 
