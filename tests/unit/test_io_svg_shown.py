@@ -869,3 +869,54 @@ DIAGRAM = """<rect width="80" height="60" fill="white" stroke="black"/><switch>
 def test_the_text_in_a_shape_without_a_name_is_its_name():
     scene = StrokeSegmenter().segment(decoded(DIAGRAM)).scene
     assert scene.labels == ("desk", "sofa", "")
+
+
+HTML = 'xmlns="http://www.w3.org/1999/xhtml"'
+
+
+@pytest.mark.parametrize(
+    ("body", "said", "point", "size"),
+    [
+        (
+            f'<foreignObject x="10" y="20" width="40" height="20"><div {HTML}>desk</div>'
+            "</foreignObject>",
+            "desk",
+            (30, -30),
+            16,
+        ),
+        (  # as Mermaid writes
+            '<g transform="translate(100,50)"><foreignObject width="40" height="20">'
+            f"<div {HTML}><style>p {{}}</style><span><p>living</p><p>ro<b>om</b></p></span></div>"
+            "</foreignObject></g>",
+            "living room",
+            (120, -60),
+            16,
+        ),
+        (  # as tldraw writes, with large letters
+            '<g transform="scale(2)"><foreignObject x="5" y="5" width="10" height="10">'
+            f'<div {HTML} style="font-size: 22px">a<br/>b</div></foreignObject></g>',
+            "a b",
+            (20, -20),
+            44,
+        ),
+        (  # as draw.io writes, with a picture for those who read no HTML
+            '<switch><foreignObject width="100%" height="100%">'
+            f'<div {HTML} style="margin-left: 9px">bed</div></foreignObject>'
+            '<image x="40" y="30" width="20" height="10" xlink:href="data:,"/></switch>',
+            "bed",
+            (50, -35),
+            16,
+        ),
+    ],
+)
+def test_what_is_written_as_html_is_read_in_the_middle_of_its_box(body, said, point, size):
+    (found,) = decoded(KEPT + body).landmarks
+    assert (found.name, found.point, found.size) == (said, point, size)
+
+
+@pytest.mark.parametrize(
+    "box", ['width="100%" height="9"', 'width="x"', 'visibility="hidden" width="9" height="9"']
+)
+def test_html_that_is_nobody_knows_where_or_not_seen_is_no_name(box):
+    body = f"<foreignObject {box}><div {HTML}>desk</div></foreignObject>"
+    assert not decoded(KEPT + body).landmarks

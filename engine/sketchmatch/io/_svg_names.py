@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from sketchmatch.io._svg_tree import tag_of
 from sketchmatch.model import Landmark
 
-__all__ = ["goes_on", "groups_label", "label_of", "written_in"]
+__all__ = ["goes_on", "groups_label", "html_in", "label_of", "size_of_html", "written_in"]
 
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 _NAMES = ("aria-label", f"{_INKSCAPE}label", "{http://www.serif.com/}id", "data-name")
@@ -31,6 +31,11 @@ _ESCAPED = re.compile(r"_x([0-9A-F]{2,5})_", re.IGNORECASE)
 # Of the height of letters: how far apart the lines of a name are at most, and those of one that
 # ends or begins with a sign that joins words, and how far aside the next line begins.
 _SPACED, _SPACED_JOINED, _ASIDE = 1.6, 2.2, 0.1
+# Elements of HTML that part no lines, and how large their letters are.
+_WITHIN_LINES = frozenset(
+    ("a", "b", "code", "em", "font", "i", "span", "strong", "sub", "sup", "u")
+)
+_FONT_SIZE = re.compile(r"font-size:\s*(\d+(?:\.\d+)?)px", re.IGNORECASE)
 _JOINED = re.compile(r"[/&+,-]\n|\n[/&+]")
 
 
@@ -69,6 +74,32 @@ def written_in(text: ElementTree.Element) -> str:
         said += f" {part}" if line != last else part
         last = line
     return _spaced(said)
+
+
+def html_in(element: ElementTree.Element) -> str:
+    """Return what is written as HTML in an element, its lines with spaces between them."""
+    return _spaced("".join(_html_of(element)))
+
+
+def _html_of(element: ElementTree.Element) -> Iterator[str]:
+    """Yield the words of an element, and what parts those of its lines."""
+    tag = tag_of(element)
+    if tag in ("", "style", "script"):
+        return
+    apart = "" if tag in _WITHIN_LINES else " "
+    yield apart + (element.text or "")
+    for child in element:
+        yield from _html_of(child)
+        yield child.tail or ""
+    yield apart
+
+
+def size_of_html(element: ElementTree.Element) -> float:
+    """Return how high the largest letters of HTML in an element are; 0 if it does not tell."""
+    styles = (each.get("style", "") for each in element.iter())
+    return max(
+        (float(found[1]) for text in styles for found in _FONT_SIZE.finditer(text)), default=0.0
+    )
 
 
 def goes_on(

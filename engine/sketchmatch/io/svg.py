@@ -3,9 +3,9 @@
 What a browser shows becomes strokes, as it shows it: every ``path``, ``line``, ``polyline``,
 ``polygon``, ``rect``, ``circle`` and ``ellipse`` one, every further subpath one more, with all
 transforms applied and y turned up; a closed shape repeats its first point, and so does an open one
-that is filled. ``use``, ``symbol`` and nested ``svg`` are followed within the document. Text and
-pictures are ignored. Coordinates are user units: ``viewBox`` scales a drawing as a whole, which a
-match does not see, unless it stretches it.
+that is filled. ``use``, ``symbol`` and nested ``svg`` are followed within the document. Pictures
+are ignored; texts, also those written as HTML, are names of places. Coordinates are user units:
+``viewBox`` scales a drawing as a whole, which a match does not see, unless it stretches it.
 
 Style sheets, ``style`` and attributes decide alike: what has neither a line nor a filling that
 could be seen is no shape, nor is what ``display``, ``visibility``, ``opacity``, a clip, ``switch``
@@ -51,7 +51,14 @@ from sketchmatch.io._svg_curves import (
     subpaths_of,
 )
 from sketchmatch.io._svg_frame import NUMBER, Frame, css_transform, fitted, length, view_box
-from sketchmatch.io._svg_names import goes_on, groups_label, label_of, written_in
+from sketchmatch.io._svg_names import (
+    goes_on,
+    groups_label,
+    html_in,
+    label_of,
+    size_of_html,
+    written_in,
+)
 from sketchmatch.io._svg_shapes import (
     Box,
     Shape,
@@ -71,6 +78,8 @@ __all__ = ["decode_svg"]
 
 _DRAWN = {*SHAPES, "svg", "g", "a", "switch", "use"}
 _VIEWPORTS = {"svg", "symbol"}
+_HTML = "foreignObject"
+_WRITTEN = {"text", _HTML}
 _HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
 _EXCALIDRAW = b"svg-source:excalidraw"
 _COMMAND = re.compile(r"([MLHVCSQTAZ])([^MLHVCSQTAZ]*)", re.IGNORECASE)
@@ -225,7 +234,7 @@ class _Drawing:
             look = self._styles.look(element, outer.look)
             if not look.displayed or not _for_us(element):
                 continue
-            if tag_of(element) == "text":
+            if tag_of(element) in _WRITTEN:
                 self._name(element, look, outer)
                 continue
             inner = replace(
@@ -259,6 +268,10 @@ class _Drawing:
 
     def _name(self, text: ElementTree.Element, look: Look, context: _Context) -> None:
         """Add what a text says to the names, or to the last of them."""
+        if tag_of(text) == _HTML:
+            self._above = None
+            self.names.extend(self._written_html(text, look, context))
+            return
         for line in self._written(text, look, context):
             name = line
             if self._above and goes_on(*self._above, text, line):
@@ -293,6 +306,29 @@ class _Drawing:
         except (ValueError, IndexError, TypeError):
             return
         size = _scale(own) * max(shown.font_size for _, shown in placed)
+        if look.visible and name and all(map(math.isfinite, (point.x, point.y, size))):
+            yield Landmark(name, (float(point.x), -float(point.y)), "room", size)
+
+    def _written_html(
+        self, html: ElementTree.Element, look: Look, context: _Context
+    ) -> Iterator[Landmark]:
+        """Yield what is written as HTML, in the middle of its box, unless that is not known.
+
+        Where a picture stands for it, for those who read none, the box is the picture's.
+        """
+        name = html_in(html)
+        others = [*self._parents[html]] if tag_of(self._parents[html]) == "switch" else []
+        boxed = next((each for each in others if tag_of(each) == "image"), html)
+        try:
+            own = svgelements.Matrix(html.get("transform", "")) * context.matrix
+            x, y, width, height = (
+                length(boxed.get(side, "0"), None, look.font_size)
+                for side in ("x", "y", "width", "height")
+            )
+            point = own.point_in_matrix_space((x + width / 2.0, y + height / 2.0))
+        except (ValueError, IndexError, TypeError):
+            return
+        size = _scale(own) * (size_of_html(html) or look.font_size)
         if look.visible and name and all(map(math.isfinite, (point.x, point.y, size))):
             yield Landmark(name, (float(point.x), -float(point.y)), "room", size)
 
@@ -356,11 +392,13 @@ class _Drawing:
                 size=(element.get("width"), element.get("height")),
                 used=context.used | {target},
             )
-        children = [child for child in element if tag_of(child) in {*_DRAWN, "text"}]
+        children = [child for child in element if tag_of(child) in {*_DRAWN, *_WRITTEN}]
         if tag_of(element) == "switch":
-            # What is written as HTML is written once more, as text, for those who read none.
-            able = (child for child in element if tag_of(child) not in ("", "foreignObject"))
+            # What is written as HTML is mostly written once more, as text, for those who read none.
+            able = (child for child in element if tag_of(child) not in ("", _HTML))
             shown = next((child for child in able if _for_us(child)), None)
+            if shown is None or tag_of(shown) == "image":
+                return [child for child in children if tag_of(child) == _HTML], context
             return [child for child in children if child is shown], context
         if self._excalidraw and tag_of(element) == "g":
             last = next((child for child in reversed(children) if tag_of(child) == "path"), None)
