@@ -731,6 +731,16 @@ def test_a_room_without_a_name_that_walls_bound_is_no_space_between_shapes():
     assert sorted(item.label for item in found.scene.objects) == ["", "", *"ABCDEF"]
 
 
+@SLOW
+def test_a_dashed_porch_over_a_dimension_does_not_join_it_to_the_house():
+    house = [box(0, 0, 12, 8), [(6, 0), (6, 8)]]
+    length = [[(0, -1), (12, -1)], [(0, -1.1), (0, -0.9)], [(12, -1.1), (12, -0.9)]]
+    porch = Stroke(np.array(box(2, -1.6, 4, 1.6)), dashed=True)
+    drawn = strokes([*house, *length]).strokes
+    found = segmented(StrokeSet((*drawn, porch))).scene
+    assert sorted(item.area for item in found.objects) == pytest.approx([48.0, 48.0], rel=0.05)
+
+
 @pytest.mark.slow
 def test_small_holes_of_walls_are_rooms_though_larger_ones_open_into_each_other():
     small = [box(1.5 * x, 1.5 * y, 1.49, 1.49) for x in range(6) for y in range(4)]

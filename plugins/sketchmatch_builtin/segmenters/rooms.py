@@ -290,7 +290,9 @@ class RoomSegmenter(Segmenter):
         aside = self._dashed(source)
         if len(lines) > _MOST_LINES:
             return aside
-        aside |= paper(lines, [stroke.width for stroke in source.strokes]) | dimensions(lines)
+        # What is dashed, as a porch or an axis, may cross a dimension without joining it to walls.
+        solid = [line[:0] if k in aside else line for k, line in enumerate(lines)]
+        aside |= paper(lines, [stroke.width for stroke in source.strokes]) | dimensions(solid)
         free, touching = things_in(lines, names)
         if not (free or touching):
             return aside
