@@ -25,6 +25,7 @@ from sketchmatch_builtin.segmenters._swings import doors_apart
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
 from tests.experiments.regions import HALVES, RSI, Tally, drawing, robot_map
+from tests.pace import within
 from tests.tools import ROOT, require
 
 WALLS = [
@@ -189,6 +190,12 @@ def test_texts_of_an_svg_plan_name_its_rooms(tmp_path):
 def test_measures_are_no_names(written, name):
     found = names_of_rooms([Landmark(written, (1.0, 2.0), "room", 3.0)])
     assert found == ([Landmark(name, (1.0, 2.0), "room", 3.0)] if name else [])
+
+
+@pytest.mark.parametrize("written", ["1" * 27 + "a", "m" * 38 + "!", "," * 30_000 + "a"])
+def test_long_numbers_and_signs_are_names_at_once(written):
+    with within(5):
+        assert len(names_of_rooms([Landmark(written, (0.0, 0.0), "room")])) == 1
 
 
 def test_the_letters_of_a_compass_are_no_names():

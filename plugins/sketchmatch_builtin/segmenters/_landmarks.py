@@ -21,7 +21,8 @@ _MOST_NAMED = 8
 _LONGEST_NAME = 40
 # Letters are larger that are so many times as high.
 _LARGER, _LEAST = 1.1, 1e-100
-# What a measure is made of: numbers, and what says that these are no number of a room.
+# What a measure is made of: numbers, and what says that these are no number of a room. Each looks
+# at a character once: what is possessive never tries again with less.
 _UNITS = (
     r"(?:[cm]?[mм][²2]?|qm|sqm|sq\.?\s?(?:m|ft|feet)\.?|кв\.?\s?м\.?|ft[²2]?|feet|in|㎡"
     r"|°\s?[CF]?|[℃℉%]|kwh?|lx|lux|ppm)"
@@ -29,12 +30,16 @@ _UNITS = (
 _SIGNS = r"(?:['\"′″’”]|[x×✕*]|by)"
 _UNIT = re.compile(rf"{_UNITS}|{_SIGNS}|\d[.,]\d", re.IGNORECASE)
 _MEASURE = re.compile(
-    rf"(?:\d+(?:[.,/⁄]\d+)*|{_UNITS}|{_SIGNS}|[½¼¾]|ca\.?|[\s~≈=±+:;,.()/-])+", re.IGNORECASE
+    rf"(?:\d++(?:[.,/⁄]\d++)*+|{_UNITS}|{_SIGNS}|[½¼¾]|ca\.?|[\s~≈=±+:;,.()/-])++",
+    re.IGNORECASE,
 )
 # What a compass says: it has no other letters.
 _COMPASS = frozenset("NESWO")
 # An area behind a name.
-_AREA = re.compile(rf"[\s,;:(/·|–-]+(?:ca\.?\s*)?\d+(?:[.,]\d+)?\s?{_UNITS}\)?$", re.IGNORECASE)
+_AREA = re.compile(
+    rf"(?<![\s,;:(/·|–-])[\s,;:(/·|–-]++(?:ca\.?\s*+)?\d++(?:[.,]\d++)?\s?{_UNITS}\)?$",
+    re.IGNORECASE,
+)
 
 
 def labels_of(
