@@ -10,6 +10,7 @@ import shapely
 from sketchmatch.io import read_source
 from sketchmatch.io.svg import decode_svg
 from sketchmatch_builtin.segmenters.strokes import StrokeSegmenter
+from tests.pace import within
 
 CASES = Path(__file__).parents[3] / "shared" / "data" / "cases" / "15-svg-freedraw-outline"
 needs_cases = pytest.mark.skipif(not CASES.is_dir(), reason=f"{CASES} is not here")
@@ -172,6 +173,20 @@ def test_parts_of_a_filling_that_touch_are_one():
     assert [len(each) for each in read(apart)] == [5, 5]
     (joined,) = read(apart.replace("M100", "M80"))
     assert np.ptp(joined, axis=0).tolist() == [170, 90]
+
+
+def test_a_ring_that_crosses_itself_is_one_with_what_it_touches():
+    left, right = read("M0 0L90 90V10L0 90zM80 20h90v50h-90z")  # from two triangles
+    assert [left[:, 0].max(), right[:, 0].min()] == pytest.approx([810 / 17] * 2)
+    assert right[:, 0].max() == 170
+
+
+def test_scribbles_without_end_are_outlines_each():
+    rng = np.random.default_rng(0)
+    scribbles = [rng.uniform(0, 100, (300, 2)) + 30 * k for k in range(2)]
+    with within(4):
+        found = read("".join(data_of([*ring, ring[0]]) for ring in scribbles))
+    assert [len(line) for line in found] == [301, 301]
 
 
 def test_rings_beyond_count_are_outlines_each():

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from functools import reduce
+from typing import Any
 
 import numpy as np
 import shapely
@@ -38,6 +39,9 @@ _STARTS, _PLACES, _ROUNDS = 96, 24, 8
 _FEWEST, _MOST_POINTS = 48, 1000
 # Rings of one shape that are put into each other; of more, each is an outline of its own.
 _MOST_RINGS = 2000
+# A ring that crosses itself more often is an outline of its own, too; so many sides are looked at
+# together.
+_MOST_CROSSINGS, _AT_ONCE = 300, 64
 
 
 def pen_lines(rings: list[FloatArray], corners: list[int], evenodd: bool) -> list[list[FloatArray]]:
@@ -187,9 +191,14 @@ def _outlines(
         _around(shape, rings[k]) if holes[k] else [rings[k]]
         for k, shape in zip(which, shapes, strict=True)
     ]
-    for group in _overlapping(shapes) if len(rings) <= _MOST_RINGS else []:
-        first, *others = sorted(group, key=lambda n: which[n])
-        whole = shapely.union_all([shapely.make_valid(shapes[n]) for n in group])
+    plain = [
+        n
+        for n, k in enumerate(which)
+        if shapes[n].is_valid or not any(_is_tangled(rings[j]) for j in (k, *holes[k]))
+    ]
+    for group in _overlapping([shapes[n] for n in plain]) if len(rings) <= _MOST_RINGS else []:
+        first, *others = sorted((plain[k] for k in group), key=lambda n: which[n])
+        whole = shapely.union_all([shapely.make_valid(shapes[n]) for n in (first, *others)])
         outlines[first] = [
             line
             for part in shapely.get_parts(whole)
@@ -199,6 +208,19 @@ def _outlines(
         for n in others:
             outlines[n] = []
     return outlines
+
+
+def _is_tangled(ring: FloatArray) -> bool:
+    """Whether a ring crosses itself so often that to find what is within it would take minutes."""
+    sides: Any = shapely.linestrings(np.stack([ring[:-1], ring[1:]], axis=1))
+    tree, crossings = shapely.STRtree(sides), 0
+    for k in range(0, len(sides), _AT_ONCE):
+        some = sides[k : k + _AT_ONCE]
+        # Each side meets itself and its neighbours, and what it crosses is met from there, too.
+        crossings += tree.query(some, predicate="intersects").shape[1] - 3 * len(some)
+        if crossings > 2 * _MOST_CROSSINGS:
+            return True
+    return False
 
 
 def _overlapping(shapes: list[shapely.Polygon]) -> list[list[int]]:
