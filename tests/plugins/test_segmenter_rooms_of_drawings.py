@@ -20,7 +20,8 @@ from sketchmatch.model import (
     StrokeSet,
 )
 from sketchmatch_builtin.segmenters._landmarks import names_of_rooms
-from sketchmatch_builtin.segmenters._plan_things import dimensions, paper, seen
+from sketchmatch_builtin.segmenters._plan_things import dimensions, paper, seen, things_in
+from sketchmatch_builtin.segmenters._plan_things import within as lines_within
 from sketchmatch_builtin.segmenters._swings import doors_apart
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
@@ -663,6 +664,34 @@ def test_fillings_without_an_area_hide_nothing():
     lines = [box(0, 0, 9, 8), [(1, 1), (8, 1), (1, 1)], [(2, 2)], [(1, 3), (8, 3), (4, 3), (1, 3)]]
     assert [line.tolist() for line in seen(filled(lines))] == [[[*p] for p in e] for e in lines]
     assert len(seen(filled(lines[1:2]))) == 1
+
+
+def scribble(size, points):
+    turns = np.random.default_rng(0).uniform(0.0, size, (points, 2))
+    return np.concatenate([turns, turns[:1]])
+
+
+def test_outlines_that_cross_themselves_are_whole_and_hide_nothing():
+    lines = [scribble(9.0, 800), box(0, 0, 9, 8), scribble(9.0, 800)]
+    with within(3):
+        found = seen(filled(lines))
+    assert [len(line) for line in found] == [801, 5, 801]
+
+
+def test_among_very_many_outlines_over_each_other_none_is_hidden():
+    lines = [box(0.03 * k, 0.03 * k, 9, 8) for k in range(500)]
+    with within(3):
+        assert len(seen(filled(lines))) == 500
+    assert len(seen(filled(lines[:3]))) == 3
+    assert not shapely.LineString(seen(filled(lines[:3]))[0]).is_ring
+
+
+def test_a_thing_whose_outline_has_a_knot_is_one():
+    knot = np.vstack([np.array(box(0, 0, 2, 1)[:4]), scribble(0.01, 400), [(0, 0)]])
+    walls = [np.array(box(-3, -3, 9, 8), dtype=float), np.array([(0.5, 0.5), (1.5, 0.5)])]
+    with within(3):
+        assert things_in([knot, *walls], []).free == [[0]]
+        assert lines_within([knot, *walls], [0]) == {2}
 
 
 def test_rooms_that_are_drawn_over_each_other_are_whole():

@@ -43,6 +43,8 @@ _TWICE = 1e-6
 _EVEN = 0.9
 # Of the span of all: what is nearer to the border of a filling is not hidden by it.
 _BORDER = 0.001
+# Outlines that may be hidden, times points of those that hide: of more, in some seconds, none is.
+_MOST_HIDING = 1_000_000
 # Lines of a dimension: it and what ends it.
 _FEWEST = 3
 # Of the length of a dimension line: how long what ends it is, and how far from its end that may be.
@@ -155,26 +157,31 @@ def seen(strokes: Sequence[Stroke]) -> list[FloatArray]:
     """Return the lines of strokes but for what later ones hide of large outlines.
 
     So rooms are drawn over each other. Things, small or open, are whole beneath others, and what
-    lies along the border of a filling is seen.
+    lies along the border of a filling is seen. What crosses itself hides nothing, and is whole.
     """
     lines = [stroke.points for stroke in strokes]
     closed = {
-        k: _outline(line)
+        k: shapely.Polygon(line)
         for k, line in enumerate(lines)
         if len(line) >= _CORNERS and is_closed(line)
     }
-    covers = np.array([k for k in closed if strokes[k].opaque], dtype=np.int64)
+    # What crosses itself has no inside that one could tell soon.
+    outlines = {k: outline for k, outline in closed.items() if outline.is_valid}
+    covers = np.array([k for k in outlines if strokes[k].opaque], dtype=np.int64)
     if not len(covers):
         return lines
     whole = shapely.MultiPoint(np.concatenate(lines))
     least = _LARGEST * whole.convex_hull.area
+    large = {k for k, outline in outlines.items() if outline.area > least}
+    if len(large) * sum(len(lines[k]) for k in covers) > _MOST_HIDING:
+        return lines
     inward = _BORDER * float(np.ptp(shapely.get_coordinates(whole), axis=0).max())
-    hiding = shapely.buffer(np.array([closed[k] for k in covers], dtype=object), -inward)
+    hiding = shapely.buffer(np.array([outlines[k] for k in covers], dtype=object), -inward)
     tree = shapely.STRtree(hiding)
     found: list[FloatArray] = []
     for k, line in enumerate(lines):
         above = np.zeros(0, dtype=np.int64)
-        if k in closed and float(shapely.area(closed[k])) > least:
+        if k in large:
             above = tree.query(shapely.LineString(line), "intersects")
         above = above[covers[above] > k]
         if not len(above):
@@ -284,7 +291,12 @@ def standing(
 
 
 def _outline(line: FloatArray) -> shapely.Geometry:
-    return shapely.make_valid(shapely.Polygon(line))
+    """Return what a closed line encloses, or, where it crosses itself, what is around it.
+
+    To part the loops of a scribble takes the third power of its points.
+    """
+    outline = shapely.Polygon(line)
+    return outline if outline.is_valid else outline.convex_hull
 
 
 def _room_at(points: FloatArray, rooms: Labels, cells: FloatArray) -> int:
