@@ -93,7 +93,7 @@ def test_geojson_is_read_kind_by_kind(tmp_path):
         ({"type": "Curve"}, "type is not a geometry"),
         (collection(), "holds no point, route or zone"),
         (collection(feature("Point", [1])), r"features\[0\]\.geometry\.coordinates\[0\] has fewer"),
-        (collection(feature("LineString", [[1, 2]])), "has 1 points; a route has 2 or more"),
+        (collection(feature("LineString", [[1, 2]])), "has 1 point; a route has 2 or more"),
         (
             collection(feature("Polygon", [[[0, 0], [1, "x"], [1, 1]]])),
             r"coordinates\[0\]\[1\]\[1\] is \"x\"; give a finite number",

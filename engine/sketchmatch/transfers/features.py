@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from sketchmatch.errors import InvalidInputError, Reason
+from sketchmatch.errors import InvalidInputError, Reason, counted
 from sketchmatch.model import FloatArray
 from sketchmatch.model.arrays import frozen_floats
 from sketchmatch.model.labels import cleaned_label
@@ -107,7 +107,8 @@ class Feature:
         fewest = _FEWEST[self.kind]
         if len(ring) < fewest or (self.kind is FeatureKind.POINT and len(ring) > 1):
             exactly = "" if self.kind is FeatureKind.POINT else " or more"
-            raise _refused(field, f"has {len(ring)} points; a {self.kind} has {fewest}{exactly}")
+            has = f"has {counted(len(ring), 'point')}"
+            raise _refused(field, f"{has}; a {self.kind} has {fewest}{exactly}")
         return ring
 
     def _checked_speeds(self, given: ArrayLike, count: int) -> FloatArray:
