@@ -48,6 +48,24 @@ def test_small_tails_and_loops_are_cut(points, kept):
     assert area(points) == pytest.approx(100, rel=0.03)
 
 
+def test_a_tail_that_leads_through_the_whole_is_cut_at_its_first_crossing():
+    tail = [(5, 12), (5, 0)]
+    points = [*tail, (10, 0), (10, 10), (0, 10), (0, 0.3), (5.1, 0.3)]
+    outline, numbers = mended(np.array(points, dtype=float))
+    assert outline.tolist() == [[5, 0.3], *[[*map(float, each)] for each in points[1:6]]]
+    assert numbers[0] == pytest.approx(11.7 / 12)
+    assert numbers[1:].tolist() == [1, 2, 3, 4, 5]
+
+
+def test_what_was_cut_is_not_cut_again():
+    # Two loops, of which the second crosses the first one: with that its crossings are gone.
+    loops = [(4, 0), (4.6, 0.4), (4.2, 0.4), (4.8, -0.2), (4.3, 0.6), (6, 0)]
+    outline, numbers = mended(np.array([(0, 0), *loops, *SQUARE[1:]], dtype=float))
+    assert shapely.Polygon(outline).is_valid
+    assert (np.diff(numbers) > 0).all()
+    assert shapely.Polygon(outline).area == pytest.approx(100, rel=0.01)
+
+
 @pytest.mark.parametrize(
     "points",
     [
