@@ -1,4 +1,5 @@
 import codecs
+import io
 
 import numpy as np
 import pytest
@@ -284,6 +285,11 @@ class TestImage:
         assert sources.image(tmp_path / "sketch.png") == sources.image(b"PNG")
         assert sources.image(str(tmp_path / "sketch.png")).image.data == b"PNG"
 
+    @pytest.mark.parametrize("kind", [bytes, bytearray, memoryview])
+    def test_bytes_of_any_kind(self, kind):
+        assert sources.image(kind(b"PNG")).image.data == b"PNG"
+        assert sources.file(kind(b"<svg/>"), name="a.svg").file.data == b"<svg/>"
+
     def test_missing_file(self, tmp_path):
         with pytest.raises(InvalidRequestError, match=r"gone\.png\) cannot be read: No such file"):
             sources.image(tmp_path / "gone.png")
@@ -293,3 +299,20 @@ def test_a_label_that_utf_8_cannot_hold_is_sent_as_well_as_can_be():
     square = [(0, 0), (1, 0), (1, 1)]
     sent = sources.polygons([square, square], ["\ud800x", "\ud83d\ude00"]).polygon_set
     assert [polygon.label for polygon in sent.polygons] == ["\N{REPLACEMENT CHARACTER}x", "😀"]
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: sources.image(io.BytesIO(b"PNG")),
+        lambda: sources.image(None),
+        lambda: sources.file(io.BytesIO(b"<svg/>"), name="a.svg"),
+        lambda: sources.map_server_map(b"room.yaml"),
+        lambda: sources.map_server_map(None),
+        lambda: sources.strokes(None),
+        lambda: sources.polygons(3),
+    ],
+)
+def test_what_is_no_source_at_all_is_refused_as_other_input_is(make):
+    with pytest.raises(InvalidRequestError, match=r"give the path of a file|is not a list of"):
+        make()

@@ -50,6 +50,7 @@ def test_what_became_of_it_is_returned(call, server):
     [
         ({"object_map": [(0, 1)]}, "object_map"),
         ({"object_map": {0: -1}}, "object_map"),
+        ({"object_map": {}}, "object_map"),  # which the contract cannot tell from none
         ({"direction": "back"}, "direction"),
         ({"y_axis": "left"}, "y_axis"),
         ({"radius": "wide"}, "radius"),
@@ -72,6 +73,7 @@ def test_an_option_of_the_wrong_form_is_refused_by_name(options, field):
         (lambda: features.route([(0, 0), (1,)]), "route.points"),
         (lambda: features.route([(0, 0), (1, 1)], speeds=["fast"]), "route.speeds"),
         (lambda: features.route([]), "route.points"),
+        (lambda: features.route(None), "route.points"),
         (lambda: features.zone([]), "zone.rings"),
         (lambda: features.zone([(0, 0), (1, 1), (2, 0)], name=3), "name"),
     ],

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import AsyncGenerator, Generator, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Self, Unpack
 
 from sketchmatch_client import sources
 from sketchmatch_client._requests import MatchOptions, Pins, match_request
 from sketchmatch_client.errors import (
+    InvalidRequestError,
     NotFoundError,
     async_translated_errors,
     refused_as,
@@ -78,7 +80,7 @@ class Sketch:
         restore
             A former revision to return to, for undo and redo.
         labels
-            Names for people, by the names of strokes that are set.
+            Names for people, by the names of strokes in this update.
         pins
             What is known of single objects from now on, as in :class:`MatchOptions`.
         timeout
@@ -196,6 +198,7 @@ def update_request(
     pins: Pins | None,
 ) -> UpdateSketchRequest:
     """Return the request for a change; see :meth:`Sketch.update`."""
+    _check_names(strokes, labels)
     names = list(strokes)
     drawn = sources.strokes(strokes.values(), [labels.get(name) for name in names])
     request = UpdateSketchRequest(sketch_id=sketch_id)
@@ -213,3 +216,19 @@ def update_request(
         known: MatchRequest = match_request(Source(), Source(), pins=pins)
         request.pins.CopyFrom(PinSet(pins=known.pins))
     return request
+
+
+def _check_names(strokes: Strokes, labels: Mapping[str, str]) -> None:
+    if not isinstance(strokes, Mapping):
+        problem = f"strokes is {reprlib.repr(strokes)}; give a dict from names to points"
+        raise InvalidRequestError(problem, "INVALID_FIELD", "strokes")
+    if not isinstance(labels, Mapping):
+        problem = f"labels is {reprlib.repr(labels)}; give a dict from names of strokes to labels"
+        raise InvalidRequestError(problem, "INVALID_FIELD", "labels")
+    for name in labels:
+        if name not in strokes:
+            problem = (
+                f"labels names {reprlib.repr(name)}, which is no stroke of this update; "
+                "send its points with its label"
+            )
+            raise InvalidRequestError(problem, "INVALID_FIELD", "labels")

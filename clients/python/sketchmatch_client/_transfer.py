@@ -92,7 +92,7 @@ def transfer_request(
 
 
 def _pairs(given: Mapping[int, int]) -> list[Partners]:
-    if not isinstance(given, Mapping):
+    if not isinstance(given, Mapping) or not given:
         raise TypeError
     return [Partners(sketch_object=a, map_object=b) for a, b in given.items()]
 
@@ -111,7 +111,10 @@ def _same(value: Any) -> Any:
 
 
 _FIELDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
-    "object_map": ("give a dict from sketched to mapped objects, by index from 0", _pairs),
+    "object_map": (
+        "give a dict from sketched to mapped objects, by index from 0, or None to match them",
+        _pairs,
+    ),
     "direction": ("give 'sketch-to-map' or 'map-to-sketch'", _one_of(_DIRECTIONS)),
     "y_axis": ("give 'up' or 'down'", _one_of(_Y_AXES)),
     "radius": ("give a number", _same),

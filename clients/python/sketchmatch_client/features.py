@@ -103,6 +103,8 @@ def _named(feature: Feature, name: str) -> Feature:
 
 def _points(given: Iterable[Sequence[float]], field: str) -> list[source_pb2.Point]:
     points = []
+    with refused_as("INVALID_FIELD", field, f"is {reprlib.repr(given)}; give points as (x, y)"):
+        given = list(given)
     for each in given:
         with refused_as("INVALID_FIELD", field, f"has {reprlib.repr(each)}; give points as (x, y)"):
             x, y = each

@@ -42,6 +42,9 @@ __all__ = [
 YAxis = Literal["up", "down"]
 """Which way y grows: screens, tablets and pictures deliver ``"down"``."""
 
+Content = bytes | bytearray | memoryview
+"""What is in a file."""
+
 _Y_AXES = {"up": source_pb2.Y_AXIS_UP, "down": source_pb2.Y_AXIS_DOWN}
 
 
@@ -75,6 +78,8 @@ def strokes(
     >>> sketch.stroke_set.strokes[1].points[2].time_seconds
     0.2
     """
+    with refused_as("INVALID_STROKE", "stroke_set.strokes", "is not a list of strokes"):
+        strokes = list(strokes)
     drawn = [
         source_pb2.Stroke(points=_stroke_points(points, f"stroke_set.strokes[{k}].points"))
         for k, points in enumerate(strokes)
@@ -116,6 +121,8 @@ def polygons(
     >>> [polygon.label for polygon in room.polygon_set.polygons]
     ['bed', 'desk']
     """
+    with refused_as("INVALID_POLYGON", "polygon_set.polygons", "is not a list of polygons"):
+        polygons = list(polygons)
     drawn = [
         source_pb2.LabelledPolygon(rings=_rings(polygon, f"polygon_set.polygons[{k}]"))
         for k, polygon in enumerate(polygons)
@@ -221,8 +228,9 @@ def map_server_map(path: str | os.PathLike[str]) -> source_pb2.Source:
     InvalidRequestError
         If the file or its picture cannot be read, or it names none.
     """
-    path = Path(path)
     field = "map_server_map.yaml"
+    with refused_as("INVALID_FILE", field, f"is {reprlib.repr(path)}; give the path of a file"):
+        path = Path(path)
     try:
         file = _map_yaml(path)
         text = text_of(_bytes(file, field))
@@ -243,7 +251,7 @@ def map_server_map(path: str | os.PathLike[str]) -> source_pb2.Source:
     )
 
 
-def image(file: str | os.PathLike[str] | bytes) -> source_pb2.Source:
+def image(file: str | os.PathLike[str] | Content) -> source_pb2.Source:
     """Return a picture of a map or of a sketch: dark shapes or outlines on light paper.
 
     Parameters
@@ -256,12 +264,12 @@ def image(file: str | os.PathLike[str] | bytes) -> source_pb2.Source:
     InvalidRequestError
         If the file cannot be read.
     """
-    data = file if isinstance(file, bytes) else _bytes(Path(file), "image.data")
+    data, _ = _content(file, "image.data")
     return source_pb2.Source(image=source_pb2.EncodedImage(data=data))
 
 
 def file(
-    file: str | os.PathLike[str] | bytes, *, name: str = "", part: str = ""
+    file: str | os.PathLike[str] | Content, *, name: str = "", part: str = ""
 ) -> source_pb2.Source:
     r"""Return a file that the server reads, such as a drawing of another tool.
 
@@ -287,10 +295,8 @@ def file(
     >>> file(b'{"shapes": []}', name="room.json").file.name
     'room.json'
     """
-    if isinstance(file, bytes):
-        data = file
-    else:
-        data, name = _bytes(Path(file), "file"), name or Path(file).name
+    data, own = _content(file, "file")
+    name = name or own
     if not name:
         raise InvalidRequestError(
             "file.name is empty; give bytes a name whose ending tells what they are",
@@ -306,6 +312,16 @@ def _map_yaml(path: Path) -> Path:
     if found is None and path.suffix.lower() in PICTURE_SUFFIXES:
         raise MapFileError("is a picture that no .yaml beside it names; give the map's .yaml")
     return path if found is None else found[0]
+
+
+def _content(file: str | os.PathLike[str] | Content, field: str) -> tuple[bytes, str]:
+    """Return what is in a file, given by its path or as bytes, and its name."""
+    if isinstance(file, Content):
+        return bytes(file), ""
+    problem = f"is {reprlib.repr(file)}; give the path of a file, or its bytes"
+    with refused_as("INVALID_FILE", field, problem):
+        path = Path(file)
+    return _bytes(path, field), path.name
 
 
 def _bytes(path: Path, field: str, origin: str = "") -> bytes:
