@@ -52,7 +52,13 @@ def gateway(settings=None, warm=False, **limits):
 
 def address_of(host: Host) -> str:
     (url,) = [
-        found[1] for line in host.said if (found := re.match(r"the sketch pad is at (\S+)", line))
+        found[1]
+        for line in host.said
+        if (
+            found := re.match(
+                r"(?:the sketch pad is|programs in browsers are answered) at (\S+)", line
+            )
+        )
     ]
     return urlsplit(url).netloc
 
@@ -501,3 +507,17 @@ def test_a_server_without_a_built_pad_says_how_to_build_it():
     status, _, body = page(Pages({}), "/")
     assert status == 404
     assert b"make web" in body
+
+
+@pytest.mark.parametrize(
+    ("pages", "said"),
+    [
+        (PAGES, ["the sketch pad is at http"]),
+        (Pages({}), ["programs in browsers are answered at http", "the sketch pad is not built; "]),
+    ],
+)
+def test_where_the_pad_is_is_said_where_there_is_one(pages, said, monkeypatch):
+    monkeypatch.setattr("sketchmatch.server.gateway.bundled_pages", lambda _: pages)
+    with gateway() as host:
+        heard = [line for line in host.said if "pad" in line or "browsers" in line]
+    assert [line[: len(begin)] for line, begin in zip(heard, said, strict=True)] == said

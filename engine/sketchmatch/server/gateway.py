@@ -15,7 +15,7 @@ from sketchmatch.app.application import Application
 from sketchmatch.config.addresses import is_of_this_machine
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.server.called import Handlers
-from sketchmatch.server.pages import Pages, answer_plainly, bundled_pages
+from sketchmatch.server.pages import NOT_BUILT, Pages, answer_plainly, bundled_pages
 from sketchmatch.server.tls import Pems, newest_context
 from sketchmatch.server.watched import Watched
 
@@ -83,7 +83,11 @@ class Gateway:
         pages = bundled_pages(robots)
         self._socket, self.address = _listening(address)
         self.url = f"{'https' if pems else 'http'}://{self.address}/"
-        self.lacking = () if pages else ("the sketch pad is not built; run make web",)
+        self.sentences = (
+            [f"the sketch pad is at {self.url}"]
+            if pages
+            else [f"programs in browsers are answered at {self.url}", NOT_BUILT]
+        )
         front = _Front(connect, pages, origins, local=is_of_this_machine(address))
         self._server = _server(uvicorn, front, pems)
         self._end: asyncio.Task[None] | None = None

@@ -13,7 +13,9 @@ from importlib import resources
 from pathlib import PurePosixPath
 from typing import Any
 
-__all__ = ["Pages", "answer_plainly", "bundled_pages"]
+__all__ = ["NOT_BUILT", "Pages", "answer_plainly", "bundled_pages"]
+
+NOT_BUILT = "the sketch pad is not built; run make web in a checkout, and install that"
 
 ROBOTS = "/robots.json"
 """Where the page reads to which ROS bridges it may send routes."""
@@ -88,7 +90,7 @@ class Pages:
         if scope["method"] not in ("GET", "HEAD"):
             await answer_plainly(send, HTTPStatus.METHOD_NOT_ALLOWED, "pages can only be read")
         elif page is None:
-            text = "there is no such page" if self else "the sketch pad is not built; run make web"
+            text = "there is no such page" if self else NOT_BUILT
             await answer_plainly(send, HTTPStatus.NOT_FOUND, text)
         else:
             await _answer(page, self._headers, scope, send)

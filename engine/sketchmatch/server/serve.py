@@ -327,7 +327,7 @@ class _Beside:
                 settings.web_robots,
                 files.pems,
             )
-            self.sentences += [f"the sketch pad is at {self._gateway.url}", *self._gateway.lacking]
+            self.sentences += self._gateway.sentences
 
     def start(self) -> None:
         """Answer from now on."""
@@ -485,7 +485,8 @@ def _opened(settings: ServerSettings, say: Callable[[str], None]) -> Store | Non
         return Store(settings.store)
     except StoreError as error:
         if settings.store_named:
-            raise InvalidInputError(Reason.INVALID_FIELD, "server.store", str(error)) from None
+            problem = f"cannot be used: {error}"
+            raise InvalidInputError(Reason.INVALID_FIELD, "server.store", problem) from None
         say(f"nothing is kept after this server stops: {error}")
         return None
 
