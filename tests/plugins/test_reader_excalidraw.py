@@ -125,6 +125,12 @@ def test_lines_with_gaps_and_fillings_are_known(more, dashed, opaque):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("width", [None, "thin", True, -3, 10**400, [1]])
+def test_a_width_that_is_none_does_not_matter(width):
+    (stroke,) = read(element("rectangle", strokeWidth=width)).strokes
+    assert stroke.width == 0
+
+
 def test_rooms_of_a_plan_of_lines_have_the_names_written_in_them():
     walls = element("rectangle", width=600, height=400)
     between = element("line", 300, 0, points=[[0, 0], [0, 400]])

@@ -70,9 +70,10 @@ class _Element:
 
     def size(self, key: str) -> float:
         """Return what is not needed to read a drawing: 0 where it is no size."""
-        value = self.data.get(key)
-        known = isinstance(value, (int, float)) and math.isfinite(value)
-        return max(float(value), 0.0) if known else 0.0
+        try:
+            return max(number(self.data.get(key), f"{self.field}.{key}", _STROKE), 0.0)
+        except InvalidInputError:
+            return 0.0
 
 
 class ExcalidrawReader(Reader):
