@@ -497,10 +497,10 @@ def test_strangers_are_not_let_in_from_other_machines(address):
 def test_what_is_lacking_is_named(tls, robot, tmp_path):
     (tmp_path / "tokens").write_text(robot[1].line)
     for settings, problem in (
-        ({"tls": tls}, "whoever does may call; give --tokens or --tls-client-ca,"),
+        ({"tls": tls}, "whoever reaches it may call; give --tokens or --tls-client-ca,"),
         (
             {"tokens": tmp_path / "tokens"},
-            "whoever does can read along, tokens too; give --tls-certificate and --tls-key,",
+            "whoever reaches it can read along, tokens too; give --tls-certificate and --tls-key,",
         ),
     ):
         with pytest.raises(InvalidInputError, match=problem):

@@ -159,7 +159,7 @@ def test_a_caller_who_keeps_as_much_as_it_may_is_told_to_delete(tmp_path):
         Client(host.address, timeout=60) as client,
     ):
         kept = client.put_scene(MAP).stored_scene.name
-        with pytest.raises(ServerBusyError, match="the limit for each caller; delete") as refused:
+        with pytest.raises(ServerBusyError, match="the limit for each caller is") as refused:
             client.put_scene(scene(100, 2))
         assert refused.value.reason == "LIMIT_EXCEEDED"
         assert refused.value.retry_after is None
