@@ -54,7 +54,7 @@ def test_tokens_are_listed_rotated_and_removed_by_name(command_line, tmp_path):
     known = read_tokens(file)
     assert [known.caller_of(token) for token in (old, pad, new)] == ["robot-7", "pad", "robot-7"]
     done = command_line("tokens", "remove", "robot-7", "--old", "--file", file)
-    assert done.stderr == f"sketchmatch: {file} knows 1 token of robot-7 less\n"
+    assert done.stderr == f"sketchmatch: removed 1 token of robot-7 from {file}\n"
     known = read_tokens(file)
     assert [known.caller_of(token) for token in (old, pad, new)] == ["", "pad", "robot-7"]
     command_line("tokens", "remove", "robot-7", "--file", file)
