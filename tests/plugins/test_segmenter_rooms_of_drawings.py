@@ -156,7 +156,8 @@ def test_texts_of_an_svg_plan_name_its_rooms(tmp_path):
     )
     file = tmp_path / "plan.svg"
     file.write_text(
-        f'<svg xmlns="http://www.w3.org/2000/svg"><g transform="scale(10)">{paths}{texts}</g></svg>'
+        f'<svg xmlns="http://www.w3.org/2000/svg"><g transform="scale(10)">{paths}'
+        f'<g font-size=".5">{texts}</g></g></svg>'
     )
     rooms = segmented(read_source(file)).scene.objects
     assert sorted(item.label for item in rooms) == ["", "", "", "bath", "living room"]
@@ -219,7 +220,7 @@ def test_what_is_written_largest_names_a_room(tmp_path):
         '<g transform="scale(.02)" font-size="30"><text x="20" y="20">bedroom</text></g>'
         '<text x="6" y="2.1" font-size=".3">sofa<tspan font-size=".6"> corner</tspan></text>'
         '<text x="6" y="2" font-size=".5">living</text>'
-        '<text x="9" y="3" font-size="nonsense">shelf</text>'
+        '<g font-size=".4"><text x="9" y="3" font-size="nonsense">shelf</text></g>'
     )
     path = tmp_path / "plan.svg"
     path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{paths}{texts}</svg>', "utf-8")

@@ -448,7 +448,32 @@ def test_shares_of_a_page_as_large_as_letters_are_known():
 def test_texts_are_where_their_first_letter_is():
     texts = '<text x="50%" y="2em">a</text><text x="3,9" y="4 8" font-size="2em">b</text>'
     found = decoded(KEPT + texts).landmarks
-    assert [(each.point, each.size) for each in found] == [((400, -32), 16), ((3, -4), 32)]
+    # A letter is half as wide as it is high.
+    assert [(each.point, each.size) for each in found] == [((404, -32), 16), ((11, -4), 32)]
+
+
+@pytest.mark.parametrize(
+    ("text", "x"),
+    [
+        ('<text x="40">desk</text>', 56),
+        ('<text x="40" text-anchor="middle">desk</text>', 40),
+        ('<g text-anchor="end"><text><tspan x="40">desk</tspan></text></g>', 24),
+        ('<text x="40" style="text-anchor:end; font-size:8px">desk</text>', 32),
+        ('<text x="40">一二</text>', 56),  # as wide as high
+        ('<text x="40">a kitchen and dining room</text>', 72),  # its beginning
+        ('<text x="40" style="writing-mode: tb">desk</text>', 40),
+        ('<text x="40" writing-mode="vertical-rl">desk</text>', 40),
+        ('<text x="40" text-anchor="nowhere">desk</text>', 56),
+    ],
+)
+def test_a_text_is_in_the_middle_of_its_line(text, x):
+    (found,) = decoded(KEPT + text).landmarks
+    assert found.point[0] == pytest.approx(x)
+
+
+def test_a_turned_text_goes_on_where_it_is_turned_to():
+    (found,) = decoded(f'{KEPT}<text x="40" transform="rotate(90)">desk</text>').landmarks
+    assert found.point == pytest.approx((0.0, -56.0))
 
 
 @pytest.mark.parametrize(
@@ -457,24 +482,28 @@ def test_texts_are_where_their_first_letter_is():
         (
             '<text><tspan x="5" y="9">writing</tspan><tspan x="5" y="19">desk</tspan></text>',
             "writing desk",
-            (5, -9),
+            (33, -9),
         ),
         (
             '<text x="5" y="9"><tspan>so</tspan><tspan x="8" y="9">fa</tspan></text>',
             "sofa",
-            (5, -9),
+            (21, -9),
         ),
         (
             '<text x="5">book<tspan x="5" dy="1em">shelf</tspan><tspan dy="1em">1</tspan></text>',
             "book shelf 1",
-            (5, 0),
+            (21, 0),
         ),
         (
             '<text><tspan><tspan x="5" y="9"><tspan>rug</tspan></tspan></tspan></text>',
             "rug",
-            (5, -9),
+            (17, -9),
         ),
-        ('<text x="5" y="9"><title>t</title>a <tspan>big</tspan> bed</text>', "a big bed", (5, -9)),
+        (
+            '<text x="5" y="9"><title>t</title>a <tspan>big</tspan> bed</text>',
+            "a big bed",
+            (37, -9),
+        ),
     ],
 )
 def test_the_lines_of_a_text_are_words(text, said, point):
@@ -815,7 +844,7 @@ def test_of_lengths_the_first_is_named_and_outlines_are_none():
 def test_texts_right_below_each_other_are_one_name(above, below, names):
     found = decoded(f"{KEPT}<text {above}>master</text><text {below}>bath</text>")
     assert [item.name for item in found.landmarks] == names
-    assert found.landmarks[0].point == (9.0, -float(above.split('"')[3]))
+    assert found.landmarks[0].point == (33.0, -float(above.split('"')[3]))
 
 
 @pytest.mark.parametrize(
@@ -852,8 +881,8 @@ def test_what_is_written_is_read_where_it_is_seen():
     )
     found = decoded(KEPT + texts).landmarks
     assert [(item.name, item.point) for item in found] == [
-        ("room 0", (0.0, -5.0)),
-        ("room 4", (4.0, -5.0)),
+        ("room 0", (24.0, -5.0)),
+        ("room 4", (28.0, -5.0)),
     ]
 
 

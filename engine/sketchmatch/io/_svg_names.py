@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterator
 from xml.etree import ElementTree
 
 from sketchmatch.io._svg_tree import tag_of
 from sketchmatch.model import Landmark
 
-__all__ = ["goes_on", "groups_label", "html_in", "label_of", "size_of_html", "written_in"]
+__all__ = [
+    "goes_on",
+    "groups_label",
+    "html_in",
+    "label_of",
+    "size_of_html",
+    "width_of",
+    "written_in",
+]
 
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 _NAMES = ("aria-label", f"{_INKSCAPE}label", "{http://www.serif.com/}id", "data-name")
@@ -31,6 +40,9 @@ _ESCAPED = re.compile(r"_x([0-9A-F]{2,5})_", re.IGNORECASE)
 # Of the height of letters: how far apart the lines of a name are at most, and those of one that
 # ends or begins with a sign that joins words, and how far aside the next line begins.
 _SPACED, _SPACED_JOINED, _ASIDE = 1.6, 2.2, 0.1
+# Of the height of letters: how wide those of most alphabets are, and those as wide as high.
+_NARROW, _WIDE = 0.5, 1.0
+_VERTICAL = re.compile(r"writing-mode\s*:\s*(?:tb|vertical)", re.IGNORECASE)
 # Elements of HTML that part no lines, and how large their letters are.
 _WITHIN_LINES = frozenset(
     ("a", "b", "code", "em", "font", "i", "span", "strong", "sub", "sup", "u")
@@ -74,6 +86,20 @@ def written_in(text: ElementTree.Element) -> str:
         said += f" {part}" if line != last else part
         last = line
     return _spaced(said)
+
+
+def width_of(text: ElementTree.Element) -> float:
+    """Return how wide the first line of a text is, as a share of its letters' height: about."""
+    lines = [*_lines_of(text, "")]
+    first = next((line for line, part in lines if part.strip()), "")
+    said = _spaced("".join(part for line, part in lines if line == first))
+    return sum(_WIDE if unicodedata.east_asian_width(each) in "FW" else _NARROW for each in said)
+
+
+def is_vertical(text: ElementTree.Element) -> bool:
+    """Whether an element says that its letters are below each other."""
+    said = f"writing-mode:{text.get('writing-mode', '')};{text.get('style', '')}"
+    return _VERTICAL.search(said) is not None
 
 
 def html_in(element: ElementTree.Element) -> str:

@@ -36,7 +36,7 @@ _PAINTS = {"fill", "stroke"}
 _INHERITED = {
     *_PAINTS,
     *{"visibility", "color", "fill-rule", "fill-opacity", "stroke-opacity", "stroke-width"},
-    *{"stroke-dasharray", "marker-start", "marker-end", "font-size"},
+    *{"stroke-dasharray", "marker-start", "marker-end", "font-size", "text-anchor"},
 }
 _TRANSFORMS = {"transform", "translate", "rotate", "scale", "transform-origin", "transform-box"}
 _GEOMETRY = {"x", "y", "width", "height", "cx", "cy", "r", "rx", "ry", "d"}
@@ -48,6 +48,7 @@ _KNOWN = {*_ATTRIBUTES, *_TRANSFORMS, *_GEOMETRY, "background", "background-colo
 _WIDE = {"inherit", "initial", "unset", "revert", "revert-layer"}
 _VISIBLE = {"visible": True, "hidden": False, "collapse": False}
 _RULES = {"nonzero": False, "evenodd": True}
+_ANCHORS = {"start": 0.0, "middle": 0.5, "end": 1.0}
 
 _LENGTHS = _GEOMETRY - {"d"}
 
@@ -93,6 +94,8 @@ class Look:
         Identities of what its ends are drawn with, or empty.
     font_size
         In user units.
+    text_anchor
+        Which share of a text lies before its place.
     opacity
         Of all of it, its parents' among them, as a share.
     displayed
@@ -119,6 +122,7 @@ class Look:
     marker_start: str = ""
     marker_end: str = ""
     font_size: float = 16.0
+    text_anchor: float = 0.0
     opacity: float = 1.0
     displayed: bool = True
     clip_path: str = ""
@@ -470,6 +474,7 @@ _VALUES: dict[str, Any] = {
     "fill-rule": lambda text: _RULES[text.lower()],
     "marker-start": _target,
     "marker-end": _target,
+    "text-anchor": lambda text: _ANCHORS[text.lower()],
 }
 
 

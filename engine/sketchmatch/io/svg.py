@@ -55,8 +55,10 @@ from sketchmatch.io._svg_names import (
     goes_on,
     groups_label,
     html_in,
+    is_vertical,
     label_of,
     size_of_html,
+    width_of,
     written_in,
 )
 from sketchmatch.io._svg_shapes import (
@@ -79,6 +81,8 @@ __all__ = ["decode_svg"]
 _DRAWN = {*SHAPES, "svg", "g", "a", "switch", "use"}
 _VIEWPORTS = {"svg", "symbol"}
 _HTML = "foreignObject"
+# Of the height of letters: a line that is longer may go on beyond what it is written in.
+_LONG = 4.0
 _WRITTEN = {"text", _HTML}
 _HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
 _EXCALIDRAW = b"svg-source:excalidraw"
@@ -272,8 +276,8 @@ class _Drawing:
             self._above = None
             self.names.extend(self._written_html(text, look, context))
             return
-        for line in self._written(text, look, context):
-            name = line
+        for line, middle in self._written(text, look, context):
+            name = replace(line, point=middle)
             if self._above and goes_on(*self._above, text, line):
                 last = self.names.pop()
                 name = replace(last, name=f"{last.name} {line.name}")
@@ -282,8 +286,11 @@ class _Drawing:
 
     def _written(
         self, text: ElementTree.Element, look: Look, context: _Context
-    ) -> Iterator[Landmark]:
-        """Yield what a text says, where it begins and how large it is, unless that is not known."""
+    ) -> Iterator[tuple[Landmark, tuple[float, float]]]:
+        """Yield what a text says, where it is placed and how large it is, unless that is not known.
+
+        With it the middle of its first line, or of what begins or ends a long one.
+        """
         name = written_in(text)
         placed = [(text, look)]
         for part, around in placed:
@@ -302,12 +309,17 @@ class _Drawing:
                 )
                 for axis, along in zip("xy", _sides(context.frame), strict=True)
             )
-            point = own.point_in_matrix_space((x, y))
+            told = next((shown for part, shown in placed if (part.text or "").strip()), look)
+            across = 0.0 if any(is_vertical(part) for part, _ in placed) else width_of(text)
+            aside = (0.5 - told.text_anchor) * min(across, _LONG) * told.font_size
+            point, middle = (own.point_in_matrix_space((at, y)) for at in (x, x + aside))
         except (ValueError, IndexError, TypeError):
             return
         size = _scale(own) * max(shown.font_size for _, shown in placed)
-        if look.visible and name and all(map(math.isfinite, (point.x, point.y, size))):
-            yield Landmark(name, (float(point.x), -float(point.y)), "room", size)
+        known = all(map(math.isfinite, (point.x, point.y, middle.x, middle.y, size)))
+        if look.visible and name and known:
+            line = Landmark(name, (float(point.x), -float(point.y)), "room", size)
+            yield line, (float(middle.x), -float(middle.y))
 
     def _written_html(
         self, html: ElementTree.Element, look: Look, context: _Context
