@@ -654,6 +654,20 @@ def test_what_a_later_room_hides_is_no_wall():
     assert [line.is_ring for line in lines] == [False, True, True, True]
 
 
+def test_what_a_large_room_hides_of_a_small_corridor_is_no_wall():
+    hall, corridor, room, rug = (
+        box(0, 0, 20, 16),
+        box(9, 0, 2, 9),
+        box(6, 4, 8, 12),
+        box(2, 2, 2, 2),
+    )
+    found = seen(filled([hall, rug, box(2, 3, 2, 2), corridor, room]))
+    lines = [shapely.LineString(line) for line in found]
+    # Of the corridor three sides are left; a thing is whole beneath another.
+    assert [line.is_ring for line in lines] == [True, True, True, False, True]
+    assert lines[3].length == pytest.approx(10.0, abs=0.1)
+
+
 def test_nothing_is_hidden_by_what_is_seen_through_or_came_before():
     lines = [box(0, 0, 9, 8), box(-4, 3, 7, 3)]
     for drawn in (strokes(lines).strokes, (*filled(lines[:1]), *strokes(lines[1:]).strokes)):

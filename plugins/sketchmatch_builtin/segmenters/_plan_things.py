@@ -154,10 +154,11 @@ def dimensions(lines: Sequence[FloatArray]) -> frozenset[int]:
 
 
 def seen(strokes: Sequence[Stroke]) -> list[FloatArray]:
-    """Return the lines of strokes but for what later ones hide of large outlines.
+    """Return the lines of strokes but for what later ones hide, where either of the two is large.
 
-    So rooms are drawn over each other. Things, small or open, are whole beneath others, and what
-    lies along the border of a filling is seen. What crosses itself hides nothing, and is whole.
+    So rooms are drawn over each other, and over corridors. Things are whole beneath things, open
+    lines beneath all, and what lies along the border of a filling is seen. What crosses itself
+    hides nothing, and is whole.
     """
     lines = [stroke.points for stroke in strokes]
     closed = {
@@ -173,17 +174,19 @@ def seen(strokes: Sequence[Stroke]) -> list[FloatArray]:
     whole = shapely.MultiPoint(np.concatenate(lines))
     least = _LARGEST * whole.convex_hull.area
     large = {k for k, outline in outlines.items() if outline.area > least}
-    if len(large) * sum(len(lines[k]) for k in covers) > _MOST_HIDING:
+    points = sum(len(lines[k]) * len(outlines if k in large else large) for k in covers.tolist())
+    if points > _MOST_HIDING:
         return lines
     inward = _BORDER * float(np.ptp(shapely.get_coordinates(whole), axis=0).max())
     hiding = shapely.buffer(np.array([outlines[k] for k in covers], dtype=object), -inward)
+    wide = np.array([k in large for k in covers.tolist()])
     tree = shapely.STRtree(hiding)
     found: list[FloatArray] = []
     for k, line in enumerate(lines):
         above = np.zeros(0, dtype=np.int64)
-        if k in large:
+        if k in outlines:
             above = tree.query(shapely.LineString(line), "intersects")
-        above = above[covers[above] > k]
+            above = above[(covers[above] > k) & (wide[above] | (k in large))]
         if not len(above):
             found.append(line)
             continue
