@@ -42,6 +42,8 @@ _OTHERS = {
 # As Excalidraw rounds corners: by a share of the smaller side, or by a length where that is less.
 _ROUND_SHARE, _ROUND_LENGTH = 0.25, 32.0
 _ARC, _CURVE = 6, 8
+# Beyond this no size is one.
+_LARGEST = 1e15
 # A colour of four parts, of which the last, how much is seen of it, is not all.
 _SEEN_THROUGH = re.compile(
     r"#[0-9a-f]{6}(?!ff)[0-9a-f]{2}|#[0-9a-f]{3}(?!f)[0-9a-f]", re.IGNORECASE
@@ -70,10 +72,10 @@ class _Element:
 
     def size(self, key: str) -> float:
         """Return what is not needed to read a drawing: 0 where it is no size."""
-        try:
-            return max(number(self.data.get(key), f"{self.field}.{key}", _STROKE), 0.0)
-        except InvalidInputError:
+        value = self.data.get(key)
+        if isinstance(value, bool) or not isinstance(value, int | float):
             return 0.0
+        return float(value) if 0.0 <= value < _LARGEST else 0.0
 
 
 class ExcalidrawReader(Reader):
@@ -137,7 +139,11 @@ class ExcalidrawReader(Reader):
             for k, (each, outline) in enumerate(zip(shapes, outlines, strict=True))
         )
         held = {each.id for each in shapes}
-        free = [each for each in texts if each.data.get("containerId") in (None, *held)]
+        free = [
+            each
+            for each in texts
+            if not each.data.get("containerId") or each.text("containerId") in held
+        ]
         return StrokeSet(
             tuple(strokes), tuple(_notes(inside, frames, part)), tuple(_landmarks(free))
         )
@@ -197,8 +203,8 @@ def _landmarks(texts: Sequence[_Element]) -> Iterator[Landmark]:
     """Yield what texts say, in their middles."""
     for each in texts:
         name = " ".join((each.text("originalText") or each.text("text")).split())
-        if name:
-            x, y = _middle(each)
+        x, y = _middle(each)
+        if name and math.isfinite(x) and math.isfinite(y):
             yield Landmark(name, (x, -y), "room", each.size("fontSize"))
 
 
