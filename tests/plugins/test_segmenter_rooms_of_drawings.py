@@ -19,7 +19,7 @@ from sketchmatch.model import (
     Stroke,
     StrokeSet,
 )
-from sketchmatch_builtin.segmenters._landmarks import names_of_rooms
+from sketchmatch_builtin.segmenters._landmarks import labels_of, names_of_rooms
 from sketchmatch_builtin.segmenters._plan_things import dimensions, paper, seen, things_in
 from sketchmatch_builtin.segmenters._plan_things import within as lines_within
 from sketchmatch_builtin.segmenters._swings import doors_apart
@@ -182,6 +182,8 @@ def test_texts_of_an_svg_plan_name_its_rooms(tmp_path):
         ("70 °F", ""),
         ("45%", ""),
         ("Hall 21 °C", "Hall"),
+        ("Deck 8 × 3 m", "Deck"),
+        ("Box 2 x 3.5m", "Box"),
         ("101", "101"),
         ("Bath 2", "Bath 2"),
         ("1 car", "1 car"),
@@ -198,6 +200,13 @@ def test_measures_are_no_names(written, name):
 def test_long_numbers_and_signs_are_names_at_once(written):
     with within(5):
         assert len(names_of_rooms([Landmark(written, (0.0, 0.0), "room")])) == 1
+
+
+def test_a_picture_names_a_room_in_which_nothing_is_written():
+    written = [Landmark("Bath", (1.0, 1.0), "room", 2.0), Landmark("🛁", (1.0, 2.0), "room", 9.0)]
+    room = shapely.box(0, 0, 3, 3)
+    assert labels_of([room], names_of_rooms(written), 0.0)[0] == ["Bath"]
+    assert labels_of([room], names_of_rooms(written[1:]), 0.0)[0] == ["🛁"]
 
 
 def test_the_letters_of_a_compass_are_no_names():

@@ -35,9 +35,10 @@ _MEASURE = re.compile(
 )
 # What a compass says: it has no other letters.
 _COMPASS = frozenset("NESWO")
-# An area behind a name.
+# An area, or two lengths, behind a name.
+_SIZE = r"\d++(?:[.,]\d++)?\s?"
 _AREA = re.compile(
-    rf"(?<![\s,;:(/·|–-])[\s,;:(/·|–-]++(?:ca\.?\s*+)?\d++(?:[.,]\d++)?\s?{_UNITS}\)?$",
+    rf"(?<![\s,;:(/·|–-])[\s,;:(/·|–-]++(?:ca\.?\s*+)?(?:{_SIZE}[x×✕*]\s?)?{_SIZE}{_UNITS}\)?$",
     re.IGNORECASE,
 )
 
@@ -85,7 +86,10 @@ def labels_of(
 
 
 def names_of_rooms(written: Iterable[Landmark]) -> list[Landmark]:
-    """Return what is written in a plan without measures, such as ``3.5 x 4``, and a compass's N."""
+    """Return what is written in a plan without measures, such as ``3.5 x 4``, and a compass's N.
+
+    Signs without a letter or number, such as a picture of a bed, count as the smallest writing.
+    """
     written = [*written]
     letters = {item.name for item in written if len(item.name) == 1 and item.name.isalpha()}
     # Who calls rooms by letters has other ones, too.
@@ -97,7 +101,8 @@ def names_of_rooms(written: Iterable[Landmark]) -> list[Landmark]:
         measured = _MEASURE.fullmatch(item.name) and _UNIT.search(item.name)
         name = _AREA.sub("", item.name).strip()
         if name and not (measured and re.search(r"\d", item.name)):
-            found.append(replace(item, name=name))
+            size = item.size if any(map(str.isalnum, name)) else 0.0
+            found.append(replace(item, name=name, size=size))
     return found
 
 
