@@ -534,6 +534,24 @@ def test_doors_are_not_looked_for_in_a_scribble_without_end():
     assert closed == []
 
 
+def test_doors_are_not_looked_for_where_very_many_lines_meet_at_hinges(monkeypatch):
+    lines = [[(0, 0), (0.8, 0)], quarter((0, 0), (1, 0), (0, 1)), [(-9, -9), (-9, 9)]]
+    lines += [[(0, 0), (-0.1 * k, -0.2)] for k in range(3)]
+    lines = [np.array(line, dtype=float) for line in lines]
+    assert len(doors_apart(lines)[1]) == 1
+    monkeypatch.setattr("sketchmatch_builtin.segmenters._swings._MOST_MEETING", 3)
+    assert doors_apart(lines)[1] == []
+
+
+@pytest.mark.parametrize(("radius", "count"), [(0.05, 0), (0.15, 1), (1.7, 1), (2.1, 0)])
+def test_doors_are_neither_tiny_nor_as_wide_as_a_room(radius, count):
+    hinge, turn = np.array([4.0, 0.0]), np.linspace(0.0, np.pi / 2, 12)
+    arc = hinge + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    wall = [(0.0, 0.0), (4.0, 0.0)], [(4.0 + radius, 0.0), (10.0, 0.0)]
+    _, closed = doors_apart([np.array(line) for line in (*wall, arc, [hinge, arc[-1]])])
+    assert len(closed) == count
+
+
 def box(x, y, width, height):
     corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height), (x, y)]
     return [(float(a), float(b)) for a, b in corners]

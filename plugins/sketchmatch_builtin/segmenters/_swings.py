@@ -35,8 +35,9 @@ _MEETS = 0.2
 # that is drawn may be off them if it is the closed one, and how much longer that is drawn than it
 # is, so that it meets the walls.
 _IN_LINE, _OPEN, _BEYOND = 0.3, 0.1, 0.1
-# In a drawing of more points or arcs no doors are looked for, as that would take long.
-_MOST_POINTS, _MOST_ARCS = 200_000, 1000
+# In a drawing of more points or arcs, or of more ends at hinges, no doors are looked for, as that
+# would take long.
+_MOST_POINTS, _MOST_ARCS, _MOST_MEETING = 200_000, 1000, 100_000
 
 
 class _Pieces(NamedTuple):
@@ -193,21 +194,25 @@ def _swings(
     arcs: Sequence[_Arc], lines: Sequence[FloatArray], pieces: _Pieces
 ) -> Iterator[tuple[_Arc, tuple[list[int], list[int]]]]:
     """Yield the arcs of doors, and for each tip of one the pieces that are a leaf up to there."""
-    near = _MEETS * np.array([arc.radius for arc in arcs])
-    ends = np.asarray(shapely.points(pieces.ends.reshape(-1, 2)), dtype=object)
-    hinges = np.asarray(shapely.points([arc.hinge for arc in arcs]), dtype=object)
-    which, end = shapely.STRtree(ends).query(hinges, "dwithin", near)
+    ends = shapely.STRtree(np.asarray(shapely.points(pieces.ends.reshape(-1, 2)), dtype=object))
+    near = [_MEETS * arc.radius for arc in arcs]
     leaves: list[tuple[list[int], list[int]]] = [([], []) for _ in arcs]
-    for n, piece, side in zip(which.tolist(), (end // 2).tolist(), (end % 2).tolist(), strict=True):
-        to_tips = pieces.ends[arcs[n].piece] - pieces.ends[piece, 1 - side]
-        tip = int(np.hypot(*to_tips.T).argmin())
-        if (
-            piece != arcs[n].piece
-            and math.hypot(*to_tips[tip].tolist()) <= near[n]
-            and is_straight(_points(lines, pieces, piece), _STRAIGHT)
-        ):
-            leaves[n][tip].append(piece)
-    for arc, reach, both in zip(arcs, near.tolist(), leaves, strict=True):
+    met = 0
+    for arc, reach, both in zip(arcs, near, leaves, strict=True):
+        at_hinge = ends.query(shapely.Point(arc.hinge), "dwithin", reach).tolist()
+        met += len(at_hinge)
+        if met > _MOST_MEETING:
+            return
+        for piece, side in (divmod(end, 2) for end in at_hinge):
+            to_tips = pieces.ends[arc.piece] - pieces.ends[piece, 1 - side]
+            tip = int(np.hypot(*to_tips.T).argmin())
+            if (
+                piece != arc.piece
+                and math.hypot(*to_tips[tip].tolist()) <= reach
+                and is_straight(_points(lines, pieces, piece), _STRAIGHT)
+            ):
+                both[tip].append(piece)
+    for arc, reach, both in zip(arcs, near, leaves, strict=True):
         if any(both):
             for tip, sides in zip(pieces.ends[arc.piece], both, strict=True):
                 sides.extend(_between(sides, np.stack([arc.hinge, tip]), reach, pieces))
