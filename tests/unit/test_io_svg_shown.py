@@ -558,6 +558,21 @@ def test_paper_is_what_covers_the_page_wherever_it_stands(paper):
             '<rect x="620" width="9" height="9" fill="#fff"/>',
             5,
         ),
+        (
+            '<rect x="600" width="90" height="90"/>'
+            '<rect x="620" y="200" width="9" height="9" fill="#fff"/>',
+            4,
+        ),
+        # Paper leaves a hundredth of the page uncovered at most.
+        ('<rect x="7" width="900" height="600"/>', 3),
+        ('<rect x="9" width="900" height="600"/>', 4),
+        ('<rect y="5" width="800" height="900"/>', 3),
+        ('<rect y="7" width="800" height="900"/>', 4),
+        ('<rect width="793" height="600"/>', 3),
+        ('<rect width="791" height="600"/>', 4),
+        ('<rect width="800" height="595"/>', 3),
+        ('<rect width="800" height="593"/>', 4),
+        ('<path d="M0 0h800v600h-800zM9 9v90h90v-90z"/>', 4),
     ],
 )
 def test_shapes_that_are_no_paper(shape, count):
@@ -577,6 +592,22 @@ def test_a_ground_smaller_than_the_page_is_told_of():
         "one is enough"
     )
     assert len(decoded(floor + THINGS[: THINGS.index("<path")]).strokes) == 3, "of two on a table"
+
+
+@pytest.mark.parametrize(
+    "floor",
+    [
+        'x="150" y="50" width="600" height="500"',
+        'x="50" y="150" width="700" height="400"',
+        'x="50" y="50" width="490" height="500"',
+        'x="50" y="50" width="700" height="460"',
+    ],
+)
+def test_what_something_sticks_out_of_is_no_ground(floor):
+    things = THINGS.split("/>")[:3]
+    for order in (things, things[::-1]):
+        found = decoded(f'<rect {floor} fill="beige"/>{"/>".join(order)}/>')
+        assert (len(found.strokes), found.notes) == (4, ())
 
 
 XKCD = """<g><path d="M0 1L400 2L800 0L799 600L400 598L1 600z" style="fill:#fff;stroke:#fff"/></g>
@@ -609,8 +640,9 @@ def test_a_filling_and_its_line_drawn_apart_are_one():
     line = '<path id="desk" stroke="#595959" d="M100 100h200v80h-200z" fill="none"/>'
     for body in (filling + line, line + filling):
         (stroke,) = decoded(body).strokes
-        assert stroke.label == "desk"
+        assert (stroke.label, stroke.width) == ("desk", 1.0)
     assert len(decoded(filling + line.replace("100h200", "101h200")).strokes) == 2
+    assert len(decoded(filling + line.replace("h-200z", "")).strokes) == 2
     assert len(decoded(filling + filling.replace("#cfe2f3", "red")).strokes) == 2
 
 
@@ -834,6 +866,7 @@ def test_of_lengths_the_first_is_named_and_outlines_are_none():
     [
         ('x="9" y="20"', 'x="9" y="39"', ["master bath"]),
         ('x="9" y="20" id="a"', 'x="9" y="39" id="b"', ["master bath"]),
+        ('x="9" y="20"', 'x="10" y="39"', ["master bath"]),
         ('x="9" y="20"', 'x="9" y="50"', ["master", "bath"]),  # too far below
         ('x="9" y="20"', 'x="19" y="39"', ["master", "bath"]),  # aside
         ('x="9" y="39"', 'x="9" y="20"', ["master", "bath"]),  # above
@@ -870,6 +903,9 @@ def test_names_go_on_for_more_lines_up_to_a_number(lines, names):
 def test_signs_join_lines_of_another_manner(first, second, joined):
     texts = f'<text y="20">{first}</text><text y="50" font-size="12">{second}</text>'
     assert len(decoded(KEPT + texts).landmarks) == (1 if joined else 2)
+    small = f'{KEPT}<g transform="scale(0.01)">{texts}</g>'
+    assert len(decoded(small).landmarks) == (1 if joined else 2)
+    assert len(decoded(KEPT + texts.replace("50", "56")).landmarks) == 2
 
 
 def test_what_is_written_is_read_where_it_is_seen():

@@ -68,6 +68,8 @@ DRAWIO = (
     '<path d="M80 30L193.6 30" fill="none" stroke="#000"/>'
     '<path d="M198.8 30L191.8 33.5L193.6 30L191.8 26.5Z" fill="#000" stroke="#000"/>'
 )
+ACROSS = '<path d="M0 0H99" fill="none" stroke="#000"/>'
+DOWN = '<path d="M0 0V99" fill="none" stroke="#000"/>'
 OTHER_END = '<path d="M74.8 30L81.8 26.5L80 30L81.8 33.5Z" fill="#000"/>'
 
 
@@ -82,6 +84,15 @@ OTHER_END = '<path d="M74.8 30L81.8 26.5L80 30L81.8 33.5Z" fill="#000"/>'
         ('<path d="M0 0H9" fill="none" stroke="#000"/><path d="M9 -9V9L29 0z"/>', 2),
         ('<path d="M0 0H99" fill="none" stroke="#000"/><path d="M99 0L88 2"/>', 2),
         (OTHER_END, 1),
+        ('<path d="M0 500H99" fill="none" stroke="#000"/>' + DRAWIO, 2),
+        (f'{ACROSS}<path d="M99 0L60 24V-24z"/>', 1),
+        (f'{ACROSS}<path d="M99 0L40 30V-30z"/>', 2),  # too large
+        (f'{ACROSS}<path d="M120 0L113 3V-3z"/>', 2),  # beside its end
+        (f'{ACROSS}<path d="M99 9L92 12V6z"/>', 2),
+        (f'{ACROSS}<path d="M99 0Q92 3 92 -3z"/>', 2),  # round
+        (f'{ACROSS}<path d="M99 0L92 3V-3zM109 0L102 3V-3z"/>', 3),
+        (f'{DOWN}<path d="M0 99L24 60H-24z"/>', 1),
+        (f'{DOWN}<path d="M0 99L30 40H-30z"/>', 2),
     ],
 )
 def test_arrowheads_are_no_shapes(drawn, count):
