@@ -728,6 +728,15 @@ def test_among_very_many_outlines_over_each_other_none_is_hidden():
     assert not shapely.LineString(seen(filled(lines[:3]))[0]).is_ring
 
 
+@pytest.mark.parametrize(("gap", "touches"), [(0.2, True), (0.4, False)])
+def test_what_is_hardly_apart_touches(gap, touches):
+    drawn = box(0, 0, 100, 80), box(gap, 20, 9, 9), [(50, 50)], [(5, 25), (9 + 2 * gap, 25)]
+    lines = [np.array(each, dtype=float) for each in drawn]
+    found = things_in(lines[:3], [])
+    assert (found.free, found.touching) == (([], [1]) if touches else ([[1]], []))
+    assert lines_within(lines, [1]) == ({3} if touches else set())
+
+
 def test_a_thing_whose_outline_has_a_knot_is_one():
     knot = np.vstack([np.array(box(0, 0, 2, 1)[:4]), scribble(0.01, 400), [(0, 0)]])
     walls = [np.array(box(-3, -3, 9, 8), dtype=float), np.array([(0.5, 0.5), (1.5, 0.5)])]
@@ -764,6 +773,8 @@ def test_a_wall_is_no_dimension():
     wall = [(0, 0), (9, 0)]
     ends = [[(0, -0.2), (0, 0.2)], [(9, -0.2), (9, 0.2)]]
     assert dimensions([np.array(line, dtype=float) for line in [wall, *ends]]) == {0, 1, 2}
+    double = [[(0.1, -0.2), (0.1, 0.2)], [(9, 3), (9, 4)]]
+    assert dimensions([np.array(line) for line in [wall, *ends, *double]]) == {0, 1, 2, 3}
     for others in (
         ends[:1],  # at one end alone
         [[(0, -2), (0, 2)], [(9, -2), (9, 2)]],  # walls that meet it
