@@ -11,10 +11,16 @@ from tests.tools import ROOT
 _EXACT = "plugins/test_exact_bounds plugins/test_exact"
 _FORCES = "unit/test_constant_force unit/test_force_histogram"
 _MATCHED = "unit/test_match unit/test_public"
+_PLANS = "plugins/test_segmenter_rooms_of_drawings"
+_STROKES = (
+    "plugins/test_segmenter_strokes plugins/test_segmenter_strokes_rules "
+    "plugins/test_segmenter_strokes_joints plugins/test_segmenter_strokes_sloppy"
+)
+_SVG = "unit/test_io_svg unit/test_io_svg_shown unit/test_io_svg_tools"
 
 _GROUPS = {
     "kernels": (
-        "engine/sketchmatch/kernels",
+        "engine/sketchmatch/kernels/*.py",
         {
             "_jit": "unit/test_jit",
             "alignment": "unit/test_alignment unit/test_relate",
@@ -33,7 +39,7 @@ _GROUPS = {
         },
     ),
     "pipeline": (
-        "engine/sketchmatch/pipeline",
+        "engine/sketchmatch/pipeline/*.py",
         {
             "ambiguity": "unit/test_ambiguity",
             "answer": f"unit/test_ambiguity unit/test_judge {_MATCHED}",
@@ -57,7 +63,7 @@ _GROUPS = {
         },
     ),
     "searchers": (
-        "plugins/sketchmatch_builtin/searchers",
+        "plugins/sketchmatch_builtin/searchers/*.py",
         {
             "_assignment": _EXACT,
             "_backtrack": _EXACT,
@@ -84,7 +90,7 @@ _GROUPS = {
         },
     ),
     "judges": (
-        "plugins/sketchmatch_builtin/judges",
+        "plugins/sketchmatch_builtin/judges/*.py",
         {
             "_odds": "unit/test_probability unit/test_judge",
             "calibration": "unit/test_probability unit/test_learning plugins/test_posterior",
@@ -95,7 +101,7 @@ _GROUPS = {
         },
     ),
     "alignment": (
-        "plugins/sketchmatch_builtin/alignment",
+        "plugins/sketchmatch_builtin/alignment/*.py",
         {
             "_candidates": "plugins/test_alignment_candidates plugins/test_align",
             "_forms": "unit/test_forms",
@@ -104,6 +110,47 @@ _GROUPS = {
             "_selves": "plugins/test_alignment_things",
             "_sides": "plugins/test_alignment_things",
             "_things": "plugins/test_alignment_things",
+        },
+    ),
+    "transfers": (
+        "engine/sketchmatch/transfers/*.py",
+        {
+            "carrying": "unit/test_carried",
+            "features": "unit/test_carried unit/test_mending",
+            "files": "unit/test_feature_files",
+            "obstacles": "unit/test_obstacles unit/test_planning unit/test_feature_files",
+        },
+    ),
+    "svg": (
+        "engine/sketchmatch/io/*svg*.py",
+        {
+            "_svg_curves": _SVG,
+            "_svg_frame": _SVG,
+            "_svg_ink": "unit/test_io_svg_ink",
+            "_svg_names": _SVG,
+            "_svg_shapes": _SVG,
+            "_svg_style": _SVG,
+            "_svg_tree": _SVG,
+            "svg": _SVG,
+        },
+    ),
+    "drawings": (
+        "plugins/sketchmatch_builtin/segmenters/_[lpsw]*.py",
+        {
+            "_landmarks": _PLANS,
+            "_leaves": "plugins/test_segmenter_rooms",
+            "_lines": _PLANS,
+            "_plan_things": _PLANS,
+            "_plans": _PLANS,
+            "_standing": "plugins/test_segmenter_lidar",
+            "_strokes_chains": _STROKES,
+            "_strokes_drawing": _STROKES,
+            "_strokes_marks": _STROKES,
+            "_strokes_outline": _STROKES,
+            "_strokes_trace": _STROKES,
+            "_swings": _PLANS,
+            "_widths": _PLANS,
+            "_writing": "plugins/test_writing",
         },
     ),
 }
@@ -145,8 +192,8 @@ class Module:
 def modules() -> list[Module]:
     """Return all modules that are mutated, group by group."""
     found = []
-    for group, (folder, named) in _GROUPS.items():
-        for file in sorted((ROOT / folder).glob("*.py")):
+    for group, (pattern, named) in _GROUPS.items():
+        for file in sorted(ROOT.glob(pattern)):
             names = named.get(file.stem, f"unit/test_{file.stem}").split()
             tests = [f"tests/{name}.py" for name in names]
             path, text = file.relative_to(ROOT).as_posix(), file.read_text(encoding="utf-8")

@@ -125,10 +125,13 @@ def test_every_module_has_tests_that_exist():
     found = modules()
     assert {each.group for each in found} == {
         "alignment",
+        "drawings",
         "judges",
         "kernels",
         "pipeline",
         "searchers",
+        "svg",
+        "transfers",
     }
     missing = {path for each in found for path in each.tests if not (ROOT / path).is_file()}
     assert not missing
