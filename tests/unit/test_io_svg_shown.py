@@ -622,6 +622,14 @@ def test_what_is_white_on_white_paper_is_not_seen():
     assert boxes(XKCD) == [(9, 9, 99, 69), (300, 300, 390, 360), (310, 310, 360, 310)]
 
 
+def test_white_shapes_are_seen_on_dark_ones_that_were_drawn_before():
+    tiles = [f'<path d="M{2 * k} 9h1v1h-1z"/>' for k in range(30)]
+    dots = [each.replace("1h-1z", '.5h-.5z" fill="#fff').replace("h1", "h.5") for each in tiles]
+    dot_on_dot = dots[20].replace("h.5", "h.4")
+    assert len(decoded("".join([*dots[25:], *tiles[:20], *dots, dot_on_dot])).strokes) == 40
+    assert len(decoded("".join([*tiles, *dots, dot_on_dot])).strokes) == 61
+
+
 def test_white_lines_on_a_page_that_says_no_colour_are_seen():
     assert boxes('<path d="M9 9h90v60h-90z" fill="none" stroke="#fff"/>') == [(9, 9, 99, 69)]
 

@@ -112,7 +112,9 @@ def without_paper(
     highs = np.maximum.accumulate(boxes[::-1, 2:])[::-1]
     kept: list[Shape] = []
     ground: list[Shape] = []
-    filled = np.zeros(len(shapes), dtype=bool)
+    fillings = np.flatnonzero([shape.filled for shape in shapes])
+    under = shapely.STRtree(shapely.box(*boxes[fillings].T))
+    filled = np.zeros(len(shapes), dtype=bool)  # of those that were kept so far
     for k, shape in enumerate(shapes):
         sheet = shape.bare or (shape.filled and shape.stroke == white)
         sheet = sheet and _rectangular(shape)
@@ -127,8 +129,9 @@ def without_paper(
         ):
             background = shape.fill or ()
             ground = [shape]
-        elif not (
-            _like_paper(shape, background, papered) and not _meets_any(boxes[k], boxes[filled])
+        elif (
+            not _like_paper(shape, background, papered)
+            or filled[fillings[under.query(shapely.box(*shape.box))]].any()
         ):
             kept.append(shape)
             filled[k] = shape.filled
@@ -155,11 +158,6 @@ def _like_paper(shape: Shape, background: Colour, papered: bool) -> bool:
         and shape.fill == background != ()
         and any(signed_area(_ends(subpath)) != 0.0 for subpath in shape.subpaths)
     )
-
-
-def _meets_any(box: FloatArray, others: FloatArray) -> bool:
-    low, high = others[:, :2] <= box[2:], others[:, 2:] >= box[:2]
-    return bool((low & high).all(axis=1).any())
 
 
 def _rectangular(shape: Shape) -> bool:
