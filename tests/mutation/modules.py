@@ -140,7 +140,7 @@ _GROUPS = {
             "_landmarks": _PLANS,
             "_leaves": "plugins/test_segmenter_rooms",
             "_lines": _PLANS,
-            "_plan_things": _PLANS,
+            "_plan_things": f"plugins/test_plan_things {_PLANS}",
             "_plans": _PLANS,
             "_standing": "plugins/test_segmenter_lidar",
             "_strokes_chains": _STROKES,
