@@ -42,14 +42,20 @@ def test_what_fills_most_of_a_place_does_not_stand_in_it(size, stands):
     assert standing([[0], [1]], lines, [], ROOMS, CELLS) == [0, 1][not stands :]
 
 
-def things(*lines):
-    found = things_in([box(0, 0, 100, 80), *lines], [])
+def things(*lines, names=()):
+    found = things_in([box(0, 0, 100, 80), *lines], names)
     return found.free, found.touching
 
 
 def test_a_thing_beside_one_that_touches_a_wall_touches_it_as_well():
     assert things(box(0, 20, 9, 9), box(9, 20, 9, 9)) == ([], [1, 2])
     assert things(box(10, 20, 9, 9), box(19, 20, 9, 9)) == ([[1, 2]], [])
+
+
+def test_what_has_a_name_is_no_thing_if_it_touches_a_wall():
+    closet = Landmark("closet", (5, 25), "room")
+    assert things(box(0, 20, 9, 9), box(0, 40, 9, 9), names=[closet]) == ([], [2])
+    assert things(box(1, 20, 9, 9), names=[closet]) == ([[1]], [])
 
 
 @pytest.mark.parametrize(("thick", "count"), [(3.0, 1), (1.5, 0)])
@@ -70,6 +76,6 @@ def test_what_touches_walls_and_covers_much_of_the_plan_is_rooms(number, count):
 
 @pytest.mark.parametrize(("length", "count"), [(6.0, 3), (4.0, 0)])
 def test_what_is_too_short_is_no_dimension(length, count):
-    ends = [np.array([(x, 49.8), (x, 50.2)]) for x in (50.0, 50.0 + length)]
+    ends = [np.array([(x, 49.9), (x, 50.1)]) for x in (50.0, 50.0 + length)]
     line = np.array([(50.0, 50.0), (50.0 + length, 50.0)])
     assert len(dimensions([box(0, 0, 100, 80), line, *ends])) == count

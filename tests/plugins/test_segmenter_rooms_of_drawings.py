@@ -762,6 +762,24 @@ def test_dashed_lines_are_no_walls_but_where_all_are():
     assert areas(dashed(rooms)) == pytest.approx([24.0, 30.0], rel=0.05)
 
 
+def test_dashed_lines_are_walls_where_no_others_part_rooms():
+    within_walls = dashed([[(4, 0), (4, 6)]]).strokes
+    drawing = StrokeSet((*strokes([box(0, 0, 9, 6)]).strokes, *within_walls))
+    assert areas(drawing) == pytest.approx([24.0, 30.0], rel=0.05)
+
+
+def test_outlines_in_a_single_place_are_rooms():
+    tents = [box(x, y, 7, 7) for x in (4, 19) for y in (4, 19)]
+    found = sorted(areas(strokes([*tents, box(0, 0, 30, 30)])))
+    assert found[:4] == pytest.approx([49.0] * 4, rel=0.1)
+
+
+def test_of_names_beside_the_rooms_nothing_is_said():
+    lines = [box(0, 0, 9, 6), [(4, 0), (4, 6)]]
+    scene = segmented(named(lines, ("bath", (2, 3), 0.3), ("plan of a house", (2, 8), 0.5)))
+    assert (scene.scene.labels, scene.warnings) == (("bath", ""), ())
+
+
 def test_doors_whose_arcs_are_dashed_close_rooms():
     swings = strokes(doors("apart")).strokes
     drawn = [replace(each, dashed=len(each.points) > 2) for each in swings]
