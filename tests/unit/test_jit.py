@@ -2,18 +2,23 @@
 
 import errno
 import hashlib
+import importlib
 import os
 import pickle
+import pkgutil
 import re
 import subprocess
 import sys
 from collections import Counter
+from enum import EnumType
 from pathlib import Path
 
 import numpy as np
 import pytest
 from platformdirs import user_cache_path
 
+import sketchmatch.kernels
+import sketchmatch_builtin
 from sketchmatch.kernels import _jit
 from sketchmatch.kernels.confidence import fmap_confidence, mean_absolute_difference
 from sketchmatch.kernels.projection import project
@@ -473,3 +478,26 @@ def test_the_cache_lies_with_those_of_the_user_else(monkeypatch):
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     place = user_cache_path("sketchmatch", appauthor=False) / "kernels"
     assert next(_jit._folders()) == place
+
+
+@compiled_only
+def test_no_kernel_takes_places_from_an_enum():
+    """Before 0.68 numba takes no member of an enum for an index."""
+    modules = [
+        importlib.import_module(found.name)
+        for package in (sketchmatch.kernels, sketchmatch_builtin)
+        for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+    ]
+    kernels = [
+        each.py_func
+        for module in modules
+        for each in vars(module).values()
+        if hasattr(each, "py_func") and each.py_func.__module__ == module.__name__
+    ]
+    assert len(kernels) > 100
+    assert not [
+        (kernel.__qualname__, name)
+        for kernel in kernels
+        for name in kernel.__code__.co_names
+        if isinstance(kernel.__globals__.get(name), EnumType)
+    ]

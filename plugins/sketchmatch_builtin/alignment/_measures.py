@@ -6,7 +6,6 @@ spacing, of ln of the areas, and of shapes.
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +28,7 @@ from sketchmatch_builtin.alignment._things import Things
 __all__ = ["Line", "Measured", "Relations", "Whole", "measure", "measured", "relations_of"]
 
 
-class Line(IntEnum):
+class _Line(NamedTuple):
     """What is measured of a line, by its place in a row; 0 for an object without partner.
 
     ``PLACE`` and ``SHAPE`` are squares of deviations, ``SIZE`` is one with its sign, and ``ROUND``
@@ -42,21 +41,24 @@ class Line(IntEnum):
     the nearest other one, in units of the spacing.
     """
 
-    PLACE = 0
-    SIZE = 1
-    SHAPE = 2
-    ROUND = 3
-    SELF = 4
-    RELATION = 5
-    WAY = 6
-    NEAR = 7
-    ALONE = 8
-    BENT = 9
-    ROOM = 10
-    FORM = 11
+    PLACE: int = 0
+    SIZE: int = 1
+    SHAPE: int = 2
+    ROUND: int = 3
+    SELF: int = 4
+    RELATION: int = 5
+    WAY: int = 6
+    NEAR: int = 7
+    ALONE: int = 8
+    BENT: int = 9
+    ROOM: int = 10
+    FORM: int = 11
 
 
-class Whole(IntEnum):
+Line = _Line()
+
+
+class _Whole(NamedTuple):
     """What is measured of a map as a whole, by its place in a row.
 
     ``SCORE`` is the sum of ℓ and −λ, ``MATCHED`` counts lines, ``MISSING`` and ``CROWD`` mapped
@@ -65,14 +67,17 @@ class Whole(IntEnum):
     than their distances, ``BEND`` that of how far the page is stretched or grows to one side.
     """
 
-    SCORE = 0
-    MATCHED = 1
-    MISSING = 2
-    CROWD = 3
-    OFFSET = 4
-    BEND = 5
-    ALIKE = 6
-    UNLIKE = 7
+    SCORE: int = 0
+    MATCHED: int = 1
+    MISSING: int = 2
+    CROWD: int = 3
+    OFFSET: int = 4
+    BEND: int = 5
+    ALIKE: int = 6
+    UNLIKE: int = 7
+
+
+Whole = _Whole()
 
 
 class Measured(NamedTuple):
