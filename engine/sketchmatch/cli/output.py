@@ -29,6 +29,7 @@ __all__ = [
     "clean",
     "console",
     "discard",
+    "document_of",
     "for_people",
     "open_again",
     "show",
@@ -144,11 +145,19 @@ def write_json(document: Mapping[str, Any]) -> None:
 
 
 def write_message(message: Message) -> None:
-    """Write a message of the contract as JSON, with index 0 and empty lists written out."""
-    from google.protobuf.json_format import MessageToJson
+    """Write a message of the contract as JSON, as :func:`document_of` has it."""
+    write_json(document_of(message))
 
-    text = MessageToJson(message, always_print_fields_with_no_presence=True, ensure_ascii=False)
-    write(_json_for(_stream(), text) + "\n")
+
+def document_of(message: Message) -> dict[str, Any]:
+    """Return a message of the contract for JSON, with index 0 and empty lists written out."""
+    from google.protobuf import __version__ as version
+    from google.protobuf.json_format import MessageToDict
+
+    major, minor = map(int, version.split(".")[:2])
+    if (major, minor) < (5, 26):  # which has another name for it
+        return MessageToDict(message, including_default_value_fields=True)  # type: ignore[call-arg]
+    return MessageToDict(message, always_print_fields_with_no_presence=True)
 
 
 def tell(text: str) -> None:

@@ -97,8 +97,6 @@ def relate(
 
 def _document(found: Listing) -> dict[str, Any]:
     """Return all that was found; each comparison as the contract's ``FmapEntry``."""
-    from google.protobuf.json_format import MessageToDict
-
     from sketchmatch.app import responses
     from sketchmatch.cli.display import chosen
 
@@ -108,10 +106,7 @@ def _document(found: Listing) -> dict[str, Any]:
         "sketchLabels": list(found.sketch.labels),
         "mapLabels": list(found.map.labels),
         "comparisonCount": found.total,
-        "comparisons": [
-            MessageToDict(responses.fmap_entry(entry), always_print_fields_with_no_presence=True)
-            for entry in found.best
-        ],
+        "comparisons": [output.document_of(responses.fmap_entry(entry)) for entry in found.best],
     }
 
 
