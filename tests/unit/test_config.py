@@ -210,6 +210,12 @@ def test_a_profile_of_ones_own_changes_the_built_in_one(file):
             "{file}: pipeline.searcher.name is 'best', which is not a searcher; choose one of: al",
         ),
         (
+            "[pipeline]\nsearcher = 'easm'",
+            "{file}: pipeline.searcher is 'easm'; it should be a table; set pipeline.searcher.name",
+        ),
+        ("server = 3", "{file}: server is 3; it should be a table"),
+        ("[algorithms]\nsearcher = 3", "{file}: algorithms.searcher is 3; it should be a table"),
+        (
             "[algorithms.searcher.easm]\ncolour = 1",
             "{file}: algorithms.searcher.easm.colour is not a parameter of easm; it has: con",
         ),

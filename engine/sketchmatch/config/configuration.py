@@ -326,6 +326,9 @@ def _selection(stages: Any) -> Selection:
     }
 
 
+_NO_TABLE = ("dict_type", "model_attributes_type", "model_type")
+
+
 def _faults(error: ValidationError, layers: Sequence[Layer]) -> Iterator[InvalidInputError]:
     """Yield what a validation found wrong, each in one sentence."""
     for fault in error.errors(include_url=False):
@@ -335,6 +338,13 @@ def _faults(error: ValidationError, layers: Sequence[Layer]) -> Iterator[Invalid
             problem = f"is not a setting; {_known(path, place)}"
         elif path[-1] == "[key]":
             problem = "cannot be the name of a profile; use small letters, digits and hyphens"
+        elif fault["type"] in _NO_TABLE:
+            naming = (
+                f"; set {'.'.join(path)}.name to choose an algorithm"
+                if "name" in keys_of(path)
+                else ""
+            )
+            problem = f"is {quoted(fault['input'])}; it should be a table{naming}"
         else:
             problem = fault_of(fault["input"], fault["msg"])
         yield InvalidInputError(Reason.INVALID_PARAMETER, place, problem)
