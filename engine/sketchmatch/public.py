@@ -265,7 +265,7 @@ def transfer(
         )
     request = TransferRequest(
         matching,
-        tuple(features),
+        _features(features),
         None if object_map is None else tuple(object_map.items()),
         direction,  # type: ignore[arg-type]  # it checks
         radius,
@@ -307,7 +307,7 @@ def carry(
     InvalidInputError
         As :func:`transfer`.
     """
-    given = tuple(features)
+    given = _features(features)
     engine = _engine(options.get("config"))
     with engine.limited():
         maps = _loaded("old", old, engine), _loaded("new", new, engine)
@@ -658,6 +658,14 @@ def _name(field: str, given: Any, what: str = "an algorithm") -> str:
         problem = f"is {quoted(given)}; give the name of {what}, or leave it out"
         raise InvalidInputError(Reason.INVALID_FIELD, field, problem)
     return given
+
+
+def _features(given: Iterable[Feature]) -> tuple[Feature, ...]:
+    found = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else None
+    if found is None or not all(isinstance(each, Feature) for each in found):
+        problem = f"is {quoted(given)}; give a list of Feature"
+        raise InvalidInputError(Reason.INVALID_FIELD, "features", problem)
+    return found
 
 
 def _pins(given: Mapping[Any, int | str | None] | Iterable[Pin] | None) -> tuple[Pin, ...]:

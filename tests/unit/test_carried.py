@@ -340,6 +340,8 @@ def test_objects_of_a_scene_are_obstacles_too():
         (("point", ([[0, 0], [1, 1]],)), "points"),
         (("zone", ([[0, 0], [1, 1]],)), "rings[0]"),
         (("zone", ()), "rings"),
+        (("path", ([[0, 0], [1, 1]],)), "kind"),
+        (("route", ([0, 0], [1, 1])), "rings"),
         (("route", ([[0, 0], [1, np.inf]],)), "points"),
         (("route", ([0, 1],)), "points"),
         (("zone", ([[0, 0], [2, 2], [2, 0], [0, 2]],)), "rings"),

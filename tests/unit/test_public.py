@@ -15,12 +15,15 @@ import pytest
 
 import sketchmatch
 from sketchmatch import (
+    Feature,
     InvalidInputError,
     Scene,
     SketchmatchError,
+    carry,
     force_histogram,
     match,
     read_scene,
+    transfer,
 )
 from sketchmatch.api import Outcome
 from sketchmatch.examples import LIVING_ROOM_MAP, LIVING_ROOM_SKETCH, LIVING_ROOM_TRUTH
@@ -290,6 +293,13 @@ def test_numbers_of_numpy_are_numbers():
     assert type(result.seed) is int
     assert result.seed == 2**64 - 1
     assert len(result.alternatives) == 1
+
+
+@pytest.mark.parametrize("given", ["zones.geojson", Feature("point", ([[1, 2]],)), [(1, 2)], 3])
+def test_what_are_no_features_are_refused(given):
+    for refused in (lambda: transfer(THREE, THREE, given), lambda: carry(given, THREE, THREE)):
+        with pytest.raises(InvalidInputError, match=r"^features is .*; give a list of Feature$"):
+            refused()
 
 
 @pytest.mark.parametrize("given", [None, 5, [SQUARE, SQUARE + 3.0], b"sketch.svg"])

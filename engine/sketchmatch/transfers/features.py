@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from sketchmatch.errors import InvalidInputError, Reason, counted
+from sketchmatch.errors import InvalidInputError, Reason, counted, quoted
 from sketchmatch.model import FloatArray
 from sketchmatch.model.arrays import frozen_floats
 from sketchmatch.model.labels import cleaned_label
@@ -69,11 +69,16 @@ class Feature:
         name: str = "",
         speeds: ArrayLike | None = None,
     ) -> None:
+        if kind not in list(FeatureKind):
+            raise _refused("kind", f"is {quoted(kind)}; give {', '.join(FeatureKind)}")
         kind = FeatureKind(kind)
         object.__setattr__(self, "kind", kind)
         object.__setattr__(self, "name", cleaned_label(name))
         if len(rings) < 1 or (kind is not FeatureKind.ZONE and len(rings) > 1):
-            raise _refused("rings", f"are {len(rings)}; give a {kind} one line of points")
+            sample = "[[1, 2]]" if kind is FeatureKind.POINT else "[[1, 2], [3, 4]]"
+            raise _refused(
+                "rings", f"are {len(rings)}; give a {kind} a single one, as in ({sample},)"
+            )
         lines = tuple(self._checked(ring, k) for k, ring in enumerate(rings))
         if kind is FeatureKind.ZONE:
             lines, numbers = zip(*map(mended, lines), strict=True)
