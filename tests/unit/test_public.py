@@ -51,6 +51,10 @@ def test_every_public_name_is_there():
         sketchmatch.nothing  # noqa: B018
 
 
+def test_every_public_name_is_completed_at_a_prompt():
+    assert set(sketchmatch.__all__) <= set(dir(sketchmatch))
+
+
 def test_importing_it_loads_nothing_heavy():
     heavy = ("numba", "cv2", "grpc", "shapely")
     code = f"import sys, sketchmatch; print([m for m in {heavy} if m in sys.modules])"
