@@ -161,12 +161,15 @@ def delete(
     server: _Server = _HERE,
     access: options.Access = options.Access(),  # noqa: B008
 ) -> None:
-    """Delete a scene; it stays for other callers who have put it."""
+    """Delete a scene, and print its whole name; it stays for other callers who have put it."""
+    from sketchmatch.cli import output
     from sketchmatch.cli.answering import client_of
     from sketchmatch.cli.sources import whole_name
 
     with client_of(server, "--server", access) as client:
-        client.delete_scene(whole_name(name, client))
+        whole = whole_name(name, client)
+        client.delete_scene(whole)
+    output.write_line(whole)
 
 
 def _labels(typed: list[str]) -> Mapping[int, str]:
