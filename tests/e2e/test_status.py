@@ -64,6 +64,10 @@ def test_health_may_be_asked_over_http_without_certificates_and_proxies(
     answers["/readyz"] = 503
     done = command_line("health", f"{address}/")
     assert (done.returncode, done.stdout, done.stderr) == (3, "NOT_SERVING\n", "")
+    del answers["/readyz"]  # as of the port for browsers
+    done = command_line("health", address)
+    assert (done.returncode, done.stdout) == (3, "")
+    assert done.stderr.startswith(f"sketchmatch: nobody tells at {address} whether the server")
     done = command_line("health", address, "--of", "searcher/easm")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("sketchmatch: --of cannot be asked over HTTP; ")

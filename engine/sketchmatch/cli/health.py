@@ -56,6 +56,7 @@ def health(
 
 def _is_ready(address: str, of: str, timeout: float) -> bool:
     """Return whether the probe over HTTP says so."""
+    from http import HTTPStatus
     from http.client import HTTPException
     from urllib.error import HTTPError
     from urllib.request import ProxyHandler, build_opener
@@ -69,10 +70,11 @@ def _is_ready(address: str, of: str, timeout: float) -> bool:
         # No proxy leads to where a probe is.
         with build_opener(ProxyHandler({})).open(f"{address.rstrip('/')}/readyz", timeout=timeout):
             return True
-    except HTTPError as error:
-        with error:
-            return False
     except (OSError, HTTPException, ValueError) as error:
+        if isinstance(error, HTTPError):
+            error.close()
+            if error.code == HTTPStatus.SERVICE_UNAVAILABLE:
+                return False
         problem = f"{address} does not answer whether the server serves ({error})"
         remedy = "check the address, or start the server with --metrics-address"
         raise ServerUnavailableError(f"{problem}; {remedy}") from None
