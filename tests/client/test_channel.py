@@ -85,6 +85,7 @@ def test_options_that_are_given_win():
     ("address", "remedy"),
     [
         ("localhost", "add the port, as in 'localhost:50051'"),
+        ("50061", "add the host, as in 'localhost:50061'"),
         ("[::1]", "add the port, as in '[::1]:50051'"),
         ("::1", "give host and port, as in 'localhost:50051' or '[::1]:50051'"),
         ("::1:50051", "give host and port, as in 'localhost:50051' or '[::1]:50051'"),

@@ -67,7 +67,7 @@ def test_health_may_be_asked_over_http_without_certificates_and_proxies(
     del answers["/readyz"]  # as of the port for browsers
     done = command_line("health", address)
     assert (done.returncode, done.stdout) == (3, "")
-    assert done.stderr.startswith(f"sketchmatch: nobody tells at {address} whether the server")
+    assert done.stderr.startswith(f"sketchmatch: {address} does not answer whether the server")
     done = command_line("health", address, "--of", "searcher/easm")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("sketchmatch: --of cannot be asked over HTTP; ")

@@ -357,6 +357,7 @@ def test_of_208_notes_one_is_told_and_how_many_more_there_are(command_line, plan
     ("address", "listening", "asked"),
     [
         ("127.0.0.1", "have a port, as in 127.0.0.1:50051", "add the port, as in"),
+        ("50061", "begin with a host, as in 127.0.0.1:50061", "add the host, as in"),
         ("", "have a port, as in 127.0.0.1:50051", "give host and port, as in"),
         ("::1", "have brackets around an IPv6 address, as in [::1]:50051", "give host and port"),
         ("http://robot:50051", "be HOST:PORT and not a URL", "give host and port alone"),

@@ -96,6 +96,8 @@ def check_address(address: str, encrypted: bool) -> None:
     parts = _HOST_AND_PORT.fullmatch(address)
     if parts is None or not parts["host"]:
         raise _refused(address, "give host and port, as in 'localhost:50051' or '[::1]:50051'")
+    if parts["port"] is None and address.isdecimal():
+        raise _refused(address, f"add the host, as in 'localhost:{address}'")
     if parts["port"] is None and not encrypted:
         raise _refused(address, f"add the port, as in '{address}:50051'")
     port = parts["port"] or "1"

@@ -69,6 +69,10 @@ def network_fault(address: str) -> str:
     numbered = numbered and int(port) <= _PORTS
     faults = (
         (_URL.match(address), "be HOST:PORT and not a URL, as in 127.0.0.1:50051"),
+        (
+            not colon and numbered,
+            f"begin with a host, as in 127.0.0.1:{port}, or 0.0.0.0:{port} for all addresses",
+        ),
         (not colon, f"have a port, as in {address or '127.0.0.1'}:50051"),
         (
             ":" in host and not bracketed,
