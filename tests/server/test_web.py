@@ -130,6 +130,11 @@ def test_a_stream_has_every_event_and_ends_without_error(server):
     assert (flags, json.loads(end)) == (2, {})
 
 
+def test_plain_json_is_no_request_for_a_stream(server):
+    """As engine/RUNNING.md says of curl."""
+    assert ask(server, MATCH, b"{}")[0] == 415
+
+
 def test_a_stream_of_json_has_the_same(server):
     request = {"sketch": {"strokeSet": {}}, "map": {}}
     _, _, answer = ask(
