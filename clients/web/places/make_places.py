@@ -161,7 +161,7 @@ def _mapped(world: World, rng: np.random.Generator) -> OccupancyGrid:
 def _write_map(folder: Path, grid: OccupancyGrid, world: World) -> None:
     shades = np.select([grid.cells == 100, grid.cells == 0], [0, 254], default=205)
     picture = Image.fromarray(np.flipud(shades).astype(np.uint8))
-    picture.save(folder / "map.png", optimize=True, bits=4)
+    picture.save(folder / "map.png", optimize=True)
     x, y, yaw = grid.origin
     lines = [
         "image: map.png",
