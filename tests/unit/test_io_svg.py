@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from sketchmatch.errors import InvalidInputError, Reason
-from sketchmatch.io import read_source
+from sketchmatch.io import read_source, svg
+from sketchmatch.io._svg_names import groups_label
 from sketchmatch.io.svg import decode_svg
 from sketchmatch.model import StrokeSet
 
@@ -101,6 +102,20 @@ def test_use_repeats_what_it_names_where_it_says():
 def test_what_uses_itself_is_drawn_once(circle):
     document = f'<svg id="whole"><g stroke="red">{circle}</g></svg>'.encode()
     assert len(decode_svg(document).strokes) == 1
+
+
+def test_what_is_used_again_and_again_is_named_once(monkeypatch):
+    asked = []
+
+    def label(element):
+        asked.append(element.get("id"))
+        return groups_label(element)
+
+    monkeypatch.setattr(svg, "groups_label", label)
+    desk = '<defs><g id="desk" data-name="desk"><rect width="2" height="1"/></g></defs>'
+    uses = "".join(f'<use href="#desk" y="{3 * k}"/>' for k in range(5))
+    assert [stroke.label for stroke in strokes(desk + uses)] == ["desk"] * 5
+    assert asked.count("desk") == 1
 
 
 def test_x_and_y_of_use_are_within_its_transform():
@@ -223,7 +238,7 @@ def uses(depth):
         (
             f'<!DOCTYPE s [<!ENTITY x "{"a" * 1000}">]><svg>{"&x;" * 8389}</svg>',
             "INVALID_FILE",
-            "its entities 8389 times",
+            "too often, 8389 times",
         ),
         (f"<svg>{uses(9)}</svg>", "LIMIT_EXCEEDED", "the limit of 100000 elements"),
         ('<svg><g id="a"><use href="#a"/><use href="#a"/></g></svg>', "INVALID_FILE", "nothing"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 from xml.etree import ElementTree
 
@@ -89,32 +89,45 @@ def subpaths_of(
     """
     geometry = _geometry(element, look, frame, field, line)
     try:
-        path = svgelements.Path(SHAPES[tag_of(element)](geometry)) * matrix
-        segments = [
-            part
-            for segment in path.reify()
-            for part in (
-                segment.as_cubic_curves() if isinstance(segment, svgelements.Arc) else (segment,)
-            )
-        ]
-        curves = [np.array([p for p in part if p is not None], np.float64) for part in segments]
+        shape = SHAPES[tag_of(element)](geometry)
+        segments = [*_placed(shape.segments(transformed=False), matrix)]
+        points = np.array([p for _, part in segments for p in part], np.float64).reshape(-1, 2)
     except (ValueError, TypeError, IndexError, ArithmeticError, AttributeError):
         raise _unreadable(element, field, "a shape that cannot be read", line) from None
     if str(geometry.get("d", "")).strip() and not segments:
         raise _unreadable(element, field, "path data that cannot be read", line)
+    if not (np.abs(points) < _LARGEST).all():
+        raise _unreadable(element, field, "a coordinate that is not a usable number", line)
     subpaths: list[Subpath] = []
-    ended = True
-    for segment, controls in zip(segments, curves, strict=True):
-        if not (np.abs(controls) < _LARGEST).all():
-            raise _unreadable(element, field, "a coordinate that is not a usable number", line)
-        if isinstance(segment, svgelements.Move):
+    ended, first = True, 0
+    for kind, part in segments:
+        controls = points[first : first + len(part)]
+        first += len(part)
+        if kind is svgelements.Move:
             ended = True
             continue
         if ended:
             subpaths.append([])
-        ended = isinstance(segment, svgelements.Close)
+        ended = kind is svgelements.Close
         subpaths[-1].append(controls)
     return subpaths
+
+
+def _placed(
+    segments: Iterable[Any], matrix: Any
+) -> Iterator[tuple[type, list[tuple[float, float]]]]:
+    """Yield the segments of a path: their kinds, and their control points in the drawing."""
+    a, b, c, d, e, f = matrix.a, matrix.b, matrix.c, matrix.d, matrix.e, matrix.f
+    for segment in segments:
+        if isinstance(segment, svgelements.Arc):
+            for curve in (segment * matrix).as_cubic_curves():
+                yield type(curve), [(p.x, p.y) for p in curve]
+        else:
+            points = [p for p in segment if p is not None]
+            yield (
+                type(segment),
+                [(p.x * a + p.y * c + e, p.x * b + p.y * d + f) for p in points],
+            )
 
 
 def _geometry(

@@ -416,6 +416,7 @@ def _transparent(text: str) -> bool:
     return parsed is not None and parsed != "currentcolor" and parsed.alpha == 0.0
 
 
+@lru_cache(maxsize=1024)
 def _colour(text: str) -> Colour | None:
     """Return what a paint shows that is no reference, or None."""
     parsed = _parsed_colour(text)
@@ -480,7 +481,8 @@ _VALUES: dict[str, Any] = {
 
 def _inherited(look: Look) -> Look:
     """Return how a child is shown of which nothing is said."""
-    if all(getattr(look, name) == value for name, value in _OWN_FIELDS.items()):
+    own = look.clip_path or look.overflow or look.transforms or look.geometry
+    if look.displayed and not own:
         return look
     return replace(look, **_OWN_FIELDS)
 

@@ -34,8 +34,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from functools import cache, partial
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import svgelements
@@ -119,7 +120,7 @@ def decode_svg(data: bytes) -> StrokeSet:
             "",
             f"is XML but not SVG: it begins with <{tag_of(root)[:LONGEST_CAUSE]}>; save it as SVG",
         )
-    drawing = _Drawing(root, lines, _EXCALIDRAW in data)
+    drawing = _Drawing(root, lines, data)
     shapes = [shape for shape in drawing.shapes() if shape.subpaths]
     shapes, ground = without_paper(shapes, drawing.page, drawing.background)
     shapes, dimensions = without_heads(without_twins(shapes))
@@ -162,21 +163,20 @@ def _note_on_dimensions(places: list[str]) -> Iterator[str]:
 
 def _document(data: bytes) -> tuple[ElementTree.Element, list[int]]:
     """Parse a document whose tree is not too large to be built; the lines are those of elements."""
-    vertices = 0
+    vertices, most = 0, source_limits().max_elements
     lines: list[int] = []
 
     def watch(attributes: Mapping[str, str], line: int) -> None:
         nonlocal vertices
         lines.append(line)
         vertices += sum(_vertices(attributes.get(name, "")) for name in LISTS)
-        _check_elements(len(lines))
+        _check_elements(len(lines), most)
         check_vertices(vertices, "")
 
     return load_xml(data, "SVG", watch), lines
 
 
-def _check_elements(count: int) -> None:
-    limit = source_limits().max_elements
+def _check_elements(count: int, limit: int) -> None:
     if count > limit:
         raise InvalidInputError(
             Reason.LIMIT_EXCEEDED,
@@ -198,8 +198,7 @@ def _vertices(data: str) -> int:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Context:
+class _Context(NamedTuple):
     """What an element inherits from those around it, and from those that use it."""
 
     matrix: Any
@@ -214,14 +213,18 @@ class _Context:
 class _Drawing:
     """A document, of which all that is shown is sought."""
 
-    def __init__(self, root: ElementTree.Element, lines: list[int], excalidraw: bool) -> None:
+    def __init__(self, root: ElementTree.Element, lines: list[int], data: bytes) -> None:
         self._root = root
         self._lines = dict(zip(root.iter(), lines, strict=True))
         self._named = {each.get("id", ""): each for each in reversed([*root.iter()])}
         self._parents = {child: each for each in root.iter() for child in each}
-        self._excalidraw = excalidraw
         self._styles = Styles(root, self._named)
+        # What is used again and again is the same each time.
+        self._label = cache(groups_label)
+        self._children = cache(partial(_children, excalidraw=_EXCALIDRAW in data))
+        self._targets: dict[ElementTree.Element, ElementTree.Element | None] = {}
         self._visited = 1
+        self._most = source_limits().max_elements
         self.background = self._styles.background(root)
         self.page: Box | None = None
         self.names: list[Landmark] = []
@@ -238,15 +241,16 @@ class _Drawing:
             look = self._styles.look(element, outer.look)
             if not look.displayed or not _for_us(element):
                 continue
-            if tag_of(element) in _WRITTEN:
+            tag = tag_of(element)
+            if tag in _WRITTEN:
                 self._name(element, look, outer)
                 continue
-            inner = replace(
-                outer, look=look, size=(None, None), matrix=self._placed(element, look, outer)
+            inner = outer._replace(
+                look=look, size=(None, None), matrix=self._placed(element, look, outer)
             )
             if look.clip_path:
-                inner = replace(inner, clip=_both(inner.clip, self._clip(look.clip_path, inner)))
-            if tag_of(element) in SHAPES:
+                inner = inner._replace(clip=_both(inner.clip, self._clip(look.clip_path, inner)))
+            if tag in SHAPES:
                 self._above = None
                 fill, stroke = self._styles.filled(look), self._styles.stroked(look)
                 if inner.frame is None and stroke is None and fill and _is_whole(element):
@@ -259,14 +263,14 @@ class _Drawing:
                     elif shape.subpaths and _meet(shape.box, inner.clip):
                         yield shape
                 continue
-            if label := groups_label(element):
-                inner = replace(inner, label=label)
-            if tag_of(element) in _VIEWPORTS:
+            if label := self._label(element):
+                inner = inner._replace(label=label)
+            if tag in _VIEWPORTS:
                 inside = self._viewport(element, inner, outer.size)
                 if inside is None:
                     continue
                 inner = inside
-            children, inner = self._children(element, inner)
+            children, inner = self._contents(element, inner)
             self._visit(len(children))
             stack.extend((child, inner) for child in reversed(children))
 
@@ -355,7 +359,7 @@ class _Drawing:
 
     def _visit(self, count: int) -> None:
         self._visited += count
-        _check_elements(self._visited)
+        _check_elements(self._visited, self._most)
 
     def _shape(
         self,
@@ -390,42 +394,34 @@ class _Drawing:
             and self._styles.hides(look),
         )
 
-    def _children(
+    def _contents(
         self, element: ElementTree.Element, context: _Context
     ) -> tuple[list[ElementTree.Element], _Context]:
-        """Return what is drawn of an element, and in which context."""
-        if tag_of(element) == "use":
-            target = self._used(element)
-            if target is None or target in context.used or target in self._around(element):
-                return [], context  # what would draw itself without end is not drawn
-            return [target], replace(
-                context,
-                matrix=self._offset(element, context),
-                size=(element.get("width"), element.get("height")),
-                used=context.used | {target},
-            )
-        children = [child for child in element if tag_of(child) in {*_DRAWN, *_WRITTEN}]
-        if tag_of(element) == "switch":
-            # What is written as HTML is mostly written once more, as text, for those who read none.
-            able = (child for child in element if tag_of(child) not in ("", _HTML))
-            shown = next((child for child in able if _for_us(child)), None)
-            if shown is None or tag_of(shown) == "image":
-                return [child for child in children if tag_of(child) == _HTML], context
-            return [child for child in children if child is shown], context
-        if self._excalidraw and tag_of(element) == "g":
-            last = next((child for child in reversed(children) if tag_of(child) == "path"), None)
-            children = [c for c in children if tag_of(c) != "path" or c is last]
-        return children, context
+        """Return what is drawn of an element that is no shape, and in which context."""
+        if tag_of(element) != "use":
+            return self._children(element), context
+        if element not in self._targets:
+            self._targets[element] = self._used(element)
+        target = self._targets[element]
+        if target is None or target in context.used:
+            return [], context  # what would draw itself without end is not drawn
+        return [target], context._replace(
+            matrix=self._offset(element, context),
+            size=(element.get("width"), element.get("height")),
+            used=context.used | {target},
+        )
 
     def _used(self, use: ElementTree.Element) -> ElementTree.Element | None:
+        """Return what a ``use`` draws, unless that is nothing, or what the ``use`` lies in."""
         href = next((use.get(name, "") for name in _HREFS if name in use.attrib), "").strip()
         if href and not href.startswith("#"):
             raise self._invalid(
                 use, "draws something from another file, which is never opened; embed it"
             )
         target = self._named.get(href[1:]) if href else None
-        drawn = target is not None and tag_of(target) in {*_DRAWN, "symbol"}
-        return target if drawn else None
+        if target is None or tag_of(target) not in {*_DRAWN, "symbol"}:
+            return None
+        return None if target in self._around(use) else target
 
     def _around(self, element: ElementTree.Element | None) -> Iterator[ElementTree.Element]:
         while element is not None:
@@ -469,6 +465,8 @@ class _Drawing:
 
     def _offset(self, use: ElementTree.Element, context: _Context) -> Any:
         frame, said = context.frame, context.look.geometry
+        if not (said or "x" in use.attrib or "y" in use.attrib):
+            return context.matrix
         try:
             x, y = (
                 length(said.get(axis, use.get(axis, "0")), along, context.look.font_size)
@@ -516,12 +514,12 @@ class _Drawing:
             into = Frame(x or 0.0, y or 0.0, width, height)
         if into is not None and not context.look.overflow:
             box = _boxed(into, context.matrix)
-            context = replace(context, clip=_both(context.clip, box))
+            context = context._replace(clip=_both(context.clip, box))
         if shown is not None and into is not None:
             matrix = fitted(shown, into, element.get("preserveAspectRatio", ""))
-            return replace(context, matrix=matrix * context.matrix, frame=shown)
+            return context._replace(matrix=matrix * context.matrix, frame=shown)
         matrix = svgelements.Matrix.translate(x or 0.0, y or 0.0) * context.matrix
-        return replace(context, matrix=matrix, frame=into and replace(into, x=0.0, y=0.0))
+        return context._replace(matrix=matrix, frame=into and replace(into, x=0.0, y=0.0))
 
     def _first_viewport(
         self, root: ElementTree.Element, context: _Context, shown: Frame | None
@@ -543,11 +541,10 @@ class _Drawing:
             return context
         if shown and size and root.get("preserveAspectRatio", "").strip() == "none":
             stretch = (size.height / shown.height) / (size.width / shown.width)
-            context = replace(
-                context, matrix=svgelements.Matrix.scale(1.0, stretch) * context.matrix
-            )
+            matrix = svgelements.Matrix.scale(1.0, stretch) * context.matrix
+            context = context._replace(matrix=matrix)
         self.page = _boxed(frame, context.matrix)
-        return replace(context, frame=frame)
+        return context._replace(frame=frame)
 
     def _clip(self, name: str, context: _Context) -> Box | None:
         """Return a box around what a clip lets through, or None where that is not known."""
@@ -564,7 +561,7 @@ class _Drawing:
         for child in clip:
             if tag_of(child) in SHAPES:
                 look = self._styles.look(child, INITIAL)
-                inner = replace(context, matrix=matrix)
+                inner = context._replace(matrix=matrix)
                 placed = self._placed(child, look, inner)
                 line = self._lines[child]
                 subpaths += subpaths_of(child, look, context.frame, placed, "", line)
@@ -573,6 +570,22 @@ class _Drawing:
     def _invalid(self, element: ElementTree.Element, problem: str) -> InvalidInputError:
         where = f"({named_element(element)} on line {self._lines[element]} of the file)"
         return invalid("", f"{where} {problem}")
+
+
+def _children(element: ElementTree.Element, excalidraw: bool) -> list[ElementTree.Element]:
+    """Return what is drawn of what an element contains."""
+    children = [child for child in element if tag_of(child) in {*_DRAWN, *_WRITTEN}]
+    if tag_of(element) == "switch":
+        # What is written as HTML is mostly written once more, as text, for those who read none.
+        able = (child for child in element if tag_of(child) not in ("", _HTML))
+        shown = next((child for child in able if _for_us(child)), None)
+        if shown is None or tag_of(shown) == "image":
+            return [child for child in children if tag_of(child) == _HTML]
+        return [child for child in children if child is shown]
+    if excalidraw and tag_of(element) == "g":
+        last = next((child for child in reversed(children) if tag_of(child) == "path"), None)
+        children = [c for c in children if tag_of(c) != "path" or c is last]
+    return children
 
 
 def _scale(matrix: Any) -> float:
