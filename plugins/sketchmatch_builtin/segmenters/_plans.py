@@ -160,7 +160,7 @@ def _between(walls: Mask, door: float | None) -> tuple[Mask, float]:
     """
     free = 1 - walls
     inside = _hull(walls) & free
-    for _ in range(2):
+    for _ in range(2 if door is None else 1):
         width = door or (doorway(inside, math.inf) if inside.any() else 1.0)
         # Outside is wider than any doorway, and joins no hall through the door of a building.
         around = math.ceil(width)

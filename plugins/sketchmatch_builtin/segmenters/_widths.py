@@ -67,17 +67,18 @@ def divided_by_width(
 def _divided(free: Mask, shares: Sequence[float], narrowest: float, least: float) -> list[Mask]:
     """Return the same of free cells in a frame of cells that are not."""
     distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    inside = free > 0
     cuts = [_Places(np.zeros(free.shape, np.int32)) for _ in shares]
     width = float(distance.max())
     while width >= narrowest:
-        fits = (distance >= width).astype(np.uint8)
+        rest = distance < width
         away, way = cv2.distanceTransformWithLabels(
-            1 - fits, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
+            rest.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
         )
-        covered = (away < width) & (free > 0)
+        covered = (away < width) & inside
+        level = _Level.of(np.asarray(way, dtype=np.int32), ~rest, width)
         for places, share in zip(cuts, shares, strict=True):
-            new = covered & (places.labels == 0)
-            places.add(new, np.asarray(way, dtype=np.int32), fits > 0, width, share)
+            places.add(covered & (places.labels == 0), level, share)
         width /= _STEP
     return [_without_borders(free, places, least) for places in cuts]
 
@@ -114,6 +115,33 @@ def _straighten(labels: _Labels, widest: FloatArray) -> None:
             window[bulge] = narrow
 
 
+@dataclass(frozen=True)
+class _Level:
+    """Where discs of one width fit.
+
+    Attributes
+    ----------
+    width
+        Half of it, in cells.
+    way
+        Shape (rows * columns,), among which cells that a disc fits the nearest is, for each cell.
+    cell_of
+        For each of these ways the flat index of such a cell.
+    """
+
+    width: float
+    way: _Labels
+    cell_of: IntArray
+
+    @classmethod
+    def of(cls, way: _Labels, fits: NDArray[np.bool_], width: float) -> _Level:
+        """Return the level of a width, where it is known which cells a disc fits."""
+        cells, way = np.flatnonzero(fits), way.reshape(-1)
+        cell_of = np.zeros(int(way.max()) + 1, np.int64)
+        cell_of[way[cells]] = cells
+        return cls(width, way, cell_of)
+
+
 @dataclass
 class _Places:
     """Cells so far, by the number of their place; 0 where none is.
@@ -135,59 +163,60 @@ class _Places:
     within: IntArray = field(default_factory=lambda: np.zeros(1, np.int64))
     meeting: IntArray = field(default_factory=lambda: np.zeros((2, 0), np.int64))
 
-    def add(
-        self,
-        new: NDArray[np.bool_],
-        way: _Labels,
-        fits: NDArray[np.bool_],
-        width: float,
-        share: float,
-    ) -> None:
-        """Add cells of a width; ``way`` tells among which cells that a disc fits the nearest is."""
-        if not (new.any() or self.meeting.size):
+    def add(self, new: NDArray[np.bool_], level: _Level, share: float) -> None:
+        """Add cells that discs of a width cover."""
+        cells, before = np.flatnonzero(new), len(self.widest)
+        if not (cells.size or self.meeting.size):
             return
-        parts, ways = _parts(new, way)
-        before = len(self.widest)
-        parts[new] += before - 1
-        cells = np.flatnonzero(fits)
-        cell_of = np.zeros(int(way.max()) + 1, np.int64)
-        cell_of[way.reshape(-1)[cells]] = cells
-        within = np.append(self.within, cell_of[ways])
-        widest = np.append(self.widest, np.full(len(ways), width))
-        labels = self.labels + parts
-        meeting = np.concatenate([self.meeting, _touching(labels, new)], axis=1)
-        first, second = way.reshape(-1)[within][meeting]
+        parts, ways = _parts(new, cells, level)
+        parts += before
+        flat = self.labels.reshape(-1)
+        flat[cells] = parts
+        within = np.append(self.within, level.cell_of[ways])
+        widest = np.append(self.widest, np.full(len(ways), level.width))
+        touching = _touching(self.labels, cells, len(widest))
+        meeting = np.concatenate([self.meeting, touching], axis=1)
+        first, second = level.way[within][meeting]
         least, most = np.sort(widest[meeting], axis=0)
         # The widest discs of one place may fit in spots apart from each other, and cover it all.
-        joined = (first == second) & (width >= np.where(least > width, _NEARLY, share) * most)
+        enough = np.where(least > level.width, _NEARLY, share) * most
+        joined = (first == second) & (level.width >= enough)
         group = groups(len(widest), meeting[:, joined]).astype(np.int32)
         self.widest = np.zeros(group.max() + 1)
         np.maximum.at(self.widest, group, widest)
         self.within = np.zeros(len(self.widest), np.int64)
         self.within[group] = within
-        self.labels = group[labels]
+        if (group[:before] == np.arange(before)).all():
+            flat[cells] = group[parts]
+        else:
+            self.labels = group[self.labels]
         apart = np.sort(group[meeting], axis=0)
         self.meeting = np.unique(apart[:, apart[0] != apart[1]], axis=1).astype(np.int64)
 
 
-def _parts(new: NDArray[np.bool_], way: _Labels) -> tuple[_Labels, IntArray]:
-    """Return the components of new cells by their ways, numbered from 1, and the way of each."""
+def _parts(new: NDArray[np.bool_], cells: IntArray, level: _Level) -> tuple[_Labels, IntArray]:
+    """Return the part of each new cell, a component of one way, and the way of each part."""
     _, components = cv2.connectedComponents(new.view(np.uint8), connectivity=8)
-    labels = np.asarray(components, dtype=np.int32)
-    most = int(way.max()) + 1
-    found, number = np.unique(labels[new].astype(np.int64) * most + way[new], return_inverse=True)
-    labels[new] = number.reshape(-1) + 1
-    return labels, found % most
+    most = len(level.cell_of)
+    keys = components.reshape(-1)[cells].astype(np.int64) * most + level.way[cells]
+    found, part = np.unique(keys, return_inverse=True)
+    return part.reshape(-1).astype(np.int32), found % most
 
 
-def _touching(labels: _Labels, new: NDArray[np.bool_]) -> IntArray:
-    """Return which labels share a side or a corner at new cells, shape (2, k), each pair once."""
-    columns = labels.shape[1]
-    cells = np.flatnonzero(new)
-    around = [row + column for row in (-columns, 0, columns) for column in (-1, 0, 1)]
-    beside = labels.reshape(-1)[cells[:, None] + np.array(around)]
-    own = np.broadcast_to(labels.reshape(-1)[cells, None], beside.shape)
-    other = (beside > 0) & (beside != own)
-    low, high = np.sort(np.stack([beside[other], own[other]]), axis=0).astype(np.int64)
-    most = int(labels.max()) + 1
-    return np.stack(np.divmod(np.unique(low * most + high), most))
+def _touching(labels: _Labels, cells: IntArray, count: int) -> IntArray:
+    """Return which of so many labels share a side or a corner at some cells, each pair once.
+
+    Returns
+    -------
+    ndarray
+        Shape (2, k).
+    """
+    flat, columns = labels.reshape(-1), labels.shape[1]
+    own = flat[cells]
+    found = []
+    for step in (row + column for row in (-columns, 0, columns) for column in (-1, 0, 1)):
+        beside = flat[cells + step]
+        other = np.flatnonzero((beside > 0) & (beside != own))
+        low, high = np.sort([beside[other], own[other]], axis=0).astype(np.int64)
+        found.append(np.unique(low * count + high))
+    return np.stack(np.divmod(np.unique(np.concatenate(found)), count))
