@@ -32,7 +32,7 @@ test: $(VENV)/dev
 
 test-slow: $(VENV)/dev
 	$(call says,the slow tests,25 minutes)
-	$(PYTEST) -m slow
+	$(PYTEST) --hypothesis-profile same -m slow
 
 # With examples that no run had before; the others draw the same ones each time.
 test-all: $(VENV)/dev

@@ -11,11 +11,22 @@ from hypothesis import settings
 INTERPRETED = bool(numba.config.DISABLE_JIT)
 """Whether kernels run as plain Python."""
 
+QUICK = 0.4
+"""Share of the examples that quick tests draw."""
+
 compiled_only = pytest.mark.skipif(
     INTERPRETED, reason="takes minutes, or says nothing, where kernels are not compiled"
 )
 
 
 def examples(count: int) -> settings:
-    """Return settings with so many examples, or with a fifteenth of them, at least 2."""
-    return settings(max_examples=max(2, count // 15) if INTERPRETED else count)
+    """Return settings with so many examples, or fewer, but at least 2.
+
+    Where kernels are plain Python it is a fifteenth of them, and in the quick tests two fifths.
+    """
+    share = 1 / 15 if INTERPRETED else QUICK if _is_quick() else 1.0
+    return settings(max_examples=max(2, int(share * count)))
+
+
+def _is_quick() -> bool:
+    return settings.get_current_profile_name() == "quick"

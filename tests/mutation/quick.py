@@ -31,7 +31,7 @@ def pytest_collection(session):
     if session.config.rootpath not in Path(sketchmatch.__file__).parents:
         raise pytest.UsageError("the tests would not see the mutant")
     phases = (Phase.explicit, Phase.generate)
-    settings.register_profile("mutants", derandomize=True, database=None, phases=phases)
+    settings.register_profile("mutants", settings.get_profile("same"), phases=phases)
     settings.load_profile("mutants")
 
 

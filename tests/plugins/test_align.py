@@ -417,6 +417,7 @@ def test_work_between_pauses_is_bounded_for_many_objects(monkeypatch, partial):
         np.testing.assert_array_equal(last.maps[0], order)
 
 
+@pytest.mark.slow
 @compiled_only
 def test_three_objects_are_found_among_very_many():
     rng = np.random.default_rng(1)

@@ -31,13 +31,19 @@ CONTRACTS = parametrize_plugins(
 )
 # What takes seconds: whole plans are cut into rooms dozens of times, and swarms fly.
 SLOW = {
-    "ImageSegmenter-threads-agree",
+    "Direct-threads-agree",
+    "Easm-threads-agree",
     "FsnnPso-threads-agree",
+    "ImageSegmenter-threads-agree",
     "NnPso-threads-agree",
+    "Posterior-threads-agree",
     "RoomSegmenter-answers-repeat",
     "RoomSegmenter-blank-sources-are-refused",
     "RoomSegmenter-inputs-stay-untouched",
+    "RoomSegmenter-scenes-are-found",
     "RoomSegmenter-threads-agree",
+    "RoomSegmenter-warnings-are-sentences",
+    "RoomSegmenter-y-points-up",
 }
 
 

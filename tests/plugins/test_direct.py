@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch.api import MatchProblem, Outcome
@@ -25,6 +25,7 @@ from sketchmatch_builtin.searchers._moves import (
     weigh_moves,
 )
 from sketchmatch_builtin.searchers.direct import Direct, evolve
+from tests.interpreted import examples
 from tests.oracle import maps as oracle
 from tests.oracle.enumeration import best_of_all
 from tests.pace import slowness, within
@@ -124,7 +125,7 @@ def table_of_likes(template, argument):
 
 
 @given(tables(most=6), st.integers(0, 2**32), st.integers(2, 8), st.integers(1, 40))
-@settings(max_examples=80)
+@examples(80)
 def test_any_short_run_is_sound(table, seed, population, offspring):
     weights = (0.5, 1.0, 2.0)
     params = {"population": population, "offspring": offspring, "patience": 1000}
@@ -182,7 +183,7 @@ def climbed(table, partners, weights):
 
 
 @given(tables_and_object_maps(), st.sampled_from(WEIGHTS), st.sampled_from([0.0, 1.0, 200.0]))
-@settings(max_examples=120)
+@examples(120)
 def test_a_climbed_map_is_a_local_optimum_under_both_moves(case, weights, factor):
     table, partners = case
     dilation = np.exp(factor * np.log(table.dilation))
@@ -195,7 +196,9 @@ def test_a_climbed_map_is_a_local_optimum_under_both_moves(case, weights, factor
         assert true_confidence(table, near, weights) <= value + 1e-11
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    "seed", [0, 1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 6))]
+)
 def test_larger_maps_climb_to_local_optima_too(seed):
     rng = np.random.default_rng(seed)
     table = random_table(rng, 14, 18) if seed % 2 else sketched_table(seed, 14, 16, wobble=0.3)
@@ -205,7 +208,7 @@ def test_larger_maps_climb_to_local_optima_too(seed):
 
 
 @given(tables_and_object_maps(most=6), st.sampled_from(WEIGHTS), st.floats(-0.05, 0.05))
-@settings(max_examples=80)
+@examples(80)
 def test_no_move_above_a_threshold_is_left_out(case, weights, above):
     table, partners = case
     objects, others = table.template_objects, table.argument_objects
@@ -256,20 +259,22 @@ def test_it_finds_the_best_of_random_relations():
     assert share_of_optima(cases) == 105
 
 
-def test_it_finds_the_best_of_sketches():
+@pytest.mark.parametrize("count", [18, pytest.param(60, marks=pytest.mark.slow)])
+def test_it_finds_the_best_of_sketches(count):
     cases = []
-    for seed in range(60):
+    for seed in range(count):
         objects = 3 + seed % 6
         drawn = min(7, max(2, objects - seed % 3))
         noise = (0.1, 0.3, 0.6)[seed % 3]
         table = sketched_table(seed, drawn, objects, displacement=noise, turn=noise)
         cases.append((table, WEIGHTS[0] if seed % 4 else WEIGHTS[seed % 7]))
-    assert share_of_optima(cases) == 60
+    assert share_of_optima(cases) == count
 
 
-def test_it_finds_the_best_where_there_are_evidence_and_rotation_weights():
+@pytest.mark.parametrize("count", [7, pytest.param(20, marks=pytest.mark.slow)])
+def test_it_finds_the_best_where_there_are_evidence_and_rotation_weights(count):
     cases = []
-    for seed in range(20):
+    for seed in range(count):
         table = (
             sketched_table(seed, 6, 7)
             if seed % 2
@@ -279,7 +284,7 @@ def test_it_finds_the_best_where_there_are_evidence_and_rotation_weights():
         if seed % 3:
             table = with_rotation_weights(np.random.default_rng(seed), table)
         cases.append((table, WEIGHTS[seed % 7]))
-    assert share_of_optima(cases) == 20
+    assert share_of_optima(cases) == count
 
 
 @pytest.mark.parametrize("weights", WEIGHTS)
@@ -301,15 +306,16 @@ def test_objects_that_are_all_alike(weights):
     assert share_of_optima(cases) == 4
 
 
-def test_it_finds_the_best_of_near_duplicates():
+@pytest.mark.parametrize("count", [9, pytest.param(30, marks=pytest.mark.slow)])
+def test_it_finds_the_best_of_near_duplicates(count):
     cases = []
-    for seed in range(30):
+    for seed in range(count):
         rng = np.random.default_rng(seed)
         places = rng.uniform(0.0, 5.0, (6, 2))
         places[3:] = places[:3] + rng.normal(0.0, (1e-9, 1e-3, 0.3)[seed % 3], (3, 2))
         others = places + rng.normal(0.0, 0.2, places.shape)
         cases.append((geometric_table(places, others, 0.1, rng), EQUAL))
-    assert share_of_optima(cases) == 30
+    assert share_of_optima(cases) == count
 
 
 @pytest.mark.parametrize("argument", [2, 3, 50])

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch.api import MatchProblem, Outcome
@@ -21,6 +21,7 @@ from sketchmatch_builtin.histograms.constant import ConstantForce
 from sketchmatch_builtin.searchers import easm as module
 from sketchmatch_builtin.searchers.easm import Easm
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+from tests.interpreted import examples
 from tests.oracle import maps as oracle
 from tests.pace import slowness, within
 from tests.strategies import random_table, tables
@@ -63,7 +64,7 @@ def assert_legal(progress, table, consistency):
 
 @BOTH
 @given(tables(most=6), st.integers(0, 2**32), st.integers(2, 12), st.integers(1, 25))
-@settings(max_examples=60)
+@examples(60)
 def test_any_short_run_ends_with_a_legal_fmap_and_its_true_confidence(
     consistency, table, seed, population, generations
 ):

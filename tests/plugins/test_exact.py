@@ -5,7 +5,7 @@ import threading
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sketchmatch.api import MatchProblem, Outcome
@@ -15,6 +15,7 @@ from sketchmatch_builtin.searchers import exact as module
 from sketchmatch_builtin.searchers._ranking import Ranking
 from sketchmatch_builtin.searchers.direct import Evolved
 from sketchmatch_builtin.searchers.exact import Exact, branch_and_bound
+from tests.interpreted import examples
 from tests.oracle import maps as oracle
 from tests.oracle.enumeration import best_of_all, every_confidence, worst_of_all
 from tests.pace import within
@@ -130,7 +131,7 @@ def test_relations_with_evidence_and_rotation_weights(seed):
 @example(random_table(np.random.default_rng(0), 2, 2), (5e-324, 0.0, 0.0))
 @example(random_table(np.random.default_rng(0), 4, 5), (0.0, 0.0, 5e-324))
 @example(random_table(np.random.default_rng(0), 4, 5), (0.0, 5e-324, 1e-323))
-@settings(max_examples=80)
+@examples(80)
 def test_any_weights_agree_with_the_slow_oracle(table, weights):
     best = max(every_confidence(table, weights).values())
     for few in (np.inf, 0.0):

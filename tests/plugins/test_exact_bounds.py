@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch.api import MatchProblem, Outcome
@@ -17,6 +17,7 @@ from sketchmatch_builtin.searchers._assignment import FORBIDDEN, reduce_by_assig
 from sketchmatch_builtin.searchers._ranking import Ranking
 from sketchmatch_builtin.searchers.direct import Evolved
 from sketchmatch_builtin.searchers.exact import Exact
+from tests.interpreted import examples
 from tests.oracle import maps as oracle
 from tests.oracle.enumeration import every_confidence
 from tests.searching import WEIGHTS
@@ -81,7 +82,7 @@ def boxes(draw):
 
 
 @given(boxes(), st.data())
-@settings(max_examples=200)
+@examples(200)
 def test_the_halves_of_a_cell_cover_it(case, data):
     box, smallest = case
     allowed = np.array([[True, False, True]])
@@ -180,7 +181,7 @@ def _slack(box):
 
 
 @given(SEEDS, st.integers(2, 4), st.integers(0, 2), st.sampled_from(WEIGHTS), st.integers(0, 3))
-@settings(max_examples=150)
+@examples(150)
 def test_a_candidate_dropped_from_a_node_is_on_no_map_below_the_limit(
     seed, objects, more, weights, sweeps
 ):
@@ -363,7 +364,7 @@ def test_what_is_given_up_for_want_of_memory_has_a_true_bound():
 
 
 @given(SEEDS, st.integers(2, 5), st.sampled_from([(0.0, 1.0, 0.0), *WEIGHTS]))
-@settings(max_examples=150)
+@examples(150)
 def test_what_fixed_objects_lose_is_never_more_than_any_direction_of_the_cell_costs(
     seed, objects, weights
 ):
@@ -396,7 +397,7 @@ def test_what_fixed_objects_lose_is_never_more_than_any_direction_of_the_cell_co
 
 @pytest.mark.slow
 @given(SEEDS, st.integers(3, 4), st.booleans())
-@settings(max_examples=100)
+@examples(100)
 def test_where_rotation_is_all_costs_and_losses_of_a_whole_map_are_its_loss(seed, objects, heavy):
     rng = np.random.default_rng(seed)
     table = random_table(rng, objects, objects + 1)
@@ -421,7 +422,7 @@ def test_where_rotation_is_all_costs_and_losses_of_a_whole_map_are_its_loss(seed
 
 @pytest.mark.slow
 @given(st.integers(1, 6), st.integers(0, 4), st.integers(0, 2**32))
-@settings(max_examples=150)
+@examples(150)
 def test_the_assignment_is_the_cheapest_and_its_reduced_costs_are_a_proof(rows, more, seed):
     rng = np.random.default_rng(seed)
     columns = rows + more

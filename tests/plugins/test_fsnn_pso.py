@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch.api import MatchProblem
@@ -22,6 +22,7 @@ from sketchmatch_builtin.searchers._growers import (
 )
 from sketchmatch_builtin.searchers.fsnn_pso import FsnnPso
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+from tests.interpreted import examples
 from tests.oracle import maps, neighbours
 from tests.strategies import random_table, tables
 
@@ -70,7 +71,7 @@ def grown(table, seed, **options):
     st.sampled_from([(10, 1), (3, 0.5), (20, 2)]),
     st.booleans(),
 )
-@settings(max_examples=30)
+@examples(30)
 def test_it_grows_as_the_thesis_says(table, seed, shape, folded):
     point = random_seed_point(np.random.default_rng(seed), folded)
     alpha, k = shape
@@ -108,7 +109,7 @@ def test_closeness_that_a_float_takes_for_1_is_told_apart(seed):
 
 
 @given(tables(least=3, most=4, more=1), st.booleans())
-@settings(max_examples=20)
+@examples(20)
 def test_mean_and_variance_are_those_of_all_compatible_vectors(table, folded):
     expected = neighbours.mean_and_variance(table, folded)
     assert mean_and_variance(table, folded=folded) == pytest.approx(expected, rel=1e-9)

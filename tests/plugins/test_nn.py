@@ -7,7 +7,7 @@ import threading
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch import match, read_scene
@@ -28,6 +28,7 @@ from sketchmatch_builtin.searchers.fsnn_pso import FsnnPso
 from sketchmatch_builtin.searchers.nn import Nn
 from sketchmatch_builtin.searchers.nn_pso import NnPso
 from sketchmatch_builtin.similarities.cross_correlation import CrossCorrelation
+from tests.interpreted import examples
 from tests.oracle import maps, neighbours
 from tests.pace import within
 from tests.strategies import random_table, tables
@@ -92,7 +93,7 @@ def grown(table, seed, folded, **options):
 
 
 @given(tables(most=5, more=2), st.integers(0, 2**32), st.booleans())
-@settings(max_examples=60)
+@examples(60)
 def test_it_grows_as_the_thesis_says(table, seed, folded):
     point = random_seed_point(np.random.default_rng(seed), folded)
     assert grown(table, point, folded) == neighbours.grow_nearest(table, point, folded)
@@ -108,7 +109,7 @@ def test_it_grows_as_the_thesis_says_on_scenes(seed, sizes, folded):
 
 
 @given(tables(most=5, more=2), st.integers(0, 2**32), st.integers(-4, 4))
-@settings(max_examples=30)
+@examples(30)
 def test_a_circular_seed_point_may_go_round(table, seed, rounds):
     point = random_seed_point(np.random.default_rng(seed), False)
     away = point + np.array([0.0, 2.0 * rounds, 0.0])
@@ -182,7 +183,7 @@ def test_it_tries_each_seed_point():
 
 @ALL
 @given(table=tables(most=6), seed=st.integers(0, 2**32))
-@settings(max_examples=40)
+@examples(40)
 def test_any_short_run_is_legal_and_its_confidence_true(searcher, table, seed):
     weights = (0.5, 1.0, 2.0)
     seen, outcome = run(searcher, table, seed, weights=weights, **SHORT[searcher])

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch.errors import InvalidInputError
@@ -12,6 +12,7 @@ from sketchmatch.model import Image
 from sketchmatch.testing import random_scene
 from sketchmatch.testing.photographs import photograph
 from sketchmatch_builtin.segmenters.image import ImageSegmenter
+from tests.interpreted import examples
 
 pytestmark = pytest.mark.slow
 
@@ -108,7 +109,7 @@ def same(scene, outlines, least=0.85):
     contrast=st.floats(0.3, 1.0),
     brightness=st.floats(0.0, 1.0),
 )
-@settings(max_examples=15)
+@examples(15)
 def test_brightness_and_contrast_change_nothing(contrast, brightness):
     lowest = brightness * (1.0 - contrast) * 255.0
     pixels = np.rint(PLAIN * contrast + lowest).astype(np.uint8)
@@ -116,7 +117,7 @@ def test_brightness_and_contrast_change_nothing(contrast, brightness):
 
 
 @given(margins=st.tuples(*[st.integers(0, 80)] * 4))
-@settings(max_examples=15)
+@examples(15)
 def test_a_margin_changes_nothing_but_where_things_are(margins):
     top, bottom, left, right = margins
     wider = cv2.copyMakeBorder(

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 import shapely
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
@@ -20,6 +20,7 @@ from sketchmatch_builtin.segmenters._cells import holes, simplified
 from sketchmatch_builtin.segmenters._standing import Parts, Room
 from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
 from tests.benchmarks.grids import MAPS
+from tests.interpreted import examples
 
 SEEDS = st.integers(0, 2**32 - 1)
 BOUNDS = Bounds(widest=30.0, thinnest=3.5, smallest=2.0)
@@ -78,7 +79,7 @@ def hangs(ring, a, b):
 
 @pytest.mark.slow
 @given(SEEDS)
-@settings(max_examples=60)
+@examples(60)
 def test_bounds_and_pieces_change_no_object(seed):
     cells = furnished_room(seed)
     with pytest.MonkeyPatch.context() as patch:
@@ -103,7 +104,7 @@ def pairs_of(ring):
 
 
 @given(SEEDS)
-@settings(max_examples=100)
+@examples(100)
 def test_a_pocket_that_cannot_hang_on_its_neck_does_not(seed):
     ring = outline_of(seed)
     a, b = pairs_of(ring)
@@ -112,7 +113,7 @@ def test_a_pocket_that_cannot_hang_on_its_neck_does_not(seed):
 
 
 @given(SEEDS)
-@settings(max_examples=60)
+@examples(60)
 def test_a_pocket_that_cannot_lean_on_the_wall_is_none(seed):
     ring = outline_of(seed)
     pockets = []
@@ -142,7 +143,7 @@ def test_of_pockets_that_do_not_hang_most_are_known_not_to():
 
 
 @given(SEEDS, st.floats(0.5, 12.0))
-@settings(max_examples=100)
+@examples(100)
 @example(3, 2.0)
 def test_a_disc_is_found_in_pieces_where_it_is_in_the_whole(seed, radius):
     for polygon in outlines_of(seed):
@@ -165,7 +166,7 @@ def raw_outlines_of(seed):
 
 @pytest.mark.slow
 @given(SEEDS)
-@settings(max_examples=100)
+@examples(100)
 def test_no_larger_disc_fits_into_an_outline_than_is_said(seed):
     parts = Parts.of(room_of(seed))
     which = range(1, len(parts.boxes))
@@ -182,7 +183,7 @@ def test_no_larger_disc_fits_into_an_outline_than_is_said(seed):
 
 
 @given(SEEDS, st.sampled_from([0.3, 0.5, 0.75, 2.0]))
-@settings(max_examples=100)
+@examples(100)
 def test_what_is_simplified_line_by_line_is_valid_and_as_near(seed, tolerance):
     for polygon in raw_outlines_of(seed):
         with pytest.MonkeyPatch.context() as patch:
@@ -217,7 +218,7 @@ def test_a_polygon_that_would_cross_itself_or_vanish_is_simplified_with_care():
 
 
 @given(SEEDS)
-@settings(max_examples=60)
+@examples(60)
 def test_parts_around_each_other_lie_as_each_does_alone(seed):
     parts = Parts.of(room_of(seed))
     which = np.arange(1, len(parts.boxes))
@@ -230,7 +231,7 @@ def test_parts_around_each_other_lie_as_each_does_alone(seed):
 
 
 @given(SEEDS)
-@settings(max_examples=60)
+@examples(60)
 def test_what_is_left_out_of_the_sides_moves_no_outline(seed):
     room, bounds = room_of(seed), BOUNDS
     parts = Parts.of(room)

@@ -16,13 +16,14 @@ import cv2
 import numpy as np
 import pytest
 import shapely
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sketchmatch.errors import InvalidInputError
 from sketchmatch.io import read_source
 from sketchmatch.model import OccupancyGrid
 from sketchmatch_builtin.segmenters.occupancy_grid import OccupancyGridSegmenter
+from tests.interpreted import examples
 from tests.tools import ROOT, require
 
 MAPS = ROOT.parent / "shared" / "data" / "ogm"
@@ -376,7 +377,7 @@ def test_a_speck_where_the_map_ends_is_left_out():
 @pytest.mark.slow
 @given(st.integers(0, 2**32 - 1))
 @example(0)
-@settings(max_examples=30)
+@examples(30)
 def test_whatever_the_walls_are_objects_are_valid(seed):
     rng = np.random.default_rng(seed)
     blurred = cv2.GaussianBlur(rng.random((60, 60)), (0, 0), 1.5)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 import shapely.affinity
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sketchmatch import match
@@ -14,6 +14,7 @@ from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.io import read_source
 from sketchmatch.model import OccupancyGrid
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter, _coarser
+from tests.interpreted import examples
 from tests.plugins.test_segmenter_lidar import doubled, lost, turned
 from tests.tools import ROOT, require
 
@@ -340,7 +341,7 @@ def offices(rng):
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=30)
+@examples(30)
 def test_offices_at_a_corridor_are_counted(seed):
     cells, count = offices(np.random.default_rng(seed))
     assert len(segmented(cells).scene) == count
@@ -367,7 +368,7 @@ def apart_when_turned(cells, turns, **params):
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3))
 @example(145904628, 2)
-@settings(max_examples=20)
+@examples(20)
 def test_a_turned_map_has_the_rooms_turned(seed, turns):
     assert apart_when_turned(offices(np.random.default_rng(seed))[0], turns) < 1e-9
 
@@ -403,7 +404,7 @@ def test_a_room_with_two_farthest_corners_is_simplified_alike_however_the_map_li
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20)
+@examples(20)
 def test_padding_and_scaling_the_map_does_that_to_the_rooms(seed):
     cells, _ = offices(np.random.default_rng(seed))
     plain = [item.polygon for item in segmented(cells, door_width=1.2).scene.objects]

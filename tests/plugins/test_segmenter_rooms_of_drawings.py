@@ -108,6 +108,7 @@ def test_rooms_of_a_picture_lie_where_they_are_drawn():
     assert corridor.centroid == pytest.approx((7 * 40, 5 * 40), abs=12)
 
 
+@pytest.mark.slow
 def test_a_large_picture_has_the_same_rooms():
     assert sorted(areas(Image(picture(scale=120)), 120)) == pytest.approx(AREAS, rel=0.12)
 

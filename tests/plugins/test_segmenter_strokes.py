@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.model import Stroke, StrokeSet
 from sketchmatch_builtin.segmenters.strokes import StrokeSegmenter
+from tests.interpreted import examples
 
 TRIANGLE = [[20, 0], [24, 0], [22, 3], [20, 0]]
 
@@ -252,7 +253,7 @@ def overlap(item, outline):
     )
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(stars(), st.floats(-0.1, 0.1), st.floats(-0.04, 0.04))
 def test_gaps_and_overshoots_of_a_tenth_are_mended(star, overshoot, drift):
     outline, start = star
@@ -273,7 +274,7 @@ def test_an_end_that_runs_along_the_beginning_is_mended():
     assert warnings == ()
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(stars(), st.floats(0.0, 6.3), st.floats(0.01, 100.0), st.tuples(*[st.floats(-9, 9)] * 2))
 def test_the_result_turns_scales_and_moves_with_the_drawing(star, angle, scale, shift):
     outline, start = star

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch.model import Stroke, StrokeSet
 from sketchmatch.testing.sloppy import draw_sloppily
 from sketchmatch_builtin.segmenters.strokes import StrokeSegmenter
+from tests.interpreted import examples
 from tests.pace import within
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]
@@ -74,7 +75,7 @@ def test_sloppy_objects_are_recovered(sloppiness, recovered, marks, invented):
 
 
 @pytest.mark.slow
-@settings(max_examples=25)
+@examples(25)
 @given(
     st.integers(0, 10_000),
     st.floats(0.0, 6.3),

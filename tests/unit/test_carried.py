@@ -12,6 +12,7 @@ from sketchmatch.pipeline.slices import finish
 from sketchmatch.transfers.carrying import carried, course_between
 from sketchmatch.transfers.features import ChangeReason, Feature, FeatureKind
 from sketchmatch.transfers.obstacles import Obstacles, sampled
+from tests.interpreted import examples
 
 
 def box(x, y, width=1.0, height=1.0):
@@ -396,7 +397,7 @@ def test_points_that_are_carried_at_once_come_as_each_would_alone():
 
 
 @given(st.integers(0, 2**32), st.sampled_from([0.0, 0.15, 0.4]), st.floats(0.1, 6.0))
-@settings(max_examples=60)
+@examples(60)
 def test_the_nearest_clear_place_is_the_nearest(seed, radius, within):
     rng = np.random.default_rng(seed)
     cells = (rng.random((60, 50)) < rng.choice([0.002, 0.02, 0.3])).astype(np.int8) * 100

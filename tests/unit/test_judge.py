@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch import InvalidInputError, Scene
@@ -34,6 +34,7 @@ from sketchmatch.pipeline.unmatched import Part, part_of
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from sketchmatch.testing import judging_problem, matching_problem, random_scene, simulate_sketch
 from sketchmatch_builtin.judges.confidence import HighestConfidence
+from tests.interpreted import examples
 from tests.oracle import maps
 from tests.strategies import random_table, with_evidence, with_rotation_weights
 
@@ -466,7 +467,7 @@ def test_of_several_maps_and_of_several_partners_one_is_right_at_most():
 # ζ of a map of some objects ----------------------------------------------------------------------
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(
     seed=st.integers(0, 2**32 - 1),
     few=st.integers(3, 6),

@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch.model import Fmap, ObjectMap, Occm
+from tests.interpreted import examples
 from tests.oracle import maps as oracle
 
 
 @given(st.data())
-@settings(max_examples=60)
+@examples(60)
 def test_an_object_map_induces_the_fmap_of_its_ordered_pairs(data):
     argument = data.draw(st.integers(2, 12))
     template = data.draw(st.integers(2, argument))
@@ -22,7 +23,7 @@ def test_an_object_map_induces_the_fmap_of_its_ordered_pairs(data):
 
 
 @given(st.data())
-@settings(max_examples=60)
+@examples(60)
 def test_an_entry_reads_as_an_ordered_pair(data):
     argument = data.draw(st.integers(2, 12))
     count = argument * (argument - 1)

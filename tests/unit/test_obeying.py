@@ -24,6 +24,7 @@ from sketchmatch.pipeline.unmatched import Part, part_of
 from sketchmatch.pipeline.warmup import warm_up, warm_up_others
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from sketchmatch.testing import random_scene, simulate_sketch
+from tests.interpreted import examples
 from tests.oracle import maps as oracle
 from tests.oracle.enumeration import every_confidence
 from tests.strategies import random_table, with_evidence, with_rotation_weights
@@ -151,7 +152,7 @@ def test_every_answer_obeys_and_has_the_true_confidence(searcher, seed, more):
             assert progress.upper_bound is None or progress.upper_bound >= best - 1e-8
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(
     seed=st.integers(0, 2**32 - 1),
     few=st.integers(2, 4),

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch import Scene, match
@@ -19,6 +19,7 @@ from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.judges._odds import likelihood, met
 from sketchmatch_builtin.judges.calibration import Calibration, calibrated, default_price
 from sketchmatch_builtin.searchers.exact import Exact
+from tests.interpreted import examples
 from tests.strategies import random_table
 
 WEIGHTS = (1.0, 1.0, 1.0)
@@ -52,7 +53,7 @@ def considered(best, argument_objects, others):
     return [dict(each) for each in found]
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(
     seed=st.integers(0, 2**32 - 1),
     few=st.integers(3, 6),

@@ -6,11 +6,12 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch import Scene
 from sketchmatch.testing import random_scene, simulate_sketch, spacing
+from tests.interpreted import examples
 from tests.strategies import CORNERED, scenes
 
 EXACT = {"displacement": 0.0, "turn": 0.0, "stretch": 0.0, "wobble": 0.0}
@@ -75,7 +76,7 @@ def test_the_spacing_is_the_median_distance_to_the_nearest():
 
 
 @given(scenes(), st.integers(0, 2**32))
-@settings(max_examples=30)
+@examples(30)
 def test_however_much_outlines_wobble_every_object_stays_a_polygon(scene, seed):
     sketch = simulate_sketch(scene, np.random.default_rng(seed), wobble=0.4)
     for item, partner in zip(sketch.scene.objects, sketch.partners, strict=True):

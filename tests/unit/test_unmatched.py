@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sketchmatch import InvalidInputError, Scene, match
@@ -31,6 +31,7 @@ from sketchmatch.pipeline.warmup import warm_up, warm_up_others
 from sketchmatch.registry import Kind, Registered, Registry, default_registry
 from sketchmatch.testing import random_scene, simulate_sketch
 from sketchmatch_builtin.searchers.exact import Exact
+from tests.interpreted import examples
 from tests.strategies import random_table, with_evidence, with_rotation_weights
 
 WEIGHTS = (1.0, 2.0, 0.5)
@@ -106,7 +107,7 @@ def matched(sketch, map_, *, selection=BY_ZETA, **settings):
     return last.result
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(
     seed=st.integers(0, 2**32 - 1),
     few=st.integers(3, 5),
@@ -126,7 +127,7 @@ def test_what_is_found_is_the_best_of_all_parts(seed, few, more, price):
     assert deepest in (best.part.left_out, best.part.left_out + 1)
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(seed=st.integers(0, 2**32 - 1), few=st.integers(4, 7), evidence=st.booleans())
 def test_an_omission_has_the_confidence_of_the_map_that_it_leaves(seed, few, evidence):
     rng = np.random.default_rng(seed)

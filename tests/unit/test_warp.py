@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sketchmatch.errors import InvalidInputError, Reason
 from sketchmatch.transfers import warp as warps
 from sketchmatch.transfers.warp import WarpKind, fit_warp
+from tests.interpreted import examples
 from tests.oracle.warp import krige
 
 seeds = st.integers(0, 2**32 - 1)
@@ -163,7 +164,7 @@ def test_a_doubtful_partner_counts_for_less():
     assert miss[0] < 0.5 * miss[1]
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(seeds, st.integers(3, 16))
 def test_no_warp_folds(seed, count):
     rng = np.random.default_rng(seed)
@@ -235,7 +236,7 @@ def test_deviations_cover_what_is_missed_where_things_take_what_is_around_them_a
     assert 0.95 < within[1] < 1.0
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(seeds, st.integers(4, 14))
 def test_there_and_back_ends_within_three_deviations(seed, count):
     rng = np.random.default_rng(seed)
@@ -248,7 +249,7 @@ def test_there_and_back_ends_within_three_deviations(seed, count):
     assert (np.abs(back(carried) - points).max(axis=1) <= 3.0 * sure).all()
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(seeds)
 def test_frames_do_not_matter(seed):
     rng = np.random.default_rng(seed)

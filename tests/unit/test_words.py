@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sketchmatch import InvalidInputError, Scene, directional_relation, force_histogram
@@ -18,6 +18,7 @@ from sketchmatch.pipeline.words import (
     directional_relations,
     nearest_relations,
 )
+from tests.interpreted import examples
 from tests.oracle.directions import degree as by_definition
 
 TURNS = math.pi / 4 * np.arange(8.0)
@@ -54,7 +55,7 @@ def small_and_far(angle, bins=360):
 
 
 @given(histograms(counts=(4, 8, 12, 36)), st.floats(-7.0, 7.0))
-@settings(max_examples=25)
+@examples(25)
 def test_degrees_are_those_of_the_definition(row, direction):
     assert degrees(row, direction)[0] == pytest.approx(by_definition(row, direction), abs=2e-3)
 
@@ -270,7 +271,7 @@ def test_touching_overlapping_and_equal_objects_are_nearest():
 
 
 @given(st.integers(0, 10**6), st.sampled_from([2, 3, 7, 12, 24, 25, 31]))
-@settings(max_examples=25)
+@examples(25)
 def test_the_nearest_is_the_one_at_the_smallest_distance(seed, count):
     rng = np.random.default_rng(seed)
     scene = Scene.from_polygons(
