@@ -213,6 +213,62 @@ def test_what_was_found_just_before_is_known_of_the_same_alone():
     assert known_maps(seen, 5, 9, True) is not laid
 
 
+@pytest.fixture
+def poses(monkeypatch):
+    """Return how many poses were weighed at each step, and how many refined."""
+    weighed, refined = [], []
+    guess, refine = module.guess_poses, module.refine_guesses
+
+    def counted(*arguments):
+        before = int(arguments[-1].state[1])
+        guess(*arguments)
+        weighed.append(int(arguments[-1].state[1]) - before)
+
+    def noted(*arguments):
+        refined.append(len(arguments[0]))
+        return refine(*arguments)
+
+    monkeypatch.setattr(module, "guess_poses", counted)
+    monkeypatch.setattr(module, "refine_guesses", noted)
+    monkeypatch.setattr(module, "_STEP", 600)
+    return weighed, refined
+
+
+def test_when_it_is_late_the_fewest_pairs_and_few_poses_do(poses):
+    weighed, refined = poses
+    drawn, mapped, order = copied(7, 12, 12)
+    seen = sides(drawn, mapped)
+    laid = known_maps(seen, late=lambda: True)
+    np.testing.assert_array_equal(laid[0].partners, order)
+    few = sum(weighed)
+    assert refined == [16]
+    # It is not taken for all that there is.
+    assert len(known_maps(seen)) > len(laid)
+    assert sum(weighed) - few > 2 * few
+    assert sum(refined) - 16 >= 60
+
+
+def test_what_was_weighed_before_the_end_of_a_search_is_not_weighed_again(poses):
+    weighed, refined = poses
+    drawn, mapped, order = copied(8, 12, 12)
+    seen = sides(drawn, mapped)
+    work = laid_maps(seen)
+    for _ in range(12):
+        next(work)
+    work.close()
+    begun = len(weighed)
+    laid = known_maps(seen, late=lambda: True)
+    np.testing.assert_array_equal(laid[0].partners, order)
+    assert (len(weighed), refined) == (begun, [16])
+    # Nor is it for all that there is, which is the same with it.
+    whole = known_maps(seen)
+    assert len(weighed) > begun
+    module._RECENT.clear()
+    module._BEGUN.clear()
+    for a, b in zip(known_maps(seen), whole, strict=True):
+        assert (a.partners.tolist(), a.pose, a.score) == (b.partners.tolist(), b.pose, b.score)
+
+
 def test_far_pairs_are_laid_first_and_each_object_soon():
     places = np.array([0.0, 1.0, 10.0, 12.0 + 1e-6j])
     pairs = module._pairs(things(np.random.default_rng(0), 4, places=places))

@@ -589,11 +589,11 @@ def test_what_is_the_sketch_again_is_no_decoy():
     x, y = np.meshgrid(np.arange(4.0), np.arange(3.0))
     places = (x + 1j * y).ravel()
     pillars = Things(places - places.mean(), np.zeros(12), np.zeros(12, complex), 1.0)
-    assert not _described._decoys(pillars)
+    assert not [*_described._decoys(pillars)]
     sizes = np.random.default_rng(0).normal(0.0, 1.5, 12)
-    assert len(_described._decoys(pillars._replace(sizes=sizes))) == 6
+    assert len([*_described._decoys(pillars._replace(sizes=sizes))]) == 6
     # One odd thing among many is left out, and the rest is the sketch again.
-    assert not _described._decoys(pillars._replace(sizes=np.append(np.zeros(11), 3.0)))
+    assert not [*_described._decoys(pillars._replace(sizes=np.append(np.zeros(11), 3.0)))]
 
 
 @pytest.mark.parametrize("count", [2, 3, 8])
@@ -627,6 +627,47 @@ def test_maps_are_described_once_each_with_those_that_were_met(monkeypatch):
     assert len({each.tobytes() for each in explored.maps}) == len(explored.maps)
     complete = described((sketch, map_), sides, table, None, met, partial=False)
     assert (complete.maps >= 0).all()
+
+
+@pytest.fixture
+def weighing(monkeypatch):
+    """Return a list of what is weighed; each takes a second of a clock that stands still else."""
+    done = []
+    monkeypatch.setattr(module.time, "monotonic", lambda: float(len(done)))
+
+    def counted(name):
+        work = getattr(_described, name)
+
+        def timed(*arguments, **options):
+            found = work(*arguments, **options)
+            done.append(name)
+            return found
+
+        monkeypatch.setattr(_described, name, timed)
+
+    counted("known_maps")
+    counted("_measured_decoy")
+    return done
+
+
+@pytest.mark.parametrize(("seconds", "decoys"), [(0.0, 1), (1.5, 1), (2.5, 2), (4.0, 3), (99.0, 6)])
+def test_once_time_is_over_no_more_decoys_are_weighed(weighing, seconds, decoys):
+    posed, truth = judging_problem(np.random.default_rng(1), objects=7)
+    judged = Posterior().judge(dataclasses.replace(posed, time_budget=seconds))
+    assert weighing == ["known_maps"] + decoys * ["_measured_decoy"]
+    assert judged.maps[0].partners.tolist() == truth.tolist()
+    assert_sound(judged, posed)
+
+
+def test_a_judgement_in_time_is_that_of_who_has_all_the_time(weighing):
+    posed, _ = judging_problem(np.random.default_rng(1), objects=7, missing=1)
+    free = Posterior().judge(posed)
+    timed = Posterior().judge(dataclasses.replace(posed, time_budget=len(weighing) + 1.0))
+    assert weighing[:7] == weighing[7:]
+    assert len(weighing) == 14
+    assert (timed.elsewhere, timed.lines.tobytes()) == (free.elsewhere, free.lines.tobytes())
+    for a, b in zip(timed.maps, free.maps, strict=True):
+        assert (a.partners.tolist(), a.probability) == (b.partners.tolist(), b.probability)
 
 
 def test_of_decoys_nothing_but_places_sizes_and_shapes_is_measured():

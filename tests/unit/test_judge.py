@@ -20,6 +20,7 @@ from sketchmatch.api import (
 from sketchmatch.errors import AnswerUnavailableError, PluginError
 from sketchmatch.kernels.evidence import SelfRelations
 from sketchmatch.model import ConfidenceWeights, Fmap
+from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.correspond import fmap_confidence, induced_map, map_confidence
 from sketchmatch.pipeline.engine import Engine
 from sketchmatch.pipeline.events import Finished
@@ -120,6 +121,30 @@ def map_of(result):
     template = result.map if swapped else result.sketch
     pairs = {b: a for a, b in found.items()} if swapped else found
     return [pairs.get(g, -1) for g in range(len(template))]
+
+
+class Standing(Clock):
+    """A clock by which the time that is left is as told."""
+
+    def left(self):
+        return Standing.seconds
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(math.inf, None), (2.5, 2.5), (0.0, 0.0)])
+def test_a_judge_is_told_how_much_time_is_left(monkeypatch, seconds, told):
+    monkeypatch.setattr(Standing, "seconds", 9.0, raising=False)
+    clock = Standing()
+    searched = Partial.search
+
+    def search(self, problem, rng):
+        yield from searched(self, problem, rng)
+        Standing.seconds = seconds
+
+    monkeypatch.setattr(Partial, "search", search)
+    sketch, map_ = drawn(4, 6)
+    selection = {"judge": Choice("told-partial"), "searcher": Choice("partial")}
+    list(run_match(MatchRequest(sketch, map_, selection), REGISTRY, clock=clock))
+    assert Told.problems[0].time_budget == told
 
 
 # What it is given --------------------------------------------------------------------------------

@@ -83,6 +83,9 @@ class JudgeProblem:
         How likely the sketch shows another place, as judged a moment ago, before something was
         drawn or erased. A judge may then assume it and use only the candidates, to be quick; the
         host asks again without it.
+    time_budget
+        Seconds that are left, 0 where the search took all of them; None for no limit. The host ends
+        no judge: whoever waits for the answer gets it as much later as the judge takes longer.
     """
 
     template: Scene
@@ -100,6 +103,7 @@ class JudgeProblem:
     omissions: FloatArray | None = None
     usual: bool = True
     elsewhere: float | None = None
+    time_budget: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

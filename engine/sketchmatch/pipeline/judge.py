@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass, replace
 from numbers import Real
@@ -21,6 +22,7 @@ from sketchmatch.model import (
 )
 from sketchmatch.model.arrays import sealed
 from sketchmatch.pipeline.alternatives import exchange_confidences, other_maps
+from sketchmatch.pipeline.clock import Clock
 from sketchmatch.pipeline.compare import Comparison
 from sketchmatch.pipeline.correspond import fmap_confidence, induced_map, map_confidence
 from sketchmatch.pipeline.guard import blaming, breaks_pins, check_map, checked_array, inspecting
@@ -110,6 +112,7 @@ def judged(
     judge: Judge,
     registry: Registry,
     usual: bool = True,
+    clock: Clock | None = None,
 ) -> Generator[float, None, Judged]:
     """Ask the judge which of the maps met is the answer.
 
@@ -121,6 +124,8 @@ def judged(
         Who judges, and where it comes from.
     usual
         As in :class:`~sketchmatch.api.JudgeProblem`.
+    clock
+        Tells how much time is left; None for no limit.
 
     Yields
     ------
@@ -135,6 +140,8 @@ def judged(
     whole, weights = Part.whole(comparison.table, comparison.own), goal.weights.searched
     first, others = yield from considered(comparison, found, goal)
     problem = problem_of(comparison, first, others, goal, usual)
+    if clock is not None and (left := clock.left()) < math.inf:
+        problem = replace(problem, time_budget=left)
     with inspecting(judge, registry, problem), blaming(judge, registry):
         judgement = judge.judge(problem)
         check_maps(judgement, problem)

@@ -271,7 +271,7 @@ def _matched(
     with clock.timing("search"):
         work = search(comparison, pipeline.searcher, goal, registry, clock)
         found = yield from _watched_search(work, comparison.swapped, clock)
-        judging = judged(comparison, found, goal, pipeline.judge, registry, plan.usual)
+        judging = judged(comparison, found, goal, pipeline.judge, registry, plan.usual, clock)
         verdict = yield from retold(judging, lambda _: _told(found, comparison.swapped, clock))
     yield Finished(answer(comparison, found, verdict, goal, sides, match_id, clock))
 

@@ -2,11 +2,13 @@
 
 from sketchmatch_builtin.alignment._candidates import (
     Laid,
+    Late,
     completed,
     drive,
     known_maps,
     laid_maps,
     near_maps,
+    never,
     refined_maps,
     template_maps,
 )
@@ -16,6 +18,7 @@ from sketchmatch_builtin.alignment._things import Things
 
 __all__ = [
     "Laid",
+    "Late",
     "Line",
     "Measured",
     "Sides",
@@ -27,6 +30,7 @@ __all__ = [
     "laid_maps",
     "measured",
     "near_maps",
+    "never",
     "refined_maps",
     "relations_of",
     "sides_of",

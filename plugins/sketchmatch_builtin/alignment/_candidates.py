@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -29,11 +30,13 @@ from sketchmatch_builtin.searchers._assignment import FORBIDDEN, reduce_by_assig
 
 __all__ = [
     "Laid",
+    "Late",
     "completed",
     "drive",
     "known_maps",
     "laid_maps",
     "near_maps",
+    "never",
     "refined_maps",
     "template_maps",
 ]
@@ -44,6 +47,9 @@ GUESSES = 25_000
 MAPS = 1_000
 """Maps to return at most: where somebody invents things, the right one may be beyond hundreds that
 seem to fit better. Where few fit, few are returned."""
+
+Late = Callable[[], bool]
+"""Whether somebody waits for an answer already."""
 
 _Value = TypeVar("_Value")
 
@@ -77,9 +83,17 @@ _VARIED = 20
 _RECENT: deque[tuple[Any, list[Laid]]] = deque(maxlen=8)
 """What :func:`laid_maps` last returned, and for what: a searcher asks first, then a judge."""
 
+_BEGUN: deque[tuple[Any, Guesses]] = deque(maxlen=8)
+"""What :func:`laid_maps` had guessed where it was closed before its end, and for what."""
+
 _CHANGES = 20_000
 _FARTHEST = 20.0
 _FEWEST = 3
+
+
+def never() -> bool:
+    """Return False: it is never late."""
+    return False
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +125,7 @@ def laid_maps(
 ) -> Generator[int, None, list[Laid]]:
     """Lay a sketch upon a map in every way that may be right.
 
-    What comes of it is kept for :func:`known_maps`.
+    What comes of it is kept for :func:`known_maps`, also where it is closed before its end.
 
     Parameters
     ----------
@@ -136,9 +150,14 @@ def laid_maps(
     list of Laid
         Different maps, what is worth most first.
     """
-    laid = yield from _laid(sides, poses, guesses)
+    key, guessed = (sides.identity, poses, maps, partial, guesses), _no_guesses(sides)
+    try:
+        laid = yield from _laid(sides, poses, guesses, guessed)
+    except GeneratorExit:
+        _BEGUN.appendleft((key, guessed))
+        raise
     found = _found(laid, sides, maps, partial)
-    _RECENT.appendleft(((sides.identity, poses, maps, partial, guesses), found))
+    _RECENT.appendleft((key, found))
     return found
 
 
@@ -154,7 +173,8 @@ def near_maps(
     start
         Maps of the sketch.
     """
-    guesses = drive(_guessed(sides, 0, _NEAR_PAIRS))
+    guesses = _no_guesses(sides)
+    drive(_guess(guesses, sides, 0, _NEAR_PAIRS))
     laid = drive(_refined(guesses, sides, _NEAR_POSES))
     partners = np.empty(len(sides.drawn.places), dtype=np.int64)
     for each in start:
@@ -177,25 +197,41 @@ def _found(laid: list[Laid], sides: Sides, maps: int, partial: bool) -> list[Lai
 
 
 def known_maps(
-    sides: Sides, poses: int = 60, maps: int = MAPS, partial: bool = True, guesses: int = GUESSES
+    sides: Sides,
+    poses: int = 60,
+    maps: int = MAPS,
+    partial: bool = True,
+    guesses: int = GUESSES,
+    late: Late = never,
 ) -> list[Laid]:
-    """Return what :func:`laid_maps` does, at once where a searcher asked for it just before."""
+    """Return what :func:`laid_maps` does, at once where a searcher asked for it just before.
+
+    Once it is late, no more poses are weighed than were before, or than those of the fewest pairs,
+    and few are refined.
+    """
     key = (sides.identity, poses, maps, partial, guesses)
     for known, found in tuple(_RECENT):
         if known == key:
             return found
-    return drive(laid_maps(sides, poses, maps, partial, guesses))
+    begun = (each for known, each in tuple(_BEGUN) if known == key)
+    guessed = deepcopy(next(begun, None)) or _no_guesses(sides)
+    found = _found(drive(_laid(sides, poses, guesses, guessed, late)), sides, maps, partial)
+    if not late():
+        _RECENT.appendleft((key, found))
+    return found
 
 
 def refined_maps(sides: Sides, poses: int, guesses: int) -> list[Laid]:
     """Return the different maps that the best poses lead to, what is worth most first."""
-    return drive(_laid(sides, poses, guesses))
+    return drive(_laid(sides, poses, guesses, _no_guesses(sides)))
 
 
-def _laid(sides: Sides, poses: int, guesses: int) -> Generator[int, None, list[Laid]]:
-    guessed = yield from _guessed(sides, guesses)
-    laid = yield from _refined(guessed, sides, poses)
-    yield int(guessed.state[1])
+def _laid(
+    sides: Sides, poses: int, most: int, guesses: Guesses, late: Late = never
+) -> Generator[int, None, list[Laid]]:
+    yield from _guess(guesses, sides, most, late=late)
+    laid = yield from _refined(guesses, sides, poses, late)
+    yield int(guesses.state[1])
     return laid
 
 
@@ -249,16 +285,23 @@ def template_maps(laid: Iterable[Laid], sides: Sides) -> list[IntArray]:
     return [sides.template_partners(each.partners) for each in laid]
 
 
-def _guessed(
-    sides: Sides, most: int, fewest_pairs: int = _FEWEST_PAIRS
-) -> Generator[int, None, Guesses]:
+def _no_guesses(sides: Sides) -> Guesses:
+    return empty_guesses(_ROOM, -_FLOOR * _ROUGH * len(sides.drawn.places))
+
+
+def _guess(
+    guesses: Guesses,
+    sides: Sides,
+    most: int,
+    fewest_pairs: int = _FEWEST_PAIRS,
+    late: Late = never,
+) -> Generator[int, None, None]:
     """Weigh the poses that follow from two pairings each, about so many at most.
 
-    Where that is none, those of the fewest pairs alone.
+    Where that is none, or it is late, those of the fewest pairs alone.
     """
     drawn, mapped = sides.drawn, sides.mapped
     rough = TOLERANCES._replace(omission=_ROUGH)
-    guesses = empty_guesses(_ROOM, -_FLOOR * _ROUGH * len(drawn.places))
     grid = grid_of(mapped)
     pairs = _pairs(drawn, None if most else fewest_pairs)
     allowed = np.isfinite(sides.bonus).astype(np.float64)
@@ -266,14 +309,15 @@ def _guessed(
     fewest = min(len(pairs), fewest_pairs) * there_are
     step = max(1, _STEP // len(drawn.places))
     while guesses.state[2] < len(pairs) * there_are:
-        if guesses.state[2] >= fewest and guesses.state[1] >= most:
+        if guesses.state[2] >= fewest and (guesses.state[1] >= most or late()):
             break
         guess_poses(pairs, drawn, mapped, grid, allowed, rough, step, guesses)
         yield int(guesses.state[1])
-    return guesses
 
 
-def _refined(guesses: Guesses, sides: Sides, poses: int) -> Generator[int, None, list[Laid]]:
+def _refined(
+    guesses: Guesses, sides: Sides, poses: int, late: Late = never
+) -> Generator[int, None, list[Laid]]:
     """Return the different maps that the best guesses lead to."""
     found: dict[bytes, Laid] = {}
     count, weighed = int(guesses.state[0]), 0
@@ -283,7 +327,7 @@ def _refined(guesses: Guesses, sides: Sides, poses: int) -> Generator[int, None,
         for laid in _laid_by(ranked[low : low + step], sides):
             if len(found) < poses:
                 _keep_better(found, laid)
-        if len(found) >= poses:
+        if len(found) >= poses or late():
             break
         weighed += step * sides.bonus.size
         if weighed + step * sides.bonus.size > _PAIRINGS:

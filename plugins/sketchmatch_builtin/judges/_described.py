@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from sketchmatch.model import IntArray, RelationTable, Scene
 from sketchmatch_builtin.alignment import (
     Laid,
+    Late,
     Measured,
     Sides,
     Things,
     known_maps,
     measured,
+    never,
     refined_maps,
     relations_of,
 )
@@ -39,6 +41,7 @@ def described(
     partial: bool = True,
     related: bool = True,
     quick: bool = False,
+    late: Late = never,
 ) -> Described:
     """Describe maps of a sketch, and of its decoys.
 
@@ -56,27 +59,33 @@ def described(
         Whether relations are those that were learned from.
     quick
         Whether to go by the maps that are known alone, and by no decoys.
+    late
+        Once it is, there are fewer maps and decoys, but one of these.
     """
-    laid = [] if quick else known_maps(sides, partial=partial)
+    laid = [] if quick else known_maps(sides, partial=partial, late=late)
     found = [*met, *(each.partners for each in laid)]
     unique = {each.tobytes(): each for each in found}
     maps = np.stack([*unique.values()])
     relations = relations_of(scenes, table, names, sides.swapped)
     known = measured(maps, sides.drawn, sides.mapped, relations)
     order = best_first(known)
-    decoys = [] if quick else _decoys(sides.drawn)
+    decoys = []
+    for decoy in () if quick else _decoys(sides.drawn):
+        decoys.append(_measured_decoy(decoy, sides.mapped))
+        if late():
+            break
     return Described(
         maps[order],
         known.at(order),
-        tuple(_measured_decoy(each, sides.mapped) for each in decoys),
+        tuple(decoys),
         len(sides.drawn.places),
         len(sides.mapped.places),
         related,
     )
 
 
-def _decoys(drawn: Things) -> list[Things]:
-    """Return what the sketch is not, and might be as likely where it shows another place.
+def _decoys(drawn: Things) -> Iterator[Things]:
+    """Yield what the sketch is not, and might be as likely where it shows another place.
 
     In the mirror, which keeps rows and corners; squeezed too; and with things in each other's
     places. One that is the sketch again, as where it shows a regular grid, is none.
@@ -89,7 +98,7 @@ def _decoys(drawn: Things) -> list[Things]:
         order = _derangement(rng, len(each.sizes))
         shuffled.append(each._replace(sizes=each.sizes[order], shapes=each.shapes[order]))
     limit = _SAME * len(drawn.places)
-    return [each for each in (mirrored, *squeezed, *shuffled) if _best(each, drawn) < limit]
+    yield from (each for each in (mirrored, *squeezed, *shuffled) if _best(each, drawn) < limit)
 
 
 def _squeezed(things: Things, by: float) -> Things:

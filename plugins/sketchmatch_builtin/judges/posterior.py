@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 
 from sketchmatch.api import Judge, JudgedMap, Judgement, JudgeProblem
 from sketchmatch.model import FloatArray, IntArray, RelationTable, Scene
-from sketchmatch_builtin.alignment import sides_of
+from sketchmatch_builtin.alignment import Late, never, sides_of
 from sketchmatch_builtin.judges._described import described
 from sketchmatch_builtin.judges._evidence import settled, weighed
 from sketchmatch_builtin.judges.calibration import POSTERIOR
@@ -36,6 +37,9 @@ class Posterior(Judge):
     Whether the sketch shows this place at all follows from how far the best map exceeds what chance
     achieves on the same map, with decoys: the sketch mirrored, which nobody draws, and with its
     objects in each other's places. Star trackers verify by such a model of chance agreement [3]_.
+
+    Where no time is left, it weighs the maps that were met and those of the poses that were tried
+    so far, and one decoy.
 
     All of it was learned from simulated sketches, on the default relations. With others it judges
     by places, sizes and shapes alone.
@@ -95,6 +99,7 @@ class Posterior(Judge):
             partial=problem.price < math.inf,
             related=problem.usual,
             quick=problem.elsewhere is not None,
+            late=_late_in(problem.time_budget),
         )
         found = weighed(known, POSTERIOR, problem.elsewhere)
         mapped = problem.template if problem.swapped else problem.argument
@@ -122,6 +127,13 @@ class Posterior(Judge):
             np.clip(lines, 0.0, 1.0),
             elsewhere,
         )
+
+
+def _late_in(seconds: float | None) -> Late:
+    if seconds is None:
+        return never
+    end = time.monotonic() + seconds
+    return lambda: time.monotonic() >= end
 
 
 def _as_certain(shares: FloatArray, maps: IntArray, mapped: Scene) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from contextlib import closing
 
 import numpy as np
 from pydantic import Field
@@ -124,14 +125,14 @@ class Align(Searcher):
             laid = near_maps(sides, start, self.params.maps, problem.partial)
             offered = laid[:_NEAR]
         else:
-            work = laid_maps(sides, self.params.poses, partial=problem.partial)
-            while True:
-                try:
-                    poses = next(work)
-                except StopIteration as stop:
-                    laid = offered = stop.value[: self.params.maps]
-                    break
-                yield best.progress(poses)
+            with closing(laid_maps(sides, self.params.poses, partial=problem.partial)) as work:
+                while True:
+                    try:
+                        poses = next(work)
+                    except StopIteration as stop:
+                        laid = offered = stop.value[: self.params.maps]
+                        break
+                    yield best.progress(poses)
         for k, each in enumerate(offered):
             best.offer(completed(each, sides))
             if (k + 1) % _OFFERED == 0:
