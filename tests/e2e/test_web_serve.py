@@ -27,7 +27,7 @@ def test_an_address_that_is_none_is_refused_by_its_name():
     (line,) = done.stderr.splitlines()
     assert done.returncode == 2
     assert "--web-address is '8080'" in line
-    assert "should have a port" in line
+    assert "should begin with a host, as in 127.0.0.1:8080" in line
 
 
 @pytest.mark.slow

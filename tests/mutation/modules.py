@@ -142,6 +142,7 @@ _GROUPS = {
             "_lines": _PLANS,
             "_plan_things": f"plugins/test_plan_things {_PLANS}",
             "_plans": _PLANS,
+            "_spaces": _PLANS,
             "_standing": "plugins/test_segmenter_lidar",
             "_strokes_chains": _STROKES,
             "_strokes_drawing": _STROKES,

@@ -35,14 +35,14 @@ def some_map(rng, n, m, least=2):
 def row_of(partners, drawn, mapped, relations=None):
     """Return what is measured of a map, by name."""
     found = measured(np.array([partners]), drawn, mapped, relations)
-    return {part.name.lower(): found.wholes[0, part] for part in Whole}
+    return {name.lower(): found.wholes[0, k] for name, k in Whole._asdict().items()}
 
 
 def lines_of(partners, drawn, mapped, relations=None):
     """Return what is measured of each object of a map, by name."""
     found = measured(np.array([partners]), drawn, mapped, relations)
     np.testing.assert_array_equal(found.matched[0], np.asarray(partners) >= 0)
-    return [{part.name.lower(): row[part] for part in Line} for row in found.lines[0]]
+    return [{name.lower(): row[k] for name, k in Line._asdict().items()} for row in found.lines[0]]
 
 
 def distorted(rng, n, noise):
@@ -66,7 +66,7 @@ def test_places_sizes_and_shapes_count_as_plain_sums_say(seed, n, noise):
     # Squares of deviations are lost below about 1e-16 of squares of places.
     near = partial(pytest.approx, rel=1e-6, abs=1e-6)
     known = aligning.whole(partners, drawn, mapped, TOLERANCES)
-    assert set(known) == {part.name.lower() for part in Whole} - WHOLE_RELATED
+    assert set(known) == {name.lower() for name in Whole._fields} - WHOLE_RELATED
     expected = known | dict.fromkeys(WHOLE_RELATED, 0.0)
     assert row_of(partners, drawn, mapped) == near(expected)
     known = aligning.lines(partners, drawn, mapped, TOLERANCES)
