@@ -151,6 +151,9 @@ def test_a_mutant_is_tried_in_a_copy_and_killed_where_a_test_fails(tmp_path, mon
         "engine/sketchmatch/__init__.py": "",
         "engine/sketchmatch/sums.py": "def double(x):\n    return x + x\n",
         "tests/mutation/__init__.py": "",
+        "tests/conftest.py": (
+            "from hypothesis import settings\nsettings.register_profile('same', derandomize=True)\n"
+        ),
         **{
             path: (ROOT / path).read_text("utf-8")
             for path in ("tests/interpreted.py", "tests/mutation/quick.py")
