@@ -68,10 +68,22 @@ def negative(picture: Mask) -> Mask:
     return np.asarray(255 - picture, np.uint8)
 
 
+def _closed(picture: Mask, kernel: Mask) -> Mask:
+    """Return the morphological closing of a picture that goes on beyond its border.
+
+    Otherwise it would fill a shadow's corner there, and a strip of a table.
+    """
+    reach = len(kernel)
+    wide = cv2.copyMakeBorder(picture, reach, reach, reach, reach, cv2.BORDER_REPLICATE)
+    closed = np.asarray(cv2.morphologyEx(wide, cv2.MORPH_CLOSE, kernel), np.uint8)
+    return closed[reach:-reach, reach:-reach]
+
+
 def _light_quadrilateral(picture: Mask) -> Mask | None:
     side = max(picture.shape)
     # Without what is drawn on it, the sheet is one light area.
-    plain = cv2.morphologyEx(picture, cv2.MORPH_CLOSE, np.ones((odd(0.03 * side),) * 2, np.uint8))
+    kernel = np.ones((odd(0.03 * side),) * 2, np.uint8)
+    plain = _closed(picture, kernel)
     low, high = int(plain.min()), int(plain.max())
     if high - low < PAPER_CONTRAST:
         return None
@@ -81,7 +93,7 @@ def _light_quadrilateral(picture: Mask) -> Mask | None:
         contours, _ = cv2.findContours(light, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         largest = max(contours, key=cv2.contourArea)
         area = cv2.contourArea(largest)
-        if most < area < 0.93 * plain.size:
+        if most < area < 0.98 * plain.size:
             corners = _four_corners(largest, area)
             if corners is not None and _stands_out(plain, light, corners):
                 best, most = corners, area
@@ -120,11 +132,12 @@ def _stands_out(plain: Any, light: Mask, corners: Any) -> bool:
     wide = np.ones((odd(0.03 * max(light.shape)),) * 2, np.uint8)
     if light[inside > 0].mean() < 0.7:
         return False
-    outside = np.asarray(cv2.dilate(inside, wide), np.uint8) == 0
-    if outside.sum() < 0.02 * light.size or light[outside].mean() > 0.1:
+    near = np.ones((odd(0.01 * max(light.shape)),) * 2, np.uint8)
+    outside = np.asarray(cv2.dilate(inside, near), np.uint8) == 0
+    if outside.sum() < 0.005 * light.size or light[outside].mean() > 0.1:
         return False
     edge = np.concatenate([light[0], light[-1], light[:, 0], light[:, -1]])
-    if edge.mean() > 0.25:
+    if edge.mean() > 0.5:
         return False
     inner = cv2.erode(plain, wide, borderType=cv2.BORDER_REPLICATE)
     rim = np.asarray(cv2.morphologyEx(inside, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))) > 0
@@ -164,8 +177,18 @@ def is_light_on_dark(small: Mask) -> bool:
     if not 0.1 <= border <= 0.9:
         return bool(border > 0.5)
     window = min(255, odd(max(3.0, 0.25 * max(small.shape))))
-    rare = small.astype(np.float64) - cv2.medianBlur(small, window)
+    rare = small.astype(np.float64) - _median(small, window)
     return float((rare**3).sum()) > 0.0
+
+
+def _median(small: Mask, window: int) -> Mask:
+    """Return the medians around pixels of a picture that goes on as its own mirror image.
+
+    Repeated, a narrow strip of a table along the border would be most of what is around it.
+    """
+    reach = window // 2
+    wide = cv2.copyMakeBorder(small, reach, reach, reach, reach, cv2.BORDER_REFLECT)
+    return np.asarray(cv2.medianBlur(wide, window)[reach:-reach, reach:-reach], np.uint8)
 
 
 def _slope(small: Mask) -> NDArray[Any]:
@@ -193,12 +216,8 @@ def paper_light(small: Mask) -> Mask:
     """
     side = max(small.shape)
     kernel = np.ones((odd(max(3.0, _THICKEST_LINE * side)),) * 2, np.uint8)
-    even = cv2.medianBlur(small, 3) if min(small.shape) >= 64 else small
-    # Continued beyond the border, so that closing does not fill a shadow's corner there.
-    reach = len(kernel)
-    wide = cv2.copyMakeBorder(even, reach, reach, reach, reach, cv2.BORDER_REPLICATE)
-    closed = np.asarray(cv2.morphologyEx(wide, cv2.MORPH_CLOSE, kernel), np.uint8)
-    plain = closed[reach:-reach, reach:-reach]
+    even = np.asarray(cv2.medianBlur(small, 3) if min(small.shape) >= 64 else small, np.uint8)
+    plain = _closed(even, kernel)
     raised = np.full_like(plain, 255)
     ring = _border(plain)
     level = _closed_ring(ring, side // 3)
