@@ -88,6 +88,23 @@ def test_light_on_dark_is_read_as_its_negative_and_said():
     assert found.warnings == (INVERTED,)
 
 
+@pytest.mark.parametrize("sides", ["all", "two", "tilted"])
+@pytest.mark.parametrize("share", [0.01, 0.02, 0.04])
+def test_a_narrow_strip_of_table_is_no_ink_and_does_not_turn_the_picture(share, sides):
+    top, bottom, left, right = (
+        round(share * 400) * k for k in {"two": (1, 0, 1, 0)}.get(sides, (1, 1, 1, 1))
+    )
+    pixels = cv2.copyMakeBorder(drawing(), top, bottom, left, right, cv2.BORDER_CONSTANT, value=70)
+    if sides == "tilted":
+        rows, columns = pixels.shape
+        turn = cv2.getRotationMatrix2D((columns / 2, rows / 2), np.degrees(share) / 2, 1.0)
+        pixels = cv2.warpAffine(pixels, turn, (columns, rows), borderValue=70)
+    found = segmented(pixels)
+    assert INVERTED not in found.warnings
+    areas = [3200.0, np.pi * 42**2, 6000.0]
+    assert sorted(item.area for item in found.scene.objects) == pytest.approx(areas, rel=0.05)
+
+
 def framed():
     pixels = drawing()
     cv2.rectangle(pixels, (10, 10), (389, 289), 20, 4)
