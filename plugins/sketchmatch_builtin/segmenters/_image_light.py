@@ -177,18 +177,8 @@ def is_light_on_dark(small: Mask) -> bool:
     if not 0.1 <= border <= 0.9:
         return bool(border > 0.5)
     window = min(255, odd(max(3.0, 0.25 * max(small.shape))))
-    rare = small.astype(np.float64) - _median(small, window)
+    rare = small.astype(np.float64) - cv2.medianBlur(small, window)
     return float((rare**3).sum()) > 0.0
-
-
-def _median(small: Mask, window: int) -> Mask:
-    """Return the medians around pixels of a picture that goes on as its own mirror image.
-
-    Repeated, a narrow strip of a table along the border would be most of what is around it.
-    """
-    reach = window // 2
-    wide = cv2.copyMakeBorder(small, reach, reach, reach, reach, cv2.BORDER_REFLECT)
-    return np.asarray(cv2.medianBlur(wide, window)[reach:-reach, reach:-reach], np.uint8)
 
 
 def _slope(small: Mask) -> NDArray[Any]:
