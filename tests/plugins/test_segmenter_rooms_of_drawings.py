@@ -22,6 +22,7 @@ from sketchmatch.model import (
 from sketchmatch_builtin.segmenters._landmarks import labels_of, names_of_rooms
 from sketchmatch_builtin.segmenters._plan_things import dimensions, paper, seen, things_in
 from sketchmatch_builtin.segmenters._plan_things import within as lines_within
+from sketchmatch_builtin.segmenters._spaces import spaces_between
 from sketchmatch_builtin.segmenters._swings import doors_apart
 from sketchmatch_builtin.segmenters._widths import divided_by_width
 from sketchmatch_builtin.segmenters.rooms import RoomSegmenter
@@ -829,6 +830,15 @@ def test_space_between_rooms_that_are_shapes_with_names_is_none(frame):
     source = lettered([*APART, *frame], "ABCDEF")
     source = replace(source, landmarks=(*source.landmarks, hall))
     assert "hall" in [item.label for item in segmented(source).scene.objects]
+
+
+def test_space_between_rooms_is_told_at_once_beside_scribbles_and_not_among_very_many_lines():
+    lines = [np.array(each, dtype=float) for each in APART]
+    rooms = [*map(shapely.Polygon, lines), shapely.box(4, 0, 4.6, 3)]
+    with within(3):
+        assert spaces_between(rooms, [*"ABCDEF", ""], [*lines, scribble(9.0, 400)]) == {6}
+    many = [*lines, *(np.array(box(0, 0, 9, 8), dtype=float) for _ in range(3000))]
+    assert not spaces_between(rooms, [*"ABCDEF", ""], many)
 
 
 @SLOW

@@ -18,6 +18,8 @@ _FEWEST, _NAMED = 3, 0.8
 # Of a room, and of the shape that it is: how much the two share. Furniture and what lies over a
 # shape may take the rest of it.
 _WITHIN, _FILLED = 0.9, 0.5
+# In a drawing of more lines it is not looked for: each could lie across all rooms.
+_MOST_LINES = 3000
 # A closed line has at least so many points, the first of them twice.
 _CORNERS = 4
 # Of the way around a space: how much of it walls may bound, which are lines, not shapes. Of the
@@ -42,11 +44,13 @@ def spaces_between(
     lines
         What is drawn, shape (k, 2) each.
     """
-    if len(rooms) <= _FEWEST or all(labels):
+    if len(rooms) <= _FEWEST or all(labels) or len(lines) > _MOST_LINES:
         return frozenset()
     found, named = np.array(rooms, dtype=object), np.array([bool(each) for each in labels])
     closed = [line for line in lines if len(line) >= _CORNERS and is_closed(line)]
-    shapes = shapely.make_valid(np.array([shapely.Polygon(line) for line in closed], dtype=object))
+    outlines = np.array([shapely.Polygon(line) for line in closed], dtype=object)
+    # What crosses itself is no room, and what it encloses would take long to tell.
+    shapes = outlines[shapely.is_valid(outlines)]
     k, shape = shapely.STRtree(shapes).query(found, "intersects")
     shared = shapely.area(shapely.intersection(found[k], shapes[shape]))
     holds = shared >= _WITHIN * shapely.area(found[k])
