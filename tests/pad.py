@@ -42,7 +42,7 @@ def name_the_stove_my_oven(page: Any, hand: Hand) -> None:
 def keep_map_as(page: Any, name: str) -> None:
     """Have the server keep the map under a name."""
     page.get_by_test_id("open-places").click()
-    page.get_by_label("Keep it as").fill(name)
+    page.get_by_label("Store it as").fill(name)
     page.get_by_test_id("keep-map").click()
     page.get_by_test_id("notice").get_by_text(name).wait_for()
 
@@ -121,7 +121,7 @@ def open_floor_as_rooms(page: Any, folder: Path) -> None:
     page.get_by_test_id("map-file").set_input_files(floor_plan(folder))
     page.locator(".map-pane .title", has_text="floor.yaml").wait_for()
     page.get_by_test_id("notice").get_by_text("choose the segmenter rooms").wait_for()
-    page.get_by_test_id("headline").get_by_text("Nothing is found on this map").wait_for()
+    page.get_by_test_id("headline").get_by_text("Nothing was found on this map").wait_for()
     page.locator("image.grid").wait_for(state="attached")
     page.get_by_test_id("open-tuning").click()
     page.get_by_role("radio", name="occupancy-grid").wait_for()
