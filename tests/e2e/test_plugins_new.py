@@ -106,7 +106,7 @@ def test_it_writes_into_a_folder_that_is_still_to_be_made(command_line, tmp_path
             (name, "searcher", f"NAME {name!r} cannot be the name of an algorithm; use up to 40 ")
             for name in ("Tabu", "2-opt", "a--b", "a_b", "../x", "", "x" * 41)
         ),
-        ("easm", "searcher", "NAME 'easm' is a searcher of sketchmatch 0.1.0 already; "),
+        ("easm", "searcher", "NAME 'easm' is already a searcher of sketchmatch 0.1.0; "),
         ("client", "searcher", "NAME 'client' would make the package sketchmatch_client, "),
         ("tabu", "sercher", "--kind is 'sercher'; choose one of: segmenter, histogram, "),
     ],

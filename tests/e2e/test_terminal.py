@@ -162,7 +162,7 @@ def test_a_reader_who_has_had_enough_does_not_cost_the_files(command, tmp_path):
         timeout=200,
     )
     os.close(written)
-    notes = [line for line in done.stderr.splitlines() if ": draws the 16 of 28" not in line]
+    notes = [line for line in done.stderr.splitlines() if " draws the 16 of 28" not in line]
     assert (done.returncode, notes) == (ExitCode.OK, [])
     with PIL.Image.open(picture) as image:
         assert image.width >= 1000
@@ -290,7 +290,7 @@ def test_a_terminal_of_another_encoding_shows_tables_and_errors(encoding):
     terminal = Terminal("match", *ROOM, columns=100, PYTHONIOENCODING=encoding)
     assert terminal.end()[0] == ExitCode.OK
     assert "1 sideboard" in terminal.shown
-    assert "zeta 0.956 of relations" in terminal.shown
+    assert "zeta 0.956: similarity" in terminal.shown
     missing = Terminal("match", "Küche→.svg", LIVING_ROOM_MAP, PYTHONIOENCODING=encoding)
     assert missing.end()[0] == ExitCode.INVALID_INPUT
     assert "->.svg does not exist; check the path" in missing.shown

@@ -504,7 +504,7 @@ class BoldJudge(Judge):
         return says([0, 1, 2, 3], lines=1.5 * np.eye(4, 5))
 
 
-@broken("judge", "right with probability 0.75, and one of its lines with 0.5")
+@broken("judge", "right with probability 0.75, but one of its lines only with 0.5")
 class ContradictingJudge(Judge):
     def judge(self, problem):
         lines = np.eye(4, 5)

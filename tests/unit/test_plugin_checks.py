@@ -799,7 +799,7 @@ JUDGES = {
         like(Ranks, judge=judge(taking_one_twice)),
     ),
     "probabilities-agree": (
-        "its map is right with probability 0.625, and one of its lines with 0.5",
+        "its map is right with probability 0.625, but one of its lines only with 0.5",
         like(Ranks, judge=judge(lambda given, *_: with_first(given, probability=0.625))),
     ),
     "price-is-a-number": ("its price is 0.0", like(Ranks, price=lambda *_: 0.0)),

@@ -69,7 +69,7 @@ TEST(Address, WhatIsNoneIsRefusedWithTheRemedy) {
   EXPECT_EQ(refusal("robot:abc"),
             "address is 'robot:abc'; give host and port, as in 'localhost:50051' or '[::1]:50051'");
   EXPECT_EQ(refusal("unix:"),
-            "address is 'unix:'; a path of at most 107 bytes, as in "
+            "address is 'unix:'; name a file by a path of at most 107 bytes, as in "
             "'unix:/run/sketchmatch.sock'");
 }
 
@@ -147,8 +147,7 @@ TEST(Encryption, PartsThatContradictEachOtherAreRefused) {
   options.certificate = Pem::content(kCertificate);
   EXPECT_EQ(refusal("localhost:1", options), "certificate is given without key; give both");
   options.tls = false;
-  EXPECT_EQ(refusal("localhost:1", options),
-            "certificate needs encryption; leave out tls = false");
+  EXPECT_EQ(refusal("localhost:1", options), "certificate needs encryption; leave out tls = false");
   ClientOptions other;
   other.key = Pem::content("-----BEGIN PRIVATE KEY-----");
   EXPECT_EQ(refusal("localhost:1", other), "key is given without certificate; give both");

@@ -393,8 +393,7 @@ TEST_F(Golden, WhatIsForMatchesAloneIsRefusedForATransfer) {
   };
   TransferOptions options;
   options.alternatives = 2;
-  EXPECT_EQ(field_of(options, {}),
-            "alternatives is only for matches; leave it out of a transfer");
+  EXPECT_EQ(field_of(options, {}), "alternatives is only for matches; leave it out of a transfer");
   options = {};
   options.request_id = "3f0e";
   EXPECT_EQ(field_of(options, {}).find("request_id is only for matches"), 0U);

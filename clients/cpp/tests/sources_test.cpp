@@ -152,7 +152,7 @@ TEST_F(MapFiles, APictureIsTakenFromWhereTheYamlSaysOrBesideIt) {
     const auto found = sources::map_server_map(moved);
     EXPECT_EQ(found.message().map_server_map().image(), "picture");
     ASSERT_EQ(found.notes().size(), 1U);
-    EXPECT_NE(found.notes()[0].find("room.pgm beside moved.yaml was taken"), std::string::npos);
+    EXPECT_NE(found.notes()[0].find("room.pgm beside moved.yaml was used"), std::string::npos);
   }
 }
 
