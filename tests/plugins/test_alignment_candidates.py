@@ -230,11 +230,11 @@ def poses(monkeypatch):
 
     monkeypatch.setattr(module, "guess_poses", counted)
     monkeypatch.setattr(module, "refine_guesses", noted)
-    monkeypatch.setattr(module, "_STEP", 600)
     return weighed, refined
 
 
-def test_when_it_is_late_the_fewest_pairs_and_few_poses_do(poses):
+def test_when_it_is_late_the_fewest_pairs_and_few_poses_do(poses, monkeypatch):
+    monkeypatch.setattr(module, "_STEP", 600)
     weighed, refined = poses
     drawn, mapped, order = copied(7, 12, 12)
     seen = sides(drawn, mapped)
@@ -248,7 +248,8 @@ def test_when_it_is_late_the_fewest_pairs_and_few_poses_do(poses):
     assert sum(refined) - 16 >= 60
 
 
-def test_what_was_weighed_before_the_end_of_a_search_is_not_weighed_again(poses):
+def test_what_was_weighed_before_the_end_of_a_search_is_not_weighed_again(poses, monkeypatch):
+    monkeypatch.setattr(module, "_STEP", 600)
     weighed, refined = poses
     drawn, mapped, order = copied(8, 12, 12)
     seen = sides(drawn, mapped)
@@ -280,21 +281,8 @@ def test_far_pairs_are_laid_first_and_each_object_soon():
     assert len({tuple(sorted(pair)) for pair in many.tolist()}) == len(many) == 60
 
 
-def test_work_between_pauses_is_bounded(monkeypatch):
-    weighed, refined = [], [0]
-    guess, refine = module.guess_poses, module.refine_guesses
-
-    def counted(*arguments):
-        before = int(arguments[-1].state[1])
-        guess(*arguments)
-        weighed.append(int(arguments[-1].state[1]) - before)
-
-    def noted(*arguments):
-        refined[0] += len(arguments[0])
-        return refine(*arguments)
-
-    monkeypatch.setattr(module, "guess_poses", counted)
-    monkeypatch.setattr(module, "refine_guesses", noted)
+def test_work_between_pauses_is_bounded(poses):
+    weighed, refined = poses
     drawn, mapped, order = copied(0, 60, 60)
     work = laid_maps(sides(drawn, mapped), 60, 120, True)
     most = before = 0
@@ -304,7 +292,7 @@ def test_work_between_pauses_is_bounded(monkeypatch):
         except StopIteration as stop:
             laid = stop.value
             break
-        most, before = max(most, refined[0] - before), refined[0]
+        most, before = max(most, sum(refined) - before), sum(refined)
     np.testing.assert_array_equal(laid[0].partners, order)
     assert max(weighed) <= module._STEP + 60
     assert 0 < most <= module._PAIRINGS // 60**2 + 1

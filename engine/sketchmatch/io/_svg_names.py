@@ -14,6 +14,7 @@ __all__ = [
     "goes_on",
     "groups_label",
     "html_in",
+    "is_vertical",
     "label_of",
     "size_of_html",
     "width_of",

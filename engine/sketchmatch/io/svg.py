@@ -222,7 +222,7 @@ class _Drawing:
         # What is used again and again is the same each time.
         self._label = cache(groups_label)
         self._children = cache(partial(_children, excalidraw=_EXCALIDRAW in data))
-        self._targets: dict[ElementTree.Element, ElementTree.Element | None] = {}
+        self._target = cache(self._used)
         self._visited = 1
         self._most = source_limits().max_elements
         self.background = self._styles.background(root)
@@ -400,9 +400,7 @@ class _Drawing:
         """Return what is drawn of an element that is no shape, and in which context."""
         if tag_of(element) != "use":
             return self._children(element), context
-        if element not in self._targets:
-            self._targets[element] = self._used(element)
-        target = self._targets[element]
+        target = self._target(element)
         if target is None or target in context.used:
             return [], context  # what would draw itself without end is not drawn
         return [target], context._replace(

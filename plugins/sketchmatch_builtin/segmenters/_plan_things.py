@@ -13,7 +13,7 @@ import shapely
 
 from sketchmatch.model import FloatArray, Landmark, Stroke
 from sketchmatch_builtin.segmenters._doorways import Labels
-from sketchmatch_builtin.segmenters._lines import is_closed, is_straight
+from sketchmatch_builtin.segmenters._lines import is_outline, is_straight, plain_outlines
 from sketchmatch_builtin.segmenters._merging import groups
 
 __all__ = ["Things", "dimensions", "paper", "seen", "standing", "things_in", "within"]
@@ -27,8 +27,6 @@ _MOST = 0.5
 # Of the square of the way around it: the least area. What is longer than seven times its width is
 # a wall.
 _THICK = 0.027
-# A closed line has at least so many points, the first of them twice.
-_CORNERS = 4
 # Of the span of all: what is nearer to each other touches.
 _NEAR = 0.003
 # So many parallel lines are of paper: as long as the longest, at like distances, in radians of one
@@ -161,13 +159,7 @@ def seen(strokes: Sequence[Stroke]) -> list[FloatArray]:
     hides nothing, and is whole.
     """
     lines = [stroke.points for stroke in strokes]
-    closed = {
-        k: shapely.Polygon(line)
-        for k, line in enumerate(lines)
-        if len(line) >= _CORNERS and is_closed(line)
-    }
-    # What crosses itself has no inside that one could tell soon.
-    outlines = {k: outline for k, outline in closed.items() if outline.is_valid}
+    outlines = plain_outlines(lines)
     covers = np.array([k for k in outlines if strokes[k].opaque], dtype=np.int64)
     if not len(covers):
         return lines
@@ -206,7 +198,7 @@ def things_in(lines: Sequence[FloatArray], names: Sequence[Landmark]) -> Things:
     names
         What is written in it.
     """
-    closed = [k for k, line in enumerate(lines) if len(line) >= _CORNERS and is_closed(line)]
+    closed = [k for k, line in enumerate(lines) if is_outline(line)]
     if not closed:
         return Things([], [])
     outlines = np.array([shapely.Polygon(lines[k]) for k in closed], dtype=object)

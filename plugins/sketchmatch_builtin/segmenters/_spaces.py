@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from sketchmatch.model import FloatArray
-from sketchmatch_builtin.segmenters._lines import is_closed
+from sketchmatch_builtin.segmenters._lines import is_closed, plain_outlines
 
 __all__ = ["spaces_between"]
 
@@ -20,8 +20,6 @@ _FEWEST, _NAMED = 3, 0.8
 _WITHIN, _FILLED = 0.9, 0.5
 # In a drawing of more lines it is not looked for: each could lie across all rooms.
 _MOST_LINES = 3000
-# A closed line has at least so many points, the first of them twice.
-_CORNERS = 4
 # Of the way around a space: how much of it walls may bound, which are lines, not shapes. Of the
 # span of all: how near to it they are.
 _WALLED, _NEAR = 0.2, 0.01
@@ -47,10 +45,7 @@ def spaces_between(
     if len(rooms) <= _FEWEST or all(labels) or len(lines) > _MOST_LINES:
         return frozenset()
     found, named = np.array(rooms, dtype=object), np.array([bool(each) for each in labels])
-    closed = [line for line in lines if len(line) >= _CORNERS and is_closed(line)]
-    outlines = np.array([shapely.Polygon(line) for line in closed], dtype=object)
-    # What crosses itself is no room, and what it encloses would take long to tell.
-    shapes = outlines[shapely.is_valid(outlines)]
+    shapes = np.array([*plain_outlines(lines).values()], dtype=object)
     k, shape = shapely.STRtree(shapes).query(found, "intersects")
     shared = shapely.area(shapely.intersection(found[k], shapes[shape]))
     holds = shared >= _WITHIN * shapely.area(found[k])
