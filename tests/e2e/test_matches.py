@@ -51,7 +51,7 @@ def test_a_match_that_is_not_there_and_a_server_that_is_not_asked_are_one_line_e
     missing = sketchmatch("matches", "show", address, "nobody")
     assert missing.returncode == 2
     assert missing.stderr.count("\n") == 1
-    assert "no match 'nobody' of yours" in missing.stderr
+    assert "you have no match 'nobody' on this server" in missing.stderr
     here = sketchmatch("match", "sketch.svg", "map.yaml", "--keep-running")
     assert (here.returncode, here.stderr.count("\n")) == (2, 1)
-    assert "--keep-running is for a server" in here.stderr
+    assert "--keep-running needs a server, but none is given" in here.stderr

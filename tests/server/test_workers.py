@@ -110,7 +110,10 @@ def test_a_match_whose_worker_is_killed_may_be_sent_again_and_no_other_notices()
         assert lost.value.reason == "WORKER_LOST"
         assert client.match(scene(5), scene(5)).object_map == small[0]
         assert worker not in children_of(pid)
-        wait_until(lambda: any("ended by itself (signal 9)" in line for line in running.said), "")
+        wait_until(
+            lambda: any("ended unexpectedly (signal 9)" in line for line in running.said),
+            "the log does not say how the worker ended",
+        )
 
 
 @pytest.mark.slow
