@@ -29,18 +29,17 @@ def lines(*command):
 @pytest.mark.slow
 def test_ones_matches_are_listed_shown_watched_and_cancelled(served):
     address, done, runs = served
-    listed = lines("list", address)
+    listed = lines("list", "--server", address)
     assert [line[:2] for line in listed] == [[runs, "RUNNING"], [done, "SUCCEEDED"]]
-    (only,) = json.loads(sketchmatch("matches", "list", address, "--json", "--limit=1").stdout)[
-        "matches"
-    ]
+    latest = sketchmatch("matches", "list", "--server", address, "--json", "--limit=1")
+    (only,) = json.loads(latest.stdout)["matches"]
     assert only["matchId"] == runs
-    shown = lines("show", address, done)
+    shown = lines("show", done, "--server", address)
     assert shown[0][:2] == ["sketch_object", "map_object"]
     assert len(shown) == 5
-    assert lines("watch", address, done) == shown
-    assert lines("cancel", address, runs)[0][0] == runs
-    stopped = sketchmatch("matches", "watch", address, runs)
+    assert lines("watch", done, "--server", address) == shown
+    assert lines("cancel", runs, "--server", address)[0][0] == runs
+    stopped = sketchmatch("matches", "watch", runs, "--server", address)
     assert (stopped.returncode, stopped.stdout) == (5, "")
     assert stopped.stderr == "sketchmatch: the match was cancelled\n"
 
@@ -48,7 +47,7 @@ def test_ones_matches_are_listed_shown_watched_and_cancelled(served):
 @pytest.mark.slow
 def test_a_match_that_is_not_there_and_a_server_that_is_not_asked_are_one_line_each(served):
     address, *_ = served
-    missing = sketchmatch("matches", "show", address, "nobody")
+    missing = sketchmatch("matches", "show", "nobody", "--server", address)
     assert missing.returncode == 2
     assert missing.stderr.count("\n") == 1
     assert "you have no match 'nobody' on this server" in missing.stderr

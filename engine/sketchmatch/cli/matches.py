@@ -37,7 +37,7 @@ def matches() -> None:
 @answering
 @options.asking
 def list_(
-    address: options.Address,
+    server: options.OwnServer = options.HERE,
     access: options.Access = options.Access(),  # noqa: B008
     limit: Annotated[int, typer.Option(min=1, help="Largest number of matches.")] = 20,
     timeout: options.Timeout = 10.0,
@@ -48,7 +48,7 @@ def list_(
 
     from sketchmatch.cli.answering import client_of
 
-    with client_of(address, "ADDRESS", access) as client:
+    with client_of(server, "--server", access) as client:
         found = list(islice(client.matches(timeout=timeout), limit))
     if json:
         output.write_json({"matches": [_document(match) for match in found]})
@@ -61,8 +61,8 @@ def list_(
 @answering
 @options.asking
 def show(
-    address: options.Address,
     name: _Name,
+    server: options.OwnServer = options.HERE,
     access: options.Access = options.Access(),  # noqa: B008
     timeout: options.Timeout = 10.0,
     json: Annotated[
@@ -75,7 +75,7 @@ def show(
     from sketchmatch.cli.answering import client_of
     from sketchmatch_client import MatchCollector
 
-    with client_of(address, "ADDRESS", access) as client:
+    with client_of(server, "--server", access) as client:
         found = client.get_match(name, timeout=timeout)
     if json:
         output.write_message(found)
@@ -93,8 +93,8 @@ def show(
 @answering
 @options.asking
 def watch(
-    address: options.Address,
     name: _Name,
+    server: options.OwnServer = options.HERE,
     access: options.Access = options.Access(),  # noqa: B008
     json: options.Json = False,
 ) -> None:
@@ -102,7 +102,7 @@ def watch(
     from sketchmatch.cli import display
     from sketchmatch.cli.answering import client_of
 
-    with client_of(address, "ADDRESS", access) as client:
+    with client_of(server, "--server", access) as client:
         answer = display.watch(client.watch(name))
     if json:
         output.write_message(answer.result)
@@ -114,15 +114,15 @@ def watch(
 @answering
 @options.asking
 def cancel(
-    address: options.Address,
     name: _Name,
+    server: options.OwnServer = options.HERE,
     access: options.Access = options.Access(),  # noqa: B008
     timeout: options.Timeout = 10.0,
 ) -> None:
     """Stop a match; one that has ended stays as it is."""
     from sketchmatch.cli.answering import client_of
 
-    with client_of(address, "ADDRESS", access) as client:
+    with client_of(server, "--server", access) as client:
         output.write_line(*_line(client.cancel_match(name, timeout=timeout)))
 
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from sketchmatch_client import MatchOptions, Pin
 
 __all__ = [
+    "HERE",
     "Access",
-    "Address",
     "Config",
     "Exclusions",
     "FormerMapSegmenter",
@@ -33,6 +33,7 @@ __all__ = [
     "MapFile",
     "MapSegmenter",
     "Overlay",
+    "OwnServer",
     "Pins",
     "Profile",
     "Search",
@@ -55,6 +56,8 @@ __all__ = [
     "say_renamed",
     "to_path",
 ]
+
+HERE = "127.0.0.1:50051"
 
 
 def to_path(text: str) -> Path:
@@ -80,10 +83,6 @@ MapFile = Annotated[
     Path,
     typer.Argument(metavar="MAP", help="Map, in any format that `match` reads.", parser=to_path),
 ]
-Address = Annotated[
-    str,
-    typer.Argument(metavar="ADDRESS", help="Address of the server: HOST:PORT or unix:PATH."),
-]
 Timeout = Annotated[
     float,
     typer.Option("--timeout", metavar="SECONDS", min=0.001, help="Longest wait for an answer."),
@@ -94,6 +93,15 @@ Server = Annotated[
         "--server",
         metavar="ADDRESS",
         help="Ask the server at HOST:PORT or unix:PATH instead of computing locally.",
+    ),
+]
+OwnServer = Annotated[
+    str,
+    typer.Option(
+        "--server",
+        metavar="ADDRESS",
+        help="Server that keeps them: HOST:PORT or unix:PATH.",
+        show_default=True,
     ),
 ]
 Config = Annotated[

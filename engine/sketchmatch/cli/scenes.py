@@ -16,13 +16,9 @@ __all__ = ["app"]
 
 app = typer.Typer(help="Store scenes on a server for later matches.", rich_markup_mode="markdown")
 
-_Server = Annotated[
-    str, typer.Option(metavar="HOST:PORT", help="Server that stores them.", show_default=True)
-]
 _Name = Annotated[
     str, typer.Argument(metavar="NAME", help="Name of a scene, or its first characters.")
 ]
-_HERE = "127.0.0.1:50051"
 
 
 @app.callback()
@@ -46,7 +42,7 @@ def put(
             parser=options.to_path,
         ),
     ],
-    server: _Server = _HERE,
+    server: options.OwnServer = options.HERE,
     access: options.Access = options.Access(),  # noqa: B008
     profile: options.Profile = "",
     segmenter: Annotated[
@@ -80,7 +76,7 @@ def put(
 @answering
 @options.asking
 def list_(
-    server: _Server = _HERE,
+    server: options.OwnServer = options.HERE,
     access: options.Access = options.Access(),  # noqa: B008
 ) -> None:
     """List your scenes, the latest first: name, number of objects, time, labels."""
@@ -98,7 +94,7 @@ def list_(
 @options.asking
 def show(
     name: _Name,
-    server: _Server = _HERE,
+    server: options.OwnServer = options.HERE,
     access: options.Access = options.Access(),  # noqa: B008
     json: options.Json = False,
     verbose: options.Verbose = False,
@@ -135,7 +131,7 @@ def label(
             help="Object number, from 1 as in tables, and its label; 3= removes the label.",
         ),
     ],
-    server: _Server = _HERE,
+    server: options.OwnServer = options.HERE,
     access: options.Access = options.Access(),  # noqa: B008
 ) -> None:
     """Label objects, and print the name of the resulting scene, which is another one."""
@@ -158,7 +154,7 @@ def label(
 @options.asking
 def delete(
     name: _Name,
-    server: _Server = _HERE,
+    server: options.OwnServer = options.HERE,
     access: options.Access = options.Access(),  # noqa: B008
 ) -> None:
     """Delete a scene, and print its whole name; it stays for other callers who have put it."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from sketchmatch.cli import options, output
 from sketchmatch.cli.output import answering
@@ -34,7 +36,10 @@ _UNITS = (("d", 86_400), ("h", 3_600), ("min", 60), ("s", 1))
 @answering
 @options.asking
 def status(
-    address: options.Address,
+    address: Annotated[
+        str,
+        typer.Argument(metavar="ADDRESS", help="Address of the server: HOST:PORT or unix:PATH."),
+    ],
     access: options.Access = options.Access(),  # noqa: B008
     timeout: options.Timeout = 5.0,
     json: options.JsonDocument = False,
