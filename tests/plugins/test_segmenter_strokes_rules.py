@@ -165,19 +165,45 @@ WALLS = box(0, 0, 90, 90)
 
 
 @pytest.mark.parametrize(
-    ("around", "objects"),
+    ("around", "things", "walls"),
     [
-        ([WALLS], 4),
-        ([WALLS, box(100, 0, 90, 90), *[np.add(each, (100, 0)) for each in THINGS]], 8),  # rooms
-        ([WALLS, box(-5, -5, 200, 100), box(120, 40, 12, 12)], 6),  # within a page
-        ([WALLS, box(-3, -3, 96, 96)], 4),  # a double line
-        ([WALLS, box(100, 60, 30, 30), box(105, 65, 9, 9), box(105, 78, 9, 9)], 7),  # a legend
-        ([box(0, 0, 80, 26), box(100, 0, 60, 60)], 4),  # less than three times as large as things
-        ([box(0, 0, 90, 90), *[box(300 * k, 300, 99, 99) for k in range(4)]], 5),  # a large thing
+        ([WALLS], 3, 1),
+        ([WALLS, box(100, 0, 90, 90), *[np.add(each, (100, 0)) for each in THINGS]], 6, 2),  # rooms
+        ([WALLS, box(-5, -5, 200, 100), box(120, 40, 12, 12)], 4, 2),  # within a page
+        ([WALLS, box(-3, -3, 96, 96)], 3, 1),  # a double line
+        ([WALLS, box(100, 60, 30, 30), box(105, 65, 9, 9), box(105, 78, 9, 9)], 6, 1),  # a legend
+        ([box(0, 0, 80, 30)], 3, 1),  # less than three times as large as the things, around all
+        ([box(0, 0, 80, 26), box(100, 0, 60, 60)], 4, 0),  # … and not around all
+        (
+            [box(0, 0, 90, 90), *[box(300 * k, 300, 99, 99) for k in range(4)]],
+            5,
+            0,
+        ),  # a large thing
+        ([box(100, -40, 60, 60)], 4, 0),  # around nothing
+        ([WALLS, *[box(40 * k, 120, 20, 20) for k in range(3)]], 6, 1),  # around half of them
+        ([WALLS, *[box(40 * k, 120, 20, 20) for k in range(4)]], 8, 0),  # … and around fewer
     ],
 )
-def test_what_is_small_beside_walls_around_it_is_no_mark_in_them(around, objects):
-    assert len(found_in(*around, *THINGS).scene) == objects
+def test_walls_around_far_smaller_things_are_left_out_and_these_are_no_marks_in_them(
+    around, things, walls
+):
+    found = found_in(*around, *THINGS)
+    assert len(found.scene) == things
+    assert len(found_in(*around, *THINGS, frame="keep").scene) == things + walls
+    assert ("set frame to 'keep'" in "".join(found.warnings)) == (walls > 0)
+
+
+def test_walls_that_have_a_name_are_an_object():
+    drawn = [Stroke(np.array(line, float)) for line in THINGS]
+    walls = Stroke(np.array(WALLS, float), label="carpet")
+    found = StrokeSegmenter().segment(StrokeSet((walls, *drawn)))
+    assert found.scene.labels == ("carpet", "", "", "")
+
+
+def test_walls_around_a_single_thing_and_marks_are_an_object_as_a_match_needs_two():
+    marks = [box(30 + 6 * k, 60, 4, 4) for k in range(3)]
+    found = found_in(WALLS, box(5, 5, 40, 40), *marks)
+    assert [item.area for item in found.scene.objects] == [8100.0, 1600.0]
 
 
 def test_a_route_within_walls_is_one_and_a_line_of_a_things_span_is_a_mark():

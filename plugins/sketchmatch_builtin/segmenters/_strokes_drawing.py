@@ -13,10 +13,23 @@ from sketchmatch.model.caching import cached_property
 
 from ._strokes_trace import Trace, span_of
 
-__all__ = ["DOT", "FLICK", "LONGHAND", "ROUTE", "TANGLED", "WRITING", "Drawing", "Outline"]
+__all__ = [
+    "DOT",
+    "FLICK",
+    "FRAME",
+    "LONGHAND",
+    "ROUTE",
+    "TANGLED",
+    "WRITING",
+    "Drawing",
+    "Outline",
+]
 
 DOT = "left out as a dot of the pen, which encloses nothing"
 FLICK = "left out as far smaller than the objects"
+FRAME = (
+    "left out as walls or a page around the objects; set frame to 'keep' to have them as objects"
+)
 LONGHAND = "left out as longhand, which has many small loops"
 ROUTE = "taken as the route, which is open and goes across much of the sketch"
 WRITING = "left out as writing, which is small and close together in a row"

@@ -94,6 +94,8 @@ def hosts(outlines: Sequence[shapely.Polygon]) -> list[int | None]:
 def frames(spans: Sequence[float], within: Sequence[int | None], whole: float) -> frozenset[int]:
     """Return the outlines that are around other things rather than things: walls, a page, a box.
 
+    These are far larger than the others, or around all of them.
+
     Parameters
     ----------
     spans
@@ -103,15 +105,20 @@ def frames(spans: Sequence[float], within: Sequence[int | None], whole: float) -
     whole
         The span of all that is drawn.
     """
-    inside = [0] * len(spans)
+    inside, around = [0] * len(spans), [0] * len(spans)
     for k in range(len(spans)):
         host = within[k]
         while host is not None:
             inside[host] += 1
+            around[k] += 1
             host = within[host]
     typical = typical_span([span for span, count in zip(spans, inside, strict=True) if not count])
     least = max(_LARGER * typical, _SPREAD * whole)
-    return frozenset(k for k, span in enumerate(spans) if inside[k] >= _FRAMED and span >= least)
+    return frozenset(
+        k
+        for k, span in enumerate(spans)
+        if inside[k] >= _FRAMED and (span >= least or inside[k] + around[k] == len(spans) - 1)
+    )
 
 
 def are_straight(strokes: Sequence[Trace]) -> list[bool]:

@@ -21,6 +21,7 @@ from ._strokes_chains import closed_chains
 from ._strokes_drawing import (
     DOT,
     FLICK,
+    FRAME,
     LONGHAND,
     ROUTE,
     TANGLED,
@@ -59,6 +60,8 @@ _LOOSE = 0.1
 _RETRACED = 0.25
 # Span of an unlabelled route as a share of the sketch's.
 _ACROSS = 0.5
+# Share of the things that stand in walls which are left out.
+_MOST = 0.5
 # So many straight lines across the sketch are of its paper.
 _LINED = 4
 _ROUTE = re.compile(r"\b(route|path)\b", re.IGNORECASE)
@@ -77,6 +80,9 @@ class StrokeSegmenter(Segmenter):
     [2]_. What remains is a stroke drawn over an outline again, a mark inside an object, a flick, or
     the route. Small strokes close to each other in a row are taken as writing if some are open, or
     if there are several such rows.
+
+    Outlines around most of what is drawn, such as the walls of a room or a page, are left out
+    unless they have a label.
 
     An outline without a label is named by the text in it, if the drawing has texts.
 
@@ -140,6 +146,14 @@ class StrokeSegmenter(Segmenter):
                 "Outlines around others, such as walls and pages, do not count as typical."
             ),
         )
+        frame: Literal["auto", "keep"] = Field(
+            "auto",
+            description=(
+                "How to treat walls or a page, which are outlines without a label around at least "
+                "three things each and together around half of all, far larger than these or "
+                "around all others: 'auto' leaves them out, 'keep' takes them as objects."
+            ),
+        )
         route: Literal["auto", "never"] = Field(
             "auto",
             description=(
@@ -169,6 +183,7 @@ class StrokeSegmenter(Segmenter):
         drawn = {k for item in objects for k in item.strokes}
         left = [k for k in range(len(points)) if k not in drawn | drawing.explained | {route}]
         left = self._without_marks(drawing, left, objects, writing)
+        objects = self._without_frames(drawing, objects)
         if route is None and self.params.route == "auto":
             route = _route_across(drawing, left)
         for k in left:
@@ -275,7 +290,7 @@ class StrokeSegmenter(Segmenter):
                 drawing.explain(members, WRITING)
             else:
                 objects.append(outline)
-                if around is not None:
+                if around is not None and not outlines[around].frame:
                     host = drawing.named(outlines[around].strokes)
                     drawing.note(members[0], f"{name} inside {host} was taken as an object, too.")
                 if outline.parted:
@@ -285,6 +300,23 @@ class StrokeSegmenter(Segmenter):
                         f"{name} {verb} separate areas, of which only the largest was taken.",
                     )
         return objects, writing
+
+    def _without_frames(self, drawing: Drawing, objects: list[Outline]) -> list[Outline]:
+        """Return the objects that are no walls around the others, and explain these."""
+        if self.params.frame == "keep":
+            return objects
+        walls = [item for item in objects if item.frame and not item.label]
+        if not walls:
+            return objects
+        things = [item for item in objects if not item.frame]
+        around = shapely.union_all([wall.area for wall in walls])
+        within = sum(around.intersects(thing.area.representative_point()) for thing in things)
+        # A match needs two.
+        if len(objects) - len(walls) < 2 or within < _MOST * len(things):
+            return objects
+        for wall in walls:
+            drawing.explain(wall.strokes, FRAME)
+        return [item for item in objects if item not in walls]
 
     def _smallest(self, outlines: list[Outline]) -> float:
         """Return the least span of an object: a match needs two, so two are large enough."""
