@@ -162,6 +162,7 @@ def test_what_lies_inside_an_object_is_a_mark_if_it_is_small(side, objects):
 
 THINGS = [box(5, 5, 20, 20), box(40, 5, 20, 20), box(70, 5, 9, 9)]
 WALLS = box(0, 0, 90, 90)
+LOOSE = ([(50, 62), (50, 80), (68, 80), (68, 62)], [(54, 60), (64, 60)])  # open by 13 %
 
 
 @pytest.mark.parametrize(
@@ -200,9 +201,16 @@ def test_walls_that_have_a_name_are_an_object():
     assert found.scene.labels == ("carpet", "", "", "")
 
 
-def test_walls_around_a_single_thing_and_marks_are_an_object_as_a_match_needs_two():
-    marks = [box(30 + 6 * k, 60, 4, 4) for k in range(3)]
-    found = found_in(WALLS, box(5, 5, 40, 40), *marks)
+@pytest.mark.parametrize("small", [box(50, 60, 5, 5), LOOSE])
+def test_what_stands_in_walls_is_an_object_as_it_is_without_them(small):
+    strokes = small if isinstance(small, tuple) else (small,)
+    assert len(found_in(*THINGS, *strokes).scene) == 4
+    assert len(found_in(WALLS, *THINGS, *strokes).scene) == 4
+
+
+def test_walls_around_a_single_thing_and_flicks_are_an_object_as_a_match_needs_two():
+    flicks = [box(30 + 6 * k, 60, 3, 3) for k in range(3)]
+    found = found_in(WALLS, box(5, 5, 40, 40), *flicks)
     assert [item.area for item in found.scene.objects] == [8100.0, 1600.0]
 
 

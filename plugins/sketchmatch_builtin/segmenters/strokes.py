@@ -276,7 +276,9 @@ class StrokeSegmenter(Segmenter):
         smallest, writing = self._smallest(outlines), self._writing(drawing, outlines)
         mark = min(_MARK * smallest, _second_largest(outlines))
         objects = []
-        for outline, first, around in zip(outlines, first_of, within, strict=True):
+        # What stands in walls is drawn in no thing.
+        in_things = [None if k in around_things else k for k in within]
+        for outline, first, around in zip(outlines, first_of, in_things, strict=True):
             members, name = outline.strokes, drawing.named(outline.strokes)
             if outline.span < smallest:
                 drawing.explain(members, FLICK)
@@ -290,7 +292,7 @@ class StrokeSegmenter(Segmenter):
                 drawing.explain(members, WRITING)
             else:
                 objects.append(outline)
-                if around is not None and not outlines[around].frame:
+                if around is not None:
                     host = drawing.named(outlines[around].strokes)
                     drawing.note(members[0], f"{name} inside {host} was taken as an object, too.")
                 if outline.parted:
