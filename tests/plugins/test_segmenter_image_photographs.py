@@ -270,3 +270,29 @@ def test_a_room_with_a_door_is_a_frame():
     found = found_in(pixels)
     assert len(found.scene) == 2
     assert found.warnings == (FRAMED,)
+
+
+def test_an_outline_with_a_gap_in_walls_with_one_as_wide_is_an_object():
+    pixels = room()
+    cv2.rectangle(pixels, (50, 55), (70, 65), 240, cv2.FILLED)
+    cv2.rectangle(pixels, (150, 400), (260, 480), 30, 5)
+    cv2.rectangle(pixels, (140, 395), (160, 405), 240, cv2.FILLED)
+    found = found_in(pixels)
+    assert len(found.scene) == 3
+    assert found.warnings == (
+        FRAMED,
+        "1 outline with gaps was closed: lower max_gap if it is not an object.",
+    )
+
+
+def test_a_mark_with_a_gap_in_an_outline_with_one_is_no_object():
+    pixels = paper()
+    cv2.circle(pixels, (600, 200), 50, 30, 5)
+    for low, high, gap in (((100, 100), (400, 400), 12), ((200, 200), (260, 260), 12)):
+        cv2.rectangle(pixels, low, high, 30, 5)
+        cv2.rectangle(pixels, (low[0] - 5, low[1] + 20), (low[0] + 5, low[1] + 20 + gap), 240, -1)
+    found = found_in(pixels)
+    assert len(found.scene) == 2
+    assert found.warnings == (
+        "1 outline with gaps was closed: lower max_gap if it is not an object.",
+    )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import cv2
 import numpy as np
@@ -115,11 +116,18 @@ def trace(ink: Mask, least: float, gap: float, frames: bool) -> Tracing:
         return found
     loose = drawing.loose(shapes, lines, writing)
     open_frame: Shape | None = None
-    for part, pieces in _closed_outlines(loose, gap, radius, least):
-        within = [other for other in found.shapes if _covers(part, _box(other))]
-        if frames and len(within) >= 2:
+
+    def inside(part: Shape) -> list[Shape]:
+        return [other for other in found.shapes if _covers(part, _box(other))]
+
+    def is_frame(part: Shape) -> bool:
+        return frames and len(inside(part)) >= 2
+
+    for part, pieces in _closed_outlines(loose, gap, radius, least, is_frame):
+        if is_frame(part):
             found.framed, open_frame = True, part
             continue
+        within = inside(part)
         if pieces > 1 and _is_writing(part, found.shapes):
             continue
         found.shapes = [other for other in found.shapes if all(other is not w for w in within)]
@@ -255,11 +263,12 @@ def _is_writing(shape: Shape, others: list[Shape]) -> bool:
 
 
 def _closed_outlines(
-    ink: Mask, gap: float, radius: int, least: float
+    ink: Mask, gap: float, radius: int, least: float, is_frame: Callable[[Shape], bool]
 ) -> Iterator[tuple[Shape, int]]:
     """Yield the shapes that open outlines enclose once gaps are closed, small gaps first.
 
-    With each comes the number of pieces that it was drawn with.
+    With each comes the number of pieces that it was drawn with. What lies in a shape belongs to it,
+    unless it is a frame.
     """
     if gap == 0.0 or not ink.any():
         return
@@ -276,9 +285,11 @@ def _closed_outlines(
         margin = reach + 2
         wide = np.pad(small, margin)
         grown = np.asarray(cv2.dilate(wide, _disk(reach)), np.uint8)
-        contours, _ = cv2.findContours(grown, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        for contour in contours:
+        for contour in _largest_first(grown):
             x, y, width, height = cv2.boundingRect(contour)
+            part = wide[y : y + height, x : x + width]
+            if not part.any():
+                continue
             filled = np.zeros((height + 2, width + 2), np.uint8)
             cv2.drawContours(filled, [contour], 0, 1, cv2.FILLED, offset=(1 - x, 1 - y))
             back = np.asarray(cv2.erode(filled, _disk(reach)), np.uint8)
@@ -290,13 +301,23 @@ def _closed_outlines(
             pieces = _opened(Shape(back, (x - 1 - margin, y - 1 - margin)), radius, 0.0)
             piece = max(pieces, key=lambda part: int(part.mask.sum()))
             taken = filled[1:-1, 1:-1] > 0
-            part = wide[y : y + height, x : x + width]
+            shape = _enlarged(piece, ink.shape[1] / small.shape[1], ink.shape[0] / small.shape[0])
+            if is_frame(shape):
+                _, numbers = cv2.connectedComponents(grown[y : y + height, x : x + width])
+                column, row = contour[0, 0] - (x, y)
+                taken = numbers == numbers[row, column]
             drawn = cv2.connectedComponents(np.where(taken, part, 0).astype(np.uint8))[0] - 1
-            along = (ink.shape[1] / small.shape[1], ink.shape[0] / small.shape[0])
-            yield _enlarged(piece, *along), drawn
+            yield shape, drawn
             part[taken] = 0
         small = np.ascontiguousarray(wide[margin:-margin, margin:-margin])
         reach += max(1, reach // 3)
+
+
+def _largest_first(mask: Mask) -> list[Any]:
+    """Return the outer contours of a mask's pieces, also of those within others."""
+    contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    outer = [contours[k] for k in np.flatnonzero(hierarchy[0][:, 3] < 0)] if contours else []
+    return sorted(outer, key=lambda each: math.prod(cv2.boundingRect(each)[2:]), reverse=True)
 
 
 def _enlarged(shape: Shape, along_x: float, along_y: float) -> Shape:
