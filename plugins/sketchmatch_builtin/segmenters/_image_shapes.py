@@ -303,7 +303,8 @@ def _closed_outlines(
             taken = filled[1:-1, 1:-1] > 0
             shape = _enlarged(piece, ink.shape[1] / small.shape[1], ink.shape[0] / small.shape[0])
             if is_frame(shape):
-                _, numbers = cv2.connectedComponents(grown[y : y + height, x : x + width])
+                within = grown[y : y + height, x : x + width]
+                numbers = np.asarray(cv2.connectedComponents(within)[1])
                 column, row = contour[0, 0] - (x, y)
                 taken = numbers == numbers[row, column]
             drawn = cv2.connectedComponents(np.where(taken, part, 0).astype(np.uint8))[0] - 1
@@ -316,7 +317,8 @@ def _closed_outlines(
 def _largest_first(mask: Mask) -> list[Any]:
     """Return the outer contours of a mask's pieces, also of those within others."""
     contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    outer = [contours[k] for k in np.flatnonzero(hierarchy[0][:, 3] < 0)] if contours else []
+    parents = np.asarray(hierarchy)[0, :, 3] if contours else ()
+    outer = [each for each, parent in zip(contours, parents, strict=True) if parent < 0]
     return sorted(outer, key=lambda each: math.prod(cv2.boundingRect(each)[2:]), reverse=True)
 
 
