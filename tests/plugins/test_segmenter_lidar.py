@@ -267,9 +267,9 @@ def legs(row, column, rows, columns, size=1):
     return [(y, x, size, size) for y in (row, row + rows) for x in (column, column + columns)]
 
 
-def more(*boxes, **params):
+def more(*boxes, shape=(80, 120), **params):
     """What is found beside the two boxes, as its area and certainty."""
-    objects = found(room(*BOXES, *boxes), **params)
+    objects = found(room(*BOXES, *boxes, shape=shape), **params)
     told = [(round(item.area, 3), item.certainty) for item in objects]
     for box in ((0.48, 1.0), (0.3, 1.0)):
         told.remove(box)
@@ -290,6 +290,13 @@ def test_legs_at_no_rectangle_or_too_far_apart_are_none():
 def test_a_table_and_its_chairs_are_apart():
     chairs = [*legs(30, 40, 7, 7), *legs(30, 55, 7, 7)]
     assert sorted(more(*chairs, *legs(44, 40, 14, 24))) == [(0.16, 0.9), (0.16, 0.9), (0.938, 0.9)]
+
+
+@pytest.mark.parametrize("gap", [6, 12])
+def test_things_in_a_row_are_told_from_what_is_between_them(gap):
+    beds = [(30 + k * (16 + gap), 40, 16, 36) for k in range(3)]
+    found_there = more(*(leg for bed in beds for leg in legs(*bed)), shape=(120, 120))
+    assert found_there == [(pytest.approx(17 * 37 * 0.0025, abs=1e-3), 0.9)] * 3
 
 
 def test_two_feet_that_face_each_other_are_a_table():

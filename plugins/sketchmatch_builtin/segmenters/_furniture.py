@@ -14,7 +14,7 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +31,7 @@ _BY_CHANCE = 0.3
 # Metres: how well a rectangle's corners are known, and the sides of the narrowest thing on four
 # legs and of the longest.
 _SLACK = 0.1
+_CORNERS = 4
 _NARROWEST, _LONGEST = 0.25, 2.0
 # A part is a bar from this ratio of its sides on; two bars are alike up to these bounds.
 _BAR = 2.5
@@ -83,18 +84,14 @@ class Bars(NamedTuple):
 
 
 def tables(legs: Legs) -> Iterator[IntArray]:
-    """Yield four parts each that stand at the corners of a rectangle, the smallest ones first.
+    """Yield four parts each that stand at the corners of a rectangle.
 
     No part is in two of them.
     """
-    if len(legs.points) < 4:
+    if len(legs.points) < _CORNERS:
         return
     largest = min(_LONGEST * math.sqrt(2.0), _largest_rectangle(legs))
-    taken = np.zeros(len(legs.points), dtype=bool)
-    for corners in _rectangles(legs.points, largest):
-        if not taken[corners].any():
-            taken[corners] = True
-            yield corners
+    yield from _apart(_rectangles(legs.points, largest), len(legs.points))
 
 
 def _largest_rectangle(legs: Legs) -> float:
@@ -106,8 +103,8 @@ def _largest_rectangle(legs: Legs) -> float:
     return float(np.cbrt(8.0 * _BY_CHANCE / len(legs.points))) / (math.pi * legs.density * _SLACK)
 
 
-def _rectangles(points: FloatArray, largest: float) -> Iterator[IntArray]:
-    """Yield the corners of rectangles, from the shortest diagonal on."""
+def _rectangles(points: FloatArray, largest: float) -> IntArray:
+    """Return the corners of rectangles, shape (k, 4), from the shortest diagonal on."""
     spots = _points(points)
     i, j = shapely.STRtree(spots).query(spots, predicate="dwithin", distance=largest)
     i, j = i[i < j], j[i < j]
@@ -120,9 +117,33 @@ def _rectangles(points: FloatArray, largest: float) -> Iterator[IntArray]:
     sides = np.sort(np.linalg.norm([first, second], axis=2), axis=0)
     fits = (np.abs(lengths[a] - lengths[b]) <= _SLACK) & (i[a] != i[b]) & (j[a] != j[b])
     fits &= (i[a] != j[b]) & (j[a] != i[b]) & (sides[0] >= _NARROWEST) & (sides[1] <= _LONGEST)
-    a, b = a[fits], b[fits]
-    for k in np.argsort(lengths[a] + lengths[b], kind="stable").tolist():
-        yield np.array([i[a[k]], j[a[k]], i[b[k]], j[b[k]]])
+    corners = np.stack([i[a], j[a], i[b], j[b]], axis=1)[fits]
+    return np.asarray(corners[np.argsort((lengths[a] + lengths[b])[fits], kind="stable")])
+
+
+def _apart(corners: IntArray, count: int) -> Iterator[IntArray]:
+    """Yield rectangles that share no part, small ones first.
+
+    Between things in a row there are rectangles too, which may be smaller. So a row is looked at
+    from its ends, if that leaves no part over: these parts have only one small rectangle.
+    """
+    pairs = np.concatenate([corners[:, [0, k]] for k in range(1, _CORNERS)]).T
+    group = groups(count, pairs)
+    for k in np.unique(group[corners[:, 0]]).tolist():
+        together = corners[group[corners[:, 0]] == k]
+        from_ends = _taken(together, max)
+        leaves_none = _CORNERS * len(from_ends) == np.count_nonzero(group == k)
+        yield from from_ends if leaves_none else _taken(together, min)
+
+
+def _taken(corners: IntArray, which: Callable[[IntArray], int]) -> list[IntArray]:
+    """Return rectangles that share no part: of the smallest ones of each part, always this one."""
+    taken: list[IntArray] = []
+    while len(corners):
+        smallest = np.unique(corners, return_index=True)[1] // _CORNERS
+        taken.append(corners[which(smallest)])
+        corners = corners[~np.isin(corners, taken[-1]).any(axis=1)]
+    return taken
 
 
 def facing(bars: Bars) -> Iterator[IntArray]:
