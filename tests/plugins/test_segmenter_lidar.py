@@ -38,7 +38,7 @@ LOOKED_AT = ("aws-small-house", "elsabot-downstairs", "tb4-warehouse", "turtlebo
 # Of the things seen: found whole, and of these in doubt; then what was found in pieces, and what
 # was invented, and of this in doubt.
 FOUND = {
-    "aws-small-house": (25, 4, 1, 0, 0),
+    "aws-small-house": (25, 4, 2, 0, 0),
     "elsabot-downstairs": (7, 1, 1, 4, 2),
     "tb4-warehouse": (28, 0, 0, 0, 0),
     "turtlebot3": (9, 0, 0, 0, 0),
@@ -343,11 +343,28 @@ def test_what_is_a_little_narrower_at_the_wall_leans_against_it():
 
 @pytest.mark.parametrize(
     "box",
-    [(2, 50, 6, 30), (2, 50, 40, 6), (2, 50, 12, 70), (2, 98, 20, 20)],
-    ids=["thin", "a partition", "wider than attached", "the corner of a building"],
+    [(2, 50, 6, 30), (2, 50, 40, 6), (2, 50, 12, 70), (2, 83, 35, 35), (2, 58, 20, 60)],
+    ids=["thin", "a partition", "wider than attached", "a wing", "long, to a corner"],
 )
-def test_bumps_partitions_wings_and_corners_are_walls(box):
+def test_bumps_partitions_and_wings_are_walls(box):
     assert more(box) == []
+
+
+@pytest.mark.parametrize("degrees", [0, 20, 45, 70])
+def test_a_box_in_a_corner_is_found_and_doubted_as_corners_of_buildings_are_like_it(degrees):
+    moved, _ = turned(doubled(room(*BOXES, (2, 98, 16, 20)))[0], degrees)
+    (there,) = [item for item in found(moved) if item.certainty < 1.0]
+    assert there.area == pytest.approx(0.8, rel=0.06)
+    assert there.certainty == 0.3
+
+
+def test_what_stands_askew_in_a_corner_or_was_hardly_met_is_left_out():
+    rows, columns = np.mgrid[:80, :120]
+    askew, dim = room(*BOXES).cells.copy(), room(*BOXES).cells.copy()
+    askew[(rows < 26) & (columns > 94 + rows)] = 100
+    dim[2:18, 98:118] = -1
+    for cells in (askew, dim):
+        assert len(found(OccupancyGrid(cells, 0.05))) == 2
 
 
 def test_what_touches_a_wall_by_a_corner_hangs_by_a_neck():

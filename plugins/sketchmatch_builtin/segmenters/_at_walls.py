@@ -3,13 +3,15 @@
 Between two corners of a room's outline that are near each other lies a pocket: what the outline
 goes around in between. A pocket is a thing if it hangs on the wall by a neck, as a shelf does that
 touches it with one corner, or if it leans against a wall that runs on straight behind it and fills
-its width and depth as a box does; a corner of the building fills one half.
+its width and depth as a box does; a corner of the building fills one half. Or it stands in a
+corner of the room and fills that as a box does, though so does a corner of the building.
 """
 
 from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +34,8 @@ _CORNER = math.radians(35.0)
 _STRAIGHT = math.cos(math.radians(30.0))
 # The share of width times depth that a box fills, after all that it lost.
 _FULL = 0.68
+# How square a corner of a room is that something fills, and by which share it may miss that.
+_SQUARE, _OFF = math.cos(math.radians(15.0)), 0.15
 # What is this much wider than where it meets the wall leans on nothing.
 _BELLY = 0.8
 # A neck is at most this share of how thick what hangs on it is somewhere.
@@ -87,6 +91,7 @@ class Leans(enum.IntEnum):
     AS_A_BOX = 1
     AS_A_SIDE = 2
     """By a neck, and so thin that it may be a side of a box."""
+    IN_A_CORNER = 3
 
 
 class Pocket(NamedTuple):
@@ -95,9 +100,10 @@ class Pocket(NamedTuple):
     Attributes
     ----------
     outline
-        Its last edge is where it meets the wall.
+        Its last edge is where it meets the wall; in a corner, its last two.
     neck, depth
-        How long that edge is, and how far the rest is away from it.
+        How long that edge is, and how far the rest is away from it; in a corner, the longer and the
+        shorter edge.
     leans
         How it meets the wall.
     """
@@ -106,6 +112,12 @@ class Pocket(NamedTuple):
     neck: float
     depth: float
     leans: Leans
+
+    @property
+    def line(self) -> FloatArray:
+        """The line from wall to wall that was seen."""
+        walls = 2 if self.leans is Leans.IN_A_CORNER else 1
+        return shapely.get_coordinates(self.outline)[:-walls]
 
     @property
     def order(self) -> tuple[int, float]:
@@ -143,6 +155,7 @@ def at_walls(room: shapely.Polygon, sides: shapely.Geometry, bounds: Bounds) -> 
         pockets = [_pocket(ring, candidate, bounds) for candidate in candidates]
         seen.append((ring, [c for c, pocket in zip(candidates, pockets, strict=True) if pocket]))
         found += [pocket for pocket in pockets if pocket]
+        found += _in_corners(ring, bounds)
     taken: list[Pocket] = []
     for pocket in sorted(found, key=lambda each: each.order):
         if not any(pocket.outline.intersects(other.outline) for other in taken):
@@ -292,6 +305,47 @@ def _pocket(ring: shapely.Polygon, candidate: _Candidate, bounds: Bounds) -> Poc
     return Pocket(outline, neck, depth, Leans.AS_A_SIDE if thin else Leans.NOT)
 
 
+def _in_corners(ring: shapely.Polygon, bounds: Bounds) -> Iterator[Pocket]:
+    """Yield what fills corners of a ring as boxes do."""
+    points = shapely.get_coordinates(ring.exterior)[:-1]
+    ways, long = _units(np.roll(points, -1, axis=0) - points, bounds.thinnest)
+    corners = _turns(points) > _CORNER
+    firsts, lasts = np.flatnonzero(corners & np.roll(long, 1)), np.flatnonzero(corners & long)
+    tree = shapely.STRtree(np.asarray(shapely.points(points[lasts]), dtype=object))
+    starts = np.asarray(shapely.points(points[firsts]), dtype=object)
+    a, b = tree.query(starts, predicate="dwithin", distance=bounds.widest)
+    a, b = firsts[a], lasts[b]
+    square = _cross(ways[a - 1], ways[b])
+    a, b, square = a[square >= _SQUARE], b[square >= _SQUARE], square[square >= _SQUARE]
+    # From the first corner on along its wall, and then along the other one to the last.
+    before, after, across = ways[a - 1], ways[b], points[b] - points[a]
+    sides = np.stack([_cross(across, after), _cross(before, across)]) / square
+    box, areas = sides[0] * sides[1] * square, _areas(points, a, b)
+    counts = (sides.min(axis=0) > bounds.thinnest) & (sides.max(axis=0) <= bounds.widest)
+    counts &= sides.min(axis=0) <= bounds.widest / 2.0
+    counts &= (areas > 0.0) & (areas <= (0.5 + _OFF) * box)
+    for k in np.flatnonzero(counts).tolist():
+        chain, corner = _chain(points, a[k], b[k]), points[a[k]] + sides[0, k] * before[k]
+        outline = shapely.Polygon([*chain, corner])
+        is_box = _parallel(chain, before[k], after[k]) >= 1.0 - _OFF
+        if is_box and outline.is_valid and is_thick(outline, bounds.thinnest):
+            yield Pocket(outline, sides[:, k].max(), sides[:, k].min(), Leans.IN_A_CORNER)
+
+
+def _units(ways: FloatArray, least: float) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return ways of the length 1, and which were at least so long."""
+    lengths = np.hypot(*ways.T)
+    return ways / np.maximum(lengths, _ROUNDING)[:, None], np.asarray(lengths >= least)
+
+
+def _parallel(line: FloatArray, *ways: FloatArray) -> float:
+    """Return which share of a line runs along one of the ways."""
+    steps = np.diff(line, axis=0)
+    lengths = np.hypot(*steps.T)
+    along = np.max([np.abs(steps @ way) for way in ways], axis=0) >= _SQUARE * lengths
+    return float(lengths[along].sum() / lengths.sum())
+
+
 def is_thick(outline: shapely.Polygon, thinnest: float) -> bool:
     """Whether more than half of it is left when what is thin is taken off."""
     core = outline.buffer(-thinnest / 2.0)
@@ -341,10 +395,13 @@ def _encloses(points: FloatArray, a: NDArray[np.int64], b: NDArray[np.int64]) ->
     return np.asarray(np.abs(way + _angles(points[b], points[a])) > math.pi)
 
 
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
 def _angles(before: FloatArray, after: FloatArray) -> FloatArray:
     """Return by which angle each point is left of another, seen from 0, 0."""
-    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return np.asarray(np.arctan2(cross, (before * after).sum(axis=1)))
+    return np.asarray(np.arctan2(_cross(before, after), (before * after).sum(axis=1)))
 
 
 def _chain(points: FloatArray, a: int, b: int) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -43,8 +44,10 @@ _MET = 0.4
 _BAR, _BAR_RATIO = 0.25, 2.5
 # What hangs on a wall by a neck, juts far out of it, or leans against it as its own bumps do.
 _HANGING, _JUTTING, _LEANING = 0.8, 0.7, 0.4
-# The share of an outline that the laser met where there is no doubt.
-_SEEN = 0.5
+# What fills a corner of the room, as a corner of the building does.
+_CORNER = 0.3
+# The share of an outline that the laser met where there is no doubt, and in a corner at least.
+_SEEN, _SEEN_IN_A_CORNER = 0.5, 0.8
 # At least so sure is what has some width, and at most so sure what is thin and ragged.
 _COMPACT, _RAGGED = 0.3, 0.4
 # Where what the laser did not see begins near what is thin, that is as doubtful. Of a speck, no
@@ -378,16 +381,14 @@ def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]
     parts_of_others, found = set(), []
     sides = shapely.union_all(_sides(thin, room, bounds))
     for pocket in at_walls(_walled(room), sides, bounds):
-        line = shapely.get_coordinates(pocket.outline)
-        polygon = _to_the_cell(line, bounds, room)
+        polygon = _to_the_cell(pocket, bounds, room)
         near = tree.query(polygon, predicate="intersects").tolist()
         part = [k for k in near if _is_most_of(polygon.intersection(outlines[k]), outlines[k])]
         apart = shapely.union_all([outlines[k] for k in near if k not in part])
         left = shapely.get_parts(polygon.difference(apart)).tolist()
         polygon = max(left, key=shapely.area, default=shapely.Polygon())
-        # Its last edge is where it meets the wall.
         plain = cast(shapely.Polygon, polygon.simplify(0.5))
-        kept = is_thick(plain, bounds.thinnest) and _seen(line[:-1], room) >= _SEEN
+        kept = is_thick(plain, bounds.thinnest) and _seen(pocket.line, room) >= _seen_of(pocket)
         if kept and not any(_is_most_of(outlines[k], polygon) for k in part):
             parts_of_others.update(part)
             found.append(Thing(shapely.Polygon(polygon.exterior), _of_pocket(pocket)))
@@ -432,39 +433,54 @@ def _sides(thin: list[shapely.Polygon], room: Room, bounds: Bounds) -> list[shap
     ]
 
 
-def _to_the_cell(line: FloatArray, bounds: Bounds, room: Room) -> shapely.Polygon:
+def _to_the_cell(pocket: Pocket, bounds: Bounds, room: Room) -> shapely.Polygon:
     """Return the outline of the cells that a simplified pocket stands for.
 
-    These are its own and those around it that it may have left out, but not beyond its last edge.
+    These are its own and those around it that it may have left out, but not beyond the walls.
     """
-    pocket, stray = shapely.Polygon(line), bounds.stray
-    left, below, right, top = np.floor(pocket.buffer(stray).bounds).astype(int).tolist()
-    left, below = max(left, 0), max(below, 0)
-    taken = 1 - (room.free[below : top + 1, left : right + 1])
+    shape, stray = pocket.outline, bounds.stray
+    left, below, right, top = np.floor(shape.buffer(stray).bounds).astype(int).tolist()
+    taken = 1 - _window(room.free, left, below, right, top)
     y, x = np.nonzero(taken)
     spots = np.asarray(shapely.points(x + left + 0.5, y + below + 0.5), dtype=object)
     # A pocket lies right of its line.
-    (x0, y0), (x1, y1) = line[-2], line[-1]
-    beyond = (x1 - x0) * (y + below + 0.5 - y0) - (y1 - y0) * (x + left + 0.5 - x0) > 0.0
-    shapely.prepare(pocket)
-    kept = shapely.distance(pocket, spots) <= np.where(beyond, 0.0, stray)
+    line = shapely.get_coordinates(shape)[len(pocket.line) - 1 :]
+    beyond = np.zeros(len(x), dtype=bool)
+    for (x0, y0), (x1, y1) in itertools.pairwise(line.tolist()):
+        beyond |= (x1 - x0) * (y + below + 0.5 - y0) - (y1 - y0) * (x + left + 0.5 - x0) > 0.0
+    shapely.prepare(shape)
+    kept = shapely.distance(shape, spots) <= np.where(beyond, 0.0, stray)
     taken[y[~kept], x[~kept]] = 0
     filled = closed(taken, round(bounds.slit))
     _, labels, boxes, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
     if len(boxes) == 1:
-        return pocket
+        return shape
     largest = labels == 1 + int(boxes[1:, cv2.CC_STAT_AREA].argmax())
     corner = np.array([left, below])
     return shapely.Polygon(outer_border(largest.astype(np.uint8)) + corner)
+
+
+def _window(mask: Mask, left: int, below: int, right: int, top: int) -> Mask:
+    """Return the cells of a mask from (left, below) to (right, top), 0 where it has none."""
+    rows, columns = mask.shape
+    inside = mask[max(below, 0) : top + 1, max(left, 0) : right + 1]
+    beyond = (max(-below, 0), max(top + 1 - rows, 0)), (max(-left, 0), max(right + 1 - columns, 0))
+    return np.pad(inside, beyond)
 
 
 def _is_most_of(part: shapely.Polygon, whole: shapely.Polygon) -> bool:
     return bool(part.area > _MOST * whole.area)
 
 
+def _seen_of(pocket: Pocket) -> float:
+    return _SEEN_IN_A_CORNER if pocket.leans is Leans.IN_A_CORNER else _SEEN
+
+
 def _of_pocket(pocket: Pocket) -> float:
     if pocket.leans is Leans.NOT:
         return _HANGING
+    if pocket.leans is Leans.IN_A_CORNER:
+        return _CORNER
     return _JUTTING if pocket.depth >= pocket.neck else _LEANING
 
 

@@ -64,15 +64,17 @@ class OccupancyGridSegmenter(Segmenter):
     then simplified [1]_.
 
     What touches a wall, or was not seen from behind, is not a hole but a pocket of the region's
-    outline: one that hangs on the wall by a neck, or leans against it as a box does. Of a table, a
-    scan shows only legs: four at the corners of a rectangle, two bars that face each other, or a
-    crowd of small things are one object if so many are unlikely to stand like that by chance [2]_.
+    outline: one that hangs on the wall by a neck, leans against it as a box does, or fills a corner
+    of the room as a box does. Of a table, a scan shows only legs: four at the corners of a
+    rectangle, two bars that face each other, or a crowd of small things are one object if so many
+    are unlikely to stand like that by chance [2]_.
 
     The certainty of an object is how likely it is one thing: 1 if the laser met it all around and
     it is not thin and ragged; 0.9 for four legs, 0.6 for feet and crowds; 0.8 for what hangs on a
     wall, 0.7 for what juts far out of it, and 0.4 for what leans against it, as the wall's own
-    bumps do; 0.3 for an outline that the laser did not meet. Edges of shadows, specks where the
-    seen area ends, and thin specks that the laser hardly met are left out.
+    bumps do; 0.3 for what fills a corner, as corners of the building do, and for an outline that
+    the laser did not meet. Edges of shadows, specks where the seen area ends, and thin specks that
+    the laser hardly met are left out.
 
     Objects come in reading order: by their highest point from the top down, then from the left. A
     name in the map's file, other than a room's, is given to the object at its place.
