@@ -372,6 +372,16 @@ def test_what_touches_a_wall_by_a_corner_hangs_by_a_neck():
     assert found_there == [(pytest.approx(20 * 60 * 0.0025, rel=0.01), 0.8)]
 
 
+def test_walls_that_end_in_something_are_no_part_of_it():
+    partition, box = (2, 60, 44, 3), (36, 63, 14, 13)
+    # With what of the partition is beside it.
+    assert more(partition, box) == [(pytest.approx(14 * 16 * 0.0025, abs=0.01), 0.8)]
+
+
+def test_what_is_hardly_thicker_than_a_wall_stays_whole():
+    assert more((2, 60, 60, 3), (10, 58, 24, 8)) == [(pytest.approx(0.755, abs=0.01), 0.7)]
+
+
 def test_a_shadow_is_kept_in_doubt_and_its_edge_left_out():
     cells = room(*BOXES).cells.copy()
     cells[30:42, 50:62] = -1

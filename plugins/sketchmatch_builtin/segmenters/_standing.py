@@ -54,6 +54,8 @@ _COMPACT, _RAGGED = 0.3, 0.4
 # larger than such a square, that is thin, is at such an edge, or was met by the laser on less than
 # that share, two are even more so. Lengths are in what is thin: how near, how long an edge.
 _SHADOW, _SPECK, _NEAR, _EDGE = 0.2, 2.0, 2.5, 2.0
+# How much thicker than a wall something is at least from which walls are told.
+_CLEARLY = 1.5
 # The share of its hull that something straight fills.
 _STRAIGHT = 0.6
 _SIDES = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
@@ -391,8 +393,29 @@ def at_the_walls(room: Room, things: list[Thing], bounds: Bounds) -> list[Thing]
         kept = is_thick(plain, bounds.thinnest) and _seen(pocket.line, room) >= _seen_of(pocket)
         if kept and not any(_is_most_of(outlines[k], polygon) for k in part):
             parts_of_others.update(part)
-            found.append(Thing(shapely.Polygon(polygon.exterior), _of_pocket(pocket)))
+            whole = shapely.Polygon(polygon.exterior)
+            found += [Thing(each, _of_pocket(pocket)) for each in _without_walls(whole, bounds)]
     return [each for k, each in enumerate(things) if k not in parts_of_others] + found
+
+
+def _without_walls(outline: shapely.Polygon, bounds: Bounds) -> list[shapely.Polygon]:
+    """Return what is left of an outline without walls that end in it or run through it.
+
+    These are as thin as walls and longer than twice that, and the rest is clearly thicker.
+    """
+    radius, long = bounds.thinnest / 2.0, 2.0 * bounds.thinnest
+    opened = outline.buffer(-radius, join_style="mitre").buffer(radius + 1.0, join_style="mitre")
+    thin = shapely.get_parts(outline.difference(opened))
+    # Half the way around is its length and how thick it is.
+    around = shapely.length(shapely.minimum_rotated_rectangle(thin)) / 2.0
+    walls = thin[around > long + bounds.thinnest]
+    if not walls.size:
+        return [outline]
+    least = max(bounds.thinnest, bounds.smallest) ** 2
+    parts = shapely.get_parts(outline.difference(shapely.union_all(walls)))
+    left = [shapely.Polygon(each.exterior) for each in parts[shapely.area(parts) > least]]
+    clearly = all(is_thick(each, _CLEARLY * bounds.thinnest) for each in left)
+    return left if left and clearly else [outline]
 
 
 def _sides(thin: list[shapely.Polygon], room: Room, bounds: Bounds) -> list[shapely.Polygon]:
