@@ -292,6 +292,31 @@ def test_a_table_and_its_chairs_are_apart():
     assert sorted(more(*chairs, *legs(44, 40, 14, 24))) == [(0.16, 0.9), (0.16, 0.9), (0.938, 0.9)]
 
 
+TABLE = legs(40, 40, 12, 16)
+SEATS = [(y, x, 1, 1) for y in (34, 58) for x in (44, 52)]
+
+
+def test_chairs_pushed_in_belong_to_their_table():
+    assert more(*TABLE, *SEATS) == [
+        (pytest.approx((25 * 17 - 4 * 4 * 6 / 2) * 0.0025, abs=1e-3), 0.9)
+    ]
+
+
+def test_of_a_chair_two_legs_are_near_the_table_and_each_other():
+    one, too_far, too_wide = SEATS[:1], [(28, 44, 1, 1), (28, 52, 1, 1)], [SEATS[0], (34, 58, 1, 1)]
+    table = (pytest.approx(13 * 17 * 0.0025, abs=1e-3), 0.9)
+    assert [more(*TABLE, *others) for others in (one, too_far, too_wide)] == [[table]] * 3
+
+
+def test_where_as_many_parts_are_strewn_elsewhere_none_are_chairs():
+    places = np.random.default_rng(0).integers((4, 4), (154, 236), (85, 2))
+    strewn = [
+        (int(y), int(x), 1, 1) for y, x in places if (y > 76 or x > 108) and (y < 150 or x > 20)
+    ]
+    there = more(*TABLE, *SEATS, *strewn, shape=(160, 240))
+    assert there == [(pytest.approx(13 * 17 * 0.0025, abs=1e-3), 0.9)]
+
+
 @pytest.mark.parametrize("gap", [6, 12])
 def test_things_in_a_row_are_told_from_what_is_between_them(gap):
     beds = [(30 + k * (16 + gap), 40, 16, 36) for k in range(3)]

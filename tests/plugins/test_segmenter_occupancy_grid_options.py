@@ -242,7 +242,7 @@ def test_a_home_has_its_furniture_and_not_its_walls():
     assert len(found.scene) == 12
     assert sorted(areas(found))[-2:] == pytest.approx([6.4, 7.6], abs=0.1)
     as_the_thresholds_say = segmented(home, keep_unknown=False)
-    assert len(as_the_thresholds_say.scene) == 28
+    assert len(as_the_thresholds_say.scene) == 27
 
 
 @pytest.mark.parametrize("side", [1000, pytest.param(4000, marks=pytest.mark.slow)])

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from sketchmatch.model import FloatArray, IntArray
 from sketchmatch_builtin.segmenters._merging import groups
 
-__all__ = ["FOOT", "Bars", "Legs", "crowds", "facing", "tables"]
+__all__ = ["FOOT", "Bars", "Legs", "chairs", "crowds", "facing", "tables"]
 
 # Sets of parts that chance may make in a room.
 _BY_CHANCE = 0.3
@@ -38,6 +38,8 @@ _BAR = 2.5
 _ALIKE, _PARALLEL = 0.75, math.cos(math.radians(12.0))
 # Metres: longer bars are no feet but two sides of one thing, this near each other.
 _SLIT = 0.3
+# Two legs of a chair are no farther from each other, and from the table at which it stands.
+_SEAT, _REACH = 0.6, 0.5
 # A crowd has at least so many parts, each so many metres from the next, as legs of chairs are.
 _FEWEST, _STEP = 5, 0.6
 
@@ -144,6 +146,29 @@ def _taken(corners: IntArray, which: Callable[[IntArray], int]) -> list[IntArray
         taken.append(corners[which(smallest)])
         corners = corners[~np.isin(corners, taken[-1]).any(axis=1)]
     return taken
+
+
+def chairs(legs: Legs, hulls: NDArray[np.object_]) -> Iterator[tuple[int, IntArray]]:
+    """Yield two parts each that are the outer legs of a chair at a table, and at which one it is.
+
+    The inner ones are next to the table's legs, and one with them. Two parts near a table mean
+    nothing if there are as many elsewhere: what is left of the room tells how many are strewn.
+    """
+    spots, table = _points(legs.points), np.full(len(legs.points), -1)
+    near, nearest = shapely.STRtree(hulls).query_nearest(
+        spots, max_distance=_REACH, all_matches=False
+    )
+    table[near] = nearest
+    around = shapely.area(shapely.buffer(hulls, _REACH)) - shapely.area(hulls)
+    density = np.count_nonzero(table < 0) / max(legs.room - around.sum(), around.sum())
+    by_chance = around * density**2 * math.pi * (_SEAT**2 - _NARROWEST**2) / 2.0
+    i, j = shapely.STRtree(spots).query(spots, predicate="dwithin", distance=_SEAT)
+    fits = (i < j) & (table[i] == table[j]) & (table[i] >= 0)
+    i, j = i[fits], j[fits]
+    fits = np.hypot(*(legs.points[i] - legs.points[j]).T) >= _NARROWEST
+    fits &= by_chance[table[i]] < _BY_CHANCE
+    for k in np.flatnonzero(fits).tolist():
+        yield int(table[i[k]]), np.array([i[k], j[k]])
 
 
 def facing(bars: Bars) -> Iterator[IntArray]:

@@ -24,7 +24,15 @@ from sketchmatch_builtin.segmenters._cells import (
     refuse_more,
     simplified,
 )
-from sketchmatch_builtin.segmenters._furniture import FOOT, Bars, Legs, crowds, facing, tables
+from sketchmatch_builtin.segmenters._furniture import (
+    FOOT,
+    Bars,
+    Legs,
+    chairs,
+    crowds,
+    facing,
+    tables,
+)
 from sketchmatch_builtin.segmenters._merging import apart, merged
 
 __all__ = ["Parts", "Room", "Thing", "as_they_are", "at_the_walls", "furnished", "merged_within"]
@@ -323,20 +331,43 @@ def _sets(
         return Legs(parts.middles[which] * room.cell, free)
 
     small, many = np.flatnonzero(leg), np.flatnonzero(clump)
+    crowded = np.zeros(len(clump), dtype=bool)
     found = [small[k] for k in tables(legs(small)) if is_thing(small[k])]
     for members in (many[k] for k in crowds(legs(many))):
         within = [each for each in found if np.isin(each, members).any()]
         if sum(map(len, within)) < _MOST * len(members) and is_thing(members):
             found = [each for each in found if not np.isin(each, members).any()]
             bar[members] = False
+            crowded[members] = True
             yield members, _CROWD
-    for members in found:
+    free_legs = np.setdiff1d(small[~crowded[small]], np.concatenate([small[:0], *found]))
+    for members in _with_chairs(found, legs(free_legs), free_legs, parts, room.cell, is_thing):
         bar[members] = False
         yield members, _TABLE
     left = np.flatnonzero(bar)
     for pair in facing(_bars(left, parts, room.cell)):
         if is_thing(left[pair]):
             yield left[pair], _FACING
+
+
+def _with_chairs(
+    found: list[IntArray],
+    legs: Legs,
+    which: IntArray,
+    parts: Parts,
+    cell: float,
+    is_thing: Callable[[IntArray], bool],
+) -> list[IntArray]:
+    """Return tables' parts with those of the chairs at them."""
+    if not found or not which.size:
+        return found
+    hulls = [shapely.MultiPoint(cell * parts.middles[each]).convex_hull for each in found]
+    more = list(found)
+    for table, pair in chairs(legs, np.array(hulls, dtype=object)):
+        together = np.union1d(more[table], which[pair])
+        if is_thing(together):
+            more[table] = together
+    return more
 
 
 def _bars(which: IntArray, parts: Parts, cell: float) -> Bars:

@@ -67,7 +67,8 @@ class OccupancyGridSegmenter(Segmenter):
     outline: one that hangs on the wall by a neck, leans against it as a box does, or fills a corner
     of the room as a box does. Of a table, a scan shows only legs: four at the corners of a
     rectangle, two bars that face each other, or a crowd of small things are one object if so many
-    are unlikely to stand like that by chance [2]_.
+    are unlikely to stand like that by chance [2]_. So are a table and the outer legs of chairs that
+    are pushed in.
 
     The certainty of an object is how likely it is one thing: 1 if the laser met it all around and
     it is not thin and ragged; 0.9 for four legs, 0.6 for feet and crowds; 0.8 for what hangs on a
