@@ -41,7 +41,7 @@ BY_EYE: dict[str, tuple[int, int]] = {
     "floors-ipa/Freiburg52_scan.png": (10, 9),
     "floors-ipa/lab_a_scan.png": (46, 60),
     "floors-ipa/lab_c_scan.png": (17, 20),
-    "floors-ipa/lab_intel.png": (26, 27),
+    "floors-ipa/lab_intel.png": (26, 28),
     "floors-ipa/office_a.png": (27, 30),
     "floors-ipa/office_c.png": (34, 34),
     "floors-ipa/office_e.png": (32, 37),

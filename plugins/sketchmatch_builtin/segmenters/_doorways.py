@@ -110,7 +110,7 @@ def roomed(free: Mask, door: float, least: float) -> tuple[Mask, Labels]:
 
 
 def bodies(free: Mask, width: _Widths, door: float, least: float) -> Labels:
-    """Return parts of free space cut at one width, numbered from 1: free cells that are joined.
+    """Return parts of free space cut at one width, by numbers above 0: free cells that are joined.
 
     Parameters
     ----------
@@ -198,8 +198,35 @@ def _with_narrow_rooms(free: Mask, labels: Labels, least: float) -> Labels:
     large[0] = False
     if not large.any():
         return labels
-    narrow = np.where(large, np.cumsum(large) + labels.max(), 0).astype(np.int32)
-    return np.asarray(labels + narrow[parts], dtype=np.int32)
+    narrow = np.where(large, np.cumsum(large), 0).astype(np.int32)[parts]
+    cut = _cut_again(narrow, least)
+    return np.where(cut > 0, labels.max() + cut, labels).astype(np.int32)
+
+
+def _cut_again(places: Labels, least: float) -> Labels:
+    """Cut places, of which each cell has the number, where they are half as wide as typically.
+
+    All of them are narrower than a doorway of the map, and a door joins them all the same.
+    """
+    width, flat = widths((places > 0).view(np.uint8)), places.reshape(-1)
+    count = int(places.max()) + 1
+    mean = np.bincount(flat, width.reshape(-1)) / np.maximum(np.bincount(flat), 1)
+    fits = width > (_DOORWAY * mean / 2.0 + 0.5).astype(np.float32)[places]
+    cores, _ = _numbered(fits.view(np.uint8), 8)
+    place_of = np.zeros(int(cores.max()) + 1, np.int32)
+    place_of[cores[fits]] = places[fits]
+    several = np.bincount(place_of[1:], minlength=count) > 1
+    if not several.any():
+        return places
+    grow(several[places].view(np.uint8), cores)
+    rooms = np.bincount(cores.reshape(-1)) >= least
+    rooms[0] = False
+    cut = np.bincount(place_of[rooms], minlength=count) > 1
+    rooms &= cut[place_of]
+    numbers = np.where(rooms, np.arange(len(rooms)), 0).astype(np.int32)[cores]
+    # What is too small for a room goes to those beside it.
+    grow(cut[places].view(np.uint8), numbers)
+    return np.where(numbers > 0, count - 1 + numbers, places).astype(np.int32)
 
 
 def _numbered(mask: Mask, connectivity: int) -> tuple[Labels, IntArray]:
