@@ -880,6 +880,20 @@ def test_closets_of_a_large_building_are_rooms():
     assert found == pytest.approx([2.1] * 4 + [9.0] * 30, rel=0.12)
 
 
+@SLOW
+def test_small_rooms_along_a_corridor_of_a_large_building_are_rooms():
+    walls = [box(0, 0, 54, 29), [(27, 0), (27, 20)]]
+    walls += [[(x, 20), (x + 12, 20)] for x in (0, 14, 28, 42)] + [[(26, 20), (28, 20)]]
+    # At distances of their own, as ruled lines are not.
+    sides = np.append(0.0, np.cumsum([2.7, 3.2, 3.1, 2.9, 3.3, 2.8] * 3)).tolist()
+    for left, right in itertools.pairwise(sides):
+        walls += [[(left, 25), (left + 1, 25)], [(left + 2, 25), (right, 25)]]
+        walls.append([(left, 25), (left, 29)])
+    found = sorted(areas(strokes(walls)))
+    assert found[-3:] == pytest.approx([270.0, 540.0, 540.0], rel=0.05)
+    assert found[:-3] == pytest.approx(sorted(4.0 * np.diff(sides)), rel=0.1)
+
+
 def test_tiles_are_no_rooms():
     rooms = [box(4 * x, 4 * y, 4, 4) for x in range(3) for y in range(3)]
     tiles = [[(0, y), (4, y)] for y in (0.7, 1.5, 2.1, 2.9, 3.4)]

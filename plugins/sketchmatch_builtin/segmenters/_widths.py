@@ -29,9 +29,11 @@ _SEGMENT = 0.4
 
 
 def divided_by_width(
-    free: Mask, shares: Sequence[float], narrowest: float, least: float
+    free: Mask, shares: Sequence[float], narrowest: float, *least: float
 ) -> list[Mask]:
     """Return the free cells without those along the borders between places, for each share.
+
+    With several areas of the smallest place, for each share there is a mask for each of these.
 
     How wide free space is at a cell is the widest disc within it that covers the cell. From the
     widest cells down, each joins the places that it touches, that a disc of this width can be moved
@@ -54,18 +56,20 @@ def divided_by_width(
     list of ndarray
         Shape of ``free``: places are components of cells joined by sides or corners.
     """
-    cuts = [np.zeros_like(free) for _ in shares]
+    cuts = [np.zeros_like(free) for _ in shares for _ in least]
     rows, columns = np.nonzero(free)
     if rows.size:
         window = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-        found = _divided(np.pad(free[window], 1), shares, narrowest, least)
+        framed = np.pad(free[window], 1)
+        places = _divided(framed, shares, narrowest)
+        found = [_without_borders(framed, each, area) for each in places for area in least]
         for cut, parts in zip(cuts, found, strict=True):
             cut[window] = parts[1:-1, 1:-1]
     return cuts
 
 
-def _divided(free: Mask, shares: Sequence[float], narrowest: float, least: float) -> list[Mask]:
-    """Return the same of free cells in a frame of cells that are not."""
+def _divided(free: Mask, shares: Sequence[float], narrowest: float) -> list[_Places]:
+    """Return the places, for each share, of free cells in a frame of cells that are not."""
     distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     inside = free > 0
     cuts = [_Places(np.zeros(free.shape, np.int32)) for _ in shares]
@@ -80,7 +84,7 @@ def _divided(free: Mask, shares: Sequence[float], narrowest: float, least: float
         for places, share in zip(cuts, shares, strict=True):
             places.add(covered & (places.labels == 0), level, share)
         width /= _STEP
-    return [_without_borders(free, places, least) for places in cuts]
+    return cuts
 
 
 def _without_borders(free: Mask, places: _Places, least: float) -> Mask:

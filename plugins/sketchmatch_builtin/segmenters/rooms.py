@@ -81,8 +81,11 @@ _MOST_LINES = 3000
 _FEWEST = 2
 # Of its longer side: half the width from which a room counts.
 _NARROWEST = 0.006
-# The smallest room: of all of them together, and of the mean one where they are many.
-_SMALLEST_SHARE, _SMALL = 0.01, 0.2
+# The smallest room: of all of them together, and of the mean one where they are many, with a door
+# that leads into it and without.
+_SMALLEST_SHARE, _SMALL_ENTERED, _SMALL = 0.01, 0.1, 0.2
+# Of all of them together, likewise: what is smaller is no room, whatever leads into it.
+_SMALLEST_ENTERED = 0.002
 
 
 class RoomSegmenter(Segmenter):
@@ -194,7 +197,8 @@ class RoomSegmenter(Segmenter):
             le=1e6,
             description=(
                 "Rooms smaller than this are left out; by default 2 m², and in a drawing a "
-                "hundredth of all rooms or, if these are many, a fifth of the mean room."
+                "hundredth of all rooms or, if these are many, a fifth of the mean room, and a "
+                "tenth of it where a door leads into them."
             ),
             json_schema_extra={"unit": "m²"},
         )
@@ -338,29 +342,25 @@ class RoomSegmenter(Segmenter):
 
     def _rooms(self, plan: Plan) -> tuple[Mask, float]:
         """Return the rooms of a plan, and the area of the smallest, in cells."""
-        area = self.params.min_area
-        share = _SMALLEST_SHARE * float(np.count_nonzero(plan.free))
-        least = max(share if area is None else area / plan.cell**2, 1.0)
-        (parts,) = self._parts(plan, [_NARROW], least)
+        area, total = self.params.min_area, float(np.count_nonzero(plan.free))
         if area is not None:
+            least = max(area / plan.cell**2, 1.0)
+            (parts,) = self._parts(plan, [_NARROW], least)
             return parts, least
-        rooms = [cells for cells in _areas(parts) if cells >= least]
-        closets = [cells for cells in _areas(plan.free) if cells < least]
-        areas = np.sort([*rooms, *closets])[::-1]
-        means = areas.cumsum() / np.arange(1, len(areas) + 1)
-        # Up to where they become much smaller at once, as what is hatched does.
-        count = int(np.argmin(np.append(areas >= _SMALL * means, False)))
-        if count and _SMALL * means[count - 1] < least:
-            least = max(_SMALL * float(means[count - 1]), 1.0)
+        least, fine = max(_SMALLEST_SHARE * total, 1.0), max(_SMALLEST_ENTERED * total, 1.0)
+        parts, finer = self._parts(plan, [_NARROW], least, fine)
+        smallest = min(_smallest(plan, parts, least), _smallest_entered(plan, finer, fine))
+        if smallest < least:
+            least = max(smallest, 1.0)
             (parts,) = self._parts(plan, [_NARROW], least)
         return parts, least
 
-    def _parts(self, plan: Plan, shares: Sequence[float], least: float) -> list[Mask]:
-        """Return the rooms of a plan, for each share, from so many cells on."""
+    def _parts(self, plan: Plan, shares: Sequence[float], *least: float) -> list[Mask]:
+        """Return the rooms of a plan, for each share, from so many cells on, or several counts."""
         if self.params.door_width is not None:
-            return [divided(plan.free, plan.door, least)]
+            return [divided(plan.free, plan.door, each) for each in least]
         narrowest = _NARROWEST * max(plan.free.shape)
-        return divided_by_width(plan.free, shares, narrowest, least)
+        return divided_by_width(plan.free, shares, narrowest, *least)
 
     def _of_plan(
         self, source: StrokeSet | PolygonSet | Image, plan: Plan, parts: Mask, least: float
@@ -407,6 +407,30 @@ class RoomSegmenter(Segmenter):
         place[np.add(order, 1)] = np.arange(1, len(found) + 1)
         meeting = parts_that_meet(free, place[labels]) - 1
         return [found[k] for k in order], tuple((a, b) for a, b in meeting.tolist())
+
+
+def _smallest(plan: Plan, parts: Mask, least: float) -> float:
+    """Return the area of the smallest room, where some that are closed may be smaller than least.
+
+    It is infinite where there is none.
+    """
+    rooms = [cells for cells in _areas(parts) if cells >= least]
+    closets = [cells for cells in _areas(plan.free) if cells < least]
+    areas = np.sort([*rooms, *closets])[::-1]
+    means = areas.cumsum() / np.arange(1, len(areas) + 1)
+    # Up to where they become much smaller at once, as what is hatched does.
+    count = int(np.argmin(np.append(areas >= _SMALL * means, False)))
+    return _SMALL * float(means[count - 1]) if count else math.inf
+
+
+def _smallest_entered(plan: Plan, parts: Mask, least: float) -> float:
+    """Return the same of rooms that open into others, as nothing does that is hatched."""
+    rooms = _numbered(parts, least)
+    entered = np.unique(parts_that_meet(plan.free | plan.doors, rooms))
+    areas = np.sort(np.bincount(rooms.reshape(-1))[entered[entered > 0]])[::-1]
+    means = areas.cumsum() / np.arange(1, len(areas) + 1)
+    large = np.flatnonzero(areas >= _SMALL_ENTERED * means)
+    return _SMALL_ENTERED * float(means[large[-1]]) if large.size else math.inf
 
 
 def _areas(mask: Mask) -> list[int]:
