@@ -469,6 +469,15 @@ def test_doors_drawn_with_their_swings_end_rooms_and_cut_none(kind, degrees):
 
 
 @SLOW
+@SLOW
+def test_a_corridor_that_doors_close_is_a_room_however_narrow_beside_halls():
+    lines = [box(0, 0, 20, 32), [(0, 16), (4, 16)], [(4.8, 16), (20, 16)]]
+    lines += [[(0, 18), (9, 18)], [(9.8, 18), (20, 18)]]
+    lines += [[(4, 16), (4, 15.2)], quarter((4, 16), (0, -1), (1, 0))]
+    lines += [[(9, 18), (9, 18.8)], quarter((9, 18), (0, 1), (1, 0))]
+    assert sorted(areas(strokes(lines))) == pytest.approx([40.0, 280.0, 320.0], rel=0.08)
+
+
 def test_a_hand_drawn_swing_is_a_door():
     rng = np.random.default_rng(2)
     lines = [line + rng.normal(0.0, 0.012, np.shape(line)) for line in [*HALL, *doors("apart")]]

@@ -13,7 +13,7 @@ import numpy as np
 from sketchmatch.api import InvalidInputError, Reason
 from sketchmatch.model import FloatArray, Image, PolygonSet, StrokeSet
 from sketchmatch_builtin.segmenters._cells import Mask
-from sketchmatch_builtin.segmenters._doorways import divided, doorway
+from sketchmatch_builtin.segmenters._doorways import divided, doorway, widths
 from sketchmatch_builtin.segmenters._plan_things import seen
 from sketchmatch_builtin.segmenters._swings import doors_apart
 
@@ -25,6 +25,8 @@ _SIDE = 1000
 _MARGIN = 0.1
 # Shades of a picture that are nearer to each other are of one thing.
 _CONTRAST = 32.0
+# Of a door's length: what is narrower is the inside of a wall.
+_WALL = 0.5
 # Beyond these, coordinates are a fault, and areas would overflow or vanish.
 _SMALLEST, _LARGEST = 1e-100, 1e15
 
@@ -75,6 +77,7 @@ def drawn(
     side
         Cells along the longer side of what lines are drawn into.
     """
+    leaf = 0.0
     if isinstance(source, Image):
         walls, cell, corner = _of_picture(source)
         closed = np.zeros_like(walls)
@@ -84,8 +87,12 @@ def drawn(
             given = seen([each for k, each in enumerate(source.strokes) if k not in left_out])
         lines, leaves = doors_apart(given)
         (walls, closed), cell, corner = _of_lines((lines, leaves), side)
+        if leaves:
+            leaf = float(np.median([np.linalg.norm(end - hinge) for hinge, end in leaves])) / cell
     door = None if door_width is None else door_width / cell
     free, width = _between(walls | closed, door)
+    if leaf:
+        free |= _behind_doors(walls, closed, leaf)
     # Walls have less room between their borders than what lies between them.
     if isinstance(source, Image) and np.count_nonzero(walls) > np.count_nonzero(free):
         free, width = walls, doorway(walls, math.inf) if door is None else door
@@ -169,6 +176,22 @@ def _between(walls: Mask, door: float | None) -> tuple[Mask, float]:
     # What was cut within the building is joined again, to be cut once for all sources.
     reach = np.ones((5, 5), np.uint8)
     return np.asarray(cv2.dilate(inside, reach), dtype=np.uint8) & free, width
+
+
+def _behind_doors(walls: Mask, closed: Mask, leaf: float) -> Mask:
+    """Return the closed spaces that doors of a length lead into, and are no insides of walls.
+
+    Beside halls, whose typical width tells how wide a doorway is, a corridor may be no wider.
+    """
+    inside = _off_border(1 - (walls | closed))
+    count, found = cv2.connectedComponents(inside, connectivity=4)
+    spaces = np.asarray(found, dtype=np.int32)
+    widest = np.zeros(count, np.float32)
+    np.maximum.at(widest, spaces.reshape(-1), widths(inside).reshape(-1))
+    entered = np.zeros(count, np.bool_)
+    entered[spaces[cv2.dilate(closed, np.ones((5, 5), np.uint8)) > 0]] = True
+    entered[0] = False
+    return np.asarray((entered & (2.0 * widest >= _WALL * leaf))[spaces], dtype=np.uint8)
 
 
 def _hull(mask: Mask) -> Mask:
