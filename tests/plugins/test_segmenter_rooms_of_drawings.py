@@ -360,7 +360,8 @@ def free_cells(*boxes):
 
 def places(cells):
     """The areas of places, the largest first."""
-    (mask,) = divided_by_width(cells, [0.5], 2.0, 20.0)
+    (cut,) = divided_by_width(cells, [0.5], 2.0)
+    mask = cut(20.0)
     return sorted(cv2.connectedComponentsWithStats(mask, connectivity=8)[2][1:, 4], reverse=True)
 
 

@@ -255,15 +255,21 @@ def grow(free: Mask, labels: Labels, most: int | None = None) -> None:
 
     Of several that are as near it is the highest. There are at most so many steps.
     """
-    flat = labels.reshape(-1)
-    rest = np.flatnonzero((free > 0) & (labels == 0))
-    steps = (1, -1, labels.shape[1], -labels.shape[1])
+    rest = ((free > 0) & (labels == 0)).view(np.uint8)
+    beside = cv2.dilate(rest, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))
+    edge = np.flatnonzero((beside > 0) & (labels > 0))
+    flat, open_ = labels.reshape(-1), rest.reshape(-1).view(np.bool_)
+    steps = np.array([1, -1, labels.shape[1], -labels.shape[1]])[:, None]
+    # Only beside what was reached in the last step may anything be reached in the next.
     for _ in itertools.count() if most is None else range(most):
-        found = np.max([flat[rest + step] for step in steps], axis=0)
-        if not found.any():
+        there = edge + steps
+        reached = open_[there]
+        cells = there[reached]
+        if not cells.size:
             return
-        flat[rest] = found
-        rest = rest[found == 0]
+        np.maximum.at(flat, cells, flat[edge[reached.nonzero()[1]]])
+        open_[cells] = False
+        edge = np.unique(cells)
 
 
 def _joined(labels: Labels, width: _Widths) -> Labels:

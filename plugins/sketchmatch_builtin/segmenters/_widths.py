@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import cv2
 import numpy as np
@@ -29,11 +30,13 @@ _SEGMENT = 0.4
 
 
 def divided_by_width(
-    free: Mask, shares: Sequence[float], narrowest: float, *least: float
-) -> list[Mask]:
-    """Return the free cells without those along the borders between places, for each share.
+    free: Mask, shares: Sequence[float], narrowest: float
+) -> list[Callable[[float], Mask]]:
+    """Return, for each share, what cuts free space along the borders between places.
 
-    With several areas of the smallest place, for each share there is a mask for each of these.
+    It takes the area in cells of the smallest place, and what is smaller belongs to those that it
+    touches. It returns the free cells without those along the borders: places are components of
+    cells joined by sides or corners.
 
     How wide free space is at a cell is the widest disc within it that covers the cell. From the
     widest cells down, each joins the places that it touches, that a disc of this width can be moved
@@ -48,24 +51,17 @@ def divided_by_width(
         Of the width of the wider place: what is narrower is another place.
     narrowest
         Half the width, in cells, from which a place counts.
-    least
-        Area in cells of the smallest place; what is smaller belongs to those that it touches.
-
-    Returns
-    -------
-    list of ndarray
-        Shape of ``free``: places are components of cells joined by sides or corners.
     """
-    cuts = [np.zeros_like(free) for _ in shares for _ in least]
-    rows, columns = np.nonzero(free)
-    if rows.size:
-        window = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-        framed = np.pad(free[window], 1)
-        places = _divided(framed, shares, narrowest)
-        found = [_without_borders(framed, each, area) for each in places for area in least]
-        for cut, parts in zip(cuts, found, strict=True):
-            cut[window] = parts[1:-1, 1:-1]
-    return cuts
+    x, y, columns, rows = cv2.boundingRect(free)
+    window = np.s_[y : y + rows, x : x + columns]
+    framed = np.pad(free[window], 1)
+
+    def cut(places: _Places, least: float) -> Mask:
+        found = np.zeros_like(free)
+        found[window] = _without_borders(framed, places, least)[1:-1, 1:-1]
+        return found
+
+    return [partial(cut, places) for places in _divided(framed, shares, narrowest)]
 
 
 def _divided(free: Mask, shares: Sequence[float], narrowest: float) -> list[_Places]:

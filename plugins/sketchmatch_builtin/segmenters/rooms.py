@@ -5,9 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import cast
 
 import cv2
@@ -244,9 +245,9 @@ class RoomSegmenter(Segmenter):
         parts, least = self._rooms(plan)
         yield self._of_plan(source, plan, parts, least)
         if self.params.door_width is None:
-            for parts in self._parts(plan, _OTHERWISE_NARROW, least):
+            for cut in self._cuts(plan, *_OTHERWISE_NARROW):
                 with suppress(InvalidInputError):
-                    yield self._of_plan(source, plan, parts, least)
+                    yield self._of_plan(source, plan, cut(least), least)
 
     def _of_map(self, source: OccupancyGrid) -> Segmentation:
         params, cell = self.params, source.resolution
@@ -343,24 +344,23 @@ class RoomSegmenter(Segmenter):
     def _rooms(self, plan: Plan) -> tuple[Mask, float]:
         """Return the rooms of a plan, and the area of the smallest, in cells."""
         area, total = self.params.min_area, float(np.count_nonzero(plan.free))
+        (cut,) = self._cuts(plan, _NARROW)
         if area is not None:
             least = max(area / plan.cell**2, 1.0)
-            (parts,) = self._parts(plan, [_NARROW], least)
-            return parts, least
+            return cut(least), least
         least, fine = max(_SMALLEST_SHARE * total, 1.0), max(_SMALLEST_ENTERED * total, 1.0)
-        parts, finer = self._parts(plan, [_NARROW], least, fine)
-        smallest = min(_smallest(plan, parts, least), _smallest_entered(plan, finer, fine))
+        parts = cut(least)
+        smallest = min(_smallest(plan, parts, least), _smallest_entered(plan, cut(fine), fine))
         if smallest < least:
             least = max(smallest, 1.0)
-            (parts,) = self._parts(plan, [_NARROW], least)
+            parts = cut(least)
         return parts, least
 
-    def _parts(self, plan: Plan, shares: Sequence[float], *least: float) -> list[Mask]:
-        """Return the rooms of a plan, for each share, from so many cells on, or several counts."""
+    def _cuts(self, plan: Plan, *shares: float) -> list[Callable[[float], Mask]]:
+        """Return what cuts a plan into rooms from so many cells on, for each share."""
         if self.params.door_width is not None:
-            return [divided(plan.free, plan.door, each) for each in least]
-        narrowest = _NARROWEST * max(plan.free.shape)
-        return divided_by_width(plan.free, shares, narrowest, *least)
+            return [partial(divided, plan.free, plan.door)]
+        return divided_by_width(plan.free, shares, _NARROWEST * max(plan.free.shape))
 
     def _of_plan(
         self, source: StrokeSet | PolygonSet | Image, plan: Plan, parts: Mask, least: float
