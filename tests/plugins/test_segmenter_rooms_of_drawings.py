@@ -20,7 +20,13 @@ from sketchmatch.model import (
     StrokeSet,
 )
 from sketchmatch_builtin.segmenters._landmarks import labels_of, names_of_rooms
-from sketchmatch_builtin.segmenters._plan_things import dimensions, paper, seen, things_in
+from sketchmatch_builtin.segmenters._plan_things import (
+    between_walls,
+    dimensions,
+    paper,
+    seen,
+    things_in,
+)
 from sketchmatch_builtin.segmenters._plan_things import within as lines_within
 from sketchmatch_builtin.segmenters._spaces import spaces_between
 from sketchmatch_builtin.segmenters._swings import doors_apart
@@ -644,6 +650,38 @@ def test_walls_are_no_paper_if_they_are_few_or_at_other_distances():
     assert paper(uneven) == frozenset()
     assert paper([line * (1.0, 1.0 + k / 10) for k, line in enumerate(grid)]) == frozenset()
     assert paper([grid[0]] * 20) == frozenset()
+
+
+def test_evenly_spaced_walls_that_end_at_others_are_no_paper():
+    walls = [box(0, 0, 54, 6)]
+    for left in range(0, 54, 3):
+        walls += [[(left, 4), (left + 1, 4)], [(left + 2, 4), (left + 3, 4)]]
+        walls.append([(left, 0), (left, 4)])
+    assert sorted(areas(strokes(walls))) == pytest.approx([12.0] * 18 + [108.0], rel=0.12)
+
+
+def test_ruled_lines_in_the_frame_of_a_sheet_go_on_beneath_what_is_drawn():
+    ruled = [[(x, -1), (x, 8)] for x in range(11)]
+    lines = [np.array(line, dtype=float) for line in [*ruled, box(-1, -1, 12, 9), *HALL]]
+    assert paper(lines) == frozenset(range(11))
+    assert between_walls(lines, paper(lines)) == frozenset()
+    # Alone in the frame they could part as many rooms.
+    assert between_walls(lines[:12], frozenset(range(11))) == frozenset(range(11))
+
+
+@SLOW
+def test_a_drawing_of_ruled_lines_alone_is_of_rooms():
+    lines = [[(3 * k, 0), (3 * k, 24)] for k in range(9)]
+    lines += [[(0, 3 * k), (24, 3 * k)] for k in range(9)]
+    assert areas(strokes(lines)) == pytest.approx([9.0] * 64, rel=0.12)
+
+
+@pytest.mark.slow
+def test_treads_of_stairs_bound_no_rooms_though_they_end_at_walls():
+    walls = [box(0, 0, 9, 4), box(0, 4, 4, 3), box(4, 4, 3, 3), box(7, 4, 2, 3)]
+    treads = [[(7, 4 + k / 4), (9, 4 + k / 4)] for k in range(1, 12)]
+    found = areas(strokes([*walls, *treads]))
+    assert sorted(found) == pytest.approx([6, 9, 12, 36], rel=0.05)
 
 
 @pytest.mark.slow

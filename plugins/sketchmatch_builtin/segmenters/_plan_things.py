@@ -16,7 +16,16 @@ from sketchmatch_builtin.segmenters._doorways import Labels
 from sketchmatch_builtin.segmenters._lines import is_outline, is_straight, plain_outlines
 from sketchmatch_builtin.segmenters._merging import groups
 
-__all__ = ["Things", "dimensions", "paper", "seen", "standing", "things_in", "within"]
+__all__ = [
+    "Things",
+    "between_walls",
+    "dimensions",
+    "paper",
+    "seen",
+    "standing",
+    "things_in",
+    "within",
+]
 
 # Of the area of the hull of all that is drawn: the largest thing.
 _LARGEST = 0.06
@@ -35,6 +44,9 @@ _RULED, _AS_LONG, _PARALLEL, _LIKE = 8, 0.98, 0.005, 0.03
 # So many are of a grid, whose lines are at most so wide, of the widest of all; of the pairs of its
 # lines in different directions those that cross.
 _GRID, _THIN, _CROSSING = 3, 0.2, 0.5
+# Of ruled lines that part rooms: how many of their ends are at others, and how many of them cross
+# others at most.
+_ENDED, _CROSSED = 0.5, 0.25
 # Of its length: what is nearer to a line than this is that line.
 _TWICE = 1e-6
 # Of the distances between them: those that are so many times the usual one.
@@ -89,6 +101,41 @@ def paper(lines: Sequence[FloatArray], widths: Sequence[float] = ()) -> frozense
         for a, b in itertools.combinations(range(len(families)), 2):
             if shapely.intersects(drawn[a][:, None], drawn[b]).mean() >= _CROSSING:
                 found.update(families[a], families[b])
+    return frozenset(found)
+
+
+def between_walls(lines: Sequence[FloatArray], ruled: frozenset[int]) -> frozenset[int]:
+    """Return which ruled lines may be walls between rooms: they end at others and cross none.
+
+    Lines of paper go on beneath all that is drawn, and end at nothing but the border of a sheet.
+
+    Parameters
+    ----------
+    lines
+        The lines of a plan, of shape (k, 2) each.
+    ruled
+        Which of them :func:`paper` found.
+    """
+    if not ruled:
+        return frozenset()
+    rest = [line for k, line in enumerate(lines) if k not in ruled and len(line) > 1]
+    others = np.array([shapely.LineString(line) for line in rest], dtype=object)
+    near = _NEAR * float(np.ptp(np.concatenate(lines), axis=0).max())
+    tree, found = shapely.STRtree(others), set[int]()
+    for which in _ruled(lines, sorted(ruled), _RULED):
+        drawn = np.array([shapely.LineString(lines[k]) for k in which], dtype=object)
+        points = np.concatenate([lines[k] for k in which])
+        ends = np.asarray(shapely.points(points), dtype=object)
+        ended = np.unique(tree.query(ends, "dwithin", near)[0])
+        one, other = tree.query(drawn, "intersects")
+        meeting = shapely.intersection(drawn[one], others[other])
+        # What ends at a wall may do so a little beyond it; closed lines end nowhere.
+        crossing = shapely.get_dimensions(meeting) == 0
+        for side in (drawn[one], others[other]):
+            crossing &= ~(shapely.distance(meeting, shapely.boundary(side)) <= near)
+        crossed = np.unique(one[crossing])
+        if len(ended) >= _ENDED * len(ends) and len(crossed) <= _CROSSED * len(which):
+            found.update(which)
     return frozenset(found)
 
 

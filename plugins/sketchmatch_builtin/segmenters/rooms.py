@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -49,6 +49,7 @@ from sketchmatch_builtin.segmenters._landmarks import (
 )
 from sketchmatch_builtin.segmenters._leaves import divided_at_openings
 from sketchmatch_builtin.segmenters._plan_things import (
+    between_walls,
     dimensions,
     paper,
     standing,
@@ -117,12 +118,12 @@ class RoomSegmenter(Segmenter):
     as beams, rugs and axes, are not walls if others bound rooms; nor is what a later, opaque
     filling hides of an outline. Small closed strokes are furniture if they stand free in a room, or
     at its walls while rooms open into each other; evenly spaced parallel lines are ruled paper,
-    many of them or a thin grid of few, and a separate straight line with ticks at both ends is a
-    dimension. If the rooms are shapes of their own with names, what is left between them without a
-    name is no room. A match may use another cut, where free space becomes less than 0.4 or 0.6
-    times as wide. A room is named by the largest text in it that is not a measure or a compass's
-    letter, or else by a label that only one line has. If polygons come with texts, as from DXF,
-    their labels are those of layers and blocks.
+    many of them or a thin grid of few, unless they end at walls, cross none and part rooms; and a
+    separate straight line with ticks at both ends is a dimension. If the rooms are shapes of their
+    own with names, what is left between them without a name is no room. A match may use another
+    cut, where free space becomes less than 0.4 or 0.6 times as wide. A room is named by the largest
+    text in it that is not a measure or a compass's letter, or else by a label that only one line
+    has. If polygons come with texts, as from DXF, their labels are those of layers and blocks.
 
     Rooms come in reading order: by their highest point from the top down, then from the left. An
     entry of the map's file with the type ``room`` names the room in which its place lies.
@@ -298,7 +299,7 @@ class RoomSegmenter(Segmenter):
             return aside
         # What is dashed, as a porch or an axis, may cross a dimension without joining it to walls.
         solid = [line[:0] if k in aside else line for k, line in enumerate(lines)]
-        aside |= paper(lines, [stroke.width for stroke in source.strokes]) | dimensions(solid)
+        aside |= self._paper(source, solid, aside) | dimensions(solid)
         free, touching = things_in(lines, names)
         if not (free or touching):
             return aside
@@ -316,6 +317,23 @@ class RoomSegmenter(Segmenter):
         if touching and 2 * len(opening) > count:
             found |= {*touching} if count <= self._rooms_without(source, found)[1].max() else set()
         return found
+
+    def _paper(
+        self, source: StrokeSet, solid: Sequence[FloatArray], left_out: frozenset[int]
+    ) -> frozenset[int]:
+        """Return the lines of a drawing's paper, but not those that bound rooms."""
+        ruled = paper(lines_of(source), [stroke.width for stroke in source.strokes])
+        if not any(len(line) for k, line in enumerate(solid) if k not in ruled):
+            # Nothing is drawn on it.
+            return frozenset()
+        walls = between_walls(solid, ruled - left_out)
+        if not walls:
+            return ruled
+        # Treads of stairs end at walls, too, and there are no rooms between them.
+        fewer, more = (
+            self._rooms_without(source, left_out | each)[1].max() for each in (ruled, ruled - walls)
+        )
+        return ruled - walls if fewer < more else ruled
 
     def _dashed(self, source: StrokeSet) -> frozenset[int]:
         """Return the dashed lines that are no doors, unless it is they that bound rooms."""
