@@ -79,6 +79,11 @@ def picture(paper=255, ink=0, scale=40):
     return pixels
 
 
+def test_a_hundred_closed_rooms_of_one_size_are_rooms():
+    boxes = [shapely.box(x, y, x + 1, y + 1) for x in range(10) for y in range(10)]
+    assert len(areas(strokes([box.exterior.coords for box in boxes]))) == 100
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, 0.001, 300.0])
 def test_strokes_that_are_walls_with_gaps_enclose_rooms_at_any_scale(factor):

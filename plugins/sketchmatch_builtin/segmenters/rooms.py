@@ -265,7 +265,7 @@ class RoomSegmenter(Segmenter):
         least = max(area / cell**2, 1.0)
         rooms = (divided_at_openings if width is None else divided)(inside, door, least)
         cut = f"at passages of up to {door * cell:.2g} m"
-        found, passages = self._outlines(inside, rooms, area, cell, "cells", cut)
+        found, passages = self._outlines(inside, rooms, least, cell, "cells", cut)
         rooms_in_map = [
             [in_map(step * ring + corner, source) for ring in _rings(room)] for room in found
         ]
@@ -388,8 +388,8 @@ class RoomSegmenter(Segmenter):
         if width is not None:
             cut = f"at passages of up to {width:.2g}"
         path = {"stroke_set": "strokes", "polygon_set": "polygons", "image": "pixels"}[source.field]
-        area = least * plan.cell**2
-        found, passages = self._outlines(plan.free | plan.doors, parts, area, plan.cell, path, cut)
+        free = plan.free | plan.doors
+        found, passages = self._outlines(free, parts, least, plan.cell, path, cut)
         rooms = [[plan.cell * ring + plan.corner for ring in _rings(room)] for room in found]
         areas = [shapely.Polygon(outer, inner) for outer, *inner in rooms]
         labels, warnings = _named(areas, source)
@@ -407,17 +407,17 @@ class RoomSegmenter(Segmenter):
         self,
         free: Mask,
         rooms: Mask,
-        area: float,
+        least: float,
         cell: float,
         path: str,
         cut: str,
     ) -> tuple[list[shapely.Polygon], tuple[tuple[int, int], ...]]:
         """Return rooms, components of cells, as outlines in reading order, and who meets whom."""
-        labels = _numbered(rooms, area / cell**2)
+        labels = _numbered(rooms, least)
         count = int(labels.max(initial=0))
         refuse_more(count, source_limits().max_objects, "raise min_area")
         if count < _FEWEST:
-            raise _too_few(count, path, area, cut)
+            raise _too_few(count, path, least * cell**2, cut)
         tolerance = self.params.tolerance
         found = _simplified(_polygons(labels), TOLERANCE if tolerance is None else tolerance / cell)
         order = sorted(range(len(found)), key=lambda k: reading_order(found[k]))
@@ -433,8 +433,11 @@ def _smallest(plan: Plan, parts: Mask, least: float) -> float:
     It is infinite where there is none.
     """
     rooms = [cells for cells in _areas(parts) if cells >= least]
-    closets = [cells for cells in _areas(plan.free) if cells < least]
-    areas = np.sort([*rooms, *closets])[::-1]
+    # What has no part may be as large: what discs cover of a space lacks its corners.
+    spaces = _numbered(plan.free, 0.0)
+    closets = np.bincount(spaces.reshape(-1))
+    closets[np.unique(spaces[parts > 0])] = closets[0] = 0
+    areas = np.sort([*rooms, *closets[closets > 0]])[::-1]
     means = areas.cumsum() / np.arange(1, len(areas) + 1)
     # Up to where they become much smaller at once, as what is hatched does.
     count = int(np.argmin(np.append(areas >= _SMALL * means, False)))
