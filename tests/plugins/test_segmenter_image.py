@@ -155,6 +155,7 @@ def test_min_size_is_relative_to_the_picture():
     assert len(segmented(pixels, blur=0.0, min_size=0.051).scene) == 3
 
 
+@pytest.mark.slow
 def test_simplify_is_relative_to_the_shape():
     small, large = paper((200, 400)), paper((2000, 4000))
     for pixels, scale in ((small, 1), (large, 10)):
@@ -207,6 +208,7 @@ def test_a_picture_of_noise_is_refused_before_it_takes_long():
         segmented(noise, blur=0.0, min_size=0.0)
 
 
+@pytest.mark.slow
 def test_nested_rings_by_the_hundred_are_no_problem():
     pixels = paper((2000, 2000), 255)
     for radius in range(4, 980, 4):

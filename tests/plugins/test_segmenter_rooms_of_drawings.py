@@ -79,6 +79,7 @@ def picture(paper=255, ink=0, scale=40):
     return pixels
 
 
+@pytest.mark.slow
 def test_a_hundred_closed_rooms_of_one_size_are_rooms():
     boxes = [shapely.box(x, y, x + 1, y + 1) for x in range(10) for y in range(10)]
     assert len(areas(strokes([box.exterior.coords for box in boxes]))) == 100
@@ -157,6 +158,7 @@ def test_a_label_that_one_line_has_names_the_room_around_its_middle():
     assert kitchen.polygon.contains(shapely.Point(1.9, 6.9))
 
 
+@pytest.mark.slow
 def test_texts_of_an_svg_plan_name_its_rooms(tmp_path):
     paths = "".join(
         f'<path fill="none" stroke="black" d="M{" L".join(f"{x} {9 - y}" for x, y in line)}"/>'
@@ -231,6 +233,7 @@ def test_the_letters_of_a_compass_are_no_names():
     assert names("W", "E") == ["W", "E"]
 
 
+@pytest.mark.slow
 def test_what_is_written_largest_names_a_room(tmp_path):
     paths = "".join(
         f'<path fill="none" stroke="black" d="M{" L".join(f"{x} {9 - y}" for x, y in line)}"/>'
@@ -490,6 +493,7 @@ def test_a_corridor_that_doors_close_is_a_room_however_narrow_beside_halls():
     assert sorted(areas(strokes(lines))) == pytest.approx([40.0, 280.0, 320.0], rel=0.08)
 
 
+@pytest.mark.slow
 def test_a_hand_drawn_swing_is_a_door():
     rng = np.random.default_rng(2)
     lines = [line + rng.normal(0.0, 0.012, np.shape(line)) for line in [*HALL, *doors("apart")]]
@@ -585,6 +589,7 @@ def named(lines, *names):
     return StrokeSet(strokes(lines).strokes, (), places)
 
 
+@pytest.mark.slow
 def test_furniture_is_of_the_room_that_it_stands_in():
     things = [
         box(4, 4, 2, 1.2),  # a sofa in the middle of the large room
@@ -604,6 +609,7 @@ def test_furniture_is_of_the_room_that_it_stands_in():
     }
 
 
+@pytest.mark.slow
 def test_a_narrow_hall_that_is_entered_from_outside_is_no_outside():
     lines = [[(0, 1.6), (0, 5), (12, 5), (12, -4), (0, -4), (0, 0.7)], [(6, 1.9), (6, 5)]]
     lines += [[(0, 1.9), (2, 1.9)], [(2.9, 1.9), (8, 1.9)], [(8.9, 1.9), (12, 1.9)]]
@@ -612,6 +618,7 @@ def test_a_narrow_hall_that_is_entered_from_outside_is_no_outside():
     assert sorted(found) == pytest.approx([18, 18.6, 18.6, 26.4, 26.4], rel=0.05)
 
 
+@pytest.mark.slow
 def test_lines_within_furniture_are_of_it():
     table = [box(4, 4, 3, 1.2), [(4, 4), (7, 5.2)], [(4, 5.2), (7, 4)], box(4.4, 5, 2, 0.1)]
     found = areas(strokes([*HALL, *doors("apart"), *table]))
@@ -637,6 +644,7 @@ def test_named_outlines_apart_in_a_place_without_a_name_are_rooms():
     assert len(segmented(strokes([*tents, *field])).scene) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [pytest.param(0.0, marks=SLOW), 8.0])
 def test_ruled_paper_is_no_wall(degrees):
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
@@ -800,6 +808,7 @@ def test_a_thing_whose_outline_has_a_knot_is_one():
         assert lines_within([knot, *walls], [0]) == {2}
 
 
+@pytest.mark.slow
 def test_rooms_that_are_drawn_over_each_other_are_whole():
     rooms = filled([box(0, 0, 10, 8), box(5, 5, 10, 7)])
     assert sorted(areas(StrokeSet(rooms))) == pytest.approx([65.0, 70.0], rel=0.05)
@@ -809,6 +818,7 @@ def dashed(lines):
     return StrokeSet(tuple(replace(stroke, dashed=True) for stroke in strokes(lines).strokes))
 
 
+@pytest.mark.slow
 def test_dashed_lines_are_no_walls_but_where_all_are():
     rooms = [box(0, 0, 4, 6), box(4, 0, 5, 6)]
     across, rug = [(-1, 3), (10, 3)], box(5, 0.5, 3, 2)
@@ -817,24 +827,28 @@ def test_dashed_lines_are_no_walls_but_where_all_are():
     assert areas(dashed(rooms)) == pytest.approx([24.0, 30.0], rel=0.05)
 
 
+@pytest.mark.slow
 def test_dashed_lines_are_walls_where_no_others_part_rooms():
     within_walls = dashed([[(4, 0), (4, 6)]]).strokes
     drawing = StrokeSet((*strokes([box(0, 0, 9, 6)]).strokes, *within_walls))
     assert areas(drawing) == pytest.approx([24.0, 30.0], rel=0.05)
 
 
+@pytest.mark.slow
 def test_outlines_in_a_single_place_are_rooms():
     tents = [box(x, y, 7, 7) for x in (4, 19) for y in (4, 19)]
     found = sorted(areas(strokes([*tents, box(0, 0, 30, 30)])))
     assert found[:4] == pytest.approx([49.0] * 4, rel=0.1)
 
 
+@pytest.mark.slow
 def test_of_names_beside_the_rooms_nothing_is_said():
     lines = [box(0, 0, 9, 6), [(4, 0), (4, 6)]]
     scene = segmented(named(lines, ("bath", (2, 3), 0.3), ("plan of a house", (2, 8), 0.5)))
     assert (scene.scene.labels, scene.warnings) == (("bath", ""), ())
 
 
+@pytest.mark.slow
 def test_doors_whose_arcs_are_dashed_close_rooms():
     swings = strokes(doors("apart")).strokes
     drawn = [replace(each, dashed=len(each.points) > 2) for each in swings]

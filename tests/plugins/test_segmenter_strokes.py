@@ -140,6 +140,7 @@ def test_what_a_stroke_encloses_is_asked_anew_for_another_gap():
     assert first_object(open_)[1] == ()
 
 
+@pytest.mark.slow
 def test_a_stroke_of_very_many_points_is_not_kept():
     long = circle(1.0, samples=5000)
     first, again = (first_object(long, simplify=0.0)[0] for _ in range(2))

@@ -13,6 +13,7 @@ from tests.experiments.runs import each_of
 from tests.experiments.training import training_drawing
 
 
+@pytest.mark.slow
 def test_what_a_judge_says_is_counted_and_sketches_that_fit_nowhere_are_too():
     cases = [known for number in range(12) for known in known_of(number)]
     found = Tally.of(cases, POSTERIOR, 15)

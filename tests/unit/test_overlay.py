@@ -85,6 +85,7 @@ def saturation(colour):
     return int(colour.max() - colour.min())
 
 
+@pytest.mark.slow
 def test_partners_have_one_colour_at_their_places():
     scene, partners = room(), [2, 0, 3, 1, 4]
     sketch = Scene(tuple(turned(scene, 0.5).objects[m] for m in partners))
@@ -330,6 +331,7 @@ def test_single_scene_numbers_every_object():
             assert (np.abs(image - tint) <= 6).all(axis=2).sum() > 3000
 
 
+@pytest.mark.slow
 def test_a_route_is_a_light_arrow_and_all_of_it_is_seen():
     light = mixed((23, 32, 51), WHITE, 0.45)
     way = np.array([[-4.0, 4.0], [3.5, 3.0], [13.0, 4.0]])

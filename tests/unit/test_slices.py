@@ -114,6 +114,7 @@ def test_closing_starts_nothing_and_lets_what_is_under_way_end(cpus):
     assert len(begun) == after
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_to_pool")
 def test_what_is_forgotten_may_be_collected_in_a_thread_of_its_own_work(monkeypatch):
     monkeypatch.setattr(module, "usable_cpus", lambda: 2)
