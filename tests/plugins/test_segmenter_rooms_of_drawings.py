@@ -459,16 +459,13 @@ def doors(kind):
     return lines
 
 
-SLOW = pytest.mark.slow
-
-
 @pytest.mark.parametrize(
     ("kind", "degrees"),
     [
         ("apart", 31.0),
         ("closed", 0.0),
         *(
-            pytest.param(kind, degrees, marks=SLOW)
+            pytest.param(kind, degrees, marks=pytest.mark.slow)
             for kind in ("apart", "one line", "closed", "thick", "ajar", "coarse")
             for degrees in (0.0, 31.0)
         ),
@@ -483,8 +480,7 @@ def test_doors_drawn_with_their_swings_end_rooms_and_cut_none(kind, degrees):
     assert len(scene.passages) == 4
 
 
-@SLOW
-@SLOW
+@pytest.mark.slow
 def test_a_corridor_that_doors_close_is_a_room_however_narrow_beside_halls():
     lines = [box(0, 0, 20, 32), [(0, 16), (4, 16)], [(4.8, 16), (20, 16)]]
     lines += [[(0, 18), (9, 18)], [(9.8, 18), (20, 18)]]
@@ -645,7 +641,7 @@ def test_named_outlines_apart_in_a_place_without_a_name_are_rooms():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degrees", [pytest.param(0.0, marks=SLOW), 8.0])
+@pytest.mark.parametrize("degrees", [0.0, 8.0])
 def test_ruled_paper_is_no_wall(degrees):
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     across = [[(x, -1.0), (x, 8.0)] for x in np.arange(-1.0, 10.1, 0.5)]
@@ -682,7 +678,7 @@ def test_ruled_lines_in_the_frame_of_a_sheet_go_on_beneath_what_is_drawn():
     assert between_walls(lines[:12], frozenset(range(11))) == frozenset(range(11))
 
 
-@SLOW
+@pytest.mark.slow
 def test_a_drawing_of_ruled_lines_alone_is_of_rooms():
     lines = [[(3 * k, 0), (3 * k, 24)] for k in range(9)]
     lines += [[(0, 3 * k), (24, 3 * k)] for k in range(9)]
@@ -884,7 +880,7 @@ def lettered(lines, letters):
     return named(lines, *((letter, at, 0.3) for letter, at in pairs))
 
 
-@SLOW
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", [[], [box(-2, -2, 17.2, 10.6)]])
 def test_space_between_rooms_that_are_shapes_with_names_is_none(frame):
     found = segmented(lettered([*APART, *frame], "ABCDEF"))
@@ -908,7 +904,7 @@ def test_space_between_rooms_is_told_at_once_beside_scribbles_and_not_among_very
     assert not spaces_between(rooms, [*"ABCDEF", ""], many)
 
 
-@SLOW
+@pytest.mark.slow
 def test_a_room_without_a_name_that_walls_bound_is_no_space_between_shapes():
     walls = [[(14, -1), (20, -1), (20, 3), (14, 3), (14, -0.8)]]
     walls += [[(20, 3), (20, 7), (14, 7), (14, 3)]]
@@ -916,7 +912,7 @@ def test_a_room_without_a_name_that_walls_bound_is_no_space_between_shapes():
     assert sorted(item.label for item in found.scene.objects) == ["", "", *"ABCDEF"]
 
 
-@SLOW
+@pytest.mark.slow
 def test_a_dashed_porch_over_a_dimension_does_not_join_it_to_the_house():
     house = [box(0, 0, 12, 8), [(6, 0), (6, 8)]]
     length = [[(0, -1), (12, -1)], [(0, -1.1), (0, -0.9)], [(12, -1.1), (12, -0.9)]]
@@ -947,7 +943,7 @@ def test_closets_of_a_large_building_are_rooms():
     assert found == pytest.approx([2.1] * 4 + [9.0] * 30, rel=0.12)
 
 
-@SLOW
+@pytest.mark.slow
 def test_small_rooms_along_a_corridor_of_a_large_building_are_rooms():
     walls = [box(0, 0, 54, 29), [(27, 0), (27, 20)]]
     walls += [[(x, 20), (x + 12, 20)] for x in (0, 14, 28, 42)] + [[(26, 20), (28, 20)]]
@@ -974,7 +970,7 @@ def test_rings_that_fill_most_of_an_outline_are_rooms_in_a_wall():
     assert sorted(found) == pytest.approx([12.0] * 9 + [12 * 9.8], rel=0.05)
 
 
-@SLOW
+@pytest.mark.slow
 def test_in_a_drawing_of_very_many_lines_furniture_is_not_looked_for(monkeypatch):
     lines = [*HALL, *doors("apart"), box(7, 6.0, 2, 1)]
     monkeypatch.setattr("sketchmatch_builtin.segmenters.rooms._MOST_LINES", len(lines) - 1)

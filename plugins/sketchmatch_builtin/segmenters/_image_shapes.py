@@ -123,8 +123,8 @@ def trace(ink: Mask, least: float, gap: float, frames: bool) -> Tracing:
     def is_frame(part: Shape) -> bool:
         return frames and len(inside(part)) >= 2
 
-    for part, pieces in _closed_outlines(loose, gap, radius, least, is_frame):
-        if is_frame(part):
+    for part, pieces, framed in _closed_outlines(loose, gap, radius, least, is_frame):
+        if framed:
             found.framed, open_frame = True, part
             continue
         within = inside(part)
@@ -264,11 +264,11 @@ def _is_writing(shape: Shape, others: list[Shape]) -> bool:
 
 def _closed_outlines(
     ink: Mask, gap: float, radius: int, least: float, is_frame: Callable[[Shape], bool]
-) -> Iterator[tuple[Shape, int]]:
+) -> Iterator[tuple[Shape, int, bool]]:
     """Yield the shapes that open outlines enclose once gaps are closed, small gaps first.
 
-    With each comes the number of pieces that it was drawn with. What lies in a shape belongs to it,
-    unless it is a frame.
+    With each comes the number of pieces that it was drawn with, and whether it is a frame. What
+    lies in a shape belongs to it, unless it is a frame.
     """
     if gap == 0.0 or not ink.any():
         return
@@ -302,13 +302,14 @@ def _closed_outlines(
             piece = max(pieces, key=lambda part: int(part.mask.sum()))
             taken = filled[1:-1, 1:-1] > 0
             shape = _enlarged(piece, ink.shape[1] / small.shape[1], ink.shape[0] / small.shape[0])
-            if is_frame(shape):
+            framed = is_frame(shape)
+            if framed:
                 within = grown[y : y + height, x : x + width]
                 numbers = np.asarray(cv2.connectedComponents(within)[1])
                 column, row = contour[0, 0] - (x, y)
                 taken = numbers == numbers[row, column]
             drawn = cv2.connectedComponents(np.where(taken, part, 0).astype(np.uint8))[0] - 1
-            yield shape, drawn
+            yield shape, drawn, framed
             part[taken] = 0
         small = np.ascontiguousarray(wide[margin:-margin, margin:-margin])
         reach += max(1, reach // 3)

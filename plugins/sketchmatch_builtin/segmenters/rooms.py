@@ -20,6 +20,7 @@ from sketchmatch.api import InvalidInputError, Reason, Segmentation, Segmenter
 from sketchmatch.model import (
     FloatArray,
     Image,
+    IntArray,
     Landmark,
     OccupancyGrid,
     PolygonSet,
@@ -432,13 +433,12 @@ def _smallest(plan: Plan, parts: Mask, least: float) -> float:
 
     It is infinite where there is none.
     """
-    rooms = [cells for cells in _areas(parts) if cells >= least]
     # What has no part may be as large: what discs cover of a space lacks its corners.
     spaces = _numbered(plan.free, 0.0)
-    closets = np.bincount(spaces.reshape(-1))
-    closets[np.unique(spaces[parts > 0])] = closets[0] = 0
-    areas = np.sort([*rooms, *closets[closets > 0]])[::-1]
-    means = areas.cumsum() / np.arange(1, len(areas) + 1)
+    closets = _areas(spaces)
+    closets[spaces[parts > 0] - 1] = 0
+    rooms = _areas(_numbered(parts, least))
+    areas, means = _with_means(np.concatenate([rooms, closets[closets > 0]]))
     # Up to where they become much smaller at once, as what is hatched does.
     count = int(np.argmin(np.append(areas >= _SMALL * means, False)))
     return _SMALL * float(means[count - 1]) if count else math.inf
@@ -448,16 +448,20 @@ def _smallest_entered(plan: Plan, parts: Mask, least: float) -> float:
     """Return the same of rooms that open into others, as nothing does that is hatched."""
     rooms = _numbered(parts, least)
     entered = np.unique(parts_that_meet(plan.free | plan.doors, rooms))
-    areas = np.sort(np.bincount(rooms.reshape(-1))[entered[entered > 0]])[::-1]
-    means = areas.cumsum() / np.arange(1, len(areas) + 1)
+    areas, means = _with_means(_areas(rooms)[entered[entered > 0] - 1])
     large = np.flatnonzero(areas >= _SMALL_ENTERED * means)
     return _SMALL_ENTERED * float(means[large[-1]]) if large.size else math.inf
 
 
-def _areas(mask: Mask) -> list[int]:
-    """Return how many cells each component of a mask has."""
-    _, _, statistics, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    return cast(list[int], statistics[1:, cv2.CC_STAT_AREA].tolist())
+def _with_means(areas: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return areas, the largest first, and for each the mean of those up to it."""
+    ordered = np.sort(areas)[::-1]
+    return ordered, ordered.cumsum() / np.arange(1, len(ordered) + 1)
+
+
+def _areas(labels: Labels) -> IntArray:
+    """Return how many cells each room has, by number from 1."""
+    return np.bincount(labels.reshape(-1))[1:]
 
 
 def _numbered(rooms: Mask, least: float) -> Labels:
