@@ -254,6 +254,7 @@ def grow(free: Mask, labels: Labels, most: int | None = None) -> None:
     """Give free cells without a label that of the nearest, in steps from side to side.
 
     Of several that are as near it is the highest. There are at most so many steps.
+    Free cells lie in a frame of cells that are not.
     """
     rest = ((free > 0) & (labels == 0)).view(np.uint8)
     beside = cv2.dilate(rest, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))
